@@ -1,0 +1,1 @@
+"""Every tunable: typed settings, read from YAML with errors that name their place."""

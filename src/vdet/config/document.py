@@ -1,0 +1,161 @@
+"""YAML text → plain values, each with the place where it stands, so that errors can name it."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from vdet.errors import ConfigError
+
+MAX_BYTES = 1_000_000
+
+Key = tuple[str | int, ...]
+"""Path to a value from the root: `("search", "windows", 0, "size")`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """Values read from one source, and the place of each key as text, `file:line:column`."""
+
+    values: dict[str, Any]
+    places: dict[Key, str] = field(default_factory=dict)
+
+
+class _Loader(yaml.SafeLoader):
+    """Safe YAML in which `1e-3` is a number and aliases are refused.
+
+    YAML 1.1 asks for a dot and a sign in `1.0e-3`; nobody expects that. An alias can stand for a
+    billion values (a "bomb"), and settings need none.
+    """
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not accepted", mark)
+        return super().compose_node(parent, index)
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"),
+    list("-+0123456789."),
+)
+
+
+def read_document(path: Path) -> Document:
+    """Read a YAML file of settings.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, is not YAML, or gives a key twice (all such places are named).
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
+    if len(data) > MAX_BYTES:
+        raise ConfigError(f"{path}: is larger than {MAX_BYTES} bytes; that is no settings file")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: is not UTF-8 text; that is no settings file") from error
+    return parse_document(text, str(path))
+
+
+def parse_document(text: str, name: str) -> Document:
+    """Read YAML text; `name` stands for it in messages. Raises `ConfigError`."""
+    walk = _Walk(name)
+    values = walk.value(_compose(text, name), ())
+    if values is None:
+        values = {}
+    elif not isinstance(values, dict):
+        walk.errors.append(f"{name}:1:1: expected settings (key: value), got {values!r:.40}")
+    if walk.errors:
+        raise ConfigError("\n".join(walk.errors))
+    return Document(values, walk.places)
+
+
+def parse_assignment(text: str) -> Document:
+    """Read `key.key=value` as `--set` takes it; list items are named by number, from 0.
+
+    Raises
+    ------
+    ConfigError
+        There is no `=`, a part of the key is missing, or the value is not YAML.
+    """
+    key, equals, value = text.partition("=")
+    parts = key.strip().split(".")
+    if not equals or not all(parts):
+        raise ConfigError(f"--set {text}: expected KEY=VALUE, as in tracker.history=12")
+    name = "--set"
+    walk = _Walk(name)
+    path: Key = tuple(int(part) if part.isdecimal() else part for part in parts)
+    nested = walk.value(_compose(value, name), path)
+    if walk.errors:
+        raise ConfigError("\n".join(walk.errors))
+    for part in reversed(path):
+        nested = {part: nested}
+    places = dict.fromkeys(walk.places, name) | {path: name}
+    return Document(nested, places)
+
+
+def _compose(text: str, name: str) -> yaml.Node | None:
+    try:
+        return yaml.compose(text, _Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
+        raise ConfigError(f"{place}: is not YAML: {error.problem or error.context}") from error
+    except yaml.YAMLError as error:  # a character that YAML forbids
+        raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
+    except RecursionError as error:
+        raise ConfigError(f"{name}: is nested too deeply") from error
+
+
+class _Walk:
+    """Turns nodes into values, noting places, and duplicate keys as errors."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.places: dict[Key, str] = {}
+        self.errors: list[str] = []
+
+    def value(self, node: yaml.Node | None, key: Key) -> Any:
+        if node is None:
+            return None
+        self.places.setdefault(key, self._place(node))
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, key)
+        if isinstance(node, yaml.SequenceNode):
+            return [self.value(item, (*key, i)) for i, item in enumerate(node.value)]
+        return self._scalar(node)
+
+    def _mapping(self, node: yaml.MappingNode, key: Key) -> dict[str, Any]:
+        values: dict[str, Any] = {}
+        for name_node, value_node in node.value:
+            name = str(name_node.value)
+            place = self._place(name_node)
+            if not isinstance(name_node, yaml.ScalarNode):
+                self.errors.append(f"{place}: expected a key, got a {name_node.id}")
+                continue
+            if name in values:
+                self.errors.append(f"{place}: {name}: is given twice; keep one")
+            self.places[(*key, name)] = place
+            values[name] = self.value(value_node, (*key, name))
+        return values
+
+    def _scalar(self, node: yaml.Node) -> Any:
+        constructor = yaml.constructor.SafeConstructor()
+        try:
+            return constructor.construct_object(node)
+        except (yaml.YAMLError, ValueError) as error:
+            problem = getattr(error, "problem", None) or error
+            self.errors.append(f"{self._place(node)}: cannot be understood: {problem}")
+            return None
+
+    def _place(self, node: yaml.Node) -> str:
+        return f"{self.name}:{node.start_mark.line + 1}:{node.start_mark.column + 1}"

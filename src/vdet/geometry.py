@@ -1,0 +1,74 @@
+"""Rectangles in an image: x to the right, y down, whole pixels, the far sides exclusive."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A rectangle of `width` × `height` pixels whose top-left pixel is `(x, y)`.
+
+    It covers the columns `x … x + width - 1` and the rows `y … y + height - 1`.
+    """
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    @property
+    def right(self) -> int:
+        """First column beyond the box."""
+        return self.x + self.width
+
+    @property
+    def bottom(self) -> int:
+        """First row beyond the box."""
+        return self.y + self.height
+
+    @property
+    def area(self) -> int:
+        """Pixels covered; 0 for a box without width or height."""
+        return max(0, self.width) * max(0, self.height)
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """The middle, `(x, y)` in pixels."""
+        return self.x + self.width / 2, self.y + self.height / 2
+
+    def contains(self, point: tuple[float, float]) -> bool:
+        """Tell whether `point`, `(x, y)` in pixels, lies in the box."""
+        x, y = point
+        return self.x <= x < self.right and self.y <= y < self.bottom
+
+    def moved_to(self, x: int, y: int) -> "Box":
+        """Return a box of the same size with its top-left pixel at `(x, y)`."""
+        return Box(x, y, self.width, self.height)
+
+    def union(self, other: "Box") -> "Box":
+        """Return the smallest box that covers both."""
+        x, y = min(self.x, other.x), min(self.y, other.y)
+        return Box(x, y, max(self.right, other.right) - x, max(self.bottom, other.bottom) - y)
+
+    def intersection(self, other: "Box") -> "Box":
+        """Return the part in common; its area is 0 where there is none."""
+        x, y = max(self.x, other.x), max(self.y, other.y)
+        width = min(self.right, other.right) - x
+        height = min(self.bottom, other.bottom) - y
+        return Box(x, y, max(0, width), max(0, height))
+
+    def clipped(self, width: int, height: int) -> "Box":
+        """Return the part that lies in an image of `width` × `height` pixels."""
+        return self.intersection(Box(0, 0, width, height))
+
+    def iou(self, other: "Box") -> float:
+        """Return intersection over union, 0 to 1; 0 where neither has an area."""
+        common = self.intersection(other).area
+        total = self.area + other.area - common
+        return common / total if total else 0.0
+
+    def gap(self, other: "Box") -> float:
+        """Return the distance in pixels between the two outlines; 0 where they touch or overlap."""
+        dx = max(self.x - other.right, other.x - self.right, 0)
+        dy = max(self.y - other.bottom, other.y - self.bottom, 0)
+        return math.hypot(dx, dy)

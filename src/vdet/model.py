@@ -1,0 +1,175 @@
+"""The linear model: weights, probability, and the file they are kept in.
+
+A model is one or several linear SVMs, each with a sigmoid that turns its score into a probability
+(Platt 1999); the model's probability is their mean. The scaling of features is folded into the
+weights, so that a score is one dot product with the raw features.
+"""
+
+import json
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ValidationError
+
+from vdet.config.schema import FeatureSettings
+from vdet.errors import ModelError
+from vdet.features import FeatureExtractor
+from vdet.files import replacing
+
+FORMAT_VERSION = 1
+MAX_MEMBERS = 20
+_MAX_BYTES = 64_000_000
+_ARRAYS = ("weights", "biases", "slopes", "offsets")
+
+Floats = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class LinearModel:
+    """`k` calibrated linear SVMs over `n` raw features.
+
+    `weights` is float32 of shape `(k, n)`; `biases`, `slopes` and `offsets` are float32 of shape
+    `(k,)`. The score of member i is `weights[i] · x + biases[i]`; its probability is
+    `1 / (1 + exp(slopes[i] · score + offsets[i]))`. `provenance` says where the model is from, as
+    plain JSON values (data set, metrics, versions).
+    """
+
+    features: FeatureSettings
+    weights: Floats
+    biases: Floats
+    slopes: Floats
+    offsets: Floats
+    provenance: dict[str, Any] = field(default_factory=dict)
+
+    def scores(self, vectors: Floats) -> Floats:
+        """Return the SVMs' scores of `vectors`, `(m, n)` → `(m, k)`."""
+        return vectors @ self.weights.T + self.biases
+
+    def probabilities_of_scores(self, scores: Floats) -> Floats:
+        """Return the mean probability over the members, `(m, k)` → `(m,)`."""
+        exponent = np.clip(scores * self.slopes + self.offsets, -80, 80)
+        return np.asarray((1 / (1 + np.exp(exponent))).mean(axis=1), np.float32)
+
+    def probabilities(self, vectors: Floats) -> Floats:
+        """Return the probability that each vector is a vehicle, `(m, n)` → `(m,)`."""
+        return self.probabilities_of_scores(self.scores(vectors))
+
+
+def save_model(model: LinearModel, path: Path) -> None:
+    """Write a model as `.npz` without pickle: arrays and a JSON header. Raises `OutputError`."""
+    header = {
+        "format": "vdet model",
+        "version": FORMAT_VERSION,
+        "features": model.features.model_dump(mode="json"),
+        "provenance": model.provenance,
+    }
+    arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
+    text = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, header=text, **arrays)
+
+
+def load_model(path: Path, features: FeatureSettings | None = None) -> LinearModel:
+    """Read a model; with `features`, check that it was trained with these.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is damaged, of another version, of other features than it says or
+        than asked for, or holds a value that is not finite. Nothing in it is ever run.
+    """
+    header, arrays = _read(path)
+    model = LinearModel(_features(header, path), **arrays, provenance=header.get("provenance", {}))
+    _check_arrays(model, path)
+    if features is not None and features != model.features:
+        raise ModelError(
+            f"{path}: was trained with other features ({_difference(model.features, features)}); "
+            "take these settings out, or train with them"
+        )
+    return model
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
+    try:
+        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+            if sum(info.file_size for info in archive.infolist()) > _MAX_BYTES:
+                raise ModelError(f"{path}: is far too large for a model")
+            header = _parse_header(_read_array(archive, "header"), path)
+            return header, {name: _read_array(archive, name) for name in _ARRAYS}
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, NotImplementedError) as error:
+        if isinstance(error, ModelError):
+            raise
+        raise ModelError(
+            f"{path}: is not a vdet model, or is damaged; make one with vdet train"
+        ) from error
+
+
+def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
+    info = archive.getinfo(f"{name}.npy")
+    with archive.open(info) as file:
+        _check_declared_size(file, info.file_size)
+    with archive.open(info) as file:
+        array: npt.NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    return array
+
+
+def _check_declared_size(file: IO[bytes], size: int) -> None:
+    """Refuse a shape that the file does not hold, before memory is set aside for it."""
+    version = np.lib.format.read_magic(file)
+    if version != (1, 0):
+        raise ValueError("not the array format that vdet writes")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+    count = 1
+    for length in shape:
+        count *= length
+    if count * dtype.itemsize != size - file.tell():
+        raise ValueError("shape and size disagree")
+
+
+def _parse_header(array: npt.NDArray[Any], path: Path) -> dict[str, Any]:
+    header = json.loads(array.astype(np.uint8).tobytes())
+    if not isinstance(header, dict) or header.get("format") != "vdet model":
+        raise ModelError(f"{path}: is not a vdet model; make one with vdet train")
+    if header.get("version") != FORMAT_VERSION:
+        raise ModelError(
+            f"{path}: is a model of version {header.get('version')!r:.20}, this program reads "
+            f"version {FORMAT_VERSION}; train it again"
+        )
+    return header
+
+
+def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
+    try:
+        return FeatureSettings.model_validate(header.get("features"))
+    except ValidationError as error:
+        raise ModelError(f"{path}: its feature settings are not understood; train again") from error
+
+
+def _check_arrays(model: LinearModel, path: Path) -> None:
+    members = len(model.biases) if model.biases.ndim == 1 else 0
+    expected = (members, FeatureExtractor(model.features).length)
+    if not 1 <= members <= MAX_MEMBERS or model.weights.shape != expected:
+        raise ModelError(
+            f"{path}: has weights of shape {model.weights.shape}, its features need {expected}; "
+            "train it again"
+        )
+    for name in _ARRAYS:
+        array = getattr(model, name)
+        if array.dtype != np.float32 or (name != "weights" and array.shape != (members,)):
+            raise ModelError(f"{path}: {name} are damaged; train it again")
+        if not np.isfinite(array).all():
+            raise ModelError(f"{path}: {name} hold a value that is not a number; train it again")
+
+
+def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:
+    return ", ".join(
+        f"features.{name}: {getattr(ours, name)}, asked for {getattr(asked, name)}"
+        for name in type(ours).model_fields
+        if getattr(ours, name) != getattr(asked, name)
+    )

@@ -1,0 +1,1 @@
+"""A frame's windows and the probability that each shows a vehicle."""

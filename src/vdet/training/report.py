@@ -1,0 +1,96 @@
+"""What `vdet train` says of a model: plain numbers, printed and kept as JSON."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True, slots=True)
+class Confusion:
+    """Test patches by truth and prediction."""
+
+    true_positives: int
+    false_positives: int
+    false_negatives: int
+    true_negatives: int
+
+    @staticmethod
+    def of(truth: npt.NDArray[np.bool_], predicted: npt.NDArray[np.bool_]) -> "Confusion":
+        """Count from bool arrays of shape `(n,)`."""
+        return Confusion(
+            int(np.count_nonzero(truth & predicted)),
+            int(np.count_nonzero(~truth & predicted)),
+            int(np.count_nonzero(truth & ~predicted)),
+            int(np.count_nonzero(~truth & ~predicted)),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAccuracy:
+    """Share of a group's test patches that are classified rightly."""
+
+    group: str
+    patches: int
+    accuracy: float
+
+
+@dataclass(frozen=True, slots=True)
+class SplitReport:
+    """A model fitted on one part of the patches and tested on the other."""
+
+    split: str
+    train_patches: int
+    test_patches: int
+    train_accuracy: float
+    test_accuracy: float
+    confusion: Confusion
+    groups: tuple[GroupAccuracy, ...]
+    fit_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingReport:
+    """Everything that is said of a training run; the saved model is the first split's."""
+
+    vehicles: int
+    non_vehicles: int
+    broken: int
+    features: int
+    extract_seconds: float
+    milliseconds_per_prediction: float
+    splits: tuple[SplitReport, ...]
+
+    def lines(self) -> Iterator[str]:
+        """Give the report as lines of text."""
+        broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
+        yield (
+            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}; "
+            f"{self.features} features each, described in {self.extract_seconds:.1f} s"
+        )
+        for split in self.splits:
+            yield from _split_lines(split)
+        yield f"one prediction: {self.milliseconds_per_prediction:.2f} ms, features included"
+
+
+_SPLITS = {
+    "random": "random split (near-duplicates on both sides)",
+    "tail": "tail split (leak-free: the last patches of each folder)",
+}
+
+
+def _split_lines(report: SplitReport) -> Iterator[str]:
+    confusion = report.confusion
+    yield ""
+    yield _SPLITS[report.split]
+    yield (
+        f"  train accuracy {report.train_accuracy:.4f} ({report.train_patches} patches), "
+        f"test accuracy {report.test_accuracy:.4f} ({report.test_patches} patches), "
+        f"fitted in {report.fit_seconds:.1f} s"
+    )
+    yield "                        said vehicle   said non-vehicle"
+    yield (f"  is vehicle      {confusion.true_positives:18d} {confusion.false_negatives:18d}")
+    yield (f"  is non-vehicle  {confusion.false_positives:18d} {confusion.true_negatives:18d}")
+    for group in report.groups:
+        yield f"  {group.group:<28}{group.patches:6d} patches  accuracy {group.accuracy:.4f}"

@@ -1,0 +1,97 @@
+"""One training run, from labelled vectors to a model with its report."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+
+import numpy as np
+import numpy.typing as npt
+
+import vdet
+from vdet.config.schema import Settings
+from vdet.dataset import PatchFile, read_patches
+from vdet.features import FeatureExtractor, to_patch
+from vdet.model import LinearModel
+from vdet.training.extraction import LabelledVectors
+from vdet.training.fitting import fit
+from vdet.training.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
+from vdet.training.splits import SplitName, hold_out
+
+_TIMED_PATCHES = 200
+
+
+def train(
+    data: LabelledVectors, files: Sequence[PatchFile], settings: Settings, extract_seconds: float
+) -> tuple[LinearModel, TrainingReport]:
+    """Fit on the configured split, and on the other one for comparison.
+
+    Returns
+    -------
+    The model fitted on the training part of `training.split`, with its provenance; the report on
+    both splits, this one first.
+    """
+    names: list[SplitName] = ["random", "tail"]
+    names.sort(key=lambda name: name != settings.training.split)
+    fitted = [_fit_split(data, settings, name) for name in names]
+    model = fitted[0][0]
+    report = TrainingReport(
+        vehicles=int(np.count_nonzero(data.vehicle)),
+        non_vehicles=int(np.count_nonzero(~data.vehicle)),
+        broken=data.broken,
+        features=data.vectors.shape[1],
+        extract_seconds=round(extract_seconds, 3),
+        milliseconds_per_prediction=_milliseconds_per_prediction(model, files),
+        splits=tuple(split for _, split in fitted),
+    )
+    provenance = {
+        "program": f"vdet {vdet.__version__}",
+        "data_sha256": data.digest,
+        "training": settings.training.model_dump(mode="json"),
+        "report": asdict(report),
+    }
+    return replace(model, provenance=provenance), report
+
+
+def _fit_split(
+    data: LabelledVectors, settings: Settings, name: SplitName
+) -> tuple[LinearModel, SplitReport]:
+    training = settings.training
+    held = hold_out(data.groups, name, training.test_fraction, training.seed)
+    began = time.perf_counter()
+    model = fit(data.vectors[~held], data.vehicle[~held], settings.features, training)
+    seconds = time.perf_counter() - began
+    predicted = model.probabilities(data.vectors) >= 0.5
+    right = predicted == data.vehicle
+    return model, SplitReport(
+        split=name,
+        train_patches=int(np.count_nonzero(~held)),
+        test_patches=int(np.count_nonzero(held)),
+        train_accuracy=float(right[~held].mean()),
+        test_accuracy=float(right[held].mean()),
+        confusion=Confusion.of(data.vehicle[held], predicted[held]),
+        groups=_by_group(data.groups[held], right[held]),
+        fit_seconds=round(seconds, 3),
+    )
+
+
+def _by_group(
+    groups: npt.NDArray[np.str_], right: npt.NDArray[np.bool_]
+) -> tuple[GroupAccuracy, ...]:
+    return tuple(
+        GroupAccuracy(str(name), int((groups == name).sum()), float(right[groups == name].mean()))
+        for name in np.unique(groups)
+    )
+
+
+def _milliseconds_per_prediction(model: LinearModel, files: Sequence[PatchFile]) -> float:
+    """Describe and score some patches one by one; return the median time."""
+    extractor = FeatureExtractor(model.features)
+    some = files[:: max(1, len(files) // _TIMED_PATCHES)]
+    times = []
+    for patch in read_patches(some):
+        if patch.image is not None:
+            image = to_patch(patch.image, model.features.patch)
+            began = time.perf_counter()
+            model.probabilities(extractor.describe(image)[np.newaxis])
+            times.append(time.perf_counter() - began)
+    return round(1000 * float(np.median(times)), 4)
