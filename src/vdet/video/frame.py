@@ -1,0 +1,59 @@
+"""What passes between the video reader, the pipeline and the writer."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One frame of a video.
+
+    `index` counts the frames of the file from 0, whichever of them are delivered. `time` is the
+    exact presentation time in seconds as the file has it (its first frame need not be at 0).
+    `image` is upright, BGR uint8, shape (height, width, 3).
+    """
+
+    index: int
+    time: Fraction
+    image: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class ColorTags:
+    """How a video says that its colours are coded, in codes of ITU-T H.273."""
+
+    primaries: int = UNSPECIFIED
+    transfer: int = UNSPECIFIED
+    matrix: int = UNSPECIFIED
+
+
+@dataclass(frozen=True, slots=True)
+class VideoInfo:
+    """What is known of a video before its frames are read.
+
+    `width` and `height` are of the upright picture in pixels. `rate` is the average in frames per
+    second (25 where the file gives none), `time_base` the unit of the file's times in seconds,
+    `start` the time of the first frame. `frames` and `duration` (seconds) are what the file
+    declares or lets one estimate: never exact, None where unknown. `rotation` is how many degrees
+    counter-clockwise the coded picture was turned to stand upright: 0, 90, 180 or 270.
+    `pixel_aspect` is the width of an upright pixel over its height.
+    """
+
+    path: Path
+    width: int
+    height: int
+    rate: Fraction
+    time_base: Fraction
+    start: Fraction = Fraction(0)
+    frames: int | None = None
+    duration: Fraction | None = None
+    rotation: int = 0
+    pixel_aspect: Fraction = Fraction(1)
+    color: ColorTags = ColorTags()
+    has_sound: bool = False

@@ -1,0 +1,51 @@
+"""Decoded pictures to upright BGR images, and BGR images to pictures for the encoder."""
+
+import av
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+_TURNS = {
+    90: cv2.ROTATE_90_COUNTERCLOCKWISE,
+    180: cv2.ROTATE_180,
+    270: cv2.ROTATE_90_CLOCKWISE,
+}
+
+
+def quarter_turns(picture: av.VideoFrame) -> int:
+    """Return how far the display matrix turns `picture`: 0, 90, 180 or 270° counter-clockwise."""
+    return round(picture.rotation / 90) * 90 % 360
+
+
+def to_bgr(picture: av.VideoFrame, rotation: int) -> NDArray[np.uint8]:
+    """Return `picture` turned by `rotation` degrees counter-clockwise, BGR uint8, (H, W, 3).
+
+    Colour matrix and range are the picture's own; BT.601 and limited where it names none.
+    """
+    image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), dtype=np.uint8)
+    if rotation:
+        return cv2.rotate(image, _TURNS[rotation]).astype(np.uint8, copy=False)
+    if picture.format.name == "bgr24":
+        return image.copy()  # else it would be the decoder's own memory
+    return np.ascontiguousarray(image)
+
+
+def fitted(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """Return `image` scaled to `width` × `height` pixels, itself where it has that size."""
+    if image.shape[:2] == (height, width):
+        return image
+    scaled = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return scaled.astype(np.uint8, copy=False)
+
+
+def to_i420(image: NDArray[np.uint8]) -> av.VideoFrame:
+    """Return a BGR image (H, W, 3) as a yuv420p picture, BT.601, limited range.
+
+    4:2:0 needs even sides: an odd one gets its last row or column twice.
+    """
+    height, width = image.shape[:2]
+    if height % 2 or width % 2:
+        edge = cv2.BORDER_REPLICATE
+        image = cv2.copyMakeBorder(image, 0, height % 2, 0, width % 2, edge).astype(np.uint8)
+    planes = cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420).astype(np.uint8, copy=False)
+    return av.VideoFrame.from_ndarray(planes, format="yuv420p")

@@ -1,0 +1,86 @@
+"""What a video file says of itself."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+from av.container import InputContainer
+from av.stream import Disposition
+from av.video.stream import VideoStream
+
+from vdet.errors import VideoError
+from vdet.video.frame import ColorTags, VideoInfo
+from vdet.video.pixels import quarter_turns
+
+_USUAL_RATE = Fraction(25)
+_LARGEST_TERM = 1_000_000  # of a rate; the encoder's own are 32-bit integers
+
+
+def picture_stream(container: InputContainer, path: Path) -> VideoStream:
+    """Return the first stream of moving pictures: a cover or a thumbnail is none.
+
+    Raises
+    ------
+    VideoError
+        There is none, or no decoder for it.
+    """
+    stills = Disposition.attached_pic | Disposition.timed_thumbnails
+    for stream in container.streams.video:
+        if not stream.disposition & stills:
+            if stream.codec_context is None:
+                raise VideoError(f"{path}: its codec is not known here; convert it to H.264 first")
+            return stream
+    raise VideoError(f"{path}: has no moving pictures; give a video file")
+
+
+def describe(
+    path: Path, container: InputContainer, stream: VideoStream, first: av.VideoFrame
+) -> VideoInfo:
+    """Gather what is known once the `first` picture of `stream` has been decoded."""
+    time_base = stream.time_base or Fraction(1, 90_000)
+    rate = _rate(stream)
+    start = (first.pts or 0) * time_base
+    duration = stated_duration(stream, start) or _longest(container)
+    rotation = quarter_turns(first)
+    width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
+    if rotation in (90, 270):
+        width, height, aspect = height, width, 1 / aspect
+    return VideoInfo(
+        path=path,
+        width=width,
+        height=height,
+        rate=rate,
+        time_base=time_base,
+        start=start,
+        frames=stream.frames or (round(duration * rate) if duration else None),
+        duration=duration,
+        rotation=rotation,
+        pixel_aspect=aspect,
+        color=ColorTags(first.color_primaries, first.color_trc, first.colorspace),
+        has_sound=bool(container.streams.audio),
+    )
+
+
+def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
+    """Return the seconds of picture that the file declares; None where it declares none.
+
+    Matroska declares, in a tag, when the stream ends; `start` is the time of its first frame.
+    """
+    if stream.duration and stream.time_base:
+        return stream.duration * stream.time_base
+    try:
+        hours, minutes, seconds = stream.metadata["DURATION"].split(":")
+        end = Fraction(hours) * 3600 + Fraction(minutes) * 60 + Fraction(seconds)
+    except (KeyError, ValueError, ZeroDivisionError):
+        return None
+    return end - start if end > start else None
+
+
+def _longest(container: InputContainer) -> Fraction | None:
+    """Return the seconds of the longest stream: the picture's own may be shorter."""
+    return Fraction(container.duration, av.time_base) if container.duration else None
+
+
+def _rate(stream: VideoStream) -> Fraction:
+    rate = stream.average_rate or stream.guessed_rate or _USUAL_RATE
+    return rate.limit_denominator(_LARGEST_TERM) or _USUAL_RATE
