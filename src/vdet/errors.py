@@ -34,3 +34,7 @@ class VideoError(VdetError, OSError):
 
 class OutputError(VdetError, OSError):
     """An output cannot be written, or is already there."""
+
+
+class TruthError(VdetError, ValueError):
+    """A file of labelled boxes, truth or tracks, cannot be used."""
