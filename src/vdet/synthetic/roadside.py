@@ -1,0 +1,141 @@
+"""What stands along a road: barriers, trees, and objects that look a little like vehicles."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vdet.images import Image
+from vdet.synthetic.camera import NEAR, Camera, Points, along
+from vdet.synthetic.painting import fill, shaded
+from vdet.synthetic.scene import PERIOD, Color, RoadsideObject, Scene, Wall
+
+_FAR = 140.0  # metres; nothing is drawn beyond
+_NEAREST = 3.0
+_SPRITE = 96  # side of a picture of foliage, pixels
+_SPRITES = 6
+
+
+class Roadside:
+    """The roadside of a scene, ready to be drawn at any frame."""
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        rng = np.random.default_rng([scene.seed, 2])
+        self._foliage = [_foliage(rng) for _ in range(_SPRITES)]
+
+    def draw(self, image: Image, station: float) -> None:
+        """Draw walls and objects, far ones first, as seen from a station of the camera."""
+        camera = self._scene.camera
+        placed = [((item.station - station) % PERIOD, item) for item in self._scene.roadside]
+        near_last = sorted(placed, key=lambda pair: -pair[0])
+        for ahead, item in near_last:
+            if _NEAREST < ahead < _FAR:
+                self._draw_object(image, camera, item, ahead)
+        for wall in self._scene.road.walls:
+            _draw_wall(image, camera, wall, station)
+
+    def _draw_object(
+        self, image: Image, camera: Camera, item: RoadsideObject, ahead: float
+    ) -> None:
+        if item.kind in ("tree", "bush"):
+            number = int(item.station * 10) % _SPRITES
+            _draw_foliage(image, camera, item, ahead, self._foliage[number])
+        elif item.kind == "sign":
+            _draw_sign(image, camera, item, ahead)
+        else:
+            _draw_box(image, camera, item, ahead)
+
+
+def _draw_wall(image: Image, camera: Camera, wall: Wall, station: float) -> None:
+    z = along(NEAR, 4 * _FAR)
+    dark, bright = shaded(wall.color, 0.7), shaded(wall.color, 1.35)
+    fill(image, camera.outline(_strip(wall, z, wall.bottom, wall.top)), wall.color)
+    fill(image, camera.outline(_strip(wall, z, wall.top - 0.08, wall.top)), bright)
+    for start in np.arange(wall.spacing - station % wall.spacing, 60.0, wall.spacing):
+        joint = np.array([start, start + 0.12])
+        fill(image, camera.outline(_strip(wall, joint, 0.0, wall.top - 0.1)), dark)
+
+
+def _strip(wall: Wall, z: npt.NDArray[np.float64], bottom: float, top: float) -> Points:
+    """Return the outline of a strip of a wall between two heights, along the distances `z`."""
+    y = np.repeat([bottom, top], len(z))
+    return np.stack([np.full_like(y, wall.lateral), y, np.concatenate([z, z[::-1]])], axis=1)
+
+
+def _panel(item: RoadsideObject, ahead: float, part: tuple[float, float, float, float]) -> Points:
+    """Return a rectangle facing the camera; `part` is left, right, bottom, top in shares of it."""
+    left, right, bottom, top = part
+    x0, x1 = (item.lateral + (share - 0.5) * item.width for share in (left, right))
+    y0, y1 = bottom * item.height, top * item.height
+    return np.array([[x0, y0, ahead], [x0, y1, ahead], [x1, y1, ahead], [x1, y0, ahead]])
+
+
+def _draw_sign(image: Image, camera: Camera, item: RoadsideObject, ahead: float) -> None:
+    """Draw two posts and a board with lines of writing."""
+
+    def paint(part: tuple[float, float, float, float], color: Color) -> None:
+        fill(image, camera.outline(_panel(item, ahead, part)), color)
+
+    for left in (0.15, 0.8):
+        paint((left, left + 0.05, 0.0, 0.6), (90, 92, 94))
+    paint((0.0, 1.0, 0.5, 1.0), (215, 218, 218))
+    paint((0.03, 0.97, 0.53, 0.97), item.color)
+    for bottom, right in ((0.82, 0.85), (0.68, 0.7), (0.58, 0.78)):
+        paint((0.12, right, bottom, bottom + 0.06), (215, 218, 218))
+
+
+def _draw_box(image: Image, camera: Camera, item: RoadsideObject, ahead: float) -> None:
+    """Draw a bin or hut: a box with its side in sight, a dark slot, and a lid."""
+    inner = item.lateral + (-0.5 if item.lateral > 0 else 0.5) * item.width
+    depth = ahead + item.width
+    side = [
+        [inner, 0, ahead],
+        [inner, item.height, ahead],
+        [inner, item.height, depth],
+        [inner, 0, depth],
+    ]
+    fill(image, camera.outline(np.array(side, dtype=float)), shaded(item.color, 0.75))
+    for part, factor in (
+        ((0.0, 1.0, 0.0, 1.0), 1.0),
+        ((0.0, 1.0, 0.9, 1.0), 1.3),
+        ((0.15, 0.85, 0.55, 0.75), 0.35),
+    ):
+        fill(image, camera.outline(_panel(item, ahead, part)), shaded(item.color, factor))
+
+
+def _foliage(rng: np.random.Generator) -> tuple[Image, Image]:
+    """Return a picture of foliage in grey, `(96, 96)`, and its mask."""
+    coarse = cv2.resize(rng.standard_normal((8, 8)), (_SPRITE, _SPRITE))
+    fine = cv2.resize(rng.standard_normal((32, 32)), (_SPRITE, _SPRITE))
+    y, x = np.mgrid[-1 : 1 : _SPRITE * 1j, -1 : 1 : _SPRITE * 1j]
+    inside = 0.75 - (np.abs(x) ** 2.5 + np.abs(y) ** 2.5) + 0.18 * coarse + 0.16 * fine
+    lit = 96 + 30 * coarse + 24 * fine - 40 * y
+    grey = np.clip(lit, 10, 255).astype(np.uint8)
+    return grey, np.where(inside > 0, 255, 0).astype(np.uint8)
+
+
+def _draw_foliage(
+    image: Image,
+    camera: Camera,
+    item: RoadsideObject,
+    ahead: float,
+    sprite: tuple[Image, Image],
+) -> None:
+    """Draw a tree or a bush; only the part in the frame is computed."""
+    corners = camera.project(_panel(item, ahead, (0.0, 1.0, 0.0, 1.0)))
+    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
+    left, top = max(0, int(x0)), max(0, int(y0))
+    right, bottom = min(image.shape[1], int(x1) + 1), min(image.shape[0], int(y1) + 1)
+    if right <= left or bottom <= top or x1 - x0 < 2:
+        return
+    scale_x, scale_y = _SPRITE / (x1 - x0), _SPRITE / (y1 - y0)
+    shrink = np.array([[scale_x, 0, (left - x0) * scale_x], [0, scale_y, (top - y0) * scale_y]])
+    size = (right - left, bottom - top)
+    grey, mask = (
+        cv2.warpAffine(part, shrink, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        for part in sprite
+    )
+    colored = cv2.merge([cv2.convertScaleAbs(grey, alpha=value / 128) for value in item.color])
+    cv2.copyTo(
+        colored, cv2.threshold(mask, 127, 255, cv2.THRESH_BINARY)[1], image[top:bottom, left:right]
+    )

@@ -1,0 +1,162 @@
+"""What a road scene consists of: plain values, in metres and seconds, that say everything.
+
+The same scene always gives the same pictures and the same truth. Lateral positions are metres to
+the right of the camera; `station` is metres along the road from where the clip begins. What stands
+beside the road, and its surface, repeat every `PERIOD` metres, so a clip may be of any length.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from vdet.synthetic.camera import Camera
+
+Color = tuple[int, int, int]
+"""Blue, green, red, 0 to 255."""
+
+PERIOD = 200.0
+"""Metres after which roadside and surface repeat."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A lane line along the road, solid or dashed; `strength` below 1 is a worn one."""
+
+    lateral: float
+    color: Color = (225, 230, 230)
+    width: float = 0.15
+    dash: float | None = None
+    """Length of a dash; None for a solid line."""
+    gap: float = 9.0
+    strength: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A concrete barrier (`bottom` 0) or a guard rail (`bottom` above 0) along the road."""
+
+    lateral: float
+    bottom: float
+    top: float
+    color: Color
+    spacing: float
+    """Metres between joints or posts."""
+
+
+@dataclass(frozen=True, slots=True)
+class Road:
+    """The carriageway from `left` to `right`, its lines, and the walls along it."""
+
+    left: float
+    right: float
+    lines: tuple[Line, ...]
+    walls: tuple[Wall, ...] = ()
+    asphalt: Color = (88, 84, 82)
+    verge: Color = (92, 132, 150)
+
+
+@dataclass(frozen=True, slots=True)
+class Shadow:
+    """A shadow across the road; `dappled` as under trees, else whole as under a bridge."""
+
+    station: float
+    length: float
+    strength: float
+    dappled: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """Exposure (1 is normal), the deviation of sensor noise in grey levels, and shadows."""
+
+    gain: float = 1.0
+    noise: float = 2.0
+    sun: float = 0.0
+    """Metres by which a vehicle's shadow is cast sideways, to the right if positive."""
+    shadows: tuple[Shadow, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RoadsideObject:
+    """Something beside the road that is no vehicle, though it may look like one."""
+
+    kind: Literal["tree", "bush", "sign", "bin", "hut"]
+    station: float
+    lateral: float
+    width: float
+    height: float
+    color: Color
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """The shape of a car, in metres; see `car` for the parts."""
+
+    width: float = 1.8
+    length: float = 4.6
+    height: float = 1.45
+    belt: float = 0.92
+    """Height of the lower edge of the windows."""
+    boot: float = 0.7
+    """From the rear to the lower edge of the rear window."""
+    slope: float = 0.6
+    """Along which the rear window rises to the roof."""
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """Where a vehicle is at a time: its rear `ahead` of the camera, its middle at `lateral`."""
+
+    time: float
+    ahead: float
+    lateral: float
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """A car seen from behind; it is there from its first to its last waypoint, straight between."""
+
+    id: int
+    path: tuple[Waypoint, ...]
+    color: Color
+    body: Body = Body()
+
+    def position(self, time: float) -> tuple[float, float] | None:
+        """Return `(ahead, lateral)` at `time`, or None while the vehicle is not there."""
+        times = [point.time for point in self.path]
+        if not times[0] <= time <= times[-1]:
+            return None
+        ahead = np.interp(time, times, [point.ahead for point in self.path])
+        lateral = np.interp(time, times, [point.lateral for point in self.path])
+        return float(ahead), float(lateral)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """A clip of `frames` frames at `rate` a second, from a camera moving at `speed` m/s."""
+
+    camera: Camera
+    road: Road
+    light: Light = Light()
+    roadside: tuple[RoadsideObject, ...] = ()
+    vehicles: tuple[Vehicle, ...] = ()
+    speed: float = 25.0
+    rate: Fraction = Fraction(25)
+    frames: int = 1
+    seed: int = 0
+    """Of textures and noise."""
+
+    def time(self, index: int) -> float:
+        """Return the time of a frame, seconds."""
+        return float(index / self.rate)
+
+    def station(self, index: int) -> float:
+        """Return how far the camera has come along the road at a frame, metres."""
+        return self.speed * self.time(index)
+
+    def nearest_first(self, time: float) -> list[tuple[float, Vehicle]]:
+        """Return the vehicles that are there at a time with how far ahead, the nearest first."""
+        placed = [(place[0], v) for v in self.vehicles if (place := v.position(time))]
+        return sorted(placed, key=lambda pair: pair[0])

@@ -1,0 +1,73 @@
+"""Scenes → where every vehicle is, from the very outlines that are drawn."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vdet.geometry import Box
+from vdet.images import Image
+from vdet.synthetic.camera import Camera, Points
+from vdet.synthetic.painting import fill_mask
+from vdet.synthetic.scene import Scene
+from vdet.synthetic.vehicle import outlines
+
+_RASTER = 256  # pixels along the longer side of the picture in which a whole outline is measured
+
+
+@dataclass(frozen=True, slots=True)
+class TrueBox:
+    """Where a vehicle is in a frame, without its shadow on the ground.
+
+    `box` bounds the vehicle inside the frame, also where nearer vehicles hide it.
+    `visibility` is the share of its outline that is inside the frame and not hidden; `hidden` is
+    the share of what is inside the frame that nearer vehicles hide. Both are 0 to 1.
+    """
+
+    id: int
+    box: Box
+    visibility: float
+    hidden: float
+
+
+def truth(scene: Scene, index: int) -> tuple[TrueBox, ...]:
+    """Return the vehicles of which a part lies inside frame `index`, by id."""
+    camera, time = scene.camera, scene.time(index)
+    covered = np.zeros((camera.height, camera.width), np.uint8)
+    found = []
+    for _, vehicle in scene.nearest_first(time):
+        parts = [outline for outline, _color in outlines(vehicle, camera, time)]
+        mask = _mask(parts, camera)
+        if mask.any():
+            found.append(_true_box(vehicle.id, mask, covered, _area(parts)))
+        covered |= mask
+    return tuple(sorted(found, key=lambda box: box.id))
+
+
+def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox:
+    inside = cv2.countNonZero(mask)
+    free = cv2.countNonZero(mask & ~covered)
+    box = Box(*cv2.boundingRect(mask))
+    return TrueBox(number, box, visibility=min(1.0, free / whole), hidden=1 - free / inside)
+
+
+def _mask(parts: list[Points], camera: Camera) -> Image:
+    mask = np.zeros((camera.height, camera.width), np.uint8)
+    for part in parts:
+        fill_mask(mask, part)
+    return mask
+
+
+def _area(parts: list[Points]) -> float:
+    """Return the pixels that the union of outlines covers, wherever it lies.
+
+    A vehicle beside the camera reaches thousands of pixels beyond the frame: it is measured in a
+    small picture of its own.
+    """
+    points = np.concatenate(parts)
+    low = points.min(axis=0)
+    scale = (_RASTER - 1) / max(1.0, float((points.max(axis=0) - low).max()))
+    mask = np.zeros((_RASTER, _RASTER), np.uint8)
+    for part in parts:
+        fill_mask(mask, (part - low) * scale)
+    return cv2.countNonZero(mask) / scale**2

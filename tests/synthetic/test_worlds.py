@@ -1,0 +1,82 @@
+import pytest
+
+from vdet.geometry import Box
+from vdet.synthetic.clip import counts
+from vdet.synthetic.scene import Scene
+from vdet.synthetic.truth import TrueBox, truth
+from vdet.synthetic.worlds import default_clip
+
+
+def history(scene: Scene, number: int) -> list[tuple[int, TrueBox]]:
+    """A vehicle's frames and boxes, of every fifth frame."""
+    return [
+        (index, box)
+        for index in range(0, scene.frames, 5)
+        for box in truth(scene, index)
+        if box.id == number
+    ]
+
+
+@pytest.fixture(params=[0, 1, 2])
+def scene(request: pytest.FixtureRequest) -> Scene:
+    return default_clip(request.param)
+
+
+def test_ids_count_from_1_and_are_never_used_twice(scene: Scene) -> None:
+    assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4]
+
+
+def test_one_vehicle_leaves_at_the_right_edge(scene: Scene) -> None:
+    seen = history(scene, 3)
+    assert seen[0][0] == 0
+    assert seen[0][1].visibility > 0.99
+    assert seen[-1][0] < scene.frames - 50
+    assert seen[-1][1].box.right == scene.camera.width
+
+
+def test_one_vehicle_enters_at_the_right_edge_and_stays(scene: Scene) -> None:
+    seen = history(scene, 4)
+    assert seen[0][0] > 25
+    assert seen[0][1].box.right == scene.camera.width
+    assert seen[0][1].visibility < 0.5
+    assert seen[-1][0] == scene.frames - 5
+
+
+def test_one_vehicle_is_hidden_by_another_that_passes_and_comes_back(scene: Scene) -> None:
+    late = [box.hidden for index, box in history(scene, 2) if index > 110]
+    assert late[0] < 0.1
+    assert max(late) > 0.9
+    assert late[-1] < 0.1
+
+
+def test_vehicles_in_full_view_have_the_sizes_that_window_sets_are_made_for(scene: Scene) -> None:
+    unit = scene.camera.height / 720
+    for index in range(0, scene.frames, 5):
+        for vehicle in truth(scene, index):
+            box = vehicle.box
+            if vehicle.visibility > 0.99:
+                assert 55 * unit < box.width < 420 * unit
+                assert 330 * unit < box.y
+                assert box.bottom < 640 * unit
+
+
+def test_the_same_seed_gives_the_same_scene() -> None:
+    assert default_clip(5) == default_clip(5)
+    assert default_clip(5) != default_clip(6)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "hidden", "expected"),
+    [(40, 24, 0.5, True), (39, 24, 0.0, False), (40, 23, 0.0, False), (90, 60, 0.51, False)],
+)
+def test_a_vehicle_counts_when_large_and_half_of_it_not_hidden(
+    width: int, height: int, hidden: float, expected: bool
+) -> None:
+    vehicle = TrueBox(1, Box(0, 0, width, height), visibility=1 - hidden, hidden=hidden)
+    assert counts(vehicle, 720) is expected
+
+
+def test_the_smallest_size_that_counts_grows_with_the_frame() -> None:
+    vehicle = TrueBox(1, Box(0, 0, 20, 12), visibility=1.0, hidden=0.0)
+    assert counts(vehicle, 360)
+    assert not counts(vehicle, 540)
