@@ -80,7 +80,7 @@ def _zip_names(source: Path) -> list[str]:
     try:
         with zipfile.ZipFile(source) as archive:
             return [info.filename for info in archive.infolist() if not info.is_dir()]
-    except (OSError, zipfile.BadZipFile) as error:
+    except (OSError, zipfile.BadZipFile, NotImplementedError, ValueError) as error:
         raise DataError(f"{source}: is neither a folder nor a readable zip file") from error
 
 
@@ -124,5 +124,5 @@ def _read_bytes(file: PatchFile, archives: dict[Path, zipfile.ZipFile]) -> bytes
             archives[file.source] = zipfile.ZipFile(file.source)
         info = archives[file.source].getinfo(file.name)
         return archives[file.source].read(info) if info.file_size <= MAX_PATCH_BYTES else b""
-    except (OSError, RuntimeError, zipfile.BadZipFile, zlib.error, NotImplementedError):
-        return b""  # RuntimeError: encrypted
+    except Exception:  # zipfile raises a dozen kinds on damaged, encrypted and foreign members
+        return b""

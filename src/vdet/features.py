@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings
+from vdet.images import Image
 
-Image = npt.NDArray[np.uint8]
 Vectors = npt.NDArray[np.float32]
 
 _CONVERSIONS = {

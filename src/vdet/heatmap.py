@@ -68,7 +68,8 @@ class HeatMap:
         for (x, y, width, height), probability in zip(
             detections.boxes.tolist(), detections.probabilities.tolist(), strict=True
         ):
-            heat[max(0, y) : y + height, max(0, x) : x + width] += probability
+            rows = slice(max(0, y), max(0, y + height))
+            heat[rows, max(0, x) : max(0, x + width)] += probability
         return heat
 
 

@@ -5,6 +5,7 @@ A model is one or several linear SVMs, each with a sigmoid that turns its score 
 weights, so that a score is one dot product with the raw features.
 """
 
+import io
 import json
 import zipfile
 from dataclasses import dataclass, field
@@ -100,22 +101,20 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
                 raise ModelError(f"{path}: is far too large for a model")
             header = _parse_header(_read_array(archive, "header"), path)
             return header, {name: _read_array(archive, name) for name in _ARRAYS}
+    except ModelError:
+        raise
     except OSError as error:
         raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError, NotImplementedError) as error:
-        if isinstance(error, ModelError):
-            raise
+    except Exception as error:  # zipfile, zlib, NumPy and json raise a dozen kinds on damaged data
         raise ModelError(
             f"{path}: is not a vdet model, or is damaged; make one with vdet train"
         ) from error
 
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
-    info = archive.getinfo(f"{name}.npy")
-    with archive.open(info) as file:
-        _check_declared_size(file, info.file_size)
-    with archive.open(info) as file:
-        array: npt.NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    data = archive.read(f"{name}.npy")  # whole: only then is the checksum compared
+    _check_declared_size(io.BytesIO(data), len(data))
+    array: npt.NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     return array
 
 
@@ -133,7 +132,9 @@ def _check_declared_size(file: IO[bytes], size: int) -> None:
 
 
 def _parse_header(array: npt.NDArray[Any], path: Path) -> dict[str, Any]:
-    header = json.loads(array.astype(np.uint8).tobytes())
+    if array.dtype != np.uint8:
+        raise ValueError("the header is not text")
+    header = json.loads(array.tobytes())
     if not isinstance(header, dict) or header.get("format") != "vdet model":
         raise ModelError(f"{path}: is not a vdet model; make one with vdet train")
     if header.get("version") != FORMAT_VERSION:
@@ -141,6 +142,8 @@ def _parse_header(array: npt.NDArray[Any], path: Path) -> dict[str, Any]:
             f"{path}: is a model of version {header.get('version')!r:.20}, this program reads "
             f"version {FORMAT_VERSION}; train it again"
         )
+    if not isinstance(header.get("provenance", {}), dict):
+        raise ModelError(f"{path}: its provenance is not understood; train it again")
     return header
 
 

@@ -39,7 +39,8 @@ def positions(settings: WindowSettings, frame_width: int) -> Boxes:
     """Lay a set's windows over its band of rows, row by row from the top left.
 
     Each product is truncated to an integer: step = int(size·(1 - overlap)),
-    buffer = int(size·overlap), count = int((span - buffer) / step), across and down.
+    buffer = int(size·overlap), count = int((span - buffer) / step), across and down; one less
+    where, by that truncation, the last window would stick out by a pixel.
 
     Parameters
     ----------
@@ -64,4 +65,6 @@ def positions(settings: WindowSettings, frame_width: int) -> Boxes:
 
 
 def _count(span: int, size: int, step: int, buffer: int) -> int:
-    return max(0, (span - buffer) // step) if span >= size else 0
+    if not 0 < size <= span:
+        return 0
+    return min((span - buffer) // step, (span - size) // step + 1)

@@ -1,6 +1,7 @@
 """YAML text → plain values, each with the place where it stands, so that errors can name it."""
 
 import re
+import reprlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import yaml
 from vdet.errors import ConfigError
 
 MAX_BYTES = 1_000_000
+MAX_INTEGER_BITS = 64
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
@@ -24,22 +26,27 @@ class Document:
 
 
 class _Loader(yaml.SafeLoader):
-    """Safe YAML in which `1e-3` is a number and aliases are refused.
+    """Safe YAML in which `1e-3` is a number, and aliases and tags are refused.
 
     YAML 1.1 asks for a dot and a sign in `1.0e-3`; nobody expects that. An alias can stand for a
-    billion values (a "bomb"), and settings need none.
+    billion values (a "bomb"), a tag can ask for any kind of value; settings need neither.
     """
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
         if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(None, None, "aliases (*name) are not accepted", mark)
-        return super().compose_node(parent, index)
+            refused = "aliases (*name)"
+        elif getattr(event, "tag", None):
+            refused = "tags (!name)"
+        else:
+            return super().compose_node(parent, index)
+        problem = f"{refused} are not accepted"
+        raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
 
 
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$"),
+    re.compile(r"^[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)[eE][-+]?[0-9]+$"),
     list("-+0123456789."),
 )
 
@@ -73,7 +80,8 @@ def parse_document(text: str, name: str) -> Document:
     if values is None:
         values = {}
     elif not isinstance(values, dict):
-        walk.errors.append(f"{name}:1:1: expected settings (key: value), got {values!r:.40}")
+        got = reprlib.repr(values)
+        walk.errors.append(f"{name}:1:1: expected settings (key: value), got {got}")
     if walk.errors:
         raise ConfigError("\n".join(walk.errors))
     return Document(values, walk.places)
@@ -93,7 +101,7 @@ def parse_assignment(text: str) -> Document:
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in tracker.history=12")
     name = "--set"
     walk = _Walk(name)
-    path: Key = tuple(int(part) if part.isdecimal() else part for part in parts)
+    path: Key = tuple(int(part) if _is_number(part) else part for part in parts)
     nested = walk.value(_compose(value, name), path)
     if walk.errors:
         raise ConfigError("\n".join(walk.errors))
@@ -101,6 +109,10 @@ def parse_assignment(text: str) -> Document:
         nested = {part: nested}
     places = dict.fromkeys(walk.places, name) | {path: name}
     return Document(nested, places)
+
+
+def _is_number(part: str) -> bool:
+    return part.isascii() and part.isdecimal() and len(part) < 10
 
 
 def _compose(text: str, name: str) -> yaml.Node | None:
@@ -137,11 +149,11 @@ class _Walk:
     def _mapping(self, node: yaml.MappingNode, key: Key) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for name_node, value_node in node.value:
-            name = str(name_node.value)
             place = self._place(name_node)
             if not isinstance(name_node, yaml.ScalarNode):
                 self.errors.append(f"{place}: expected a key, got a {name_node.id}")
                 continue
+            name = name_node.value
             if name in values:
                 self.errors.append(f"{place}: {name}: is given twice; keep one")
             self.places[(*key, name)] = place
@@ -151,11 +163,14 @@ class _Walk:
     def _scalar(self, node: yaml.Node) -> Any:
         constructor = yaml.constructor.SafeConstructor()
         try:
-            return constructor.construct_object(node)
-        except (yaml.YAMLError, ValueError) as error:
+            value = constructor.construct_object(node)
+            if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
+                raise OverflowError("the number is too large")
+        except (yaml.YAMLError, ValueError, OverflowError) as error:
             problem = getattr(error, "problem", None) or error
             self.errors.append(f"{self._place(node)}: cannot be understood: {problem}")
             return None
+        return value
 
     def _place(self, node: yaml.Node) -> str:
         return f"{self.name}:{node.start_mark.line + 1}:{node.start_mark.column + 1}"

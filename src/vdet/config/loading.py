@@ -1,6 +1,7 @@
 """Layers of settings → one `Settings`: built-in, then a YAML file, then assignments."""
 
 import difflib
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,7 +47,7 @@ def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> 
     try:
         settings = Settings.model_validate(values)
     except ValidationError as error:
-        errors += [_describe(detail, places) for detail in error.errors()]
+        errors += [_describe(detail, places) for detail in error.errors() if _is_true(detail)]
     if errors:
         raise ConfigError("\n".join(errors))
     given = any("features" in layer.values for layer in layers)
@@ -74,6 +75,11 @@ def _overlay(below: Any, above: Any) -> Any:
     return above
 
 
+def _is_true(detail: ErrorDetails) -> bool:
+    """Tell a list that is too short from one that pydantic left the faulty items out of."""
+    return not (detail["type"] == "too_short" and detail["input"])
+
+
 def _describe(detail: ErrorDetails, places: dict[Key, str]) -> str:
     key = tuple(detail["loc"])
     place = _place(key, places)
@@ -96,16 +102,24 @@ def format_key(key: Key) -> str:
     return text
 
 
+_EXPECTED = {
+    "model_type": "should be a section, key: value",
+    "tuple_type": "should be a list, or in --set the number of an item that it has, from 0",
+}
+
+
 def _expected(detail: ErrorDetails) -> str:
     match detail["type"]:
-        case "extra_forbidden":
+        case "extra_forbidden" | "invalid_key":
             return f"is no setting{_suggestion(tuple(detail['loc']))}"
         case "missing":
             return "is missing"
         case "value_error":
             return str(detail["ctx"]["error"])
-    message = detail["msg"].removeprefix("Input ").replace("a valid tuple", "a list")
-    return f"{message} (got {detail['input']!r:.40})"
+        case "too_short":
+            return "should have at least one item"
+    message = _EXPECTED.get(detail["type"]) or detail["msg"].removeprefix("Input ")
+    return f"{message} (got {reprlib.repr(detail['input'])})"
 
 
 def _suggestion(key: Key) -> str:

@@ -5,7 +5,8 @@ Slow and plain; faster engines are held to what it gives. Source: seed section 2
 
 import numpy as np
 
-from vdet.features import FeatureExtractor, Image, to_patch
+from vdet.features import FeatureExtractor, to_patch
+from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.windows import Boxes, Windows
 

@@ -161,5 +161,4 @@ def _cut(image: Image, window: Box, rng: np.random.Generator) -> Image:
         patch = cv2.GaussianBlur(patch, (0, 0), float(rng.uniform(0.4, 1.2)))
     if rng.random() < 0.5:
         patch = cv2.flip(patch, 1)
-    noise = rng.standard_normal(patch.shape, dtype=np.float32) * rng.uniform(0, 3)
-    return np.asarray(np.clip(patch * rng.uniform(0.75, 1.25) + noise, 0, 255), np.uint8)
+    return np.asarray(np.clip(patch * rng.uniform(0.75, 1.25), 0, 255), np.uint8)

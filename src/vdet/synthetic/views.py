@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from vdet.geometry import Box
@@ -34,7 +35,15 @@ def views(rng: np.random.Generator) -> Iterator[View]:
         scene = _busy_road(rng)
         renderer = Renderer(scene)
         for index in range(scene.frames):
-            yield View(renderer.image(index), truth(scene, index), _objects(scene, index))
+            image = _as_recorded(renderer.image(index), rng)
+            yield View(image, truth(scene, index), _objects(scene, index))
+
+
+def _as_recorded(image: Image, rng: np.random.Generator) -> Image:
+    """Return a frame with the losses of compression; a detector never sees one without them."""
+    quality = int(rng.integers(30, 95))
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR_BGR), np.uint8)
 
 
 def _busy_road(rng: np.random.Generator) -> Scene:

@@ -74,8 +74,8 @@ def extract(
     kept = [file for file, ok in zip(files, good, strict=True) if ok]
     return LabelledVectors(
         np.concatenate([part.vectors for part in done]),
-        np.array([file.vehicle for file in kept]),
-        np.array([file.group for file in kept]),
+        np.array([file.vehicle for file in kept], bool),
+        np.array([file.group for file in kept], str),
         _digest(files, [checksum for part in done for checksum in part.checksums]),
         len(files) - len(kept),
     )

@@ -1,10 +1,14 @@
 """What `vdet train` says of a model: plain numbers, printed and kept as JSON."""
 
+import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+
+from vdet.files import replacing
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,13 @@ class TrainingReport:
         )
         for split in self.splits:
             yield from _split_lines(split)
+        yield ""
         yield f"one prediction: {self.milliseconds_per_prediction:.2f} ms, features included"
+
+    def write(self, path: Path) -> None:
+        """Write the report as JSON. Raises `OutputError`."""
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
 
 
 _SPLITS = {

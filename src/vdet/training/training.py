@@ -1,7 +1,7 @@
 """One training run, from labelled vectors to a model with its report."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from vdet.config.schema import Settings
 from vdet.dataset import PatchFile, read_patches
 from vdet.features import FeatureExtractor, to_patch
 from vdet.model import LinearModel
-from vdet.training.extraction import LabelledVectors
+from vdet.training.extraction import LabelledVectors, extract
 from vdet.training.fitting import fit
 from vdet.training.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
 from vdet.training.splits import SplitName, hold_out
@@ -21,15 +21,35 @@ _TIMED_PATCHES = 200
 
 
 def train(
-    data: LabelledVectors, files: Sequence[PatchFile], settings: Settings, extract_seconds: float
+    files: Sequence[PatchFile],
+    settings: Settings,
+    *,
+    jobs: int = -1,
+    progress: Callable[[int], object] = lambda _: None,
 ) -> tuple[LinearModel, TrainingReport]:
-    """Fit on the configured split, and on the other one for comparison.
+    """Describe the patches, fit on the configured split, and on the other one for comparison.
+
+    Parameters
+    ----------
+    jobs
+        Processes, as joblib counts them: -1 for one a core.
+    progress
+        Called with the number of patches described since the last call.
 
     Returns
     -------
     The model fitted on the training part of `training.split`, with its provenance; the report on
     both splits, this one first.
+
+    Raises
+    ------
+    DataError
+        Too many patches are unreadable, or too few are left to learn from.
     """
+    began = time.perf_counter()
+    broken = settings.training.max_broken
+    data = extract(files, settings.features, max_broken=broken, jobs=jobs, progress=progress)
+    extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != settings.training.split)
     fitted = [_fit_split(data, settings, name) for name in names]

@@ -1,0 +1,45 @@
+# `make demo` and `make test` need only Python 3.11+ with venv, and a package index.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+DATA ?= $(or $(VDET_DATA),data)
+
+.PHONY: demo test lint types tests data model clean
+
+demo: $(READY)  ## make a small data set and a road clip, train, detect, compare with the truth
+	$(BIN)/vdet demo demo --overwrite
+
+test: lint types tests  ## everything that CI checks
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(READY)
+	$(BIN)/mypy
+
+tests: $(READY)
+	$(BIN)/pytest -n 2
+
+data:  ## fetch the data set (124 MB) into data/; data/README.md tells what it is
+	cd data && for name in vehicles non-vehicles; do \
+		curl --fail --location --continue-at - --output $$name.zip \
+			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
+	done
+
+model: $(READY)  ## train the shipped model anew from the data set in $(DATA)
+	$(BIN)/vdet train $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip -c configs/seed.yaml \
+		-o src/vdet/models/seed.npz --overwrite
+
+# The versions in constraints.txt are the ones that the tests were last run with.
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "vdet needs Python 3.11 or later; give it as PYTHON=…"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+		--editable '.[dev]' --constraint constraints.txt
+	touch $@
+
+clean:
+	rm -rf $(VENV) demo dist build .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,69 @@
+"""The program: its commands, and the one place where errors become text and exit codes."""
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import NoReturn
+
+import click
+
+import vdet
+from vdet.cli.config import config
+from vdet.cli.demo import demo
+from vdet.cli.detect_image import detect_image
+from vdet.cli.detect_video import detect_video
+from vdet.cli.logs import set_up_logs
+from vdet.cli.train import train
+from vdet.errors import VdetError
+
+INTERRUPTED = 130
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(vdet.__version__, prog_name="vdet")
+@click.option("-v", "--verbose", is_flag=True, help="Say more of what is done.")
+@click.option("-q", "--quiet", is_flag=True, help="No progress bars, no warnings, only errors.")
+@click.pass_context
+def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
+    """Find and follow vehicles in road video on an ordinary CPU."""
+    set_up_logs(verbose=verbose, quiet=quiet)
+    context.obj = quiet
+
+
+for _command in (train, detect_image, detect_video, config, demo):
+    cli.add_command(_command)
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run the program and exit: 0 success, 1 an error, 2 wrong usage, 130 interrupted.
+
+    An error is one line on standard error; with `VDET_DEBUG=1` in the environment a traceback
+    follows.
+    """
+    try:
+        code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (KeyboardInterrupt, click.Abort):
+        sys.exit(_complain("interrupted", INTERRUPTED))
+    except VdetError as error:
+        sys.exit(_complain(str(error), error.exit_code))
+    except BrokenPipeError:  # the reader of our output has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except Exception as error:
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        sys.exit(
+            _complain(f"internal error, please report it ({text}); VDET_DEBUG=1 shows more", 1)
+        )
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _complain(message: str, code: int) -> int:
+    for line in message.splitlines():
+        click.echo(f"vdet: {line}", err=True)
+    if os.environ.get("VDET_DEBUG") == "1":
+        traceback.print_exc()
+    return code

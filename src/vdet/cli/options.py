@@ -1,0 +1,89 @@
+"""Options that several commands share, so that one flag means one thing everywhere."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from vdet.config.loading import LoadedSettings, load_settings
+from vdet.model import LinearModel, load_model
+from vdet.resources import find_config, shipped_model
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class PathOf(click.Path):
+    """A path, given to the command as `pathlib.Path`; whether it exists is the library's to say."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+
+class Time(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
+    """A time in the video: seconds, MM:SS or HH:MM:SS, each with decimals."""
+
+    name = "time"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, context: click.Context | None
+    ) -> Fraction:
+        """Return the time in exact seconds."""
+        if isinstance(value, Fraction):
+            return value
+        seconds = Fraction(0)
+        try:
+            for part in str(value).split(":"):
+                seconds = seconds * 60 + Fraction(part)
+        except (ValueError, ZeroDivisionError):
+            seconds = Fraction(-1)
+        if seconds < 0:
+            self.fail(
+                f"{value!r} is no time; give seconds or HH:MM:SS, as in 1:23.5", param, context
+            )
+        return seconds
+
+
+def settings_options(command: F) -> F:
+    """Add `-c FILE` and `--set KEY=VALUE`; read them with `read_settings`."""
+    command = click.option(
+        "--set",
+        "assignments",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help="Change one setting, as in tracker.history=12; may be given often.",
+    )(command)
+    return click.option(
+        "-c",
+        "--config",
+        "config_name",
+        metavar="FILE",
+        help="YAML settings over the built-in ones: a file, or a shipped one (seed).",
+    )(command)
+
+
+def read_settings(config_name: str | None, assignments: tuple[str, ...]) -> LoadedSettings:
+    """Read what `settings_options` gave."""
+    return load_settings(find_config(config_name) if config_name else None, assignments)
+
+
+def model_option(command: F) -> F:
+    """Add `--model FILE`; read it with `read_model`."""
+    return click.option(
+        "--model",
+        "model_path",
+        type=PathOf(),
+        metavar="FILE",
+        help="Model from vdet train; without it, the one that ships with vdet.",
+    )(command)
+
+
+def read_model(model_path: Path | None, loaded: LoadedSettings) -> LinearModel:
+    """Read the model, and check it against the features that were asked for."""
+    return load_model(model_path or shipped_model(), loaded.features)
+
+
+overwrite_option = click.option(
+    "--overwrite", is_flag=True, help="Replace outputs that are there already."
+)

@@ -1,0 +1,48 @@
+"""`vdet train`: patches to a model."""
+
+from pathlib import Path
+
+import click
+
+from vdet.cli.options import PathOf, overwrite_option, read_settings, settings_options
+from vdet.cli.progress import progress_bar
+from vdet.dataset import find_patches
+from vdet.files import check_output
+from vdet.model import save_model
+
+
+@click.command()
+@click.argument("data", nargs=-1, required=True, type=PathOf(), metavar="DATA...")
+@click.option("-o", "--output", required=True, type=PathOf(), help="The model to write, .npz.")
+@settings_options
+@click.option("--jobs", default=-1, show_default=True, help="Processes; -1 for one a core.")
+@overwrite_option
+@click.pass_obj
+def train(
+    quiet: bool,
+    *,
+    data: tuple[Path, ...],
+    output: Path,
+    config_name: str | None,
+    assignments: tuple[str, ...],
+    jobs: int,
+    overwrite: bool,
+) -> None:
+    """Train a model on DATA: folders or zip files of labelled patches.
+
+    Patches lie in vehicles/<group>/ and non-vehicles/<group>/. The report is printed, and written
+    beside the model as JSON.
+    """
+    from vdet.training import train as fit_model
+
+    settings = read_settings(config_name, assignments).settings
+    report_path = output.with_suffix(".json")
+    for path in (output, report_path):
+        check_output(path, overwrite=overwrite)
+    files = find_patches(data)
+    with progress_bar(" patches", quiet=quiet) as start:
+        model, report = fit_model(files, settings, jobs=jobs, progress=start(len(files)))
+    save_model(model, output)
+    report.write(report_path)
+    click.echo("\n".join(report.lines()))
+    click.echo(f"\n{output}: the model; {report_path}: the report")

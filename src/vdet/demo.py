@@ -1,0 +1,124 @@
+"""The whole system on a made-up road: patches, training, detection, comparison with the truth."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from vdet.config.schema import Settings
+from vdet.dataset import find_patches
+from vdet.evaluation.predictions import read_predictions
+from vdet.evaluation.scores import Scores, score
+from vdet.evaluation.truth import read_truth
+from vdet.files import check_output
+from vdet.model import save_model
+from vdet.pipeline import VideoJob, process_video
+from vdet.synthetic.clip import write_clip, write_truth
+from vdet.synthetic.patches import write_patches
+from vdet.synthetic.worlds import default_clip
+from vdet.training import TrainingReport, train
+
+PATCHES = 1200
+"""Of each class."""
+
+
+@dataclass(frozen=True, slots=True)
+class DemoFiles:
+    """What the demo leaves in its folder."""
+
+    folder: Path
+
+    @property
+    def patches(self) -> Path:
+        """Folder of the labelled patches."""
+        return self.folder / "patches"
+
+    @property
+    def clip(self) -> Path:
+        """The road, as the camera saw it."""
+        return self.folder / "road.mp4"
+
+    @property
+    def truth(self) -> Path:
+        """Where the vehicles really are, MOTChallenge columns."""
+        return self.folder / "truth.txt"
+
+    @property
+    def model(self) -> Path:
+        """Trained on the patches."""
+        return self.folder / "model.npz"
+
+    @property
+    def report(self) -> Path:
+        """Of the training."""
+        return self.folder / "model.json"
+
+    @property
+    def result(self) -> Path:
+        """The road with the found vehicles drawn in."""
+        return self.folder / "found.mp4"
+
+    @property
+    def tracks(self) -> Path:
+        """The found vehicles, a record a frame."""
+        return self.folder / "found.jsonl"
+
+    @property
+    def stages(self) -> Path:
+        """Folder of pictures of every stage at one moment."""
+        return self.folder / "stages"
+
+
+@dataclass(frozen=True, slots=True)
+class DemoResult:
+    """What the demo found out, and where to look at it."""
+
+    training: TrainingReport
+    scores: Scores
+    frames: int
+    seconds: float
+
+
+def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
+    """Refuse to write over an earlier demo. Raises `OutputError`."""
+    if files.folder.exists():
+        for path in (files.clip, files.truth, files.model, files.report, files.result):
+            check_output(path, overwrite=overwrite)
+
+
+def run_demo(
+    files: DemoFiles,
+    settings: Settings,
+    *,
+    seed: int = 1,
+    say: Callable[[str], object] = lambda _: None,
+    progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
+) -> DemoResult:
+    """Make the data, train on them, detect in the clip, and compare with the truth.
+
+    Parameters
+    ----------
+    seed
+        Of everything that is drawn; the same seed gives the same data.
+    say
+        Told what comes next, a line a step.
+    progress
+        As `process_video` takes it, for the longer steps.
+    """
+    files.folder.mkdir(parents=True, exist_ok=True)
+    say(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
+    write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
+    scene = default_clip(seed)
+    write_clip(files.clip, scene)
+    write_truth(files.truth, scene)
+    say("2/4 training …")
+    patches = find_patches([files.patches])
+    model, report = train(patches, settings, progress=progress(len(patches)))
+    save_model(model, files.model)
+    report.write(files.report)
+    say("3/4 finding the vehicles …")
+    middle = scene.frames / scene.rate / 2
+    job = VideoJob(files.clip, files.result, files.tracks, stages=files.stages, at=middle)
+    summary = process_video(job, model, settings, progress)
+    say("4/4 comparing with the truth …")
+    scores = score(read_predictions(files.tracks), read_truth(files.truth), rate=float(scene.rate))
+    return DemoResult(report, scores, summary.frames, summary.seconds)

@@ -1,0 +1,1 @@
+"""Drawing on frames: boxes, ids, heat, and pictures of every stage."""

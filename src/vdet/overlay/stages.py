@@ -1,0 +1,105 @@
+"""A picture of every stage of the detection, as the original's report shows them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.scaling import scale_lengths
+from vdet.config.schema import FeatureSettings, Settings
+from vdet.detection import Detection
+from vdet.geometry import Box
+from vdet.images import Image, write_image
+from vdet.overlay.drawing import GREEN, WHITE, blend_heat, color_of, draw_box, draw_label
+from vdet.overlay.patches import patch_sheet
+from vdet.search.engine import lay_windows
+from vdet.windows import Boxes, Windows
+
+LabelledBox = tuple[Box, str]
+
+
+def write_stages(
+    folder: Path,
+    image: Image,
+    detection: Detection,
+    boxes: Sequence[LabelledBox],
+    *,
+    settings: Settings,
+    features: FeatureSettings,
+) -> None:
+    """Write `1-patches.png` … `5-boxes.png` into `folder`, which is made where it is missing.
+
+    Parameters
+    ----------
+    image
+        The frame searched, BGR uint8 `(H, W, 3)`.
+    boxes
+        The final boxes with their labels, full-frame pixels.
+    features
+        Those of the model.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    height, width = image.shape[:2]
+    search = scale_lengths(settings.search, height / settings.reference_height)
+    pictures = {
+        "1-patches": patch_sheet(_examples(image, detection.windows), features),
+        "2-windows": _draw_window_sets(image, lay_windows(search, width, height)),
+        "3-hits": _draw_hits(image, detection.hits),
+        "4-heat": _draw_heat(image, detection),
+        "5-boxes": _draw_boxes(image, detection, boxes),
+    }
+    for name, picture in pictures.items():
+        write_image(folder / f"{name}.png", picture)
+
+
+def _examples(image: Image, windows: Windows) -> dict[str, Image]:
+    """Return the likeliest and the unlikeliest window of the frame, with captions."""
+    best, worst = int(windows.probabilities.argmax()), int(windows.probabilities.argmin())
+    examples = {}
+    for name, i in (("car", best), ("not car", worst)):
+        x, y, width, height = windows.boxes[i].tolist()
+        caption = f"{name}? p = {windows.probabilities[i]:.2f}"
+        examples[caption] = image[y : y + height, x : x + width]
+    return examples
+
+
+def _draw_window_sets(image: Image, sets: Sequence[Boxes]) -> Image:
+    """Draw each set's windows as a fine grid with one whole window, and its count."""
+    picture = (image * 0.6).astype(np.uint8)
+    for number, boxes in enumerate(sets):
+        for x, y, width, height in boxes.tolist():
+            picture[y, x : x + width] = color_of(number)
+            picture[y : y + height, x] = color_of(number)
+    for number, boxes in enumerate(sets):
+        if len(boxes):
+            first = Box(*boxes[0].tolist())
+            corner = (first.x + number * image.shape[1] // len(sets), first.y)
+            label = f"{first.width} px: {len(boxes)} windows"
+            draw_box(picture, first.moved_to(*corner), color_of(number), label)
+    return picture
+
+
+def _draw_hits(image: Image, hits: Windows) -> Image:
+    picture = image.copy()
+    for i in np.argsort(hits.probabilities, kind="stable").tolist():
+        box = Box(*hits.boxes[i].tolist())
+        draw_box(picture, box, GREEN)
+        draw_label(picture, f"{hits.probabilities[i]:.2f}", (box.x, box.bottom), GREEN)
+    return picture
+
+
+def _draw_heat(image: Image, detection: Detection) -> Image:
+    picture = blend_heat(image, detection.heat)
+    draw_label(picture, f"peak {detection.heat.max():.1f}", (0, 0), WHITE)
+    return picture
+
+
+def _draw_boxes(image: Image, detection: Detection, boxes: Sequence[LabelledBox]) -> Image:
+    """Draw the regions thin and white with their peak, the final boxes over them."""
+    picture = image.copy()
+    for region in detection.regions:
+        draw_box(picture, region.box, WHITE)
+        draw_label(picture, f"heat {region.peak:.1f}", (region.box.x, region.box.bottom), WHITE)
+    for number, (box, label) in enumerate(boxes, start=1):
+        draw_box(picture, box, color_of(number), label)
+    return picture

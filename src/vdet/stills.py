@@ -1,0 +1,150 @@
+"""Vehicles in pictures: read, detected, drawn, listed."""
+
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vdet.config.schema import Settings
+from vdet.detection import detect_still, still_boxes
+from vdet.errors import ImageError, OutputError
+from vdet.files import check_output, replacing
+from vdet.geometry import Box
+from vdet.images import SUFFIXES, read_image, write_image
+from vdet.model import LinearModel
+from vdet.overlay.drawing import color_of, draw_box
+from vdet.overlay.stages import write_stages
+
+
+@dataclass(frozen=True, slots=True)
+class StillJob:
+    """A picture to be searched, and where its results go (None: nowhere)."""
+
+    source: Path
+    picture: Path | None
+    stages: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class StillResult:
+    """Boxes found in a picture of `width` × `height` pixels, each with its region's peak heat."""
+
+    source: Path
+    width: int
+    height: int
+    boxes: tuple[tuple[Box, float], ...]
+
+
+def find_images(paths: Sequence[Path]) -> list[Path]:
+    """Return the pictures among `paths`, those in folders included (not in folders of these).
+
+    Raises
+    ------
+    ImageError
+        A path does not exist, or a folder holds no picture.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES)
+            if not inside:
+                raise ImageError(f"{path}: holds no pictures ({', '.join(sorted(SUFFIXES))})")
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise ImageError(f"{path}: no such file or folder")
+    return list(dict.fromkeys(found))
+
+
+def plan(
+    sources: Sequence[Path], out: Path | None, stages: Path | None, *, overwrite: bool
+) -> list[StillJob]:
+    """Decide where each picture's results go, and refuse what cannot be, before any work.
+
+    `out` is a file for a single picture where it has a picture's suffix, else a folder, which is
+    made; pictures keep their names in it. Stage pictures of several sources go to one folder each.
+
+    Raises
+    ------
+    OutputError
+        An output is there already (and not `overwrite`), equals a source, or is wanted twice.
+    """
+    single_file = out is not None and len(sources) == 1 and out.suffix.lower() in SUFFIXES
+    jobs = []
+    for source in sources:
+        picture = out if single_file or out is None else out / source.name
+        folder = stages / source.stem if stages and len(sources) > 1 else stages
+        jobs.append(StillJob(source, picture, folder))
+    pictures = [job.picture for job in jobs if job.picture]
+    for job, picture in zip(jobs, pictures, strict=False):
+        if pictures.count(picture) > 1:
+            raise OutputError(f"{picture}: wanted by two inputs of one name; run them separately")
+        if picture.resolve() == job.source.resolve():
+            raise OutputError(f"{picture}: is the input itself; give another output")
+    if out is not None and not single_file:
+        _make_folder(out)
+    for picture in pictures:
+        check_output(picture, overwrite=overwrite)
+    return jobs
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
+
+
+def process_still(job: StillJob, model: LinearModel, settings: Settings) -> StillResult:
+    """Search a picture and write what the job asks for. Raises `ImageError`, `OutputError`."""
+    image = read_image(job.source)
+    height, width = image.shape[:2]
+    try:
+        detection = detect_still(model, settings, image)
+    except ImageError as error:
+        raise ImageError(f"{job.source}: {error}") from error
+    boxes = still_boxes(detection, settings, height)
+    labelled = [(box, f"heat {peak:.1f}") for box, peak in boxes]
+    if job.stages:
+        write_stages(
+            job.stages, image, detection, labelled, settings=settings, features=model.features
+        )
+    if job.picture:
+        for number, (box, label) in enumerate(labelled, start=1):
+            draw_box(image, box, color_of(number), label)
+        write_image(job.picture, image)
+    return StillResult(job.source, width, height, tuple(boxes))
+
+
+def write_json(results: Iterable[StillResult], target: str) -> None:
+    """Write results as a JSON list to the file `target`, or to standard output for `-`.
+
+    Each item has `image`, `width`, `height` and `boxes`, a list of objects with `x`, `y`, `width`,
+    `height` (pixels) and `peak` (heat). Raises `OutputError`.
+    """
+    items = [
+        {
+            "image": str(result.source),
+            "width": result.width,
+            "height": result.height,
+            "boxes": [
+                {
+                    "x": box.x,
+                    "y": box.y,
+                    "width": box.width,
+                    "height": box.height,
+                    "peak": round(peak, 3),
+                }
+                for box, peak in result.boxes
+            ],
+        }
+        for result in results
+    ]
+    text = json.dumps(items, indent=2) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    with replacing(Path(target)) as temporary:
+        temporary.write_text(text, encoding="utf-8")

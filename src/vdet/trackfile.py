@@ -1,0 +1,118 @@
+"""Shown boxes, frame by frame, as text: MOTChallenge, CSV or JSON lines, by the file's suffix.
+
+| suffix   | a line is          | columns                                                          |
+|----------|--------------------|------------------------------------------------------------------|
+| `.txt`   | a box              | `frame, id, left, top, width, height, 1, -1, -1, -1`, no heading |
+| `.csv`   | a box              | `frame,time,id,x,y,width,height,from_match`, with heading        |
+| `.jsonl` | a frame, even if   | `frame`, `time`, `tracks`: a list of objects with `id`, `x`, `y`,|
+|          | nothing is in it   | `width`, `height`, `from_match`                                  |
+
+In `.csv` and `.jsonl` frames count from 0 from the start of the file, `time` is in seconds, and
+`x, y` is the top-left pixel of the box, counted from 0. In `.txt` frames and pixels count from 1,
+as MOTChallenge has it (Milan et al., "MOT16", 2016).
+"""
+
+import csv
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Protocol, TextIO
+
+from vdet.errors import OutputError
+from vdet.files import replacing
+from vdet.tracking.track import Track
+from vdet.video import Frame
+
+
+class TrackWriter(Protocol):
+    """Takes the shown tracks of one frame after the other."""
+
+    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+        """Add the tracks of a frame."""
+
+
+class NoTracks:
+    """Takes tracks and writes nothing."""
+
+    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+        """Do nothing."""
+
+
+class _Mot:
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+        for track in tracks:
+            box = track.box
+            self._file.write(
+                f"{frame.index + 1},{track.id},{box.x + 1},{box.y + 1},{box.width},{box.height},"
+                "1,-1,-1,-1\n"
+            )
+
+
+class _Csv:
+    def __init__(self, file: TextIO) -> None:
+        self._rows = csv.writer(file, lineterminator="\n")
+        self._rows.writerow(["frame", "time", "id", "x", "y", "width", "height", "from_match"])
+
+    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+        for track in tracks:
+            box = track.box
+            place = (box.x, box.y, box.width, box.height)
+            time = f"{float(frame.time):.6f}"
+            self._rows.writerow([frame.index, time, track.id, *place, int(track.from_match)])
+
+
+class _JsonLines:
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+        boxes = [
+            {
+                "id": track.id,
+                "x": track.box.x,
+                "y": track.box.y,
+                "width": track.box.width,
+                "height": track.box.height,
+                "from_match": track.from_match,
+            }
+            for track in tracks
+        ]
+        record = {"frame": frame.index, "time": round(float(frame.time), 6), "tracks": boxes}
+        self._file.write(json.dumps(record) + "\n")
+
+
+_FORMATS: dict[str, Callable[[TextIO], TrackWriter]] = {
+    ".txt": _Mot,
+    ".csv": _Csv,
+    ".jsonl": _JsonLines,
+}
+
+
+def check_suffix(path: Path) -> None:
+    """Raise `OutputError` where the suffix names no format of tracks."""
+    if path.suffix.lower() not in _FORMATS:
+        raise OutputError(f"{path}: tracks are written as {', '.join(_FORMATS)}")
+
+
+@contextmanager
+def track_writer(path: Path | None) -> Iterator[TrackWriter]:
+    """Give a writer for `path` (None: of nothing); the file appears when the block ends well.
+
+    Raises
+    ------
+    OutputError
+        The suffix is unknown, or the file cannot be written.
+    """
+    if path is None:
+        yield NoTracks()
+        return
+    check_suffix(path)
+    with (
+        replacing(path) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        yield _FORMATS[path.suffix.lower()](file)

@@ -1,0 +1,59 @@
+"""`vdet config`."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from conftest import Run
+
+SEED = Path(__file__).parents[2] / "configs" / "seed.yaml"
+
+
+def test_prints_the_built_in_settings_as_commented_yaml(run: Run) -> None:
+    result = run("config")
+    assert result.code == 0
+    assert result.out == SEED.read_text(encoding="utf-8")
+    assert yaml.safe_load(result.out)["tracker"]["history"] == 10
+
+
+def test_a_file_and_then_assignments_change_them(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text("heat: {frames: 3, threshold: 2}\n")
+    printed = yaml.safe_load(run("config", "-c", file, "--set", "heat.threshold=5").out)
+    assert printed["heat"] == {"frames": 3, "blur": 15, "threshold": 5.0}
+
+
+def test_what_is_printed_can_be_given_back(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "printed.yaml"
+    file.write_text(run("config", "--set", "training.C=1e-3").out, encoding="utf-8")
+    assert run("config", "-c", file).out == file.read_text(encoding="utf-8")
+
+
+def test_shipped_configs_are_known_by_name(run: Run) -> None:
+    assert run("config", "-c", "seed").out == run("config", "-c", SEED).out
+
+
+def test_a_config_that_is_not_there(run: Run, tmp_path: Path) -> None:
+    result = run("config", "-c", tmp_path / "none.yaml")
+    assert result.code == 1
+    assert "no such file; shipped configs are: " in result.err
+
+
+def test_all_mistakes_are_named_at_once(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text("heat:\n  frmes: 3\nsearch:\n  windows:\n    - {size: 64, overlap: 1.2}\n")
+    result = run("config", "-c", file, "--set", "tracker.history=ten")
+    assert result.code == 1
+    lines = result.err.splitlines()
+    assert f"vdet: {file}:2:3: heat.frmes: is no setting; did you mean frames?" in lines
+    assert any(f"{file}:5:18: search.windows[0].overlap: " in line for line in lines)
+    assert any("--set: tracker.history: should be a valid integer" in line for line in lines)
+    assert all(line.startswith("vdet: ") for line in lines)
+
+
+@pytest.mark.parametrize("bad", ["history", "=3", "tracker..history=3"])
+def test_an_assignment_needs_a_key_and_a_value(run: Run, bad: str) -> None:
+    result = run("config", "--set", bad)
+    assert result.code == 1
+    assert "expected KEY=VALUE" in result.err

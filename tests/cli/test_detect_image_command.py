@@ -1,0 +1,157 @@
+"""`vdet detect-image`."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from conftest import Run
+from vdet.images import read_image, write_image
+from vdet.synthetic import render, truth
+from vdet.synthetic.scene import Scene
+
+FEW_WINDOWS = ("--set", "search.windows=[{size: 160, overlap: 0.7, top: 380, bottom: 600}]")
+
+
+@pytest.fixture
+def picture(scene: Scene, tmp_path: Path) -> Path:
+    path = tmp_path / "in" / "road.png"
+    path.parent.mkdir()
+    write_image(path, render(scene, 10))
+    return path
+
+
+def test_draws_boxes_into_one_picture(run: Run, picture: Path, model_path: Path) -> None:
+    out = picture.parent.parent / "found.png"
+    result = run("detect-image", picture, "-o", out, "--model", model_path)
+    assert result.code == 0, result.err
+    before, after = read_image(picture), read_image(out)
+    assert after.shape == before.shape
+    assert (after != before).any()
+
+
+def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Scene) -> None:
+    result = run("detect-image", picture, "--json", "-", "--model", model_path)
+    assert result.code == 0, result.err
+    (item,) = json.loads(result.out)
+    assert (item["image"], item["width"], item["height"]) == (str(picture), 320, 180)
+    assert item["boxes"]
+    for box in item["boxes"]:
+        assert set(box) == {"x", "y", "width", "height", "peak"}
+        assert 0 <= box["x"] < box["x"] + box["width"] <= 320
+    near = [true.box for true in truth(scene, 10) if true.box.width > 20]
+    assert any(
+        abs(box["x"] + box["width"] / 2 - true.center[0]) < true.width
+        for box in item["boxes"]
+        for true in near
+    )
+
+
+def test_a_folder_of_pictures(run: Run, picture: Path, model_path: Path, tmp_path: Path) -> None:
+    write_image(picture.with_name("b.jpg"), read_image(picture))
+    (picture.parent / "notes.txt").write_text("no picture")
+    result = run(
+        "detect-image", picture.parent, "-o", tmp_path / "out", "--model", model_path, *FEW_WINDOWS
+    )
+    assert result.code == 0, result.err
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["b.jpg", "road.png"]
+
+
+def test_a_picture_of_every_stage(run: Run, picture: Path, model_path: Path) -> None:
+    stages = picture.parent.parent / "stages"
+    assert run("detect-image", picture, "--stages", stages, "--model", model_path).code == 0
+    names = ["1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png"]
+    assert sorted(p.name for p in stages.iterdir()) == names
+    for name in names[1:]:
+        assert read_image(stages / name).shape == (180, 320, 3)
+
+
+def test_asks_for_an_output(run: Run, picture: Path) -> None:
+    result = run("detect-image", picture)
+    assert result.code == 2
+    assert "nothing would be written" in result.err
+
+
+def test_keeps_what_is_there(run: Run, picture: Path, model_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.png"
+    out.write_bytes(b"precious")
+    result = run("detect-image", picture, "-o", out, "--model", model_path)
+    assert result.code == 1
+    assert "is there already; give --overwrite" in result.err
+    assert out.read_bytes() == b"precious"
+    again = run("detect-image", picture, "-o", out, "--model", model_path, "--overwrite")
+    assert again.code == 0
+    assert read_image(out).shape == (180, 320, 3)
+
+
+def test_never_writes_over_its_input(run: Run, picture: Path) -> None:
+    result = run("detect-image", picture, "-o", picture, "--overwrite")
+    assert result.code == 1
+    assert "is the input itself" in result.err
+
+
+def test_two_inputs_of_one_name(run: Run, picture: Path, tmp_path: Path) -> None:
+    twin = tmp_path / "twin" / picture.name
+    twin.parent.mkdir()
+    twin.write_bytes(picture.read_bytes())
+    result = run("detect-image", picture, twin, "-o", tmp_path / "out")
+    assert result.code == 1
+    assert "wanted by two inputs" in result.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_bad_picture_does_not_stop_the_others(
+    run: Run, picture: Path, model_path: Path, tmp_path: Path
+) -> None:
+    (picture.parent / "a.png").write_text("text")
+    out = tmp_path / "out"
+    result = run("detect-image", picture.parent, "-o", out, "--model", model_path, *FEW_WINDOWS)
+    assert result.code == 1
+    assert "a.png: is not a picture, or is damaged" in result.err
+    assert [p.name for p in out.iterdir()] == ["road.png"]
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("one-colour.png", np.full((180, 320, 3), 90, np.uint8)),
+        ("16-bit.png", np.full((180, 320, 3), 40_000, np.uint16)),
+        ("grey.png", np.full((180, 320), 90, np.uint8)),
+        ("alpha.png", np.full((180, 320, 4), 90, np.uint8)),
+    ],
+)
+def test_unusual_pictures_are_searched(
+    run: Run, model_path: Path, tmp_path: Path, name: str, array: np.ndarray
+) -> None:
+    path = tmp_path / name
+    cv2.imwrite(str(path), array)
+    result = run("detect-image", path, "--json", "-", "--model", model_path, *FEW_WINDOWS)
+    assert result.code == 0, result.err
+    (item,) = json.loads(result.out)
+    assert (item["width"], item["height"]) == (320, 180)
+
+
+def test_a_picture_too_small_for_any_window(run: Run, model_path: Path, tmp_path: Path) -> None:
+    path = tmp_path / "tiny.png"
+    write_image(path, np.zeros((90, 6, 3), np.uint8))
+    result = run("detect-image", path, "--json", "-", "--model", model_path)
+    assert result.code == 1
+    assert "tiny.png: no search window fits into a frame of 6×90 pixels" in result.err
+
+
+@pytest.mark.parametrize("content", [b"", b"text", b"\x89PNG\r\n\x1a\n" + bytes(40)])
+def test_a_file_that_is_no_picture(run: Run, tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "x.png"
+    path.write_bytes(content)
+    result = run("detect-image", path, "-o", tmp_path / "out.png")
+    assert result.code == 1
+    assert "is not a picture, or is damaged" in result.err
+    assert not (tmp_path / "out.png").exists()
+
+
+def test_a_picture_that_is_not_there(run: Run, tmp_path: Path) -> None:
+    result = run("detect-image", tmp_path / "none.png", "-o", tmp_path / "out.png")
+    assert result.code == 1
+    assert "no such file or folder" in result.err

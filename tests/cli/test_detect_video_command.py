@@ -1,0 +1,149 @@
+"""`vdet detect-video`."""
+
+import csv
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from vdet.images import read_image
+from vdet.video import VideoReader
+
+# Fewer windows than the seed's, and cars shown sooner: the tests need not be slow.
+QUICK = (
+    "--set", "search.windows=[{size: 96, overlap: 0.75, top: 380, bottom: 572}]",
+    "--set", "tracker.confident_detections_needed=2",
+)  # fmt: skip
+
+
+def _times(path: Path) -> list[Fraction]:
+    with VideoReader(path) as reader:
+        return [frame.time for frame in reader]
+
+
+def test_writes_a_video_of_the_same_frames(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.mp4"
+    result = run("detect-video", clip_path, out, "--model", model_path, *QUICK)
+    assert result.code == 0, result.err
+    assert _times(out) == _times(clip_path)
+    assert f"{clip_path}: 30 frames" in result.err
+    assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
+
+
+def test_runs_with_the_shipped_model_and_settings(
+    run: Run, clip_path: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out.mp4"
+    assert run("detect-video", clip_path, out, "--frames", "2").code == 0
+    assert len(_times(out)) == 2
+
+
+def test_tracks_agree_in_every_format(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    for suffix in ("jsonl", "csv", "txt"):
+        tracks = tmp_path / f"t.{suffix}"
+        options = ("--no-video", "--tracks", tracks, "--model", model_path, *QUICK)
+        assert run("detect-video", clip_path, *options).code == 0
+    records = [json.loads(line) for line in (tmp_path / "t.jsonl").read_text().splitlines()]
+    assert [record["frame"] for record in records] == list(range(30))
+    assert [record["time"] for record in records] == [round(i / 25, 6) for i in range(30)]
+    boxes = [
+        (record["frame"], *(track[key] for key in ("id", "x", "y", "width", "height")))
+        for record in records
+        for track in record["tracks"]
+    ]
+    assert boxes, "nothing was found: the test would say nothing"
+    with (tmp_path / "t.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    keys = ("frame", "id", "x", "y", "width", "height")
+    assert [tuple(int(row[key]) for key in keys) for row in rows] == boxes
+    lines = [line.split(",") for line in (tmp_path / "t.txt").read_text().splitlines()]
+    shifted = [(f + 1, i, x + 1, y + 1, w, h) for f, i, x, y, w, h in boxes]
+    assert [tuple(map(int, line[:6])) for line in lines] == shifted
+
+
+def test_two_runs_give_the_same_tracks(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    for name in ("a.csv", "b.csv"):
+        options = ("--no-video", "--tracks", tmp_path / name, "--model", model_path, *QUICK)
+        assert run("detect-video", clip_path, *options).code == 0
+    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+
+
+def test_a_part_of_the_video(run: Run, clip_path: Path, model_path: Path, tmp_path: Path) -> None:
+    tracks = tmp_path / "t.jsonl"
+    options = ("--start", "0:00.4", "--end", "0.8", "--tracks", tracks, "--model", model_path)
+    assert run("detect-video", clip_path, tmp_path / "out.mp4", *options, *QUICK).code == 0
+    frames = [json.loads(line)["frame"] for line in tracks.read_text().splitlines()]
+    assert frames == list(range(10, 20))
+    assert _times(tmp_path / "out.mp4") == [Fraction(i, 25) for i in range(10)]
+
+
+def test_a_picture_of_every_stage_of_one_moment(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    options = ("--no-video", "--stages", tmp_path / "stages", "--at", "0.2", "--frames", "8")
+    assert run("detect-video", clip_path, *options, "--model", model_path, *QUICK).code == 0
+    assert len(list((tmp_path / "stages").glob("*.png"))) == 5
+    assert read_image(tmp_path / "stages" / "4-heat.png").shape == (180, 320, 3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "give OUT, or --no-video"),
+        (("out.mp4", "--no-video"), "give OUT, or --no-video"),
+        (("--no-video",), "nothing would be written"),
+        (("out.mp4", "--stages", "x"), "--stages and --at go together"),
+        (("out.mp4", "--start", "5", "--end", "5"), "--end must be later"),
+        (("out.mp4", "--start", "soon"), "is no time"),
+        (("out.mp4", "--frames", "0"), "is not in the range"),
+    ],
+)
+def test_wrong_usage(run: Run, clip_path: Path, arguments: tuple[str, ...], words: str) -> None:
+    result = run("detect-video", clip_path, *arguments)
+    assert result.code == 2
+    assert words in result.err
+
+
+def test_keeps_what_is_there(run: Run, clip_path: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.mp4"
+    out.write_bytes(b"precious")
+    result = run("detect-video", clip_path, out)
+    assert result.code == 1
+    assert "is there already; give --overwrite" in result.err
+    assert out.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("option", ["out", "tracks"])
+def test_never_writes_over_its_input(run: Run, clip_path: Path, option: str) -> None:
+    target = (clip_path,) if option == "out" else ("--no-video", "--tracks", clip_path)
+    result = run("detect-video", clip_path, *target, "--overwrite")
+    assert result.code == 1
+    assert "is the input itself" in result.err
+    assert len(_times(clip_path)) == 30
+
+
+@pytest.mark.parametrize(
+    ("out", "words"),
+    [("out.avi", "videos are written as .mp4, .mov, .mkv"), ("none/out.mp4", "does not exist")],
+)
+def test_an_output_that_cannot_be(
+    run: Run, clip_path: Path, tmp_path: Path, out: str, words: str
+) -> None:
+    result = run("detect-video", clip_path, tmp_path / out)
+    assert result.code == 1
+    assert words in result.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_tracks_of_unknown_kind(run: Run, clip_path: Path, tmp_path: Path) -> None:
+    result = run("detect-video", clip_path, "--no-video", "--tracks", tmp_path / "t.xml")
+    assert result.code == 1
+    assert "tracks are written as .txt, .csv, .jsonl" in result.err

@@ -1,0 +1,75 @@
+"""The program as a whole: help, versions, errors as text, exit codes."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import vdet
+from conftest import Run
+
+
+def test_help_lists_every_command(run: Run) -> None:
+    result = run("--help")
+    assert result.code == 0
+    for command in ("train", "detect-image", "detect-video", "config", "demo"):
+        assert command in result.out
+
+
+def test_version(run: Run) -> None:
+    assert vdet.__version__ in run("--version").out
+
+
+def test_unknown_command_is_wrong_usage(run: Run) -> None:
+    result = run("detekt-video")
+    assert result.code == 2
+    assert "No such command" in result.err
+
+
+def test_an_error_is_one_line_without_traceback(run: Run, tmp_path: Path) -> None:
+    result = run("detect-video", tmp_path / "none.mp4", tmp_path / "out.mp4")
+    assert result.code == 1
+    assert result.err.count("\n") == 1
+    assert result.err.startswith("vdet: ")
+    assert "Traceback" not in result.err
+
+
+def test_debug_shows_the_traceback(tmp_path: Path) -> None:
+    arguments = ["detect-video", str(tmp_path / "none.mp4"), str(tmp_path / "out.mp4")]
+    result = subprocess.run(
+        [sys.executable, "-c", "from vdet.cli import main; main()", *arguments],
+        env=os.environ | {"VDET_DEBUG": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert "Traceback" in result.stderr
+
+
+def test_an_interrupt_ends_with_130(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("vdet.cli.config.render", interrupt)
+    result = run("config")
+    assert result.code == 130
+    assert "interrupted" in result.err
+
+
+def test_a_bug_is_one_line_too(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("two\nlines")
+
+    monkeypatch.setattr("vdet.cli.config.render", fail)
+    result = run("config")
+    assert result.code == 1
+    assert result.err.count("\n") == 1
+    assert "internal error, please report it (RuntimeError: two lines)" in result.err
+
+
+def test_scikit_learn_is_not_loaded_by_detection() -> None:
+    code = "import sys, vdet.cli; sys.exit('sklearn' in sys.modules or 'scipy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,85 @@
+"""What many tests need: the program, a small model, a small road clip, the real data set."""
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+from vdet.cli import main
+from vdet.config.schema import Settings
+from vdet.dataset import find_patches
+from vdet.model import save_model
+from vdet.synthetic import default_clip, write_clip, write_patches
+from vdet.synthetic.scene import Scene
+from vdet.training import train
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run of the program left behind."""
+
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Outcome]
+
+
+@pytest.fixture
+def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Run `vdet` with arguments, in this process."""
+    monkeypatch.delenv("VDET_DEBUG", raising=False)
+
+    def run_it(*arguments: str | Path) -> Outcome:
+        with pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+        captured = capfd.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return Outcome(code, captured.out, captured.err)
+
+    return run_it
+
+
+@pytest.fixture(scope="session")
+def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of generated patches, 300 of each class."""
+    folder = tmp_path_factory.mktemp("patches")
+    write_patches(folder, seed=5, vehicles=300, non_vehicles=300)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A model with the seed's features, trained on generated patches."""
+    path = tmp_path_factory.mktemp("model") / "model.npz"
+    model, _ = train(find_patches([patches_path]), Settings(), jobs=1)
+    save_model(model, path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def scene() -> Scene:
+    """A second and a bit of the demo's road, 320×180 pixels."""
+    return replace(default_clip(1, width=320, height=180), frames=30)
+
+
+@pytest.fixture(scope="session")
+def clip_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """`scene` as a video file."""
+    path = tmp_path_factory.mktemp("clip") / "road.mp4"
+    write_clip(path, scene)
+    return path
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """The folder of the real data set; the test is skipped where it is not found."""
+    places = [os.environ.get("VDET_DATA"), Path(__file__).parents[2] / "shared" / "data"]
+    for place in places:
+        if place and (Path(place) / "vehicles.zip").exists():
+            return Path(place)
+    pytest.skip("the real data set is not here; data/README.md tells where to get it")
