@@ -10,6 +10,7 @@ import numpy.typing as npt
 import vdet
 from vdet.config.schema import Settings
 from vdet.dataset import PatchFile, read_patches
+from vdet.errors import DataError
 from vdet.features import FeatureExtractor, to_patch
 from vdet.model import LinearModel
 from vdet.training.extraction import LabelledVectors, extract
@@ -77,6 +78,8 @@ def _fit_split(
 ) -> tuple[LinearModel, SplitReport]:
     training = settings.training
     held = hold_out(data.groups, name, training.test_fraction, training.seed)
+    if not held.any():
+        raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
     model = fit(data.vectors[~held], data.vehicle[~held], settings.features, training)
     seconds = time.perf_counter() - began

@@ -1,0 +1,225 @@
+from pathlib import Path
+
+import pytest
+
+from vdet.config.document import MAX_BYTES, parse_assignment, parse_document, read_document
+from vdet.errors import ConfigError
+
+
+def refusal(text: str) -> str:
+    with pytest.raises(ConfigError) as error:
+        parse_document(text, "my.yaml")
+    return str(error.value)
+
+
+def test_every_key_has_the_place_where_it_stands() -> None:
+    document = parse_document("a:\n  b: 1\n  c: [x, {d: 2}]\n", "my.yaml")
+    assert document.values == {"a": {"b": 1, "c": ["x", {"d": 2}]}}
+    assert document.places == {
+        (): "my.yaml:1:1",
+        ("a",): "my.yaml:1:1",
+        ("a", "b"): "my.yaml:2:3",
+        ("a", "c"): "my.yaml:3:3",
+        ("a", "c", 0): "my.yaml:3:7",
+        ("a", "c", 1): "my.yaml:3:10",
+        ("a", "c", 1, "d"): "my.yaml:3:11",
+    }
+
+
+@pytest.mark.parametrize("text", ["", "\n", "# nothing\n", "---\n", "null", "{}"])
+def test_an_empty_document_is_no_settings_at_all(text: str) -> None:
+    assert parse_document(text, "my.yaml").values == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1e-3", 0.001), ("1E3", 1000.0), ("-2e+5", -2e5), (".5e1", 5.0), ("1.0e-3", 0.001)],
+)
+def test_a_number_with_an_exponent_is_a_number(text: str, value: float) -> None:
+    assert parse_document(f"a: {text}", "my.yaml").values == {"a": value}
+
+
+@pytest.mark.parametrize("text", ["1e", "e3", "1e3x", '"1e3"', "1e5.0"])
+def test_what_only_resembles_an_exponent_is_text(text: str) -> None:
+    assert parse_document(f"a: {text}", "my.yaml").values == {"a": text.strip('"')}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("yes", True), ("off", False), ("0x10", 16), ("~", None), ("1:30", 90)]
+)
+def test_the_other_scalars_are_those_of_yaml_1_1(text: str, value: object) -> None:
+    assert parse_document(f"a: {text}", "my.yaml").values == {"a": value}
+
+
+def test_all_keys_are_text() -> None:
+    assert parse_document("1: a\ntrue: b\n<<: {c: 1}", "my.yaml").values == {
+        "1": "a",
+        "true": "b",
+        "<<": {"c": 1},
+    }
+
+
+def test_a_key_given_twice_is_refused_where_it_stands_the_second_time() -> None:
+    assert refusal("a: 1\nb: {c: 1, c: 2}\na: 3\n") == (
+        "my.yaml:2:11: c: is given twice; keep one\nmy.yaml:3:1: a: is given twice; keep one"
+    )
+
+
+def test_the_same_key_in_two_sections_is_fine() -> None:
+    assert parse_document("a: {x: 1}\nb: {x: 1}\n", "my.yaml").values["b"] == {"x": 1}
+
+
+@pytest.mark.parametrize("text", ["3", "words", "[1, 2]", "- a\n- b"])
+def test_a_document_that_is_no_mapping_is_refused(text: str) -> None:
+    assert refusal(text).startswith("my.yaml:1:1: expected settings (key: value), got ")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: [1, 2", "my.yaml:1:9: is not YAML: "),
+        ("a: 1\n b: 2", "my.yaml:2:3: is not YAML: mapping values are not allowed here"),
+        ("\ta: 1", "my.yaml:1:1: is not YAML: found character '\\t' that cannot start any token"),
+        ('a: "open', "my.yaml:1:9: is not YAML: "),
+        ("--- 1\n--- 2", "my.yaml:2:1: is not YAML: but found another document"),
+        ("a: \x00", "my.yaml: is not YAML: unacceptable character #x0000: "),
+        ("%YAML 9.9\n---\na: 1", "my.yaml:1:1: is not YAML: found incompatible YAML document"),
+        ("a: @b", "my.yaml:1:4: is not YAML: "),
+    ],
+)
+def test_what_is_not_yaml_is_refused_where_it_goes_wrong(text: str, message: str) -> None:
+    answer = refusal(text)
+    assert answer.startswith(message)
+    assert "\n" not in answer
+
+
+@pytest.mark.parametrize(
+    "text", ["a: &x 1\nb: *x", "a: &x [1]\nb: [*x, *x]", "a: *none", "<<: *base", "&x a: *x"]
+)
+def test_an_alias_is_refused(text: str) -> None:
+    assert "is not YAML: aliases (*name) are not accepted" in refusal(text)
+
+
+def test_a_bomb_of_aliases_is_refused_at_the_first_one() -> None:
+    lines = ["a0: &a0 [x]"] + [f"a{i}: &a{i} [{f'*a{i - 1}, ' * 9}]" for i in range(1, 30)]
+    assert refusal("\n".join(lines)).startswith("my.yaml:2:10: is not YAML: aliases")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "!!python/object/apply:os.getcwd []",
+        "a: !!python/name:os.getcwd ''",
+        "a: !!timestamp words",
+        "a: !!int ''",
+        "a: !!float ''",
+        "a: !!bool words",
+        "a: !!binary '***'",
+        "a: !!set {x}",
+        "a: !mine 1",
+        "!!str a: 1",
+        "a: ! 1",
+    ],
+)
+def test_a_tag_is_refused(text: str) -> None:
+    assert "is not YAML: tags (!name) are not accepted" in refusal(text)
+
+
+@pytest.mark.parametrize("text", ["? [a, b]\n: 1", "? {a: b}\n: 1", "[a]: 1", "{a: 1}: 2"])
+def test_a_key_that_is_a_collection_is_refused(text: str) -> None:
+    assert "expected a key, got a " in refusal(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "2001-99-99",
+        "2001-01-01t00:00:00+99:99",
+        "9" * 5000,
+        "0x" + "f" * 5000,
+        "1:" + "00:" * 300 + "0.0",
+        "0b_",
+        "=",
+        "<<",
+    ],
+    ids=["date", "offset", "digits", "hex", "sexagesimal", "binary", "equals", "merge"],
+)
+def test_a_value_that_cannot_be_understood_is_named(text: str) -> None:
+    assert refusal(f"a: 1\nb: {text}").startswith("my.yaml:2:4: cannot be understood: ")
+
+
+@pytest.mark.parametrize("text", ["[" * 20_000, "a: " + "{b: " * 20_000, "- " * 20_000])
+def test_very_deep_nesting_is_refused(text: str) -> None:
+    assert refusal(text) == "my.yaml: is nested too deeply"
+
+
+def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_bytes(b"\xef\xbb\xbfa: 1\r\n")
+    assert read_document(path).values == {"a": 1}
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"no\.yaml: cannot be read: No such file"):
+        read_document(tmp_path / "no.yaml")
+
+
+def test_a_folder_is_no_settings_file(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="cannot be read: Is a directory"):
+        read_document(tmp_path)
+
+
+@pytest.mark.parametrize("data", [b"a: \xff", "a: ä".encode("latin-1"), "a: 1".encode("utf-16")])
+def test_a_file_that_is_not_utf_8_is_refused(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_bytes(data)
+    with pytest.raises(ConfigError, match=r"my\.yaml: is not UTF-8 text"):
+        read_document(path)
+
+
+def test_a_huge_file_is_refused_unparsed(tmp_path: Path) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_bytes(b"#" * (MAX_BYTES + 1))
+    with pytest.raises(ConfigError, match=r"my\.yaml: is larger than 1000000 bytes"):
+        read_document(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("tracker.history=12", {"tracker": {"history": 12}}),
+        (" heat.blur = 3 # px", {"heat": {"blur": 3}}),
+        ("search.windows.1.overlap=0.5", {"search": {"windows": {1: {"overlap": 0.5}}}}),
+        ("training.C=1e-3", {"training": {"C": 0.001}}),
+        ("a=b=c", {"a": "b=c"}),
+        ("heat={frames: 3, blur: 0}", {"heat": {"frames": 3, "blur": 0}}),
+        ("features.hog.channels=[0, 2]", {"features": {"hog": {"channels": [0, 2]}}}),
+        ("heat=", {"heat": None}),
+    ],
+)
+def test_an_assignment_is_a_document_of_one_key(text: str, values: object) -> None:
+    assert parse_assignment(text).values == values
+
+
+@pytest.mark.parametrize("text", ["", "=", "heat", "heat.frames", "=3", "heat..frames=3", ".a=1"])
+def test_an_assignment_without_a_whole_key_or_value_says_what_is_expected(text: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        parse_assignment(text)
+    assert str(error.value) == (f"--set {text}: expected KEY=VALUE, as in tracker.history=12")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("heat=[", "--set:1:2: is not YAML"),
+        ("heat=*x", "--set:1:1: is not YAML: aliases"),
+        ("heat=!!int 3", "--set:1:1: is not YAML: tags"),
+        ("heat={a: 1, a: 2}", "--set:1:8: a: is given twice"),
+        ("heat=2001-99-99", "--set:1:1: cannot be understood"),
+        ("heat=\ud800", "--set: is not YAML: unacceptable character"),
+    ],
+)
+def test_the_value_of_an_assignment_is_yaml(text: str, message: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        parse_assignment(text)
+    assert str(error.value).startswith(message)

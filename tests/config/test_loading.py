@@ -1,0 +1,243 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from vdet.config.loading import LoadedSettings, format_key, load_settings
+from vdet.config.schema import FeatureSettings, Settings
+from vdet.errors import ConfigError
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "my.yaml"
+
+
+def load(path: Path, text: str, *assignments: str) -> LoadedSettings:
+    path.write_text(text, encoding="utf-8")
+    return load_settings(path, assignments)
+
+
+def refusal(path: Path, text: str, *assignments: str) -> list[str]:
+    """Give the lines of the error, the file's folder left out."""
+    with pytest.raises(ConfigError) as error:
+        load(path, text, *assignments)
+    return str(error.value).replace(f"{path.parent}/", "").split("\n")
+
+
+def test_without_file_and_assignments_the_settings_are_the_defaults() -> None:
+    assert load_settings() == LoadedSettings(Settings(), None)
+
+
+def test_an_empty_file_changes_nothing(path: Path) -> None:
+    assert load(path, "") == LoadedSettings(Settings(), None)
+
+
+def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
+    loaded = load(path, "heat:\n  frames: 5\ntraining: {C: 1e-3}\n").settings
+    expected = Settings.model_validate({"heat": {"frames": 5}, "training": {"C": 0.001}})
+    assert loaded == expected
+    assert loaded.heat.threshold == Settings().heat.threshold
+
+
+def test_assignments_lie_over_the_file_and_later_ones_over_earlier_ones(path: Path) -> None:
+    heat = load(
+        path, "heat: {frames: 5, blur: 7, threshold: 2}", "heat.frames=6", "heat.blur=8",
+        "heat.frames=7",
+    ).settings.heat  # fmt: skip
+    assert (heat.frames, heat.blur, heat.threshold) == (7, 8, 2.0)
+
+
+def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
+    window = "{size: 96, overlap: 0.5, top: 0, bottom: 200}"
+    windows = load(path, f"search: {{windows: [{window}]}}").settings.search.windows
+    assert [w.size for w in windows] == [96]
+
+
+def test_an_assignment_may_name_one_item_of_a_list() -> None:
+    windows = load_settings(None, ["search.windows.1.overlap=0.5"]).settings.search.windows
+    default = Settings().search.windows
+    assert windows == (default[0], default[1].model_copy(update={"overlap": 0.5}))
+
+
+def test_an_assignment_may_name_an_item_of_a_list_in_the_file(path: Path) -> None:
+    text = "search:\n  windows:\n  - {size: 96, overlap: 0.5, top: 0, bottom: 200}\n"
+    (window,) = load(path, text, "search.windows.0.size=100").settings.search.windows
+    assert (window.size, window.bottom) == (100, 200)
+
+
+def test_an_assignment_may_replace_a_whole_item() -> None:
+    item = "{size: 64, overlap: 0.5, top: 0, bottom: 70}"
+    loaded = load_settings(None, [f"search.windows.0={item}"]).settings
+    assert [window.bottom for window in loaded.search.windows] == [70, 500]
+
+
+@pytest.mark.parametrize(
+    ("text", "assignments"),
+    [("features: {color_space: HSV}", []), ("", ["features.color_space=HSV"])],
+)
+def test_features_are_told_apart_where_they_are_asked_for(
+    path: Path, text: str, assignments: list[str]
+) -> None:
+    assert load(path, text, *assignments).features == FeatureSettings(color_space="HSV")
+
+
+def test_features_asked_for_as_they_are_by_default_are_asked_for(path: Path) -> None:
+    assert load(path, "features: {patch: 64}").features == FeatureSettings()
+
+
+def test_features_are_not_asked_for_by_other_settings(path: Path) -> None:
+    assert load(path, "heat: {frames: 3}", "tracker.history=3").features is None
+
+
+def test_an_error_names_file_line_column_key_and_what_was_expected(path: Path) -> None:
+    text = "search:\n  windows:\n    - {size: 64, overlap: 1.2, top: 0, bottom: 100}\n"
+    assert refusal(path, text) == [
+        "my.yaml:3:18: search.windows[0].overlap: should be less than 1 (got 1.2)"
+    ]
+
+
+def test_all_errors_are_given_at_once(path: Path) -> None:
+    text = "heat: {frames: 0, blur: -1}\ntraining:\n  C: -1\ntrakcer: {}\n"
+    assert sorted(refusal(path, text, "output.crf=99", "nonsense")) == [
+        "--set nonsense: expected KEY=VALUE, as in tracker.history=12",
+        "--set: output.crf: should be less than or equal to 51 (got 99)",
+        "my.yaml:1:19: heat.blur: should be greater than or equal to 0 (got -1)",
+        "my.yaml:1:8: heat.frames: should be greater than or equal to 1 (got 0)",
+        "my.yaml:3:3: training.C: should be greater than 0 (got -1)",
+        "my.yaml:4:1: trakcer: is no setting; did you mean tracker?",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tracker: {histroy: 3}", "1:11: tracker.histroy: is no setting; did you mean history?"),
+        ("heat: {x: 3}", "1:8: heat.x: is no setting; known here: frames, blur, threshold"),
+        ("features: {hog: {cel: 3}}", "1:18: features.hog.cel: is no setting; did you mean cell?"),
+        ("heat: 3", "1:1: heat: should be a section, key: value (got 3)"),
+        ("heat:", "1:1: heat: should be a section, key: value (got None)"),
+        ("heat: {frames: 2001-01-01}", "1:8: heat.frames: should be a valid integer (got datetime"),
+        ("heat: {threshold: .nan}", "1:8: heat.threshold: should be a finite number (got nan)"),
+        ("heat: {threshold: 1e999}", "1:8: heat.threshold: should be a finite number (got inf)"),
+        ("heat: {threshold: -.inf}", "1:8: heat.threshold: should be a finite number (got -inf)"),
+        ("heat: {frames: 2.5}", "1:8: heat.frames: should be a valid integer, got a number with a"),
+        ("features: {color_space: BGR}", "1:12: features.color_space: should be 'YCrCb', 'HSV', "),
+        ("features: {patch: 60}", "1:1: features: patch must be a multiple of hog.cell (8)"),
+        ("features: {hog: {block: 8, cell: 16}}", "1:1: features: hog.block × hog.cell must not"),
+        ("features: {hog: {channels: [0, 0]}}", "1:12: features.hog: channels must differ"),
+        (
+            "features: {hog: {channels: []}, histogram: {bins: 0}}",
+            "1:1: features: at least one of hog, histogram and spatial must be on",
+        ),
+        ("search: {windows: []}", "1:10: search.windows: should have at least one item"),
+        ("search: {windows: [5]}", "1:20: search.windows[0]: should be a section, key: value"),
+        ("search: {windows: 5}", "1:10: search.windows: should be a list"),
+        (
+            "search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
+            "1:20: search.windows[0]: bottom must be at least top + size",
+        ),
+        (
+            "search: {windows: [{size: 64, overlap: 0.99, top: 0, bottom: 64}]}",
+            "1:20: search.windows[0]: overlap leaves a step of less than a pixel",
+        ),
+        ("'': 1", "1:1: : is no setting; known here: reference_height, features, "),
+    ],
+)
+def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str) -> None:
+    (line,) = refusal(path, text)
+    assert line.startswith(f"my.yaml:{message}")
+
+
+def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
+    assert refusal(path, "search: {windows: [{size: 64, top: 0}]}") == [
+        "my.yaml:1:20: search.windows[0].overlap: is missing",
+        "my.yaml:1:20: search.windows[0].bottom: is missing",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("assignment", "message"),
+    [
+        ("heat.frames=x", "heat.frames: should be a valid integer"),
+        ("heat.frames.0=5", "heat.frames: should be a valid integer"),
+        ("search.windows.0.sise=3", "search.windows[0].sise: is no setting; did you mean size?"),
+        ("search.windows.2.size=3", "search.windows: should be a list, or in --set the number of"),
+        ("search.windows.-1.size=3", "search.windows: should be a list, or in --set the number of"),
+        ("search.windows.x.size=3", "search.windows: should be a list, or in --set the number of"),
+        ("search.windows.0.0=3", "search.windows[0][0]: is no setting; known here: size, "),
+        ("tracker.0=3", "tracker[0]: is no setting; known here: history, "),
+        ("0=3", "[0]: is no setting; known here: reference_height, "),
+        ("9" * 5000 + "=3", "9999"),
+        ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: should be a valid integer"),
+    ],
+)
+def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, message: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_settings(None, [assignment])
+    (line,) = str(error.value).split("\n")
+    assert line.startswith(f"--set: {message}")
+
+
+def test_a_value_that_an_assignment_mends_is_no_error(path: Path) -> None:
+    assert load(path, "heat: {frames: 0}", "heat.frames=1").settings.heat.frames == 1
+
+
+@pytest.mark.parametrize("value", ["[" * 200 + "]" * 200, "9" * 300, "x" * 5000])
+def test_a_long_value_is_shortened_in_the_message(path: Path, value: str) -> None:
+    (line,) = refusal(path, f"heat: {{frames: {value}}}")
+    assert len(line) < 200
+
+
+def test_keys_are_written_as_a_user_would() -> None:
+    assert format_key(("search", "windows", 0, "size")) == "search.windows[0].size"
+
+
+_NAMES = st.sampled_from(
+    ["features", "hog", "channels", "search", "windows", "size", "heat", "frames", "tracker", "x"]
+)
+_SCALARS = st.one_of(
+    st.sampled_from(
+        [
+            "1", "0x1f", "0b1", "017", "1_000", "1e9999", "-.inf", ".nan", "1:30:30.5", "~", "yes",
+            "2001-01-01", "2001-12-14t21:59:43.10-05:00", "<<", "=", "*a", "&a 1", "!!int x",
+            "!!timestamp x", "!!python/object:x {}", "? a", "- a", "|\n x", ">-\n x", "%", "@", "`",
+            "'", '"\\x', '"\\ud800"', "\t", "\x07", "#", "9" * 5000, "[", "{", "]", "}", ",",
+        ]
+    ),
+    st.text(max_size=6),
+)  # fmt: skip
+_YAML = st.recursive(
+    _SCALARS,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3).map(lambda items: f"[{', '.join(items)}]"),
+        st.lists(st.tuples(_NAMES, inner), max_size=3).map(
+            lambda pairs: "{" + ", ".join(f"{key}: {value}" for key, value in pairs) + "}"
+        ),
+    ),
+    max_leaves=8,
+)
+
+
+@given(st.one_of(_YAML, st.text(), st.lists(_SCALARS).map("\n".join)))
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_any_text_gives_settings_or_a_config_error(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
+    try:
+        loaded = load_settings(path)
+    except ConfigError as error:
+        assert str(error).startswith(str(path))  # noqa: PT017
+    else:
+        assert isinstance(loaded.settings, Settings)
+
+
+@given(st.one_of(st.text(), st.tuples(st.lists(_NAMES).map(".".join), _YAML).map("=".join)))
+@settings(max_examples=200)
+def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
+    try:
+        loaded = load_settings(None, [text])
+    except ConfigError as error:
+        assert str(error).startswith("--set")  # noqa: PT017
+    else:
+        assert isinstance(loaded.settings, Settings)

@@ -1,0 +1,120 @@
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic.fields import FieldInfo
+
+from vdet.config.document import parse_document
+from vdet.config.rendering import render
+from vdet.config.schema import (
+    FeatureSettings,
+    HeatSettings,
+    HistogramSettings,
+    HogSettings,
+    SearchSettings,
+    Section,
+    Settings,
+    TrackerSettings,
+    TrainingSettings,
+    WindowSettings,
+)
+
+SEED = Path(__file__).parents[2] / "configs" / "seed.yaml"
+
+
+def read_back(text: str) -> Settings:
+    return Settings.model_validate(parse_document(text, "printed").values)
+
+
+def fields_of(section: type[Section], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    for name, field in section.model_fields.items():
+        yield prefix + name, field
+        for kind in (field.annotation, *get_args(field.annotation)):
+            if isinstance(kind, type) and issubclass(kind, Section):
+                yield from fields_of(kind, f"{prefix}{name}.")
+
+
+def is_section(field: FieldInfo) -> bool:
+    return isinstance(field.annotation, type) and issubclass(field.annotation, Section)
+
+
+FIELDS = dict(fields_of(Settings))
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@st.composite
+def windows(draw: st.DrawFn) -> WindowSettings:
+    size, top = draw(st.integers(10, 500)), draw(st.integers(0, 1000))
+    bottom = top + size + draw(st.integers(0, 1000))
+    overlap = draw(st.floats(0, 0.85))
+    return WindowSettings(size=size, overlap=overlap, top=top, bottom=bottom)
+
+
+some_settings = st.builds(
+    Settings,
+    reference_height=st.integers(16, 5000),
+    features=st.builds(
+        FeatureSettings,
+        color_space=st.sampled_from(["YCrCb", "RGB", "LUV"]),
+        hog=st.builds(HogSettings, channels=st.sampled_from([(), (0,), (2, 0), (0, 1, 2)])),
+        histogram=st.builds(HistogramSettings, bins=st.sampled_from([8, 256])),
+    ),
+    training=st.builds(
+        TrainingSettings,
+        C=st.floats(0, 1e6, exclude_min=True),
+        split=st.sampled_from(["random", "tail"]),
+        seed=st.integers(0, 2**32 - 1),
+    ),
+    search=st.builds(
+        SearchSettings,
+        probability=st.floats(0, 1),
+        windows=st.lists(windows(), min_size=1, max_size=3).map(tuple),
+    ),
+    heat=st.builds(HeatSettings, threshold=finite.map(abs)),
+    tracker=st.builds(TrackerSettings, good_fraction=st.floats(0, 1)),
+)
+
+
+@given(some_settings)
+def test_printed_settings_are_read_back_the_same(settings: Settings) -> None:
+    assert read_back(render(settings)) == settings
+
+
+def test_the_seed_config_is_the_defaults_printed() -> None:
+    assert SEED.read_text(encoding="utf-8") == render(Settings())
+
+
+def test_every_setting_is_printed() -> None:
+    printed = parse_document(render(Settings()), "printed").values
+    assert printed == Settings().model_dump(mode="json")
+
+
+def test_the_keys_of_list_items_are_looked_at_too() -> None:
+    assert {"search.windows.overlap", "features.hog.cell", "output.crf"} <= FIELDS.keys()
+
+
+@pytest.mark.parametrize("key", FIELDS)
+def test_every_key_has_words_of_its_own(key: str) -> None:
+    field = FIELDS[key]
+    words = field.annotation.__doc__ if is_section(field) else field.description
+    assert words
+
+
+@pytest.mark.parametrize("key", [key for key, field in FIELDS.items() if field.description])
+def test_the_words_of_every_key_are_printed_as_a_comment(key: str) -> None:
+    comments = [line.strip()[2:] for line in render(Settings()).splitlines() if "# " in line]
+    assert str(FIELDS[key].description) in " ".join(comments)
+
+
+def test_no_line_is_longer_than_100_characters() -> None:
+    assert max(map(len, render(Settings()).splitlines())) <= 100
+
+
+def test_what_is_printed_is_plain_yaml() -> None:
+    loaded: Any = yaml.safe_load(render(Settings()))
+    assert read_back(yaml.safe_dump(loaded)) == Settings()

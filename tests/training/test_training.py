@@ -1,0 +1,284 @@
+import logging
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+import pytest
+
+import vdet
+from vdet.config.schema import (
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    Settings,
+    TrainingSettings,
+)
+from vdet.dataset import PatchFile, find_patches
+from vdet.errors import DataError
+from vdet.features import FeatureExtractor
+from vdet.images import Image, write_image
+from vdet.model import load_model, save_model
+from vdet.training import train
+from vdet.training.extraction import MAX_NAMED, extract
+from vdet.training.fitting import fit
+from vdet.training.splits import hold_out
+
+SIZE = 16
+GROUPS = {
+    "vehicles/far": 12,
+    "vehicles/near": 20,
+    "non-vehicles/road": 15,
+    "non-vehicles/sky": 10,
+}
+SETTINGS = Settings(
+    features=FeatureSettings(
+        patch=SIZE,
+        hog=HogSettings(cell=4, channels=(0,)),
+        histogram=HistogramSettings(bins=8),
+    ),
+    training=TrainingSettings(C=0.1),
+)
+
+
+def texture(rng: np.random.Generator, vehicle: bool) -> Image:
+    """Draw noise with dark bars across for a vehicle, upright ones for anything else."""
+    image = rng.integers(120, 200, (SIZE, SIZE, 3), dtype=np.uint8)
+    at = int(rng.integers(2, 6))
+    bars = image if vehicle else image.swapaxes(0, 1)
+    bars[at : at + 3] = bars[at + 6 : at + 9] = 30
+    return image
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    rng = np.random.default_rng(0)
+    for group, count in GROUPS.items():
+        (folder / group).mkdir(parents=True)
+        for i in range(count):
+            write_image(folder / group / f"{i}.png", texture(rng, group.startswith("vehicles")))
+    return folder
+
+
+@pytest.fixture
+def files(data: Path) -> list[PatchFile]:
+    return find_patches([data])
+
+
+def with_broken(files: list[PatchFile], folder: Path, count: int) -> list[PatchFile]:
+    """Add patches that are no pictures, in the middle of the list."""
+    (folder / "vehicles").mkdir()
+    broken = [PatchFile(folder, f"vehicles/{i}.png", "vehicles/far", True) for i in range(count)]
+    for file in broken:
+        (folder / file.name).write_text("no picture")
+    return [*files[:9], *broken, *files[9:]]
+
+
+def tolerant(share: float) -> Settings:
+    training = SETTINGS.training.model_copy(update={"max_broken": share})
+    return SETTINGS.model_copy(update={"training": training})
+
+
+def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
+    vectors = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    assert vectors.groups.tolist() == [file.group for file in files]
+    assert vectors.vehicle.tolist() == [file.vehicle for file in files]
+    assert vectors.vehicle.sum() == 32
+    assert vectors.broken == 0
+    last = cv2.imread(str(files[-1].source / files[-1].name))
+    assert last is not None
+    extractor = FeatureExtractor(SETTINGS.features)
+    assert vectors.vectors.shape == (57, extractor.length)
+    expected = extractor.describe(np.asarray(last, np.uint8))
+    np.testing.assert_array_equal(vectors.vectors[-1], expected)
+
+
+def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
+    larger = SETTINGS.features.model_copy(update={"patch": 32})
+    vectors = extract(files, larger, max_broken=0, jobs=1).vectors
+    np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
+
+
+def test_several_processes_give_the_same_as_one(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.training.extraction.CHUNK", 10)
+    one = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    two = extract(files, SETTINGS.features, max_broken=0, jobs=2)
+    np.testing.assert_array_equal(one.vectors, two.vectors)
+    np.testing.assert_array_equal(one.groups, two.groups)
+    assert one.digest == two.digest
+
+
+def test_progress_adds_up_to_the_number_of_patches(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.training.extraction.CHUNK", 10)
+    steps: list[int] = []
+    extract(files, SETTINGS.features, max_broken=0, jobs=1, progress=steps.append)
+    assert steps == [10, 10, 10, 10, 10, 7]
+
+
+def test_the_digest_tells_data_sets_apart(files: list[PatchFile]) -> None:
+    whole, same, fewer, renamed = (
+        extract(some, SETTINGS.features, max_broken=0, jobs=1).digest
+        for some in (
+            files,
+            files,
+            files[1:],
+            [replace(files[0], group="non-vehicles/x"), *files[1:]],
+        )
+    )
+    assert whole == same
+    assert len({whole, fewer, renamed}) == 3
+    assert len(whole) == 64
+
+
+def test_broken_patches_are_named_skipped_and_counted(
+    files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    mixed = with_broken(files, tmp_path, 2)
+    with caplog.at_level(logging.WARNING, "vdet"):
+        vectors = extract(mixed, SETTINGS.features, max_broken=0.1, jobs=1)
+    assert vectors.broken == 2
+    assert vectors.groups.tolist() == [file.group for file in files]
+    whole = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    np.testing.assert_array_equal(vectors.vectors, whole.vectors)
+    assert [record.message for record in caplog.records] == [
+        f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(2)
+    ]
+
+
+def test_of_many_broken_patches_the_first_are_named(
+    files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    mixed = with_broken(files, tmp_path, MAX_NAMED + 3)
+    with caplog.at_level(logging.WARNING, "vdet"):
+        extract(mixed, SETTINGS.features, max_broken=0.5, jobs=1)
+    assert len(caplog.records) == MAX_NAMED + 1
+    assert caplog.records[-1].message == "… and 3 more"
+
+
+def test_more_broken_patches_than_are_tolerated_are_an_error(
+    files: list[PatchFile], tmp_path: Path
+) -> None:
+    mixed = with_broken(files, tmp_path, 3)
+    message = r"vehicles/0\.png: 3 of 60 patches are broken, more than the 4\.0% of training\.max_b"
+    with pytest.raises(DataError, match=message):
+        train(mixed, tolerant(0.04), jobs=1)
+    _, report = train(mixed, tolerant(0.05), jobs=1)
+    assert report.broken == 3
+
+
+def test_nothing_but_broken_patches_is_an_error_however_tolerant(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(DataError, match="patches"):
+        train(with_broken([], tmp_path, 5), tolerant(1), jobs=1)
+
+
+def test_the_report_counts_patches_and_features(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    assert (report.vehicles, report.non_vehicles, report.broken) == (32, 25, 0)
+    assert report.features == FeatureExtractor(SETTINGS.features).length
+    assert report.milliseconds_per_prediction > 0
+
+
+def test_a_separable_set_is_learnt(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    for split in report.splits:
+        assert split.train_accuracy == 1
+        assert split.test_accuracy >= 0.9
+
+
+def test_the_parts_of_each_split_add_up(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    for split in report.splits:
+        assert split.train_patches + split.test_patches == 57
+        assert sum(asdict(split.confusion).values()) == split.test_patches
+        assert sum(group.patches for group in split.groups) == split.test_patches
+        right = split.confusion.true_positives + split.confusion.true_negatives
+        assert split.test_accuracy == pytest.approx(right / split.test_patches)
+        by_group = sum(group.patches * group.accuracy for group in split.groups)
+        assert by_group == pytest.approx(right)
+
+
+def test_the_tail_split_is_reported_by_group(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    tail = report.splits[1]
+    assert {group.group: group.patches for group in tail.groups} == {
+        "non-vehicles/road": 3,
+        "non-vehicles/sky": 2,
+        "vehicles/far": 2,
+        "vehicles/near": 4,
+    }
+
+
+@pytest.mark.parametrize("name", ["random", "tail"])
+def test_the_patches_of_the_test_are_not_learnt_from(
+    files: list[PatchFile], name: Literal["random", "tail"]
+) -> None:
+    training = SETTINGS.training.model_copy(update={"split": name})
+    model, _ = train(files, SETTINGS.model_copy(update={"training": training}), jobs=1)
+    data = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    kept = ~hold_out(data.groups, name, training.test_fraction, training.seed)
+    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.features, training)
+    np.testing.assert_array_equal(model.weights, expected.weights)
+
+
+@pytest.mark.parametrize(("split", "order"), [("random", "random tail"), ("tail", "tail random")])
+def test_the_model_is_that_of_the_configured_split_which_comes_first(
+    files: list[PatchFile], split: str, order: str
+) -> None:
+    training = SETTINGS.training.model_copy(update={"split": split})
+    settings = SETTINGS.model_copy(update={"training": training})
+    model, report = train(files, settings, jobs=1)
+    assert [part.split for part in report.splits] == order.split()
+    vectors = extract(files, settings.features, max_broken=0, jobs=1)
+    right = (model.probabilities(vectors.vectors) >= 0.5) == vectors.vehicle
+    first = report.splits[0]
+    accuracy = first.train_patches * first.train_accuracy + first.test_patches * first.test_accuracy
+    assert right.sum() == pytest.approx(accuracy)
+
+
+def test_the_same_seed_gives_the_same_model_and_another_seed_another(
+    files: list[PatchFile],
+) -> None:
+    other = SETTINGS.model_copy(
+        update={"training": SETTINGS.training.model_copy(update={"seed": 1})}
+    )
+    one, same, different = (train(files, s, jobs=1)[0] for s in (SETTINGS, SETTINGS, other))
+    for name in ("weights", "biases", "slopes", "offsets"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
+    assert (one.weights != different.weights).any()
+
+
+def test_a_trained_model_says_where_it_is_from_and_can_be_kept(
+    files: list[PatchFile], tmp_path: Path
+) -> None:
+    model, report = train(files, SETTINGS, jobs=1)
+    save_model(model, tmp_path / "model.npz")
+    loaded = load_model(tmp_path / "model.npz", SETTINGS.features)
+    provenance = loaded.provenance
+    assert provenance["program"] == f"vdet {vdet.__version__}"
+    assert provenance["training"] == SETTINGS.training.model_dump(mode="json")
+    assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
+    digest = extract(files, SETTINGS.features, max_broken=0, jobs=1).digest
+    assert provenance["data_sha256"] == digest
+    np.testing.assert_array_equal(loaded.weights, model.weights)
+
+
+def test_too_few_patches_for_the_folds_are_an_error(files: list[PatchFile]) -> None:
+    few = [files[0], files[1], *[file for file in files if file.vehicle]]
+    with pytest.raises(DataError, match=r"a class has [0-2] training patches"):
+        train(few, SETTINGS, jobs=1)
+
+
+def test_groups_of_one_patch_each_leave_nothing_to_test_the_tail_on(
+    files: list[PatchFile],
+) -> None:
+    lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]
+    with pytest.raises(DataError, match="no folder has two patches"):
+        train(lonely, SETTINGS, jobs=1)
