@@ -1,6 +1,6 @@
 """One frame → its windows, heat and regions: what still pictures and video have in common."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from vdet.config.scaling import scale_lengths
 from vdet.config.schema import Settings
@@ -8,7 +8,7 @@ from vdet.geometry import Box
 from vdet.heatmap import Heat, HeatMap, Region, find_regions
 from vdet.images import Image
 from vdet.model import LinearModel
-from vdet.search.engine import make_search
+from vdet.search.engine import FrameSearch
 from vdet.windows import Windows
 
 
@@ -17,7 +17,7 @@ class Detection:
     """What was found in a frame, before any memory of cars.
 
     `windows` are all searched ones, `hits` those of at least `search.probability`, `heat` is
-    float32 `(H, W)`, `regions` is where it exceeds `heat.threshold`.
+    their heatmap, `regions` is where it exceeds `heat.threshold`.
     """
 
     windows: Windows
@@ -41,14 +41,17 @@ class Detector:
     """
 
     def __init__(self, model: LinearModel, settings: Settings, width: int, height: int) -> None:
-        self._engine = make_search(model, settings, width, height)
+        self._search = FrameSearch(model, settings, width, height)
         self._probability = settings.search.probability
         self._heat = scale_lengths(settings.heat, height / settings.reference_height)
         self._map = HeatMap(width, height, self._heat)
 
-    def detect(self, image: Image) -> Detection:
-        """Search the next frame, BGR uint8 `(H, W, 3)`."""
-        windows = self._engine.search(image)
+    def search(self, image: Image) -> Windows:
+        """Search a frame, BGR uint8 `(H, W, 3)`; may be called from threads, in any order."""
+        return self._search.search(image)
+
+    def accumulate(self, windows: Windows) -> Detection:
+        """Add the windows of the next frame to the heat."""
         hits = windows.detected(self._probability)
         heat = self._map.update(hits)
         return Detection(windows, hits, heat, tuple(find_regions(heat, self._heat.threshold)))
@@ -60,11 +63,11 @@ def detect_still(model: LinearModel, settings: Settings, image: Image) -> Detect
     So the threshold means the same as in video. Raises `ImageError` like `Detector`.
     """
     height, width = image.shape[:2]
-    once = settings.model_copy(update={"heat": settings.heat.model_copy(update={"frames": 1})})
-    threshold = settings.heat.threshold
-    detection = Detector(model, once, width, height).detect(image)
-    heat = detection.heat * settings.heat.frames
-    return replace(detection, heat=heat, regions=tuple(find_regions(heat, threshold)))
+    detector = Detector(model, settings, width, height)
+    windows = detector.search(image)
+    for _ in range(settings.heat.frames - 1):
+        detector.accumulate(windows)
+    return detector.accumulate(windows)
 
 
 def still_boxes(detection: Detection, settings: Settings, height: int) -> list[tuple[Box, float]]:

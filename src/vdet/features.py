@@ -4,7 +4,9 @@ Sources: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection",
 section 1.
 """
 
+import itertools
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -25,6 +27,39 @@ _CONVERSIONS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the parts of a feature vector lie; HOG has one part a described channel."""
+
+    hog: tuple[slice, ...]
+    histogram: slice
+    spatial: slice
+
+    @staticmethod
+    def of(settings: FeatureSettings) -> "Layout":
+        """Return the layout of the vectors that these settings give."""
+        hog = settings.hog
+        blocks = settings.patch // hog.cell - hog.block + 1
+        length = blocks**2 * hog.block**2 * hog.orientations
+        starts = [i * length for i in range(len(hog.channels) + 1)]
+        histogram = slice(starts[-1], starts[-1] + 3 * settings.histogram.bins)
+        spatial = slice(histogram.stop, histogram.stop + 3 * settings.spatial.size**2)
+        return Layout(
+            tuple(itertools.starmap(slice, itertools.pairwise(starts))), histogram, spatial
+        )
+
+    @property
+    def length(self) -> int:
+        """Features of a patch; 4,800 for the seed's settings."""
+        return int(self.spatial.stop)
+
+    @property
+    def first_stage(self) -> npt.NDArray[np.intp]:
+        """Indices of what the first stage of a cascade looks at: first HOG channel, histogram."""
+        parts = [*self.hog[:1], self.histogram]
+        return np.concatenate([np.arange(part.start, part.stop) for part in parts])
+
+
 class FeatureExtractor:
     """Describes patches by the settings; holds OpenCV's descriptor, nothing that changes.
 
@@ -35,19 +70,8 @@ class FeatureExtractor:
 
     def __init__(self, settings: FeatureSettings) -> None:
         self.settings = settings
+        self.layout = Layout.of(settings)
         self._hog = hog_descriptor(settings, (settings.patch, settings.patch))
-
-    @property
-    def hog_length(self) -> int:
-        """HOG features of one channel; 1,568 for the seed's settings."""
-        return self._hog.getDescriptorSize() if self.settings.hog.channels else 0
-
-    @property
-    def length(self) -> int:
-        """Features of a patch; 4,800 for the seed's settings."""
-        spatial = 3 * self.settings.spatial.size**2
-        hog = self.hog_length * len(self.settings.hog.channels)
-        return hog + 3 * self.settings.histogram.bins + spatial
 
     def describe(self, patch: Image) -> Vectors:
         """Describe one patch.
@@ -59,7 +83,7 @@ class FeatureExtractor:
 
         Returns
         -------
-        float32 of shape `(length,)`: HOG 0 to 1, histogram in pixels, spatial bins 0 to 255.
+        float32 of shape `(layout.length,)`: HOG 0 to 1, histogram in pixels, spatial bins 0 to 255.
         """
         channels = np.ascontiguousarray(convert(patch, self.settings).transpose(2, 0, 1))
         parts: list[npt.ArrayLike] = []
@@ -71,9 +95,9 @@ class FeatureExtractor:
         return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
 
     def describe_all(self, patches: Iterable[Image]) -> Vectors:
-        """Describe patches one by one; float32 of shape `(n, length)`."""
+        """Describe patches one by one; float32 of shape `(n, layout.length)`."""
         vectors = [self.describe(patch) for patch in patches]
-        return np.stack(vectors) if vectors else np.empty((0, self.length), np.float32)
+        return np.stack(vectors) if vectors else np.empty((0, self.layout.length), np.float32)
 
 
 def convert(image: Image, settings: FeatureSettings) -> Image:
@@ -95,7 +119,13 @@ def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:
 
 
 def to_patch(image: Image, side: int) -> Image:
-    """Resize a crop (BGR uint8) to a square patch of `side` pixels, bilinearly."""
-    if image.shape[:2] == (side, side):
+    """Resize a crop (BGR uint8) to a square patch of `side` pixels."""
+    return resize(image, side, side)
+
+
+def resize(image: Image, width: int, height: int) -> Image:
+    """Resize an image: by area where it shrinks, so that nothing is skipped, else bilinearly."""
+    if image.shape[:2] == (height, width):
         return image
-    return np.asarray(cv2.resize(image, (side, side), interpolation=cv2.INTER_LINEAR), np.uint8)
+    method = cv2.INTER_AREA if image.shape[1] > width else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (width, height), interpolation=method), np.uint8)

@@ -14,7 +14,20 @@ from vdet.config.schema import HeatSettings
 from vdet.geometry import Box
 from vdet.windows import Windows
 
-Heat = npt.NDArray[np.float32]
+Values = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class Heat:
+    """A heatmap: float32 `values`, each of them for `shrink` × `shrink` pixels of the frame."""
+
+    values: Values
+    shrink: int = 1
+
+    @property
+    def peak(self) -> float:
+        """The highest value."""
+        return float(self.values.max(initial=0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,35 +55,36 @@ class HeatMap:
     """
 
     def __init__(self, width: int, height: int, settings: HeatSettings) -> None:
-        self._shape = (height, width)
+        self._shape = (-(-height // settings.shrink), -(-width // settings.shrink))
         self._settings = settings
-        self._recent: deque[Heat] = deque(maxlen=settings.frames)
+        self._recent: deque[Values] = deque(maxlen=settings.frames)
 
     def update(self, detections: Windows) -> Heat:
         """Add a frame's detected windows, forget the oldest frame, return the blurred sum.
 
-        Returns
-        -------
-        float32 of shape `(height, width)`: the sum over the last `frames` frames, this one
-        included, of the probabilities of the windows that cover each pixel, then blurred.
+        The sum runs over the last `frames` frames, this one included, and the windows that cover a
+        pixel; each adds its probability, or with `weight: coverage` its share of that.
         """
-        self._recent.append(self._heat_of(detections))
+        self._recent.append(self._values_of(detections))
         total = np.zeros(self._shape, np.float32)
-        for heat in self._recent:
-            total += heat
-        side = self._settings.blur | 1  # a Gaussian kernel has a middle
+        for values in self._recent:
+            total += values
+        side = self._settings.blur // self._settings.shrink | 1  # a Gaussian kernel has a middle
         if side > 1:
             cv2.GaussianBlur(total, (side, side), 0, dst=total)
-        return total
+        return Heat(total, self._settings.shrink)
 
-    def _heat_of(self, detections: Windows) -> Heat:
-        heat = np.zeros(self._shape, np.float32)
-        for (x, y, width, height), probability in zip(
-            detections.boxes.tolist(), detections.probabilities.tolist(), strict=True
-        ):
-            rows = slice(max(0, y), max(0, y + height))
-            heat[rows, max(0, x) : max(0, x + width)] += probability
-        return heat
+    def _values_of(self, detections: Windows) -> Values:
+        values = np.zeros(self._shape, np.float32)
+        heats = detections.probabilities
+        if self._settings.weight == "coverage":
+            heats = heats * detections.shares
+        sides = detections.boxes.astype(np.int64)
+        sides[:, 2:] += sides[:, :2]
+        sides = np.maximum(0, (sides + self._settings.shrink // 2) // self._settings.shrink)
+        for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
+            values[top:bottom, left:right] += heat
+        return values
 
 
 def find_regions(heat: Heat, threshold: float) -> list[Region]:
@@ -79,7 +93,7 @@ def find_regions(heat: Heat, threshold: float) -> list[Region]:
     Outer contours only: a hole does not split a region. The centroid is that of the filled
     outline (`cv2.moments`), or the middle of the box where the outline is a line or a point.
     """
-    hot = (heat > threshold).astype(np.uint8)
+    hot = (heat.values > threshold).astype(np.uint8)
     contours, _ = cv2.findContours(hot, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     regions = [_region(heat, hot, contour) for contour in contours]
     return sorted(regions, key=lambda region: (region.box.y, region.box.x))
@@ -87,12 +101,16 @@ def find_regions(heat: Heat, threshold: float) -> list[Region]:
 
 def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike) -> Region:
     x, y, width, height = cv2.boundingRect(contour)
-    box = Box(x, y, width, height)
     inside = np.zeros((height, width), np.uint8)
     cv2.drawContours(inside, [contour], -1, 1, cv2.FILLED, offset=(-x, -y))
-    inside &= hot[y : box.bottom, x : box.right]
-    peak = float(heat[y : box.bottom, x : box.right][inside > 0].max())
+    inside &= hot[y : y + height, x : x + width]
+    peak = float(heat.values[y : y + height, x : x + width][inside > 0].max())
+    n = heat.shrink
+    box = Box(n * x, n * y, n * width, n * height)
     moments = cv2.moments(contour)
     area = moments["m00"]
-    centroid = (moments["m10"] / area, moments["m01"] / area) if area else box.center
+    if not area:
+        return Region(box, box.center, peak)
+    offset = (n - 1) / 2  # the middle of a value's pixels
+    centroid = (n * moments["m10"] / area + offset, n * moments["m01"] / area + offset)
     return Region(box, centroid, peak)

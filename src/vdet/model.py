@@ -18,15 +18,28 @@ from pydantic import ValidationError
 
 from vdet.config.schema import FeatureSettings
 from vdet.errors import ModelError
-from vdet.features import FeatureExtractor
+from vdet.features import Layout
 from vdet.files import replacing
 
 FORMAT_VERSION = 1
 MAX_MEMBERS = 20
 _MAX_BYTES = 64_000_000
 _ARRAYS = ("weights", "biases", "slopes", "offsets")
+_FIRST_STAGE_ARRAYS = ("first_weights", "first_bias")
 
 Floats = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class FirstStage:
+    """A cheap linear model that tells where a vehicle is still possible (a cascade's first stage).
+
+    It looks at the features `Layout.first_stage` of a vector x, which pass where
+    `weights · x + bias >= 0`. `weights` is float32 of shape `(f,)`, `bias` of shape `(1,)`.
+    """
+
+    weights: Floats
+    bias: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +48,9 @@ class LinearModel:
 
     `weights` is float32 of shape `(k, n)`; `biases`, `slopes` and `offsets` are float32 of shape
     `(k,)`. The score of member i is `weights[i] · x + biases[i]`; its probability is
-    `1 / (1 + exp(slopes[i] · score + offsets[i]))`. `provenance` says where the model is from, as
-    plain JSON values (data set, metrics, versions).
+    `1 / (1 + exp(slopes[i] · score + offsets[i]))`. An engine may ask
+    `first_stage` first. `provenance` says where the model is from, as plain JSON values (data set,
+    metrics, versions).
     """
 
     features: FeatureSettings
@@ -44,6 +58,7 @@ class LinearModel:
     biases: Floats
     slopes: Floats
     offsets: Floats
+    first_stage: FirstStage | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def scores(self, vectors: Floats) -> Floats:
@@ -66,9 +81,13 @@ def save_model(model: LinearModel, path: Path) -> None:
         "format": "vdet model",
         "version": FORMAT_VERSION,
         "features": model.features.model_dump(mode="json"),
+        "first_stage": model.first_stage is not None,
         "provenance": model.provenance,
     }
     arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
+    if model.first_stage:
+        arrays["first_weights"] = model.first_stage.weights
+        arrays["first_bias"] = model.first_stage.bias
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
@@ -84,7 +103,10 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         than asked for, or holds a value that is not finite. Nothing in it is ever run.
     """
     header, arrays = _read(path)
-    model = LinearModel(_features(header, path), **arrays, provenance=header.get("provenance", {}))
+    first = [arrays.pop(name) for name in _FIRST_STAGE_ARRAYS if name in arrays]
+    features, provenance = _features(header, path), header.get("provenance", {})
+    stage = FirstStage(*first) if first else None
+    model = LinearModel(features, **arrays, first_stage=stage, provenance=provenance)
     _check_arrays(model, path)
     if features is not None and features != model.features:
         raise ModelError(
@@ -100,7 +122,10 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
             if sum(info.file_size for info in archive.infolist()) > _MAX_BYTES:
                 raise ModelError(f"{path}: is far too large for a model")
             header = _parse_header(_read_array(archive, "header"), path)
-            return header, {name: _read_array(archive, name) for name in _ARRAYS}
+            arrays = {name: _read_array(archive, name) for name in _ARRAYS}
+            if header.get("first_stage"):
+                arrays |= {name: _read_array(archive, name) for name in _FIRST_STAGE_ARRAYS}
+            return header, arrays
     except ModelError:
         raise
     except OSError as error:
@@ -156,18 +181,26 @@ def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
 
 def _check_arrays(model: LinearModel, path: Path) -> None:
     members = len(model.biases) if model.biases.ndim == 1 else 0
-    expected = (members, FeatureExtractor(model.features).length)
+    layout = Layout.of(model.features)
+    expected = (members, layout.length)
     if not 1 <= members <= MAX_MEMBERS or model.weights.shape != expected:
         raise ModelError(
             f"{path}: has weights of shape {model.weights.shape}, its features need {expected}; "
             "train it again"
         )
-    for name in _ARRAYS:
-        array = getattr(model, name)
-        if array.dtype != np.float32 or (name != "weights" and array.shape != (members,)):
-            raise ModelError(f"{path}: {name} are damaged; train it again")
-        if not np.isfinite(array).all():
-            raise ModelError(f"{path}: {name} hold a value that is not a number; train it again")
+    for name in _ARRAYS[1:]:
+        _check_array(getattr(model, name), (members,), name, path)
+    _check_array(model.weights, expected, "weights", path)
+    if stage := model.first_stage:
+        _check_array(stage.weights, layout.first_stage.shape, "first_weights", path)
+        _check_array(stage.bias, (1,), "first_bias", path)
+
+
+def _check_array(array: Floats, shape: tuple[int, ...], name: str, path: Path) -> None:
+    if array.dtype != np.float32 or array.shape != shape:
+        raise ModelError(f"{path}: {name} are damaged; train it again")
+    if not np.isfinite(array).all():
+        raise ModelError(f"{path}: {name} hold a value that is not a number; train it again")
 
 
 def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:

@@ -82,7 +82,7 @@ def follow(
     detector = Detector(model, settings, width, height)
     cars = Cars(scale_lengths(settings.tracker, height / settings.reference_height))
     for frame in frames:
-        detection = detector.detect(frame.image)
+        detection = detector.accumulate(detector.search(frame.image))
         tracks = cars.update(frame.image, detection.regions)
         yield FrameResult(frame, detection, tuple(tracks))
 

@@ -1,10 +1,11 @@
 """Window sets → window positions, and what was found in them.
 
-Source of the positions' rule: seed section 2, "Sliding Windows"; the counts 423 + 408 = 831 for a
+Source of the overlap rule: seed section 2, "Sliding Windows"; the counts 423 + 408 = 831 for a
 1280×720 frame are the original's.
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
@@ -14,17 +15,21 @@ from vdet.config.schema import WindowSettings
 Boxes = npt.NDArray[np.int32]
 """Shape `(n, 4)`: x, y, width, height in full-frame pixels."""
 
+Floats = npt.NDArray[np.float32]
+
 
 @dataclass(frozen=True, slots=True)
 class Windows:
     """Searched windows with the probability that each shows a vehicle.
 
     `boxes` is int32 of shape `(n, 4)`: x, y, width, height in full-frame pixels;
-    `probabilities` is float32 of shape `(n,)`, 0 to 1.
+    `probabilities` is float32 of shape `(n,)`, 0 to 1; `shares` is float32 of shape `(n,)`: one
+    over the number of windows of the same set that cover a pixel.
     """
 
     boxes: Boxes
-    probabilities: npt.NDArray[np.float32]
+    probabilities: Floats
+    shares: Floats
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -32,39 +37,79 @@ class Windows:
     def detected(self, probability: float) -> "Windows":
         """Return those of at least this probability, in the same order."""
         keep = self.probabilities >= probability
-        return Windows(self.boxes[keep], self.probabilities[keep])
+        return Windows(self.boxes[keep], self.probabilities[keep], self.shares[keep])
 
 
-def positions(settings: WindowSettings, frame_width: int) -> Boxes:
-    """Lay a set's windows over its band of rows, row by row from the top left.
+@dataclass(frozen=True, slots=True)
+class WindowGrid:
+    """A set's square windows, in columns and rows.
 
-    Each product is truncated to an integer: step = int(size·(1 - overlap)),
-    buffer = int(size·overlap), count = int((span - buffer) / step), across and down; one less
-    where, by that truncation, the last window would stick out by a pixel.
+    `size` is a window's side and `step` the distance to the next, frame pixels. The window in
+    column i and row j lies at `left + i·step`, `top + j·step`, rounded to whole pixels.
+    """
+
+    size: int
+    step: Fraction
+    left: Fraction
+    top: Fraction
+    columns: int
+    rows: int
+
+    def __len__(self) -> int:
+        return self.columns * self.rows
+
+    @property
+    def boxes(self) -> Boxes:
+        """The windows row by row from the top left, int32 `(rows · columns, 4)`."""
+        x = np.array([round(self.left + i * self.step) for i in range(self.columns)], np.int32)
+        y = np.array([round(self.top + j * self.step) for j in range(self.rows)], np.int32)
+        boxes = np.full((self.rows, self.columns, 4), self.size, np.int32)
+        boxes[:, :, 0] = x
+        boxes[:, :, 1] = y[:, np.newaxis]
+        return boxes.reshape(-1, 4)
+
+    @property
+    def share(self) -> float:
+        """One over the number of windows that cover a pixel, (step / size)²."""
+        return float((self.step / self.size) ** 2)
+
+
+def lay_grid(
+    settings: WindowSettings, frame_width: int, frame_height: int, *, cells: int = 8
+) -> WindowGrid:
+    """Lay a set's windows over its band of rows and the width of the frame.
+
+    With `overlap`, each product is truncated to an integer: step = int(size·(1 - overlap)),
+    buffer = int(size·overlap), count = int((span - buffer) / step), across and down. With `step`,
+    a whole number of cells, as many windows as the span holds.
 
     Parameters
     ----------
     settings
         Lengths already scaled to the frame (`scale_lengths`).
-    frame_width
-        Pixels.
+    frame_width, frame_height
+        Pixels; the band ends where the frame does.
+    cells
+        Cells across a patch, in which `step` is counted.
 
     Returns
     -------
-    int32 of shape `(rows · columns, 4)`; empty where the band or the frame is smaller than a
-    window.
+    The grid; without windows where the band or the frame is smaller than a window.
     """
     size = settings.size
-    step = max(1, int(size * (1 - settings.overlap)))
-    buffer = int(size * settings.overlap)
-    columns = _count(frame_width, size, step, buffer)
-    rows = _count(settings.bottom - settings.top, size, step, buffer)
-    y, x = np.divmod(np.arange(rows * columns, dtype=np.int32), max(1, columns))
-    side = np.full_like(x, size)
-    return np.stack([x * step, settings.top + y * step, side, side], axis=1)
+    spans = frame_width, min(settings.bottom, frame_height) - settings.top
+    if size <= 0 or min(spans) < size:
+        return WindowGrid(max(1, size), Fraction(1), Fraction(0), Fraction(settings.top), 0, 0)
+    step, buffer = _step_and_buffer(settings, cells)
+    columns, rows = (
+        min(int((span - buffer) / step), int((span - size) / step) + 1) for span in spans
+    )
+    return WindowGrid(size, step, Fraction(0), Fraction(settings.top), columns, rows)
 
 
-def _count(span: int, size: int, step: int, buffer: int) -> int:
-    if not 0 < size <= span:
-        return 0
-    return min((span - buffer) // step, (span - size) // step + 1)
+def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, int]:
+    if settings.step is not None:
+        return Fraction(settings.step * settings.size, cells), 0
+    assert settings.overlap is not None  # one of the two is always given
+    step = max(1, int(settings.size * (1 - settings.overlap)))
+    return Fraction(step), int(settings.size * settings.overlap)

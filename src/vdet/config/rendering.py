@@ -23,6 +23,8 @@ def render(settings: Settings) -> str:
 def _section(section: Section, indent: str, *, comments: bool = True) -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
+        if value is None:
+            continue
         if isinstance(value, Section):
             if not indent:
                 yield ""

@@ -89,6 +89,15 @@ class CalibrationSettings(Section):
     )
 
 
+class FirstStageSettings(Section):
+    """A cheap linear model over the first channel's HOG and the histogram, for the cascade."""
+
+    C: float = Field(1e-3, gt=0, le=1e6, description="penalty of its linear SVM")
+    recall: float = Field(
+        0.999, gt=0, le=1, description="share of vehicle patches that it must let pass"
+    )
+
+
 class TrainingSettings(Section):
     """How `vdet train` fits the classifier."""
 
@@ -105,6 +114,7 @@ class TrainingSettings(Section):
     seed: int = Field(0, ge=0, le=2**32 - 1, description="of the split, the folds and the solver")
     max_broken: Fraction = Field(0.01, description="share of unreadable patches that is tolerated")
     calibration: CalibrationSettings = CalibrationSettings()
+    first_stage: FirstStageSettings = FirstStageSettings()
 
 
 class WindowSettings(Section):
@@ -113,8 +123,14 @@ class WindowSettings(Section):
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH] = Field(
         description="side of a window, pixels"
     )
-    overlap: float = Field(
-        ge=0, lt=1, description="share of a window that its neighbour covers too"
+    overlap: float | None = Field(
+        None, ge=0, lt=1, description="share of a window that its neighbour covers too; or"
+    )
+    step: int | None = Field(
+        None,
+        ge=1,
+        description="distance to the next window in cells of the patch, which is what the dense "
+        "engine is fastest with; one of overlap and step is given",
     )
     top: Pixels = Field(description="first row of the band")
     bottom: Pixels = Field(description="first row below the band")
@@ -123,7 +139,9 @@ class WindowSettings(Section):
     def _fits_its_band(self) -> "WindowSettings":
         if self.bottom - self.top < self.size:
             raise ValueError("bottom must be at least top + size")
-        if int(self.size * (1 - self.overlap)) < 1:
+        if (self.overlap is None) == (self.step is None):
+            raise ValueError("one of overlap and step must be given")
+        if self.overlap is not None and int(self.size * (1 - self.overlap)) < 1:
             raise ValueError("overlap leaves a step of less than a pixel")
         return self
 
@@ -131,8 +149,16 @@ class WindowSettings(Section):
 class SearchSettings(Section):
     """Where vehicles are looked for in a frame."""
 
-    engine: Literal["patch"] = Field(
-        "patch", description="patch: every window cropped, resized, described and scored on its own"
+    engine: Literal["auto", "dense", "patch"] = Field(
+        "auto",
+        description="patch: every window cropped, resized, described and scored on its own; dense: "
+        "each strip described once for all its windows, many times faster; auto: dense where the "
+        "features allow it",
+    )
+    cascade: bool = Field(
+        True,
+        description="dense engine: drop windows by the model's first stage (luma, histogram) "
+        "before the rest of their features is computed",
     )
     probability: Fraction = Field(0.5, description="a window is a detection from here on")
     windows: tuple[WindowSettings, ...] = Field(
@@ -150,6 +176,14 @@ class HeatSettings(Section):
     """Detections of consecutive frames summed into a heatmap, and its regions."""
 
     frames: int = Field(2, ge=1, le=100, description="frames whose detections are summed")
+    weight: Literal["none", "coverage"] = Field(
+        "none",
+        description="none: a window adds its probability; coverage: divided by the number of "
+        "windows of its set that cover a pixel, so that the threshold does not depend on overlap",
+    )
+    shrink: Literal[1, 2, 4, 8] = Field(
+        1, description="the map has one value for this many pixels across and down"
+    )
     blur: Pixels = Field(15, description="side of the Gaussian blur, pixels; 0 or 1 for none")
     threshold: float = Field(1.4, ge=0, description="a region is where the heat is above this")
 

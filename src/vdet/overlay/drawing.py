@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.geometry import Box
+from vdet.heatmap import Heat
 from vdet.images import Image
 from vdet.tracking.track import Track
 
@@ -69,9 +70,10 @@ def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -
     cv2.putText(image, text, origin, _FONT, scale, (0, 0, 0), thickness, cv2.LINE_AA)
 
 
-def blend_heat(image: Image, heat: np.ndarray[tuple[int, int], np.dtype[np.float32]]) -> Image:
+def blend_heat(image: Image, heat: Heat) -> Image:
     """Return the image with the heat over it, from black over red to white at its peak."""
-    peak = float(heat.max())
-    shade = (heat * (255 / peak) if peak > 0 else heat).astype(np.uint8)
-    colored = cv2.applyColorMap(shade, cv2.COLORMAP_HOT)
+    scale = 255 / heat.peak if heat.peak > 0 else 0
+    shade = (heat.values * scale).astype(np.uint8)
+    large = np.kron(shade, np.ones((heat.shrink, heat.shrink), np.uint8))
+    colored = cv2.applyColorMap(large[: image.shape[0], : image.shape[1]], cv2.COLORMAP_HOT)
     return np.asarray(cv2.addWeighted(image, 0.5, colored, 0.8, 0), np.uint8)

@@ -5,15 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.config.scaling import scale_lengths
 from vdet.config.schema import FeatureSettings, Settings
 from vdet.detection import Detection
 from vdet.geometry import Box
 from vdet.images import Image, write_image
 from vdet.overlay.drawing import GREEN, WHITE, blend_heat, color_of, draw_box, draw_label
 from vdet.overlay.patches import patch_sheet
-from vdet.search.engine import lay_windows
-from vdet.windows import Boxes, Windows
+from vdet.search.engine import lay_grids
+from vdet.windows import WindowGrid, Windows
 
 LabelledBox = tuple[Box, str]
 
@@ -40,10 +39,9 @@ def write_stages(
     """
     folder.mkdir(parents=True, exist_ok=True)
     height, width = image.shape[:2]
-    search = scale_lengths(settings.search, height / settings.reference_height)
     pictures = {
         "1-patches": patch_sheet(_examples(image, detection.windows), features),
-        "2-windows": _draw_window_sets(image, lay_windows(search, width, height)),
+        "2-windows": _draw_window_sets(image, lay_grids(settings, features, width, height)),
         "3-hits": _draw_hits(image, detection.hits),
         "4-heat": _draw_heat(image, detection),
         "5-boxes": _draw_boxes(image, detection, boxes),
@@ -63,19 +61,17 @@ def _examples(image: Image, windows: Windows) -> dict[str, Image]:
     return examples
 
 
-def _draw_window_sets(image: Image, sets: Sequence[Boxes]) -> Image:
+def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
     """Draw each set's windows as a fine grid with one whole window, and its count."""
     picture = (image * 0.6).astype(np.uint8)
-    for number, boxes in enumerate(sets):
-        for x, y, width, height in boxes.tolist():
+    for number, grid in enumerate(grids):
+        for x, y, width, height in grid.boxes.tolist():
             picture[y, x : x + width] = color_of(number)
             picture[y : y + height, x] = color_of(number)
-    for number, boxes in enumerate(sets):
-        if len(boxes):
-            first = Box(*boxes[0].tolist())
-            corner = (first.x + number * image.shape[1] // len(sets), first.y)
-            label = f"{first.width} px: {len(boxes)} windows"
-            draw_box(picture, first.moved_to(*corner), color_of(number), label)
+    for number, grid in enumerate(grids):
+        across = number * grid.columns // len(grids)
+        example = Box(*grid.boxes[across].tolist())
+        draw_box(picture, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
     return picture
 
 
@@ -90,7 +86,7 @@ def _draw_hits(image: Image, hits: Windows) -> Image:
 
 def _draw_heat(image: Image, detection: Detection) -> Image:
     picture = blend_heat(image, detection.heat)
-    draw_label(picture, f"peak {detection.heat.max():.1f}", (0, 0), WHITE)
+    draw_label(picture, f"peak {detection.heat.peak:.1f}", (0, 0), WHITE)
     return picture
 
 

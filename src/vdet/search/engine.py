@@ -1,44 +1,85 @@
-"""The search of one frame size: window sets laid over the frame, scored by an engine."""
+"""The search of one frame size: window sets laid over the frame, each scored by an engine."""
 
+import logging
 from typing import Protocol
 
 import numpy as np
 
 from vdet.config.scaling import scale_lengths
-from vdet.config.schema import SearchSettings, Settings
-from vdet.errors import ImageError
+from vdet.config.schema import FeatureSettings, SearchSettings, Settings
+from vdet.errors import ConfigError, ImageError
 from vdet.images import Image
 from vdet.model import LinearModel
+from vdet.search.dense import dense_search, why_not_dense
 from vdet.search.patch import PatchSearch
-from vdet.windows import Boxes, Windows, positions
+from vdet.windows import Floats, WindowGrid, Windows, lay_grid
+
+log = logging.getLogger("vdet")
 
 
-class SearchEngine(Protocol):
-    """Scores all windows of a frame."""
+class GridSearch(Protocol):
+    """Scores the windows of one grid."""
 
-    def search(self, image: Image) -> Windows:
-        """Score every window of a frame, BGR uint8 `(H, W, 3)`."""
+    def search(self, image: Image) -> Floats:
+        """Return each window's probability, float32 `(n,)`, in a frame, BGR uint8 `(H, W, 3)`."""
 
 
-def make_search(model: LinearModel, settings: Settings, width: int, height: int) -> SearchEngine:
-    """Prepare the search of frames of `width` × `height` pixels.
+class FrameSearch:
+    """Scores all windows of frames of one size; holds nothing that a search changes.
+
+    Parameters
+    ----------
+    width, height
+        Size of the frames, pixels.
 
     Raises
     ------
     ImageError
         No search window fits into such a frame.
+    ConfigError
+        The dense engine is asked for, and the model's features cannot be computed densely.
     """
-    search = scale_lengths(settings.search, height / settings.reference_height)
-    boxes = np.concatenate(lay_windows(search, width, height))
-    if not len(boxes):
-        raise ImageError(
-            f"no search window fits into a frame of {width}×{height} pixels; "
-            "give a larger one, or other search.windows"
+
+    def __init__(self, model: LinearModel, settings: Settings, width: int, height: int) -> None:
+        grids = lay_grids(settings, model.features, width, height)
+        if not grids:
+            raise ImageError(
+                f"no search window fits into a frame of {width}×{height} pixels; "
+                "give a larger one, or other search.windows"
+            )
+        dense = _is_dense(settings.search, model.features)
+        cascade = settings.search.cascade
+        self._searches: list[GridSearch] = [
+            dense_search(model, grid, cascade=cascade) if dense else PatchSearch(model, grid)
+            for grid in grids
+        ]
+        self._boxes = np.concatenate([grid.boxes for grid in grids])
+        self._shares = np.repeat(
+            np.array([grid.share for grid in grids], np.float32), [len(grid) for grid in grids]
         )
-    return PatchSearch(model, boxes)
+
+    def search(self, image: Image) -> Windows:
+        """Score every window of a frame, BGR uint8 `(H, W, 3)`; may be called from threads."""
+        probabilities = np.concatenate([search.search(image) for search in self._searches])
+        return Windows(self._boxes, probabilities, self._shares)
 
 
-def lay_windows(search: SearchSettings, width: int, height: int) -> list[Boxes]:
-    """Return each set's windows that lie inside the frame; lengths already scaled to it."""
-    sets = [positions(settings, width) for settings in search.windows]
-    return [boxes[boxes[:, 1] + boxes[:, 3] <= height] for boxes in sets]
+def lay_grids(
+    settings: Settings, features: FeatureSettings, width: int, height: int
+) -> list[WindowGrid]:
+    """Lay the window sets over a frame; those of which no window fits are left out."""
+    search = scale_lengths(settings.search, height / settings.reference_height)
+    cells = features.patch // features.hog.cell
+    grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
+    return [grid for grid in grids if len(grid)]
+
+
+def _is_dense(search: SearchSettings, features: FeatureSettings) -> bool:
+    if search.engine == "patch":
+        return False
+    reason = why_not_dense(features)
+    if reason and search.engine == "dense":
+        raise ConfigError(f"search.engine: dense cannot compute {reason}; take auto or patch")
+    if reason:
+        log.info("the patch engine searches: the dense one cannot compute %s", reason)
+    return not reason

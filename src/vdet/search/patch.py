@@ -8,22 +8,22 @@ import numpy as np
 from vdet.features import FeatureExtractor, to_patch
 from vdet.images import Image
 from vdet.model import LinearModel
-from vdet.windows import Boxes, Windows
+from vdet.windows import Floats, WindowGrid
 
 
 class PatchSearch:
-    """Scores the windows at `boxes`, `(n, 4)` x, y, width, height, all inside the frame."""
+    """Scores the windows of one grid, all inside the frame."""
 
-    def __init__(self, model: LinearModel, boxes: Boxes) -> None:
+    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._boxes = boxes
+        self._boxes = grid.boxes
         self._extractor = FeatureExtractor(model.features)
 
-    def search(self, image: Image) -> Windows:
-        """Score every window of a frame, BGR uint8 `(H, W, 3)`."""
+    def search(self, image: Image) -> Floats:
+        """Return each window's probability, float32 `(n,)`, in a frame, BGR uint8 `(H, W, 3)`."""
         side = self._model.features.patch
-        vectors = np.empty((len(self._boxes), self._extractor.length), np.float32)
+        vectors = np.empty((len(self._boxes), self._extractor.layout.length), np.float32)
         for i, (x, y, width, height) in enumerate(self._boxes.tolist()):
             crop = image[y : y + height, x : x + width]
             vectors[i] = self._extractor.describe(to_patch(crop, side))
-        return Windows(self._boxes, self._model.probabilities(vectors))
+        return self._model.probabilities(vectors)

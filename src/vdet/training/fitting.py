@@ -2,6 +2,7 @@
 
 import logging
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from vdet.config.schema import FeatureSettings, TrainingSettings
 from vdet.errors import DataError
 from vdet.features import Vectors
 from vdet.model import LinearModel
+from vdet.training.first_stage import fit_first_stage
 
 log = logging.getLogger("vdet")
 
@@ -62,7 +64,8 @@ def fit(
         calibrated.fit(scaled, vehicle)
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
-    return _to_model(calibrated.calibrated_classifiers_, scaler, features)
+    model = _to_model(calibrated.calibrated_classifiers_, scaler, features)
+    return replace(model, first_stage=fit_first_stage(vectors, vehicle, features, settings))
 
 
 def _to_model(members: list[Any], scaler: Any, features: FeatureSettings) -> LinearModel:

@@ -1,0 +1,65 @@
+"""HOG of a whole strip, and the weighted sum of the blocks of each window in it.
+
+A descriptor whose window is the strip gives every block once, block column by block column; the
+window at a block position is a square of neighbouring blocks.
+"""
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from vdet.config.schema import FeatureSettings
+from vdet.features import Vectors, hog_descriptor
+from vdet.images import Image
+from vdet.windows import Floats
+
+
+def describe_blocks(channel: Image, features: FeatureSettings) -> Vectors:
+    """Describe every block of a strip.
+
+    Parameters
+    ----------
+    channel
+        uint8 `(h, w)`, both whole numbers of cells.
+
+    Returns
+    -------
+    float32 `(columns, rows, block features)`.
+    """
+    height, width = channel.shape
+    hog = features.hog
+    vector = hog_descriptor(features, (width, height)).compute(channel)
+    columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
+    return np.reshape(np.asarray(vector, np.float32), (columns, rows, -1))
+
+
+def window_sums(blocks: Vectors, weights: Floats) -> Floats:
+    """Sum the weighted blocks of the window at each block position.
+
+    Parameters
+    ----------
+    blocks
+        `(columns, rows, d)`.
+    weights
+        `(m, b, b, d)`, for windows of b × b blocks.
+
+    Returns
+    -------
+    float32 `(m, columns - b + 1, rows - b + 1)`.
+
+    One matrix product gives every block's product with every weight slice: b² planes a score. A
+    window's sum runs over the planes, each shifted by its own block position; with the planes laid
+    flat, the shifts are constant strides.
+    """
+    columns, rows, length = blocks.shape
+    scores, side = weights.shape[:2]
+    planes = weights.reshape(-1, length) @ blocks.reshape(-1, length).T
+    plane, item = columns * rows, planes.itemsize
+    wide, high = columns - side + 1, rows - side + 1
+    flat = (wide - 1) * rows + high
+    strides = (side * side * plane, side * plane + rows, plane + 1, 1)
+    shifted = as_strided(
+        planes, (scores, side, side, flat), [item * stride for stride in strides], writeable=False
+    )
+    sums = np.zeros((scores, wide * rows), np.float32)
+    np.sum(shifted, axis=(1, 2), out=sums[:, :flat])
+    return sums.reshape(scores, wide, rows)[:, :, :high]
