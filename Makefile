@@ -28,9 +28,12 @@ data:  ## fetch the data set (124 MB) into data/; data/README.md tells what it i
 			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
 	done
 
-model: $(READY)  ## train the shipped model anew from the data set in $(DATA)
-	$(BIN)/vdet train $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip -c configs/seed.yaml \
-		-o src/vdet/models/seed.npz --overwrite
+model: $(READY)  ## train the shipped models anew from the data set in $(DATA)
+	for name in default seed; do \
+		$(BIN)/vdet train $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip -c configs/$$name.yaml \
+			-o src/vdet/models/$$name.npz --overwrite || exit 1; \
+		rm src/vdet/models/$$name.json; \
+	done
 
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt

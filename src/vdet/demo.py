@@ -81,7 +81,8 @@ class DemoResult:
 def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
     """Refuse to write over an earlier demo. Raises `OutputError`."""
     if files.folder.exists():
-        for path in (files.clip, files.truth, files.model, files.report, files.result):
+        outputs = (files.clip, files.truth, files.model, files.report, files.result, files.tracks)
+        for path in outputs:
             check_output(path, overwrite=overwrite)
 
 
@@ -118,7 +119,7 @@ def run_demo(
     say("3/4 finding the vehicles …")
     middle = scene.frames / scene.rate / 2
     job = VideoJob(files.clip, files.result, files.tracks, stages=files.stages, at=middle)
-    summary = process_video(job, model, settings, progress)
+    summary = process_video(job, model, settings, progress=progress)
     say("4/4 comparing with the truth …")
     scores = score(read_predictions(files.tracks), read_truth(files.truth), rate=float(scene.rate))
     return DemoResult(report, scores, summary.frames, summary.seconds)

@@ -53,12 +53,6 @@ class Layout:
         """Features of a patch; 4,800 for the seed's settings."""
         return int(self.spatial.stop)
 
-    @property
-    def first_stage(self) -> npt.NDArray[np.intp]:
-        """Indices of what the first stage of a cascade looks at: first HOG channel, histogram."""
-        parts = [*self.hog[:1], self.histogram]
-        return np.concatenate([np.arange(part.start, part.stop) for part in parts])
-
 
 class FeatureExtractor:
     """Describes patches by the settings; holds OpenCV's descriptor, nothing that changes.
@@ -124,8 +118,25 @@ def to_patch(image: Image, side: int) -> Image:
 
 
 def resize(image: Image, width: int, height: int) -> Image:
-    """Resize an image: by area where it shrinks, so that nothing is skipped, else bilinearly."""
+    """Resize an image without skipping pixels.
+
+    It is halved (each pixel the mean of four) as long as it is twice too large and both sides are
+    even, then brought to size bilinearly, or by area where it is still twice too large.
+    """
+    while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width and _is_even(image):
+        image = halve(image)
     if image.shape[:2] == (height, width):
         return image
-    method = cv2.INTER_AREA if image.shape[1] > width else cv2.INTER_LINEAR
+    shrinks = image.shape[0] >= 2 * height or image.shape[1] >= 2 * width
+    method = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(image, (width, height), interpolation=method), np.uint8)
+
+
+def halve(image: Image) -> Image:
+    """Return an image of even sides at half its size, each pixel the mean of four."""
+    half = (image.shape[1] // 2, image.shape[0] // 2)
+    return np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _is_even(image: Image) -> bool:
+    return not any(side % 2 for side in image.shape[:2])

@@ -25,21 +25,8 @@ FORMAT_VERSION = 1
 MAX_MEMBERS = 20
 _MAX_BYTES = 64_000_000
 _ARRAYS = ("weights", "biases", "slopes", "offsets")
-_FIRST_STAGE_ARRAYS = ("first_weights", "first_bias")
 
 Floats = npt.NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True)
-class FirstStage:
-    """A cheap linear model that tells where a vehicle is still possible (a cascade's first stage).
-
-    It looks at the features `Layout.first_stage` of a vector x, which pass where
-    `weights · x + bias >= 0`. `weights` is float32 of shape `(f,)`, `bias` of shape `(1,)`.
-    """
-
-    weights: Floats
-    bias: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +35,8 @@ class LinearModel:
 
     `weights` is float32 of shape `(k, n)`; `biases`, `slopes` and `offsets` are float32 of shape
     `(k,)`. The score of member i is `weights[i] · x + biases[i]`; its probability is
-    `1 / (1 + exp(slopes[i] · score + offsets[i]))`. An engine may ask
-    `first_stage` first. `provenance` says where the model is from, as plain JSON values (data set,
-    metrics, versions).
+    `1 / (1 + exp(slopes[i] · score + offsets[i]))`. `provenance` says
+    where the model is from, as plain JSON values (data set, metrics, versions).
     """
 
     features: FeatureSettings
@@ -58,7 +44,6 @@ class LinearModel:
     biases: Floats
     slopes: Floats
     offsets: Floats
-    first_stage: FirstStage | None = None
     provenance: dict[str, Any] = field(default_factory=dict)
 
     def scores(self, vectors: Floats) -> Floats:
@@ -81,13 +66,9 @@ def save_model(model: LinearModel, path: Path) -> None:
         "format": "vdet model",
         "version": FORMAT_VERSION,
         "features": model.features.model_dump(mode="json"),
-        "first_stage": model.first_stage is not None,
         "provenance": model.provenance,
     }
     arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
-    if model.first_stage:
-        arrays["first_weights"] = model.first_stage.weights
-        arrays["first_bias"] = model.first_stage.bias
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
@@ -103,10 +84,7 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         than asked for, or holds a value that is not finite. Nothing in it is ever run.
     """
     header, arrays = _read(path)
-    first = [arrays.pop(name) for name in _FIRST_STAGE_ARRAYS if name in arrays]
-    features, provenance = _features(header, path), header.get("provenance", {})
-    stage = FirstStage(*first) if first else None
-    model = LinearModel(features, **arrays, first_stage=stage, provenance=provenance)
+    model = LinearModel(_features(header, path), **arrays, provenance=header.get("provenance", {}))
     _check_arrays(model, path)
     if features is not None and features != model.features:
         raise ModelError(
@@ -123,8 +101,6 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
                 raise ModelError(f"{path}: is far too large for a model")
             header = _parse_header(_read_array(archive, "header"), path)
             arrays = {name: _read_array(archive, name) for name in _ARRAYS}
-            if header.get("first_stage"):
-                arrays |= {name: _read_array(archive, name) for name in _FIRST_STAGE_ARRAYS}
             return header, arrays
     except ModelError:
         raise
@@ -191,9 +167,6 @@ def _check_arrays(model: LinearModel, path: Path) -> None:
     for name in _ARRAYS[1:]:
         _check_array(getattr(model, name), (members,), name, path)
     _check_array(model.weights, expected, "weights", path)
-    if stage := model.first_stage:
-        _check_array(stage.weights, layout.first_stage.shape, "first_weights", path)
-        _check_array(stage.bias, (1,), "first_bias", path)
 
 
 def _check_array(array: Floats, shape: tuple[int, ...], name: str, path: Path) -> None:

@@ -1,8 +1,9 @@
 """The stream: frames → search → heat → tracker → overlay → writer."""
 
+import os
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -15,10 +16,11 @@ from vdet.files import check_output
 from vdet.model import LinearModel
 from vdet.overlay.drawing import draw_tracks, track_label
 from vdet.overlay.stages import write_stages
+from vdet.stream import ahead, behind, each_with, quiet_libraries
 from vdet.trackfile import check_suffix, track_writer
 from vdet.tracking.cars import Cars
 from vdet.tracking.track import Track
-from vdet.video import Frame, FrameWriter, NullWriter, VideoReader, VideoWriter
+from vdet.video import Frame, FrameWriter, NullWriter, VideoInfo, VideoReader, VideoWriter
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +72,18 @@ def check_job(job: VideoJob, *, overwrite: bool) -> None:
 
 
 def follow(
-    frames: Iterable[Frame], model: LinearModel, settings: Settings, width: int, height: int
+    frames: Iterable[Frame],
+    model: LinearModel,
+    settings: Settings,
+    width: int,
+    height: int,
+    *,
+    threads: int = 1,
 ) -> Iterator[FrameResult]:
     """Find and follow the cars through frames of one size, in order.
+
+    The search of several frames may run in `threads` at once; what follows it, frame by frame,
+    gives the same result whatever their number.
 
     Raises
     ------
@@ -81,22 +92,29 @@ def follow(
     """
     detector = Detector(model, settings, width, height)
     cars = Cars(scale_lengths(settings.tracker, height / settings.reference_height))
-    for frame in frames:
-        detection = detector.accumulate(detector.search(frame.image))
-        tracks = cars.update(frame.image, detection.regions)
-        yield FrameResult(frame, detection, tuple(tracks))
+    with each_with(lambda frame: detector.search(frame.image), frames, threads) as searched:
+        for frame, windows in searched:
+            detection = detector.accumulate(windows)
+            tracks = cars.update(frame.image, detection.regions)
+            yield FrameResult(frame, detection, tuple(tracks))
 
 
 def process_video(
     job: VideoJob,
     model: LinearModel,
     settings: Settings,
+    *,
+    threads: int | None = None,
     progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
 ) -> Summary:
     """Run a job; its outputs appear under their names when all is done.
 
+    Reading, searching, and encoding overlap in threads; tracking and drawing lie between them.
+
     Parameters
     ----------
+    threads
+        Of the search; None for one a core.
     progress
         Called once with the expected number of frames (None: unknown); what it returns is called
         with the number of frames done since the last call.
@@ -110,18 +128,22 @@ def process_video(
     ids: set[int] = set()
     frames = 0
     with ExitStack() as stack:
+        stack.enter_context(quiet_libraries())
         reader = stack.enter_context(
             VideoReader(job.source, start=job.start, end=job.end, frames=job.frames)
         )
         tracks = stack.enter_context(track_writer(job.tracks))
         video = stack.enter_context(_video_writer(job, reader, settings.output))
+        encode = stack.enter_context(behind(video.write))
+        read = stack.enter_context(ahead(reader))
         pictures = _StagePictures(job, reader.info.start, settings, model.features)
         advance = progress(reader.expected)
-        for result in _follow_all(reader, model, settings):
+        results = _follow_all(read, reader.info, model, settings, threads or os.cpu_count() or 1)
+        for result in stack.enter_context(closing(results)):
             pictures.offer(result)
             tracks.write(result.frame, result.tracks)
             draw_tracks(result.frame.image, result.tracks)
-            video.write(result.frame)
+            encode(result.frame)
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
@@ -136,11 +158,10 @@ def _video_writer(job: VideoJob, reader: VideoReader, output: OutputSettings) ->
 
 
 def _follow_all(
-    reader: VideoReader, model: LinearModel, settings: Settings
-) -> Iterator[FrameResult]:
-    info = reader.info
+    frames: Iterator[Frame], info: VideoInfo, model: LinearModel, settings: Settings, threads: int
+) -> Generator[FrameResult]:
     try:
-        yield from follow(reader, model, settings, info.width, info.height)
+        yield from follow(frames, model, settings, info.width, info.height, threads=threads)
     except ImageError as error:
         raise VideoError(f"{info.path}: {error}") from error
 

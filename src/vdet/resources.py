@@ -2,16 +2,31 @@
 
 from pathlib import Path
 
-from vdet.errors import ConfigError
+from vdet.config.schema import FeatureSettings
+from vdet.errors import ConfigError, ModelError
+from vdet.model import load_model
 
 _PACKAGE = Path(__file__).parent
 # In a wheel the configs lie in the package; in a work tree beside `src`.
 _CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
 
 
-def shipped_model() -> Path:
-    """Return the model that is used where none is given."""
-    return _PACKAGE / "models" / "seed.npz"
+def shipped_model(features: FeatureSettings) -> Path:
+    """Return the shipped model that was trained with these features.
+
+    Raises
+    ------
+    ModelError
+        There is none.
+    """
+    models = sorted((_PACKAGE / "models").glob("*.npz"))
+    for path in models:
+        if load_model(path).features == features:
+            return path
+    raise ModelError(
+        "no shipped model was trained with the features in the settings; give --model, or train "
+        "one with these settings"
+    )
 
 
 def find_config(name: str) -> Path:

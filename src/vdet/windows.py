@@ -113,3 +113,15 @@ def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, in
     assert settings.overlap is not None  # one of the two is always given
     step = max(1, int(settings.size * (1 - settings.overlap)))
     return Fraction(step), int(settings.size * settings.overlap)
+
+
+def every_nth(grid: WindowGrid, n: int, across: int, down: int) -> WindowGrid:
+    """Return the grid of every n-th window, from column `across` and row `down` on."""
+    return WindowGrid(
+        grid.size,
+        grid.step * n,
+        grid.left + across * grid.step,
+        grid.top + down * grid.step,
+        len(range(across, grid.columns, n)),
+        len(range(down, grid.rows, n)),
+    )

@@ -28,6 +28,7 @@ from vdet.pipeline import VideoJob, check_job, process_video
 @click.option("--start", type=Time(), help="From this time on: seconds or HH:MM:SS.")
 @click.option("--end", type=Time(), help="Up to this time.")
 @click.option("--frames", type=click.IntRange(min=1), help="At most so many frames.")
+@click.option("--threads", type=click.IntRange(min=1), help="Of the search; else one a core.")
 @click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage …")
 @click.option("--at", type=Time(), help="… of the frame at this time.")
 @model_option
@@ -44,6 +45,7 @@ def detect_video(
     start: Fraction | None,
     end: Fraction | None,
     frames: int | None,
+    threads: int | None,
     stages: Path | None,
     at: Fraction | None,
     model_path: Path | None,
@@ -65,7 +67,7 @@ def detect_video(
     job = VideoJob(source, output, tracks, start, end, frames, stages, at or Fraction(0))
     check_job(job, overwrite=overwrite)
     with progress_bar(" frames", quiet=quiet) as progress:
-        summary = process_video(job, model, loaded.settings, progress)
+        summary = process_video(job, model, loaded.settings, threads=threads, progress=progress)
     if not quiet:
         rate = summary.frames / summary.seconds
         click.echo(

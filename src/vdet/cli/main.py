@@ -9,10 +9,12 @@ from typing import NoReturn
 import click
 
 import vdet
+from vdet.cli.calibrate import calibrate
 from vdet.cli.config import config
 from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
+from vdet.cli.eval import evaluate
 from vdet.cli.logs import set_up_logs
 from vdet.cli.train import train
 from vdet.errors import VdetError
@@ -31,7 +33,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     context.obj = quiet
 
 
-for _command in (train, detect_image, detect_video, config, demo):
+for _command in (train, detect_image, detect_video, calibrate, evaluate, config, demo):
     cli.add_command(_command)
 
 

@@ -59,7 +59,7 @@ def settings_options(command: F) -> F:
         "--config",
         "config_name",
         metavar="FILE",
-        help="YAML settings over the built-in ones: a file, or a shipped one (seed).",
+        help="YAML settings over the built-in ones: a file, or a shipped one (default, seed).",
     )(command)
 
 
@@ -75,13 +75,15 @@ def model_option(command: F) -> F:
         "model_path",
         type=PathOf(),
         metavar="FILE",
-        help="Model from vdet train; without it, the one that ships with vdet.",
+        help="Model from vdet train; else the shipped one that fits the settings.",
     )(command)
 
 
 def read_model(model_path: Path | None, loaded: LoadedSettings) -> LinearModel:
     """Read the model, and check it against the features that were asked for."""
-    return load_model(model_path or shipped_model(), loaded.features)
+    if model_path is None:
+        return load_model(shipped_model(loaded.settings.features))
+    return load_model(model_path, loaded.features)
 
 
 overwrite_option = click.option(

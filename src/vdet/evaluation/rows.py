@@ -63,7 +63,7 @@ def collect(
             raise refusal(path, row.line, complaint)
         lines[key] = row.line
         checked.append(row)
-    return _video(checked, frame_count, rate)
+    return in_memory(checked, frame_count=frame_count, rate=rate)
 
 
 def _complaint(row: Row, frame_count: int | None) -> str | None:
@@ -80,7 +80,10 @@ def _complaint(row: Row, frame_count: int | None) -> str | None:
     return None
 
 
-def _video(rows: list[Row], frame_count: int | None, rate: float | None) -> LabelledVideo:
+def in_memory(
+    rows: Iterable[Row], *, frame_count: int | None = None, rate: float | None = None
+) -> LabelledVideo:
+    """Put rows in order of frame (in one frame, as they come), unchecked."""
     ordered = sorted(rows, key=lambda row: row.frame)
     boxes = [(row.x, row.y, row.width, row.height) for row in ordered]
     return LabelledVideo(

@@ -34,10 +34,9 @@ def line_width(image: Image) -> int:
 
 def draw_box(image: Image, box: Box, color: Color, label: str = "") -> None:
     """Draw an outline just inside `box` and a label above it (inside, at the frame's top)."""
-    width = line_width(image)
-    inset = width // 2
-    corner = (box.right - 1 - inset, box.bottom - 1 - inset)
-    cv2.rectangle(image, (box.x + inset, box.y + inset), corner, color, width)
+    for inset in range(line_width(image)):  # OpenCV's own thick lines are a pixel or two wider
+        corner = (box.right - 1 - inset, box.bottom - 1 - inset)
+        cv2.rectangle(image, (box.x + inset, box.y + inset), corner, color)
     if label:
         draw_label(image, label, (box.x, box.y), color)
 

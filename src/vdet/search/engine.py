@@ -12,7 +12,10 @@ from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.dense import dense_search, why_not_dense
 from vdet.search.patch import PatchSearch
+from vdet.search.pyramid import FramePyramid
 from vdet.windows import Floats, WindowGrid, Windows, lay_grid
+
+_ROW_MULTIPLE = 16  # so that the pyramid's levels begin at whole pixels
 
 log = logging.getLogger("vdet")
 
@@ -20,8 +23,8 @@ log = logging.getLogger("vdet")
 class GridSearch(Protocol):
     """Scores the windows of one grid."""
 
-    def search(self, image: Image) -> Floats:
-        """Return each window's probability, float32 `(n,)`, in a frame, BGR uint8 `(H, W, 3)`."""
+    def search(self, frame: FramePyramid) -> Floats:
+        """Return each window's probability, float32 `(n,)`."""
 
 
 class FrameSearch:
@@ -48,19 +51,20 @@ class FrameSearch:
                 "give a larger one, or other search.windows"
             )
         dense = _is_dense(settings.search, model.features)
-        cascade = settings.search.cascade
         self._searches: list[GridSearch] = [
-            dense_search(model, grid, cascade=cascade) if dense else PatchSearch(model, grid)
-            for grid in grids
+            dense_search(model, grid) if dense else PatchSearch(model, grid) for grid in grids
         ]
         self._boxes = np.concatenate([grid.boxes for grid in grids])
+        top, bottom = self._boxes[:, 1].min(), (self._boxes[:, 1] + self._boxes[:, 3]).max()
+        self._rows = int(top) // _ROW_MULTIPLE * _ROW_MULTIPLE, int(bottom)
         self._shares = np.repeat(
             np.array([grid.share for grid in grids], np.float32), [len(grid) for grid in grids]
         )
 
     def search(self, image: Image) -> Windows:
         """Score every window of a frame, BGR uint8 `(H, W, 3)`; may be called from threads."""
-        probabilities = np.concatenate([search.search(image) for search in self._searches])
+        frame = FramePyramid(image, *self._rows)
+        probabilities = np.concatenate([search.search(frame) for search in self._searches])
         return Windows(self._boxes, probabilities, self._shares)
 
 

@@ -6,8 +6,8 @@ Slow and plain; faster engines are held to what it gives. Source: seed section 2
 import numpy as np
 
 from vdet.features import FeatureExtractor, to_patch
-from vdet.images import Image
 from vdet.model import LinearModel
+from vdet.search.pyramid import FramePyramid
 from vdet.windows import Floats, WindowGrid
 
 
@@ -19,11 +19,11 @@ class PatchSearch:
         self._boxes = grid.boxes
         self._extractor = FeatureExtractor(model.features)
 
-    def search(self, image: Image) -> Floats:
-        """Return each window's probability, float32 `(n,)`, in a frame, BGR uint8 `(H, W, 3)`."""
+    def search(self, frame: FramePyramid) -> Floats:
+        """Return each window's probability, float32 `(n,)`."""
         side = self._model.features.patch
         vectors = np.empty((len(self._boxes), self._extractor.layout.length), np.float32)
         for i, (x, y, width, height) in enumerate(self._boxes.tolist()):
-            crop = image[y : y + height, x : x + width]
+            crop = frame.image[y : y + height, x : x + width]
             vectors[i] = self._extractor.describe(to_patch(crop, side))
         return self._model.probabilities(vectors)

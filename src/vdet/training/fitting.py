@@ -2,7 +2,6 @@
 
 import logging
 import warnings
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ from vdet.config.schema import FeatureSettings, TrainingSettings
 from vdet.errors import DataError
 from vdet.features import Vectors
 from vdet.model import LinearModel
-from vdet.training.first_stage import fit_first_stage
 
 log = logging.getLogger("vdet")
 
@@ -64,8 +62,7 @@ def fit(
         calibrated.fit(scaled, vehicle)
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
-    model = _to_model(calibrated.calibrated_classifiers_, scaler, features)
-    return replace(model, first_stage=fit_first_stage(vectors, vehicle, features, settings))
+    return _to_model(calibrated.calibrated_classifiers_, scaler, features)
 
 
 def _to_model(members: list[Any], scaler: Any, features: FeatureSettings) -> LinearModel:

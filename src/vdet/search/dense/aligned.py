@@ -1,63 +1,55 @@
-"""Search of a grid whose windows step by whole cells: they share their blocks."""
+"""Search of grids whose windows step by whole cells, all or every n-th: they share their blocks."""
 
 import numpy as np
 
-from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.dense.histogram import table_sums
 from vdet.search.dense.hog import describe_blocks, window_sums
-from vdet.search.dense.strips import Strip, channel_of, spans
+from vdet.search.dense.strips import Strip
 from vdet.search.dense.weights import DenseWeights
-from vdet.windows import Floats, WindowGrid
+from vdet.search.pyramid import FramePyramid
+from vdet.windows import Floats, WindowGrid, every_nth
 
 
 class AlignedSearch:
-    """Scores a grid that steps by `cells` cells, across and down."""
+    """Scores a grid that steps by whole cells, across and down."""
 
-    def __init__(
-        self, model: LinearModel, weights: DenseWeights, grid: WindowGrid, cells: int
-    ) -> None:
+    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._weights = weights
-        self._grid = grid
-        self._cells = cells
+        self._weights = DenseWeights.of(model)
         self._strip = Strip(grid, model.features)
-        step = cells * model.features.hog.cell
-        self._x = np.arange(grid.columns)[:, np.newaxis] * step
-        self._y = np.arange(grid.rows)[np.newaxis] * step
+        cell = model.features.hog.cell
+        self._cells = int(grid.step * model.features.patch / grid.size / cell)
+        self._x = np.arange(grid.columns)[:, np.newaxis] * self._cells * cell
+        self._y = np.arange(grid.rows)[np.newaxis] * self._cells * cell
 
-    def search(self, image: Image) -> Floats:
-        """Return each window's probability, float32 `(n,)`, in a frame, BGR uint8 `(H, W, 3)`.
-
-        It is 0 for a window that the first stage has dropped.
-        """
-        strip = self._strip.cut(image)
-        patch = self._model.features.patch
-        scores = table_sums(strip, self._weights.tables, patch, self._x, self._y)
-        scores += self._weights.biases[:, np.newaxis, np.newaxis]
-        self._add_hog(scores, strip, 0, 0, self._grid.columns)
-        possible = np.ones(scores.shape[1:], bool)
-        if self._weights.has_first_stage:
-            possible = scores[-1] >= 0
-        members = scores[: self._weights.members]
-        reach = patch // self._model.features.hog.cell // self._cells
-        for start, stop in spans(np.any(possible, axis=1), reach):
-            for number in range(1, len(self._weights.hog)):
-                self._add_hog(members, strip, number, start, stop)
-        probabilities = np.zeros(possible.shape, np.float32)
-        probabilities[possible] = self._model.probabilities_of_scores(members[:, possible].T)
-        return probabilities.T.ravel()
-
-    def _add_hog(self, scores: Floats, strip: Image, number: int, start: int, stop: int) -> None:
-        """Add a channel's part to the scores `(m, columns, rows)` of some columns of windows."""
+    def search(self, frame: FramePyramid) -> Floats:
+        """Return each window's probability, float32 `(n,)`."""
         features = self._model.features
-        cell = features.hog.cell
-        # A cell more on each side: gradients at the cut are then those of the whole strip.
-        left = max(0, int(self._x[start, 0]) - cell)
-        right = int(self._x[stop - 1, 0]) + features.patch + cell
-        channel = channel_of(strip, features.hog.channels[number], left, right)
-        weights = self._weights.hog[number][: len(scores)]
-        sums = window_sums(describe_blocks(channel, features), weights)
-        first = (int(self._x[start, 0]) - left) // cell
-        columns = slice(first, first + (stop - start - 1) * self._cells + 1, self._cells)
-        scores[:, start:stop] += sums[:, columns, :: self._cells]
+        strip = self._strip.cut(frame)
+        every_block = window_sums(describe_blocks(strip, features), self._weights.hog)
+        scores = every_block[:, :: self._cells, :: self._cells]
+        scores = scores + table_sums(strip, self._weights.tables, features.patch, self._x, self._y)
+        by_row = scores.transpose(2, 1, 0).reshape(-1, len(scores))
+        return self._model.probabilities_of_scores(by_row + self._model.biases)
+
+
+class PhasedSearch:
+    """Scores a grid of which every n-th window steps by whole cells, as n² aligned grids."""
+
+    def __init__(self, model: LinearModel, grid: WindowGrid, every: int) -> None:
+        self._shape = (grid.rows, grid.columns)
+        self._every = every
+        self._parts = {
+            (down, across): AlignedSearch(model, every_nth(grid, every, across, down))
+            for down in range(min(every, grid.rows))
+            for across in range(min(every, grid.columns))
+        }
+
+    def search(self, frame: FramePyramid) -> Floats:
+        """Return each window's probability, float32 `(n,)`."""
+        probabilities = np.zeros(self._shape, np.float32)
+        for (down, across), part in self._parts.items():
+            place = probabilities[down :: self._every, across :: self._every]
+            place[:] = part.search(frame).reshape(place.shape)
+        return probabilities.ravel()

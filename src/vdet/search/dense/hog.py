@@ -13,23 +13,32 @@ from vdet.images import Image
 from vdet.windows import Floats
 
 
-def describe_blocks(channel: Image, features: FeatureSettings) -> Vectors:
+def describe_blocks(strip: Image, features: FeatureSettings) -> Vectors:
     """Describe every block of a strip.
 
     Parameters
     ----------
-    channel
-        uint8 `(h, w)`, both whole numbers of cells.
+    strip
+        uint8 `(h, w, 3)` in the features' colour space; both sides whole numbers of cells.
 
     Returns
     -------
-    float32 `(columns, rows, block features)`.
+    float32 `(columns, rows, d)`, d the block's features channel by channel.
     """
-    height, width = channel.shape
+    height, width = strip.shape[:2]
     hog = features.hog
-    vector = hog_descriptor(features, (width, height)).compute(channel)
     columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
-    return np.reshape(np.asarray(vector, np.float32), (columns, rows, -1))
+    descriptor = hog_descriptor(features, (width, height))
+    blocks = [
+        np.reshape(descriptor.compute(channel_of(strip, number)), (columns, rows, -1))
+        for number in hog.channels
+    ]
+    return np.concatenate(blocks, axis=-1, dtype=np.float32)
+
+
+def channel_of(strip: Image, number: int) -> Image:
+    """Return one channel of a strip, contiguous `(h, w)`, as the descriptor needs it."""
+    return np.ascontiguousarray(strip[:, :, number])
 
 
 def window_sums(blocks: Vectors, weights: Floats) -> Floats:
@@ -46,20 +55,20 @@ def window_sums(blocks: Vectors, weights: Floats) -> Floats:
     -------
     float32 `(m, columns - b + 1, rows - b + 1)`.
 
-    One matrix product gives every block's product with every weight slice: b² planes a score. A
+    One matrix product gives every block's product with every weight slice: b² planes a member. A
     window's sum runs over the planes, each shifted by its own block position; with the planes laid
     flat, the shifts are constant strides.
     """
     columns, rows, length = blocks.shape
-    scores, side = weights.shape[:2]
+    members, side = weights.shape[:2]
     planes = weights.reshape(-1, length) @ blocks.reshape(-1, length).T
     plane, item = columns * rows, planes.itemsize
     wide, high = columns - side + 1, rows - side + 1
     flat = (wide - 1) * rows + high
     strides = (side * side * plane, side * plane + rows, plane + 1, 1)
     shifted = as_strided(
-        planes, (scores, side, side, flat), [item * stride for stride in strides], writeable=False
+        planes, (members, side, side, flat), [item * stride for stride in strides], writeable=False
     )
-    sums = np.zeros((scores, wide * rows), np.float32)
+    sums = np.zeros((members, wide * rows), np.float32)
     np.sum(shifted, axis=(1, 2), out=sums[:, :flat])
-    return sums.reshape(scores, wide, rows)[:, :, :high]
+    return sums.reshape(members, wide, rows)[:, :, :high]

@@ -11,13 +11,15 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from vdet.features import hog_descriptor
+from vdet.features import Vectors, hog_descriptor
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.dense.histogram import table_sums
-from vdet.search.dense.strips import Strip, channel_of
+from vdet.search.dense.hog import channel_of
+from vdet.search.dense.strips import Strip
 from vdet.search.dense.weights import DenseWeights
-from vdet.windows import Floats, WindowGrid
+from vdet.search.pyramid import FramePyramid
+from vdet.windows import Floats, WindowGrid, every_nth
 
 Indices = npt.NDArray[np.intp]
 
@@ -35,52 +37,38 @@ class _Phase:
 class LocatedSearch:
     """Scores a grid of any step."""
 
-    def __init__(self, model: LinearModel, weights: DenseWeights, grid: WindowGrid) -> None:
+    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._weights = weights
+        self._tables = DenseWeights.of(model).tables
         self._windows = len(grid)
         self._phases = list(_phases(grid, model))
         side = model.features.patch
         self._hog = hog_descriptor(model.features, (side, side))
 
-    def search(self, image: Image) -> Floats:
-        """Return each window's probability, float32 `(n,)`, in a frame, BGR uint8 `(H, W, 3)`.
-
-        It is 0 for a window that the first stage has dropped.
-        """
+    def search(self, frame: FramePyramid) -> Floats:
+        """Return each window's probability, float32 `(n,)`."""
         probabilities = np.zeros(self._windows, np.float32)
         for phase in self._phases:
-            probabilities[phase.numbers] = self._search_phase(phase, image)
+            strip = phase.strip.cut(frame)
+            vectors = self._describe(strip, phase)
+            scores = vectors @ self._model.weights[:, : vectors.shape[1]].T + self._model.biases
+            side = self._model.features.patch
+            scores += table_sums(strip, self._tables, side, phase.x, phase.y).T
+            probabilities[phase.numbers] = self._model.probabilities_of_scores(scores)
         return probabilities
 
-    def _search_phase(self, phase: _Phase, image: Image) -> Floats:
-        strip = phase.strip.cut(image)
-        side = self._model.features.patch
-        scores = table_sums(strip, self._weights.tables, side, phase.x, phase.y)
-        scores += self._weights.biases[:, np.newaxis]
-        everyone = np.arange(len(phase.numbers))
-        self._add_hog(scores, strip, 0, phase, everyone)
-        possible = everyone
-        if self._weights.has_first_stage:
-            possible = np.nonzero(scores[-1] >= 0)[0]
-        members = scores[: self._weights.members]
-        for number in range(1, len(self._weights.hog)):
-            self._add_hog(members, strip, number, phase, possible)
-        probabilities = np.zeros(len(everyone), np.float32)
-        probabilities[possible] = self._model.probabilities_of_scores(members[:, possible].T)
-        return probabilities
-
-    def _add_hog(
-        self, scores: Floats, strip: Image, number: int, phase: _Phase, wanted: Indices
-    ) -> None:
-        """Add a channel's part to the scores `(m, n)` of the wanted windows."""
-        if not len(wanted):
-            return
-        channel = channel_of(strip, self._model.features.hog.channels[number])
-        locations = list(zip(phase.x[wanted].tolist(), phase.y[wanted].tolist(), strict=True))
-        vectors = np.asarray(self._hog.compute(channel, locations=locations), np.float32)
-        weights = self._weights.hog[number][: len(scores)].reshape(len(scores), -1)
-        scores[:, wanted] += weights @ vectors.reshape(len(wanted), -1).T
+    def _describe(self, strip: Image, phase: _Phase) -> Vectors:
+        """Return the HOG of each window, float32 `(n, features)`, channel by channel."""
+        locations = list(zip(phase.x.tolist(), phase.y.tolist(), strict=True))
+        described = [
+            self._hog.compute(channel_of(strip, number), locations=locations)
+            for number in self._model.features.hog.channels
+        ]
+        return np.concatenate(
+            [np.reshape(vectors, (len(locations), -1)) for vectors in described],
+            axis=1,
+            dtype=np.float32,
+        )
 
 
 def _phases(grid: WindowGrid, model: LinearModel) -> Iterator[_Phase]:
@@ -94,15 +82,3 @@ def _phases(grid: WindowGrid, model: LinearModel) -> Iterator[_Phase]:
             row, column = np.divmod(np.arange(len(part)), part.columns)
             numbers = (row * every + down) * grid.columns + column * every + across
             yield _Phase(Strip(part, model.features), numbers, column * pixels, row * pixels)
-
-
-def every_nth(grid: WindowGrid, n: int, across: int, down: int) -> WindowGrid:
-    """Return the grid of every n-th window, from column `across` and row `down` on."""
-    return WindowGrid(
-        grid.size,
-        grid.step * n,
-        grid.left + across * grid.step,
-        grid.top + down * grid.step,
-        len(range(across, grid.columns, n)),
-        len(range(down, grid.rows, n)),
-    )

@@ -2,12 +2,10 @@
 
 from fractions import Fraction
 
-import numpy as np
-import numpy.typing as npt
-
 from vdet.config.schema import FeatureSettings
-from vdet.features import convert, resize
+from vdet.features import convert
 from vdet.images import Image
+from vdet.search.pyramid import FramePyramid
 from vdet.windows import WindowGrid
 
 
@@ -20,13 +18,13 @@ class Strip:
 
     def __init__(self, grid: WindowGrid, features: FeatureSettings) -> None:
         self._features = features
-        self._columns, self.width = _extent(grid, features, grid.left, grid.columns)
-        self._rows, self.height = _extent(grid, features, grid.top, grid.rows)
+        self._columns, self._width = _extent(grid, features, grid.left, grid.columns)
+        self._rows, self._height = _extent(grid, features, grid.top, grid.rows)
 
-    def cut(self, image: Image) -> Image:
-        """Return the strip of a frame, BGR uint8, in the features' colour space, `(h, w, 3)`."""
-        part = image[self._rows, self._columns]
-        return convert(resize(part, self.width, self.height), self._features)
+    def cut(self, frame: FramePyramid) -> Image:
+        """Return the strip of a frame in the features' colour space, uint8 `(h, w, 3)`."""
+        strip = frame.cut(self._rows, self._columns, self._width, self._height)
+        return convert(strip, self._features)
 
 
 def _extent(
@@ -35,22 +33,3 @@ def _extent(
     span = (count - 1) * grid.step + grid.size
     start = round(first)
     return slice(start, start + round(span)), round(span * features.patch / grid.size)
-
-
-def channel_of(strip: Image, number: int, start: int = 0, stop: int | None = None) -> Image:
-    """Return one channel of a strip's columns `start` to `stop`, contiguous `(h, w)`."""
-    return np.ascontiguousarray(strip[:, start:stop, number])
-
-
-def spans(columns: npt.NDArray[np.bool_], reach: int) -> list[tuple[int, int]]:
-    """Return the runs of true columns as (first, one beyond last).
-
-    Runs are joined where fewer than `reach` false columns part them.
-    """
-    (wanted,) = np.nonzero(columns)
-    if not len(wanted):
-        return []
-    breaks = np.nonzero(np.diff(wanted) > reach)[0]
-    firsts = wanted[np.concatenate([[0], breaks + 1])]
-    lasts = wanted[np.concatenate([breaks, [len(wanted) - 1]])]
-    return [(int(first), int(last) + 1) for first, last in zip(firsts, lasts, strict=True)]

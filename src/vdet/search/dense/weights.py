@@ -12,39 +12,23 @@ from vdet.windows import Floats
 
 @dataclass(frozen=True, slots=True)
 class DenseWeights:
-    """Weights of `m` linear scores: the model's members, then its first stage if it has one.
+    """The weights of a model's `m` members.
 
-    `hog` has one float32 array `(m, blocks, blocks, block features)` a described channel, blocks
-    by column and row; the first stage's part is zero beyond the first channel. `tables` is float32
-    `(m, 256, 3)`: what a pixel of each value adds, channel by channel. `biases` is `(m,)`.
+    `hog` is float32 `(m, blocks, blocks, d)`, blocks by column and row, `d` the features of a block
+    in all described channels, one after the other. `tables` is float32 `(m, 256, 3)`: what a pixel
+    of each value adds, channel by channel.
     """
 
-    hog: tuple[Floats, ...]
+    hog: Floats
     tables: Floats
-    biases: Floats
-    members: int
 
     @staticmethod
-    def of(model: LinearModel, *, cascade: bool) -> "DenseWeights":
-        """Sort a model's weights; without `cascade` its first stage is left out."""
-        layout = Layout.of(model.features)
-        weights, biases = model.weights, model.biases
-        if cascade and model.first_stage:
-            row = np.zeros((1, layout.length), np.float32)
-            row[0, layout.first_stage] = model.first_stage.weights
-            weights = np.concatenate([weights, row])
-            biases = np.concatenate([biases, model.first_stage.bias])
-        return DenseWeights(
-            tuple(_blocks(weights[:, part], model.features) for part in layout.hog),
-            _tables(weights[:, layout.histogram], model.features.histogram.bins),
-            biases,
-            len(model.biases),
-        )
-
-    @property
-    def has_first_stage(self) -> bool:
-        """Whether the last score is the first stage's."""
-        return len(self.biases) > self.members
+    def of(model: LinearModel) -> "DenseWeights":
+        """Sort a model's weights."""
+        layout, features = Layout.of(model.features), model.features
+        hog = [_blocks(model.weights[:, part], features) for part in layout.hog]
+        tables = _tables(model.weights[:, layout.histogram], features.histogram.bins)
+        return DenseWeights(np.concatenate(hog, axis=-1), tables)
 
 
 def _blocks(weights: Floats, features: FeatureSettings) -> Floats:

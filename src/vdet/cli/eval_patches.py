@@ -1,0 +1,71 @@
+"""`vdet eval patches`: how well the classifier works."""
+
+from pathlib import Path
+
+import click
+
+from vdet.cli.eval_options import give_results, results_options
+from vdet.cli.options import PathOf, read_settings, settings_options
+from vdet.cli.progress import progress_bar
+from vdet.dataset import find_patches
+from vdet.evaluation.output import check_outputs
+from vdet.model import load_model
+
+
+@click.command()
+@click.argument("data", nargs=-1, required=True, type=PathOf(), metavar="DATA...")
+@click.option(
+    "--model",
+    "model_path",
+    type=PathOf(),
+    metavar="FILE",
+    help="Test this model on all of DATA; without it, models are trained afresh for each split.",
+)
+@click.option(
+    "--split",
+    "splits",
+    multiple=True,
+    type=click.Choice(("random", "tail", "groups")),
+    help="Only this split; may be given often. groups: leave one group out.",
+)
+@settings_options
+@click.option("--jobs", default=-1, show_default=True, help="Processes; -1 for one a core.")
+@results_options
+@click.pass_obj
+def patches(
+    quiet: bool,
+    *,
+    data: tuple[Path, ...],
+    model_path: Path | None,
+    splits: tuple[str, ...],
+    config_name: str | None,
+    assignments: tuple[str, ...],
+    jobs: int,
+    json_target: str | None,
+    report: Path | None,
+    overwrite: bool,
+) -> None:
+    """Measure the classifier on DATA: folders or zip files of labelled patches."""
+    from vdet.evaluation.patches import SPLITS, evaluate_model, evaluate_splits
+    from vdet.evaluation.patches.text import lines, plain
+    from vdet.evaluation.report.patch_page import patch_page
+
+    if model_path is not None and splits:
+        raise click.UsageError("--split trains afresh; leave it out, or --model")
+    loaded = read_settings(config_name, assignments)
+    model = load_model(model_path, loaded.features) if model_path else None
+    check_outputs(json_target, report, overwrite=overwrite)
+    files = find_patches(data)
+    with progress_bar("", quiet=quiet) as progress:
+        if model is None:
+            chosen = [split for split in SPLITS if split in (splits or SPLITS)]
+            result = evaluate_splits(files, loaded.settings, chosen, jobs=jobs, progress=progress)
+        else:
+            result = evaluate_model(files, model, loaded.settings, jobs=jobs, progress=progress)
+    give_results(
+        lines(result),
+        plain(result),
+        lambda: patch_page(result),
+        json_target=json_target,
+        report=report,
+    )

@@ -1,0 +1,1 @@
+"""Detection run on labelled videos, under one or many settings, and scored."""

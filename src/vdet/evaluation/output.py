@@ -1,0 +1,61 @@
+"""Where results go: JSON to a file or standard output, a report into a folder."""
+
+import importlib
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vdet.errors import OutputError
+from vdet.files import check_output, replacing
+
+PAGE = "report.html"
+
+
+def check_outputs(json_target: str | None, report: Path | None, *, overwrite: bool) -> None:
+    """Refuse, before any work, what could not be written; the folder of a report is made.
+
+    Raises
+    ------
+    OutputError
+        A file is there already (and not `overwrite`) or cannot be written; matplotlib, which
+        draws the report, is not installed.
+    """
+    if json_target not in (None, "-"):
+        check_output(Path(json_target), overwrite=overwrite)
+    if report is not None:
+        _check_matplotlib()
+        _make_folder(report)
+        check_output(report / PAGE, overwrite=overwrite)
+
+
+def write_json(values: Mapping[str, Any], target: str) -> None:
+    """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
+    text = json.dumps(values, indent=2, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    with replacing(Path(target)) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_page(html: str, folder: Path) -> Path:
+    """Write a report into its folder and return the file. Raises `OutputError`."""
+    with replacing(folder / PAGE) as temporary:
+        temporary.write_text(html, encoding="utf-8")
+    return folder / PAGE
+
+
+def _check_matplotlib() -> None:
+    try:
+        importlib.import_module("matplotlib")
+    except ImportError as error:
+        raise OutputError('--report needs matplotlib; pip install "vdet[report]"') from error
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error

@@ -1,0 +1,52 @@
+"""`vdet eval patches`."""
+
+import json
+from pathlib import Path
+
+from conftest import Run
+
+QUICK = ("--set", "training.C=0.001", "--jobs", "1")
+
+
+def test_trains_afresh_for_a_split(run: Run, patches_path: Path, tmp_path: Path) -> None:
+    target, folder = tmp_path / "p.json", tmp_path / "report"
+    options = ("--split", "tail", "--json", target, "--report", folder)
+    result = run("eval", "patches", patches_path, *options, *QUICK)
+    assert result.code == 0, result.err
+    for words in ("300 vehicles, 300 non-vehicles", "leak-free", "calibration error", "["):
+        assert words in result.out
+    (trial,) = json.loads(target.read_text())["trials"]
+    assert (trial["name"], trial["scores"]["patches"]) == ("tail", 120)
+    assert trial["scores"]["accuracy"] > 0.9
+    html = (folder / "report.html").read_text()
+    for words in ("Curves", "Accuracy by group", "Worst mistakes: tail", "data:image/svg+xml"):
+        assert words in html
+
+
+def test_measures_a_ready_model_on_everything(
+    run: Run, patches_path: Path, model_path: Path
+) -> None:
+    options = ("--model", model_path, "--json", "-", "--jobs", "1")
+    result = run("eval", "patches", patches_path, *options)
+    assert result.code == 0, result.err
+    (trial,) = json.loads(result.out)["trials"]
+    assert trial["scores"]["patches"] == 600
+    assert "was trained on most of these very patches" in trial["meaning"]
+    assert "ROC AUC" in result.err, "the table makes room on standard output"
+
+
+def test_a_model_and_a_split_exclude_each_other(
+    run: Run, patches_path: Path, model_path: Path
+) -> None:
+    result = run("eval", "patches", patches_path, "--model", model_path, "--split", "tail")
+    assert result.code == 2
+    assert "--split trains afresh" in result.err
+
+
+def test_earlier_numbers_are_kept(run: Run, patches_path: Path, tmp_path: Path) -> None:
+    target = tmp_path / "p.json"
+    target.write_text("precious")
+    result = run("eval", "patches", patches_path, "--json", target)
+    assert result.code == 1
+    assert "is there already; give --overwrite" in result.err
+    assert target.read_text() == "precious"

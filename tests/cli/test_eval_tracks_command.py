@@ -1,0 +1,80 @@
+"""`vdet eval tracks`."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+
+
+def write(path: Path, frames: range, ending: str) -> Path:
+    path.write_text("".join(f"{frame},1,1,1,100,100,{ending}\n" for frame in frames))
+    return path
+
+
+@pytest.fixture
+def found(tmp_path: Path) -> Path:
+    return write(tmp_path / "found.txt", range(3, 13), "1,-1,-1,-1")
+
+
+@pytest.fixture
+def truth(tmp_path: Path) -> Path:
+    return write(tmp_path / "gt.txt", range(1, 11), "1,3,1")
+
+
+def test_prints_a_table(run: Run, found: Path, truth: Path) -> None:
+    result = run("eval", "tracks", found, truth, "--until", "10", "--rate", "25")
+    assert (result.code, result.err) == (0, "")
+    assert "8 found, 2 missed, 0 false alarms" in result.out
+    assert "vehicle 1 missed" in result.out
+
+
+def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
+    result = run("eval", "tracks", found, truth, "--until", "10", "--json", "-")
+    values = json.loads(result.out)
+    assert values["precision"] == 1
+    assert values["recall"] == 0.8
+    keys = "f1 ap50 ap50_95 mean_iou mota motp idf1 hota deta assa id_switches fragmentations"
+    assert set(keys.split()) <= set(values)
+    assert values["losses"][0]["last"] == 2
+
+
+def test_boxes_beyond_the_truth_are_warned_of(run: Run, found: Path, truth: Path) -> None:
+    result = run("eval", "tracks", found, truth)
+    assert result.code == 0
+    assert result.err.count("\n") == 1
+    assert "count" in result.err
+    assert "--until 10" in result.err
+
+
+def test_writes_a_report(run: Run, found: Path, truth: Path, tmp_path: Path) -> None:
+    result = run("eval", "tracks", found, truth, "--report", tmp_path / "report")
+    assert result.code == 0, result.err
+    html = (tmp_path / "report" / "report.html").read_text()
+    for words in ("Vehicle by vehicle", "Largest losses", "vehicle 1 missed", "data:image/svg+xml"):
+        assert words in html
+
+
+def test_without_matplotlib_a_report_is_an_error_of_one_line(
+    run: Run, found: Path, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    result = run("eval", "tracks", found, truth, "--report", tmp_path / "report")
+    assert (result.code, result.out) == (1, "")
+    assert result.err == 'vdet: --report needs matplotlib; pip install "vdet[report]"\n'
+
+
+def test_bad_truth_is_an_error_of_one_line(run: Run, found: Path, tmp_path: Path) -> None:
+    bad = tmp_path / "bad.txt"
+    bad.write_text("1,1,1,1,100,100,1,3,1\n1,1,1\n")
+    result = run("eval", "tracks", found, bad)
+    assert (result.code, result.out) == (1, "")
+    assert result.err.startswith(f"vdet: {bad}:2: ")
+    assert result.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("option", [("--until", "0"), ("--rate", "0")])
+def test_wrong_usage(run: Run, found: Path, truth: Path, option: tuple[str, str]) -> None:
+    assert run("eval", "tracks", found, truth, *option).code == 2

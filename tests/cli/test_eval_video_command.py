@@ -1,0 +1,92 @@
+"""`vdet eval video`."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from vdet.synthetic.clip import write_truth
+from vdet.synthetic.scene import Scene
+
+# Fewer windows than the seed's, and cars shown sooner: the tests need not be slow.
+QUICK = (
+    "--set", "search.windows=[{size: 96, overlap: 0.75, top: 380, bottom: 572}]",
+    "--set", "tracker.confident_detections_needed=2",
+)  # fmt: skip
+
+
+@pytest.fixture
+def truth_path(scene: Scene, tmp_path: Path) -> Path:
+    path = tmp_path / "gt.txt"
+    write_truth(path, replace(scene, frames=8))
+    return path
+
+
+def test_scores_agree_with_those_of_the_tracks_written(
+    run: Run, clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    tracks, folder = tmp_path / "found.jsonl", tmp_path / "report"
+    common = ("--model", model_path, *QUICK)
+    made = run(
+        "detect-video", clip_path, "--no-video", "--tracks", tracks, "--frames", "8", *common
+    )
+    assert made.code == 0, made.err
+    options = ("--truth", truth_path, "--json", "-", "--report", folder)
+    from_video = run("eval", "video", clip_path, *options, *common)
+    assert from_video.code == 0, from_video.err
+    total = json.loads(from_video.out)["total"]
+    again = run("eval", "tracks", tracks, truth_path, "--rate", "25", "--json", "-")
+    from_tracks = json.loads(again.out)
+    assert total["track_boxes"] > 0, "nothing was found: the test would say nothing"
+    assert {key: from_tracks[key] for key in total} == total
+    assert "data:image/jpeg" in (folder / "report.html").read_text()
+
+
+def test_several_videos_and_a_sweep(
+    run: Run, clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    videos = (clip_path, clip_path, "--truth", truth_path, "--truth", truth_path, "--until", "4")
+    sweeps = ("--sweep", "heat.threshold=1,5000", "--sweep", "tracker.history=5,10")
+    target, folder = tmp_path / "s.json", tmp_path / "report"
+    results = ("--json", target, "--report", folder)
+    result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK)
+    assert result.code == 0, result.err
+    runs = json.loads(target.read_text())["sweep"]
+    assert [each["settings"]["heat.threshold"] for each in runs] == ["1", "1", "5000", "5000"]
+    assert [len(each["videos"]) for each in runs] == [2] * 4
+    assert runs[2]["total"]["track_boxes"] == 0, "nothing is as hot as that"
+    assert "heat.threshold=5000 tracker.history=10" in result.out
+    assert "best F1: " in result.out
+    assert "Settings compared" in (folder / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "Missing option '--truth'"),
+        (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "1 videos, 2 --truth"),
+        (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
+        (("--truth", "gt.txt", "--sweep", "heat.threshold"), 1, "expected KEY=VALUE,VALUE"),
+        (("--truth", "gt.txt", "--sweep", "heat.treshold=1,2"), 1, "did you mean threshold?"),
+        (("--truth", "gt.txt", "--sweep", "features.hog.cell=8,16"), 1, "other features"),
+    ],
+)
+def test_what_cannot_be_is_said_before_any_work(
+    run: Run, clip_path: Path, truth_path: Path, arguments: tuple[str, ...], code: int, words: str
+) -> None:
+    named = [str(truth_path.with_name(a)) if a.endswith(".txt") else a for a in arguments]
+    result = run("eval", "video", clip_path, *named)
+    assert (result.code, result.out) == (code, "")
+    assert words in result.err
+
+
+def test_truth_of_a_longer_video(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    truth = tmp_path / "long.txt"
+    truth.write_text("40,1,10,10,50,50,1,3,1\n")
+    result = run("eval", "video", clip_path, "--truth", truth, "--model", model_path, *QUICK)
+    assert result.code == 1
+    assert "long.txt:1: the frame is number 40 of a video of 30" in result.err

@@ -1,0 +1,67 @@
+"""A world as plain as can be: cars are red rectangles on grey, and the model is sure of red."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+
+from vdet.config.schema import (
+    FeatureSettings,
+    HeatSettings,
+    HistogramSettings,
+    HogSettings,
+    SearchSettings,
+    Settings,
+    TrackerSettings,
+    WindowSettings,
+)
+from vdet.geometry import Box
+from vdet.images import Image
+from vdet.model import LinearModel
+from vdet.video import Frame
+
+WIDTH, HEIGHT = 320, 240
+CAR = Box(96, 120, 64, 48)
+BINS = 8
+COLOUR = FeatureSettings(
+    color_space="RGB", hog=HogSettings(channels=()), histogram=HistogramSettings(bins=BINS)
+)
+SETTINGS = Settings(
+    reference_height=HEIGHT,
+    features=COLOUR,
+    search=SearchSettings(windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),)),
+    heat=HeatSettings(frames=2, blur=5, threshold=1.4),
+    tracker=TrackerSettings(min_region=30),
+)
+
+
+def red_finder() -> LinearModel:
+    """Give a model that is sure of a window where 44 % of the pixels are bright red."""
+    weights = np.zeros((1, 3 * BINS), np.float32)
+    weights[0, BINS - 1] = 1 / COLOUR.patch**2
+    return LinearModel(
+        COLOUR,
+        weights,
+        biases=np.array([-0.44], np.float32),
+        slopes=np.array([-20], np.float32),
+        offsets=np.zeros(1, np.float32),
+    )
+
+
+def road(*boxes: Box) -> Image:
+    """Draw red cars on a grey road."""
+    image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    for box in boxes:
+        image[box.y : box.bottom, box.x : box.right] = (0, 0, 255)
+    return image
+
+
+def car_at(index: int) -> Box:
+    """Tell where the car of `drive` is: it goes to the right, a pixel a frame."""
+    return CAR.moved_to(40 + index, CAR.y)
+
+
+def drive(count: int) -> Iterator[Frame]:
+    """Give frames of a car that drives from left to right, 25 a second."""
+    for index in range(count):
+        yield Frame(index, Fraction(index, 25), road(car_at(index)))

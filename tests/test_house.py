@@ -1,0 +1,154 @@
+"""The house rules that a machine can check: who imports whom, how long, how quick to start."""
+
+import ast
+import graphlib
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src" / "vdet"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+LONGEST = 250
+
+ROOMS = (
+    "cli", "demo", "evaluation", "pipeline", "stills", "trackfile", "overlay", "detection",
+    "training", "tracking", "heatmap", "search", "lanes", "model", "features", "windows",
+    "dataset", "synthetic", "video", "resources", "images", "files", "geometry", "config",
+    "errors", "__init__",
+)  # fmt: skip
+"""From top to bottom: a room imports only what stands below it."""
+
+TEXTS = sorted(
+    path
+    for pattern in ("src/**/*", "tests/**/*", "configs/*", "benchmarks/**/*", "data/README.md", "*")
+    for path in ROOT.glob(pattern)
+    if path.is_file()
+    and path.suffix in {".py", ".md", ".yaml", ".toml", ".txt", ".json"}
+    and not path.relative_to(ROOT).parts[0].startswith(".")
+)
+# Put together, so that this file does not name one itself.
+LOCAL_PATH = re.compile(
+    r"(?<![\w.*:/])/(?:" + "|".join(["work", "home", "Users", "root"]) + r")/\w"
+)
+
+
+def name_of(path: Path) -> str:
+    """Return a module's dotted name without `vdet.`; packages as themselves."""
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return ".".join(parts[:-1] if len(parts) > 1 and parts[-1] == "__init__" else parts)
+
+
+NAMES = {name_of(path): path for path in MODULES}
+
+
+def room_of(module: str) -> str:
+    return module.split(".", maxsplit=1)[0]
+
+
+def imports_of(path: Path, *, at_start: bool = False) -> Iterator[str]:
+    """Give the modules of vdet that a file imports; `at_start`: not those inside functions."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in tree.body if at_start else ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (_without_vdet(alias.name) for alias in node.names if _ours(alias.name))
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: imports are absolute here"
+            if node.module and _ours(node.module):
+                yield from (_imported(node.module, alias.name) for alias in node.names)
+
+
+def _ours(module: str) -> bool:
+    return module.split(".", maxsplit=1)[0] == "vdet"
+
+
+def _without_vdet(module: str) -> str:
+    return module.partition(".")[2] or "__init__"
+
+
+def _imported(module: str, name: str) -> str:
+    """Return what `from module import name` imports: a module of that name, or something in it."""
+    inside = _without_vdet(f"{module}.{name}")
+    return inside if inside in NAMES else _without_vdet(module)
+
+
+def test_every_room_has_its_place() -> None:
+    assert {room_of(name) for name in NAMES} <= set(ROOMS)
+    assert len(set(ROOMS)) == len(ROOMS)
+
+
+def test_a_module_imports_only_what_stands_below_its_room() -> None:
+    upward = [
+        f"{module} imports {used}"
+        for module, path in NAMES.items()
+        for used in imports_of(path)
+        if ROOMS.index(room_of(used)) < ROOMS.index(room_of(module))
+    ]
+    assert upward == []
+
+
+@pytest.mark.parametrize("room", ["errors", "geometry"])
+def test_the_foundations_import_nothing_of_vdet(room: str) -> None:
+    assert list(imports_of(NAMES[room])) == []
+
+
+def test_nothing_imports_the_command_line() -> None:
+    users = [
+        name
+        for name, path in NAMES.items()
+        if room_of(name) != "cli" and any(room_of(used) == "cli" for used in imports_of(path))
+    ]
+    assert users == []
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    graph = {name: set(imports_of(path, at_start=True)) - {name} for name, path in NAMES.items()}
+    order = list(graphlib.TopologicalSorter(graph).static_order())  # CycleError names the circle
+    assert len(order) == len(NAMES)
+
+
+def test_no_module_is_so_long_that_it_must_do_more_than_one_job() -> None:
+    lines = {name: len(path.read_text("utf-8").splitlines()) for name, path in NAMES.items()}
+    assert {name: count for name, count in lines.items() if count > LONGEST} == {}
+
+
+@pytest.mark.parametrize("heavy", ["joblib", "matplotlib", "pandas", "scipy", "sklearn"])
+def test_the_program_starts_without_heavy_packages(heavy: str, loaded_by_cli: set[str]) -> None:
+    assert "vdet.cli" in loaded_by_cli
+    assert heavy not in loaded_by_cli
+
+
+@pytest.fixture(scope="module")
+def loaded_by_cli() -> set[str]:
+    code = "import sys, vdet.cli; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_no_text_names_a_place_on_somebodys_machine() -> None:
+    assert len(TEXTS) > 100
+    found = [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in TEXTS
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if LOCAL_PATH.search(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("line", "local"),
+    [
+        ("see {}work/data", True),
+        ('"{}home/someone/x"', True),
+        ("../work/data", False),
+        ("https://example.org{}home/x", False),
+        ("the work/home balance", False),
+    ],
+)
+def test_the_search_for_such_places_finds_them(line: str, local: bool) -> None:
+    assert bool(LOCAL_PATH.search(line.format("/"))) is local

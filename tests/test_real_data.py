@@ -1,0 +1,131 @@
+"""What ships with the program, on the real data set and video.
+
+Frames of the project video count from 0. Where cars are is said of frames before the 880th only:
+the later ones, to which most of the photographs belong, are kept back for an independent check.
+"""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conftest import Run
+from vdet.config.loading import load_settings
+from vdet.dataset import find_patches, read_patches
+from vdet.detection import detect_still, still_boxes
+from vdet.features import FeatureExtractor
+from vdet.geometry import Box
+from vdet.images import Image, read_image
+from vdet.model import LinearModel, load_model
+from vdet.resources import find_config, shipped_model
+from vdet.training.splits import hold_out
+from vdet.video import VideoReader
+
+pytestmark = pytest.mark.realdata
+SEED = load_settings(find_config("seed"), ()).settings
+
+
+@pytest.fixture(scope="module")
+def model(real_data: Path) -> LinearModel:
+    assert real_data.is_dir()
+    return load_model(shipped_model())
+
+
+def frame(real_data: Path, index: int) -> Image:
+    """Read one frame of the project video."""
+    with VideoReader(
+        real_data / "project_video.mp4", start=Fraction(index, 25), frames=1
+    ) as reader:
+        (read,) = reader
+    assert read.index == index
+    return read.image
+
+
+def found(model: LinearModel, image: Image) -> list[Box]:
+    boxes = still_boxes(detect_still(model, SEED, image), SEED, image.shape[0])
+    return [box for box, _ in boxes]
+
+
+def is_on(box: Box, car: Box) -> bool:
+    """Tell whether a box is about where a car is: its middle on the car, a fair part in common."""
+    return car.contains(box.center) and box.iou(car) > 0.25
+
+
+def test_the_shipped_model_knows_patches_of_the_end_of_every_folder(
+    real_data: Path, model: LinearModel
+) -> None:
+    files = find_patches([real_data / "vehicles.zip", real_data / "non-vehicles.zip"])
+    held = hold_out(np.array([file.group for file in files]), "tail", 0.2, seed=0)
+    chosen = [files[i] for i in np.flatnonzero(held)[::10]]
+    extractor = FeatureExtractor(model.features)
+    patches = [patch.image for patch in read_patches(chosen)]
+    vectors = extractor.describe_all(patch for patch in patches if patch is not None)
+    assert len(vectors) == len(chosen) > 300
+    said = model.probabilities(vectors) >= 0.5
+    assert np.mean(said == [file.vehicle for file in chosen]) >= 0.95
+
+
+@pytest.mark.parametrize("index", [24, 74])
+def test_nothing_is_found_on_an_empty_road(real_data: Path, model: LinearModel, index: int) -> None:
+    assert found(model, frame(real_data, index)) == []
+
+
+@pytest.mark.parametrize(
+    ("index", "car"),
+    [(299, Box(1005, 406, 214, 102)), (499, Box(892, 406, 122, 67))],
+)
+def test_the_white_car_is_found(real_data: Path, model: LinearModel, index: int, car: Box) -> None:
+    assert any(is_on(box, car) for box in found(model, frame(real_data, index)))
+
+
+def test_the_white_car_is_found_in_a_photograph(real_data: Path, model: LinearModel) -> None:
+    (box,) = found(model, read_image(real_data / "test_images" / "test3.jpg"))
+    assert is_on(box, Box(873, 416, 88, 53))
+
+
+def test_the_white_and_the_black_car_are_found_apart(real_data: Path, model: LinearModel) -> None:
+    boxes = found(model, frame(real_data, 729))
+    white = [box for box in boxes if is_on(box, Box(864, 413, 84, 51))]
+    black = [box for box in boxes if is_on(box, Box(981, 397, 299, 206))]
+    assert (len(white), len(black)) == (1, 1)
+    assert white != black
+
+
+def test_every_photograph_is_searched(run: Run, real_data: Path) -> None:
+    result = run("detect-image", real_data / "test_images", "--json", "-", "-c", "seed")
+    assert result.code == 0, result.err
+    items = json.loads(result.out)
+    assert [Path(item["image"]).name for item in items] == [f"test{i}.jpg" for i in range(1, 7)]
+    for item in items:
+        frame_box = Box(0, 0, item["width"], item["height"])
+        assert (frame_box.width, frame_box.height) == (1280, 720)
+        for found_box in item["boxes"]:
+            box = Box(*(found_box[key] for key in ("x", "y", "width", "height")))
+            assert frame_box.intersection(box) == box
+
+
+def test_both_cars_are_followed_through_the_video(
+    run: Run, real_data: Path, tmp_path: Path
+) -> None:
+    first, count = 739, 12
+    options = (
+        "--no-video", "--tracks", tmp_path / "tracks.jsonl",
+        "--start", str(first / 25), "--frames", str(count),
+        "-c", "seed", "--set", "tracker.confident_detections_needed=2",
+    )  # fmt: skip
+    result = run("detect-video", real_data / "project_video.mp4", *options)
+    assert result.code == 0, result.err
+    records = [json.loads(line) for line in (tmp_path / "tracks.jsonl").read_text().splitlines()]
+    assert [record["frame"] for record in records] == list(range(first, first + count))
+    places = {"white": Box(874, 414, 87, 52), "black": Box(950, 403, 309, 168)}  # at the end
+    followed: dict[str, set[int]] = {car: set() for car in places}
+    for record in records[-5:]:
+        for track in record["tracks"]:
+            box = Box(*(track[key] for key in ("x", "y", "width", "height")))
+            for car, place in places.items():
+                if is_on(box, place):
+                    followed[car].add(track["id"])
+    assert all(len(ids) == 1 for ids in followed.values()), followed
+    assert followed["white"].isdisjoint(followed["black"])
