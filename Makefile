@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DATA ?= $(or $(VDET_DATA),data)
 
-.PHONY: demo test lint types tests data model clean
+.PHONY: demo test lint types tests bench data model clean
 
 demo: $(READY)  ## make a small data set and a road clip, train, detect, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
@@ -21,6 +21,9 @@ types: $(READY)
 
 tests: $(READY)
 	$(BIN)/pytest -n 2
+
+bench: $(READY)  ## how fast it is, as ratios measured in one run
+	$(BIN)/python -m benchmarks
 
 data:  ## fetch the data set (124 MB) into data/; data/README.md tells what it is
 	cd data && for name in vehicles non-vehicles; do \

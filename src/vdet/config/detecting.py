@@ -49,10 +49,8 @@ class SearchSettings(Section):
     windows: tuple[WindowSettings, ...] = Field(
         (
             WindowSettings(size=64, step=1, top=400, bottom=488),
-            WindowSettings(size=80, step=1, top=396, bottom=506),
             WindowSettings(size=96, step=1, top=392, bottom=524),
             WindowSettings(size=128, step=1, top=388, bottom=564),
-            WindowSettings(size=160, step=1, top=380, bottom=600),
             WindowSettings(size=192, step=1, top=372, bottom=612),
         ),
         min_length=1,
@@ -74,7 +72,7 @@ class HeatSettings(Section):
         4, description="the map has one value for this many pixels across and down"
     )
     blur: Pixels = Field(15, description="side of the Gaussian blur, pixels; 0 or 1 for none")
-    threshold: float = Field(0.8, ge=0, description="a region is where the heat is above this")
+    threshold: float = Field(0.5, ge=0, description="a region is where the heat is above this")
 
 
 class TrackerSettings(Section):

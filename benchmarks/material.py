@@ -1,0 +1,49 @@
+"""What is measured on: the real project video where it is found, else the generated clip."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from vdet.config.loading import load_settings
+from vdet.config.schema import Settings
+from vdet.images import Image
+from vdet.model import LinearModel, load_model
+from vdet.resources import find_config, shipped_model
+from vdet.synthetic import default_clip, write_clip
+from vdet.video import VideoReader
+
+FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
+
+
+@dataclass(frozen=True)
+class Config:
+    """Shipped settings with the shipped model that fits them."""
+
+    settings: Settings
+    model: LinearModel
+
+    def with_engine(self, engine: str) -> Settings:
+        search = self.settings.search.model_copy(update={"engine": engine})
+        return self.settings.model_copy(update={"search": search})
+
+
+def config(name: str) -> Config:
+    settings = load_settings(find_config(name)).settings
+    return Config(settings, load_model(shipped_model(settings.features)))
+
+
+def video(folder: Path) -> Path:
+    """Return the project video, or make a 720p clip in `folder`."""
+    places = [os.environ.get("VDET_DATA"), Path(__file__).parents[2] / "shared" / "data"]
+    for place in places:
+        if place and (path := Path(place) / "project_video.mp4").exists():
+            return path
+    path = folder / "generated.mp4"
+    write_clip(path, default_clip(1, width=1280, height=720))
+    return path
+
+
+def frames(path: Path) -> list[Image]:
+    with VideoReader(path, frames=max(FRAMES_SEARCHED) + 1) as reader:
+        read = [frame.image for frame in reader if frame.index % 10 == 0]
+    return [read[index // 10 % len(read)] for index in FRAMES_SEARCHED]

@@ -1,0 +1,91 @@
+"""One thread, one frame after the other: the search against other ways to look at a frame."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+
+from benchmarks.material import Config
+from benchmarks.rounds import Subject, measure
+from vdet.images import Image
+from vdet.search.engine import FrameSearch
+
+HEIGHTS = (360, 720, 1080, 2160)
+DECODED = 60
+
+
+def search_times(
+    path: Path, images: Sequence[Image], default: Config, seed: Config, rounds: int
+) -> dict[str, float]:
+    """Return seconds a frame for the dense searches and their references."""
+    searches = {
+        "default dense": _search(default, "dense", images),
+        "seed patch": _search(seed, "patch", images),
+        "seed dense": _search(seed, "dense", images),
+        "detectMultiScale": _detect_multi_scale(images),
+    }
+    times = measure(searches, rounds)
+    per_frame = {name: seconds / len(images) for name, seconds in times.items()}
+    return per_frame | _decoding(path, default, images, rounds)
+
+
+def _search(config: Config, engine: str, images: Sequence[Image]) -> Subject:
+    height, width = images[0].shape[:2]
+    search = FrameSearch(config.model, config.with_engine(engine), width, height)
+
+    def run() -> None:
+        for image in images:
+            search.search(image)
+
+    return run
+
+
+def _detect_multi_scale(images: Sequence[Image]) -> Subject:
+    """OpenCV's own sliding-window detector: 64×64, stride 8, scale 1.1, rows 380-660."""
+    hog = cv2.HOGDescriptor((64, 64), (16, 16), (8, 8), (8, 8), 9)
+    weights = np.random.default_rng(0).normal(0, 0.01, hog.getDescriptorSize() + 1)
+    hog.setSVMDetector(weights.astype(np.float32))
+    bands = [np.ascontiguousarray(image[380:660]) for image in images]
+
+    def run() -> None:
+        for band in bands:
+            hog.detectMultiScale(band, hitThreshold=5, winStride=(8, 8), scale=1.1)
+
+    return run
+
+
+def _decoding(
+    path: Path, default: Config, images: Sequence[Image], rounds: int
+) -> dict[str, float]:
+    """Decode with one thread to BGR, in turn with the search that it is compared with."""
+
+    def decode() -> None:
+        with av.open(str(path)) as container:
+            stream = container.streams.video[0]
+            stream.thread_type = "NONE"
+            for number, frame in enumerate(container.decode(stream)):
+                frame.to_ndarray(format="bgr24")
+                if number + 1 == DECODED:
+                    return
+
+    subjects = {"decoding": decode, "default dense": _search(default, "dense", images)}
+    times = measure(subjects, rounds)
+    return {
+        "decoding": times["decoding"] / DECODED,
+        "default dense beside decoding": times["default dense"] / len(images),
+    }
+
+
+def times_per_megapixel(images: Sequence[Image], default: Config, rounds: int) -> dict[int, float]:
+    """Return the default search's seconds a megapixel for frames of several heights."""
+    subjects: dict[str, Subject] = {}
+    areas: dict[str, float] = {}
+    for height in HEIGHTS:
+        width = images[0].shape[1] * height // images[0].shape[0]
+        scaled = [np.asarray(cv2.resize(image, (width, height)), np.uint8) for image in images[:2]]
+        subjects[str(height)] = _search(default, "dense", scaled)
+        areas[str(height)] = 2 * width * height / 1e6
+    times = measure(subjects, rounds)
+    return {int(name): seconds / areas[name] for name, seconds in times.items()}
