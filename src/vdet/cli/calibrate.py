@@ -1,0 +1,86 @@
+"""`vdet calibrate`: chessboard photographs to a camera."""
+
+import logging
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from vdet.cli.options import PathOf, overwrite_option
+from vdet.files import check_output
+from vdet.lanes.calibration import Pattern
+from vdet.lanes.calibration import calibrate as fit_camera
+from vdet.lanes.camera_file import save_camera
+from vdet.lanes.preview import check_previews, write_previews
+from vdet.stills import find_images
+
+log = logging.getLogger("vdet")
+
+
+class PatternOf(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
+    """The inner corners of a chessboard, along and across: 9x6."""
+
+    name = "pattern"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, context: click.Context | None
+    ) -> Pattern:
+        """Return both numbers."""
+        if isinstance(value, tuple):
+            return value[0], value[1]
+        match = re.fullmatch(r"([0-9]{1,3})[x×]([0-9]{1,3})", value)
+        if not match or min(int(n) for n in match.groups()) < 3:
+            self.fail(
+                f"{value!r} is no pattern; give the inner corners of the board, 3 or more along "
+                "and across, as in 9x6",
+                param,
+                context,
+            )
+        return int(match[1]), int(match[2])
+
+
+@click.command()
+@click.argument("photos", nargs=-1, required=True, type=PathOf(), metavar="PHOTO...")
+@click.option("-o", "--output", required=True, type=PathOf(), help="The camera to write, .yaml.")
+@click.option(
+    "--pattern",
+    default="9x6",
+    show_default=True,
+    type=PatternOf(),
+    help="Inner corners of the board, along and across.",
+)
+@click.option(
+    "--preview",
+    type=PathOf(),
+    metavar="DIR",
+    help="Every photograph with its corners, undistorted.",
+)
+@overwrite_option
+def calibrate(
+    *,
+    photos: tuple[Path, ...],
+    output: Path,
+    pattern: Pattern,
+    preview: Path | None,
+    overwrite: bool,
+) -> None:
+    """Find a camera's focal length and lens distortion from each PHOTO of a flat chessboard.
+
+    PHOTO: files, or folders of them; ten or more, of the whole board from different sides.
+    """
+    check_output(output, overwrite=overwrite)
+    found = find_images(photos)
+    if preview:
+        check_previews(preview, found, overwrite=overwrite)
+    calibration = fit_camera(found, pattern)
+    for skip in calibration.skipped:
+        log.warning("%s: not used: %s", skip.photo, skip.reason)
+    save_camera(calibration.camera, output)
+    if preview:
+        write_previews(preview, calibration, pattern)
+    camera = calibration.camera
+    click.echo(
+        f"{output}: {camera.width}×{camera.height}, focal length {camera.focal[0]:.0f} px, "
+        f"RMS error {camera.rms:.2f} px, {len(calibration.views)} of {len(found)} photographs used"
+    )

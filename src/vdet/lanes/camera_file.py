@@ -1,0 +1,97 @@
+"""The file a camera is kept in: short YAML that a person can read, and check."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails
+
+from vdet.config.document import Document, Key, read_document
+from vdet.config.loading import format_key
+from vdet.config.section import Section
+from vdet.errors import ConfigError
+from vdet.files import replacing
+from vdet.lanes.camera import Camera
+
+_Side = Annotated[int, Field(ge=16, le=100_000)]
+_Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
+_Row = tuple[float, float, float]
+
+
+class _CameraFile(Section):
+    width: _Side
+    height: _Side
+    matrix: tuple[_Row, _Row, _Row]
+    distortion: tuple[_Coefficient, _Coefficient, _Coefficient, _Coefficient, _Coefficient]
+    rms: float = Field(ge=0)
+
+    @model_validator(mode="after")
+    def _matrix_has_its_form(self) -> "_CameraFile":
+        (_, skew, _), (zero, _, _), last = self.matrix
+        if (skew, zero, last) != (0, 0, (0, 0, 1)):
+            raise ValueError("matrix should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
+        return self
+
+
+def save_camera(camera: Camera, path: Path) -> None:
+    """Write a camera as YAML. Raises `OutputError`."""
+    rows = "\n".join(f"  - [{', '.join(map(repr, row))}]" for row in camera.matrix.tolist())
+    text = f"""\
+# A camera, as `vdet calibrate` found it.
+
+# frame size, pixels
+width: {camera.width}
+height: {camera.height}
+# focal lengths and principal point, pixels: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
+matrix:
+{rows}
+# lens distortion (OpenCV's model): [k1, k2, p1, p2, k3]
+distortion: [{", ".join(map(repr, camera.distortion))}]
+# root mean square error of the chessboard corners, pixels
+rms: {camera.rms!r}
+"""
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def load_camera(path: Path) -> Camera:
+    """Read a camera.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, is not YAML, or is no camera; one line a mistake.
+    """
+    document = read_document(path)
+    try:
+        read = _CameraFile.model_validate(document.values)
+    except ValidationError as error:
+        lines = [_describe(detail, document, path) for detail in error.errors()]
+        raise ConfigError("\n".join(lines)) from error
+    (fx, _, cx), (_, fy, cy), _ = read.matrix
+    camera = Camera(read.width, read.height, (fx, fy), (cx, cy), read.distortion, read.rms)
+    if camera.flaw:
+        raise ConfigError(f"{document.places['matrix',]}: matrix: {camera.flaw}")
+    return camera
+
+
+def _describe(detail: ErrorDetails, document: Document, path: Path) -> str:
+    key = tuple(detail["loc"])
+    match detail["type"]:
+        case "missing":
+            text = "is missing; `vdet calibrate` writes camera files"
+        case "extra_forbidden":
+            text = (
+                f"is nothing that a camera file has; known: {', '.join(_CameraFile.model_fields)}"
+            )
+        case _:
+            text = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    place = _place(document, key, path)
+    return f"{place}: {format_key(key)}: {text}" if key else f"{place}: {text}"
+
+
+def _place(document: Document, key: Key, path: Path) -> str:
+    """Return where `key` stands, or what it should be in."""
+    if key in document.places or not key:
+        return document.places.get(key, str(path))
+    return _place(document, key[:-1], path)

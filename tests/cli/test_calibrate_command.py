@@ -1,0 +1,104 @@
+"""`vdet calibrate`."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conftest import Run
+from lanes.chessboards import photographs
+from vdet.images import read_image, write_image
+from vdet.lanes.camera import Camera
+from vdet.lanes.camera_file import load_camera
+
+
+@pytest.fixture(scope="session")
+def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of six photographs of a board and one of a wall."""
+    folder = tmp_path_factory.mktemp("boards")
+    camera = Camera(640, 480, (560, 558), (322, 236), (-0.25, 0.06, 0, 0, 0), 0)
+    for number, image in enumerate(photographs(camera, 6)):
+        write_image(folder / f"board{number}.png", image)
+    write_image(folder / "wall.png", np.full((480, 640, 3), 99, np.uint8))
+    return folder
+
+
+def test_makes_a_camera_of_a_folder_and_names_what_it_skipped(
+    run: Run, boards: Path, tmp_path: Path
+) -> None:
+    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml")
+    assert result.code == 0, result.err
+    camera = load_camera(tmp_path / "camera.yaml")
+    assert camera.focal == pytest.approx((560, 558), rel=0.01)
+    assert "wall.png: not used: no board of 9×6 inner corners is seen" in result.err
+    assert "640×480, focal length 56" in result.out
+    assert "6 of 7 photographs used" in result.out
+
+
+def test_previews_show_each_photograph_used_beside_its_undistorted_self(
+    run: Run, boards: Path, tmp_path: Path
+) -> None:
+    preview = tmp_path / "preview"
+    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml", "--preview", preview)
+    assert result.code == 0, result.err
+    assert sorted(p.name for p in preview.iterdir()) == [f"board{n}.jpg" for n in range(6)]
+    assert read_image(preview / "board0.jpg").shape == (480, 1280, 3)
+
+
+def test_too_few_photographs_are_an_error(run: Run, boards: Path, tmp_path: Path) -> None:
+    some = [boards / f"board{number}.png" for number in range(4)]
+    result = run("calibrate", *some, "-o", tmp_path / "camera.yaml")
+    assert result.code == 1
+    assert "only 4 of 4 photographs can be used, at least 5 are needed" in result.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_pattern_than_the_board_has_is_not_found(
+    run: Run, boards: Path, tmp_path: Path
+) -> None:
+    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml", "--pattern", "7x5")
+    assert result.code == 1
+    assert "give another --pattern than 7×5" in result.err
+
+
+@pytest.mark.parametrize("pattern", ["9", "9x", "9x6x3", "2x6", "ninexsix", "-9x6"])
+def test_a_pattern_that_is_none_is_wrong_usage(run: Run, tmp_path: Path, pattern: str) -> None:
+    result = run("calibrate", tmp_path, "-o", tmp_path / "c.yaml", f"--pattern={pattern}")
+    assert result.code == 2
+    assert "as in 9x6" in result.err
+
+
+def test_an_earlier_camera_is_not_lost(run: Run, boards: Path, tmp_path: Path) -> None:
+    output = tmp_path / "camera.yaml"
+    output.write_text("precious")
+    assert run("calibrate", boards, "-o", output).code == 1
+    assert output.read_text() == "precious"
+    assert run("calibrate", boards, "-o", output, "--overwrite").code == 0
+    assert load_camera(output).width == 640
+
+
+def test_earlier_previews_are_not_lost(run: Run, boards: Path, tmp_path: Path) -> None:
+    (tmp_path / "board3.jpg").write_text("precious")
+    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml", "--preview", tmp_path)
+    assert result.code == 1
+    assert "board3.jpg: is there already" in result.err
+    assert not (tmp_path / "camera.yaml").exists()
+
+
+def test_photographs_of_one_name_cannot_share_a_preview(
+    run: Run, boards: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "board0.png").write_bytes((boards / "board0.png").read_bytes())
+    result = run(
+        "calibrate", boards, other, "-o", tmp_path / "camera.yaml", "--preview", tmp_path / "p"
+    )
+    assert result.code == 1
+    assert "wanted by two photographs of one name" in result.err
+
+
+def test_a_photograph_that_is_not_there_is_named(run: Run, tmp_path: Path) -> None:
+    result = run("calibrate", tmp_path / "none.jpg", "-o", tmp_path / "camera.yaml")
+    assert result.code == 1
+    assert "none.jpg: no such file or folder" in result.err

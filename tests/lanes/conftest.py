@@ -1,0 +1,89 @@
+"""Roads with known lines, and settings that fit the camera which sees them."""
+
+from collections.abc import Callable
+
+import pytest
+
+from vdet.config.lanes import LaneSettings, ViewSettings
+from vdet.lanes.camera import Camera as CalibratedCamera
+from vdet.lanes.finder import LaneFinder
+from vdet.lanes.lane import Lane
+from vdet.synthetic.camera import Camera
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import Light, Line, Road, Scene
+
+YELLOW = (60, 180, 225)
+NEAR, FAR = 6.0, 42.0
+
+
+@pytest.fixture
+def settings_for() -> Callable[[Camera], LaneSettings]:
+    """Make settings whose view is the road from 6 m to 42 m ahead of a level camera."""
+
+    def row(camera: Camera, distance: float) -> float:
+        return (camera.horizon + camera.focal * camera.above_ground / distance) / camera.height
+
+    def column(camera: Camera, lateral: float, distance: float) -> float:
+        return 0.5 + camera.focal * lateral / distance / camera.width
+
+    def make(camera: Camera) -> LaneSettings:
+        view = ViewSettings(
+            top=row(camera, FAR),
+            bottom=row(camera, NEAR),
+            top_left=column(camera, -1.85, FAR),
+            top_right=column(camera, 1.85, FAR),
+            bottom_left=column(camera, -1.85, NEAR),
+            bottom_right=column(camera, 1.85, NEAR),
+            length=FAR - NEAR,
+        )
+        return LaneSettings(view=view)
+
+    return make
+
+
+@pytest.fixture
+def make_road() -> Callable[..., Scene]:
+    """Make a scene: a yellow line to the left, a dashed white one to the right, 3.7 m apart."""
+
+    def make(
+        *,
+        curvature: float = 0.0,
+        lines: tuple[Line, ...] = (Line(-1.85, YELLOW), Line(1.85, dash=3.0)),
+        asphalt: tuple[int, int, int] = (88, 84, 82),
+        light: Light | None = None,
+        size: tuple[int, int] = (1280, 720),
+        frames: int = 4,
+    ) -> Scene:
+        return Scene(
+            camera=Camera.dashboard(*size, curvature=curvature),
+            road=Road(left=-7.0, right=7.0, lines=lines, asphalt=asphalt),
+            light=light or Light(),
+            frames=frames,
+            seed=3,
+        )
+
+    return make
+
+
+@pytest.fixture
+def drive(settings_for: Callable[[Camera], LaneSettings]) -> Callable[..., list[Lane | None]]:
+    """Find the lane in each frame of scenes that follow one another."""
+
+    def find(*scenes: Scene) -> list[Lane | None]:
+        camera = scenes[0].camera
+        finder = LaneFinder(settings_for(camera), camera.width, camera.height)
+        lanes = []
+        for scene in scenes:
+            renderer = Renderer(scene)
+            lanes += [finder.find(renderer.image(index)) for index in range(scene.frames)]
+        return lanes
+
+    return find
+
+
+@pytest.fixture
+def wide_camera() -> CalibratedCamera:
+    """A camera whose lens bends straight lines visibly."""
+    return CalibratedCamera(
+        640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5
+    )

@@ -1,0 +1,146 @@
+"""Calibration on photographs drawn for a known camera."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from lanes.chessboards import PATTERN, photographs
+from vdet.errors import ImageError
+from vdet.images import write_image
+from vdet.lanes.calibration import Calibration, calibrate, find_corners
+from vdet.lanes.camera import Camera
+
+
+@pytest.fixture(scope="module")
+def true_camera() -> Camera:
+    return Camera(640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0), 0)
+
+
+@pytest.fixture(scope="module")
+def photos(true_camera: Camera, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("boards")
+    paths = []
+    for number, image in enumerate(photographs(true_camera)):
+        paths.append(folder / f"board{number}.png")
+        write_image(paths[-1], image)
+    return paths
+
+
+@pytest.fixture(scope="module")
+def calibration(photos: list[Path]) -> Calibration:
+    return calibrate(photos, PATTERN)
+
+
+def test_focal_length_and_principal_point_are_recovered(
+    calibration: Calibration, true_camera: Camera
+) -> None:
+    camera = calibration.camera
+    assert (camera.width, camera.height) == (640, 480)
+    assert camera.focal == pytest.approx(true_camera.focal, rel=0.01)
+    assert camera.center == pytest.approx(true_camera.center, abs=4)
+    assert camera.rms < 0.2
+    assert len(calibration.views) == len(calibration.errors) == 8
+    assert calibration.skipped == ()
+
+
+def test_the_distortion_found_moves_points_as_the_true_one_does(
+    calibration: Calibration, true_camera: Camera
+) -> None:
+    pixels = np.mgrid[40:620:8j, 40:450:8j].reshape(2, 1, -1).T
+    moved = [
+        cv2.undistortPoints(pixels, camera.matrix, np.array(camera.distortion), P=camera.matrix)
+        for camera in (calibration.camera, true_camera)
+    ]
+    assert np.abs(moved[0] - moved[1]).max() < 2.5
+
+
+def test_corners_are_found_to_a_fraction_of_a_pixel(true_camera: Camera) -> None:
+    front = photographs(true_camera, 1)[0]
+    corners = find_corners(front, PATTERN)
+    assert corners is not None
+    board = np.zeros((54, 3))
+    board[:, :2] = np.mgrid[:9, :6].T.reshape(-1, 2) - (4, 2.5)
+    shift = np.array([0, 0, 13.0])
+    distortion = np.array(true_camera.distortion)
+    expected, _ = cv2.projectPoints(board, np.zeros(3), shift, true_camera.matrix, distortion)
+    assert np.abs(corners - expected[:, 0]).max() < 0.15
+
+
+def test_a_photograph_without_a_board_is_skipped_and_named(
+    photos: list[Path], tmp_path: Path
+) -> None:
+    blank = tmp_path / "wall.png"
+    write_image(blank, np.full((480, 640, 3), 99, np.uint8))
+    broken = tmp_path / "broken.png"
+    broken.write_bytes(b"no picture")
+    skipped = calibrate([*photos[:5], blank, broken], PATTERN).skipped
+    assert [skip.photo for skip in skipped] == [blank, broken]
+    assert skipped[0].reason == "no board of 9×6 inner corners is seen"
+    assert skipped[1].reason.startswith("is not a picture")
+
+
+def test_a_photograph_that_is_larger_by_a_pixel_is_used(
+    photos: list[Path], true_camera: Camera, tmp_path: Path
+) -> None:
+    image = cv2.imread(str(photos[0]))
+    assert image is not None
+    grown = tmp_path / "grown.png"
+    write_image(grown, np.pad(image, ((0, 1), (0, 1), (0, 0)), mode="edge"))
+    found = calibrate([grown, *photos[1:]], PATTERN)
+    assert found.skipped == ()
+    assert found.camera.focal == pytest.approx(true_camera.focal, rel=0.01)
+    assert (found.camera.width, found.camera.height) == (640, 480)
+
+
+def test_a_photograph_of_another_size_is_skipped_and_named(
+    photos: list[Path], tmp_path: Path
+) -> None:
+    image = cv2.imread(str(photos[0]))
+    assert image is not None
+    large = tmp_path / "large.png"
+    write_image(large, np.asarray(cv2.resize(image, (960, 720)), np.uint8))
+    skipped = calibrate([*photos[1:], large], PATTERN).skipped
+    assert [(skip.photo, skip.reason) for skip in skipped] == [
+        (large, "is 960×720, the others are 640×480")
+    ]
+
+
+def test_a_view_that_spoils_the_fit_is_dropped_and_named(
+    photos: list[Path], true_camera: Camera, tmp_path: Path
+) -> None:
+    image = cv2.imread(str(photos[3]))
+    assert image is not None
+    rows, columns = np.indices((480, 640), dtype=np.float32)
+    waves = columns + 3 * np.sin(rows / 20, dtype=np.float32)
+    bent = tmp_path / "bent.png"  # of a board that is not flat
+    write_image(bent, np.asarray(cv2.remap(image, waves, rows, cv2.INTER_LINEAR), np.uint8))
+    found = calibrate([*photos, bent], PATTERN)
+    assert [skip.photo for skip in found.skipped] == [bent]
+    assert "would spoil the fit" in found.skipped[0].reason
+    assert found.camera.focal == pytest.approx(true_camera.focal, rel=0.01)
+
+
+def test_fewer_than_five_photographs_are_refused(photos: list[Path]) -> None:
+    with pytest.raises(ImageError, match=r"only 4 of 4 photographs .* at least 5 are needed"):
+        calibrate(photos[:4], PATTERN)
+
+
+def test_no_photograph_with_a_board_is_refused(photos: list[Path]) -> None:
+    with pytest.raises(ImageError, match=r"only 0 of 5 .* another --pattern than 8×4"):
+        calibrate(photos[:5], (8, 4))
+
+
+def test_boards_that_are_all_seen_from_the_front_are_refused(
+    true_camera: Camera, tmp_path: Path
+) -> None:
+    front = photographs(true_camera, 1)[0]
+    same = []
+    for number in range(5):
+        same.append(tmp_path / f"{number}.png")
+        moved = np.array([[1, 0, 4.0 * number], [0, 1, 3.0 * number]])
+        image = cv2.warpAffine(front, moved, (640, 480), borderMode=cv2.BORDER_REPLICATE)
+        write_image(same[-1], np.asarray(image, np.uint8))
+    with pytest.raises(ImageError, match=r"much the same side .* take some with the board slanted"):
+        calibrate(same, PATTERN)
