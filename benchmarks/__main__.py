@@ -89,9 +89,12 @@ def _search_rows(times: dict[str, float]) -> list[Row]:
 
 def _run_rows(times: dict[str, float], played: float) -> list[Row]:
     through, detect, only = times["pass through"], times["detect"], times["detect only"]
+    lanes = times["detect with lanes"]
     return [
         Row("detect-video / passing frames through", detect / through, "≤ 1.4", "1.1",
             f"{detect:.2f} and {through:.2f} s for {played:.0f} s of video"),
+        Row("detect-video --lanes --camera / without", lanes / detect, "≤ 1.35", "–",
+            f"{lanes:.2f} and {detect:.2f} s"),
         Row("video's length / detect-video --no-video", played / only, "≥ 3", "6",
             f"{played:.1f} and {only:.2f} s"),
     ]  # fmt: skip

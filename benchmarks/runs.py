@@ -1,20 +1,26 @@
-"""Whole runs of detect-video: against passing frames through, real time, and for memory."""
+"""Whole runs of detect-video: passed frames, real time, lanes, and memory, to compare with."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 from benchmarks.material import Config
-from benchmarks.rounds import measure
+from benchmarks.rounds import Subject, measure
+from vdet.lanes.camera import Camera
+from vdet.lanes.road import LaneRequest
 from vdet.pipeline import VideoJob, process_video
 from vdet.stream import ahead, behind
 from vdet.video import VideoReader, VideoWriter
 
 FRAMES = 250
+CAMERA = Camera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
+"""Like the one of the project video; its maps cost the same whatever the numbers."""
 
 
 def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[str, float]:
-    """Return seconds for the first frames: passed through, detected and written, detected only."""
+    """Return seconds for the first frames: passed through, detected and written, the same with
+    lanes, detected only.
+    """
     out = folder / "out.mp4"
 
     def pass_through() -> None:
@@ -27,13 +33,22 @@ def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[st
             for frame in frames:
                 encode(frame)
 
-    def detect() -> None:
-        process_video(VideoJob(path, out, frames=FRAMES), default.model, default.settings)
+    def detect(lanes: LaneRequest | None = None) -> None:
+        job = VideoJob(path, out, frames=FRAMES, lanes=lanes)
+        process_video(job, default.model, default.settings)
+
+    def detect_with_lanes() -> None:
+        detect(LaneRequest(CAMERA))
 
     def detect_only() -> None:
         process_video(VideoJob(path, frames=FRAMES), default.model, default.settings)
 
-    subjects = {"pass through": pass_through, "detect": detect, "detect only": detect_only}
+    subjects: dict[str, Subject] = {
+        "pass through": pass_through,
+        "detect": detect,
+        "detect with lanes": detect_with_lanes,
+        "detect only": detect_only,
+    }
     return measure(subjects, rounds)
 
 

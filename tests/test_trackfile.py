@@ -1,13 +1,19 @@
+import json
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
 from vdet.evaluation.predictions import read_predictions
 from vdet.geometry import Box
+from vdet.lanes.lane import Lane
+from vdet.lanes.record import lane_record
+from vdet.lanes.road import LaneRequest, Road, RoadWatch
 from vdet.trackfile import check_suffix, track_writer
 from vdet.tracking.track import Track
 from vdet.video.frame import Frame
@@ -22,6 +28,16 @@ FRAMES: list[tuple[int, Fraction, list[Track]]] = [
         [Track(1, Box(11, 21, 31, 41), from_match=True), Track(2, Box(0, -3, 5, 6), False)],
     ),
 ]
+
+
+LANE = Lane(
+    curvature=-0.001,
+    radius=1000.0,
+    offset=0.25,
+    width=3.7,
+    left=np.array([[1.0, 8.0], [3.0, 4.0]]),
+    right=np.array([[9.0, 8.0], [7.0, 4.0]]),
+)
 
 
 def write(path: Path, frames: Sequence[tuple[int, Fraction, list[Track]]] = FRAMES) -> str:
@@ -57,6 +73,35 @@ def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
         '"height": 41, "from_match": true}, {"id": 2, "x": 0, "y": -3, "width": 5, '
         '"height": 6, "from_match": false}]}\n'
     )
+
+
+def road(lane: Lane | None) -> Road:
+    image = np.zeros((36, 64, 3), np.uint8)
+    watch = RoadWatch(LaneRequest(), LaneSettings(), 64, 36)
+    return replace(watch.follow(watch.look(image)), lane=lane)
+
+
+def write_with_lanes(path: Path) -> str:
+    with track_writer(path) as writer:
+        for (index, time, tracks), lane in zip(FRAMES, (LANE, None, None), strict=True):
+            writer.write(Frame(index, time, IMAGE), tracks, road(lane))
+    return path.read_bytes().decode()
+
+
+def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> None:
+    with_lanes = write_with_lanes(tmp_path / "with.jsonl").splitlines()
+    without = write(tmp_path / "without.jsonl").splitlines()
+    lanes = []
+    for line, other in zip(with_lanes, without, strict=True):
+        record = json.loads(line)
+        lanes.append(record.pop("lane"))
+        assert record == json.loads(other)
+    assert lanes == [lane_record(LANE), None, None]
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".csv"])
+def test_other_formats_have_no_place_for_a_lane(tmp_path: Path, suffix: str) -> None:
+    assert write_with_lanes(tmp_path / f"a{suffix}") == write(tmp_path / f"b{suffix}")
 
 
 def test_without_frames_only_a_heading_is_written(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The stream: frames → search → heat → tracker → overlay → writer."""
+"""The stream: frames → search → heat → tracker → annotation → writer."""
 
 import os
 import time
@@ -8,19 +8,20 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from vdet.annotation import StagePictures, annotate
 from vdet.config.scaling import scale_lengths
-from vdet.config.schema import FeatureSettings, OutputSettings, Settings
-from vdet.detection import Detection, Detector
-from vdet.errors import ImageError, OutputError, VideoError
+from vdet.config.schema import OutputSettings, Settings
+from vdet.detection import Detector
+from vdet.errors import ConfigError, ImageError, OutputError, VideoError
 from vdet.files import check_output
+from vdet.frame_result import FrameResult
+from vdet.lanes.road import LaneRequest, Look, RoadWatch
 from vdet.model import LinearModel
-from vdet.overlay.drawing import draw_tracks, track_label
-from vdet.overlay.stages import write_stages
 from vdet.stream import ahead, behind, each_with, quiet_libraries
 from vdet.trackfile import check_suffix, track_writer
 from vdet.tracking.cars import Cars
-from vdet.tracking.track import Track
 from vdet.video import Frame, FrameWriter, NullWriter, VideoInfo, VideoReader, VideoWriter
+from vdet.windows import Windows
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +30,8 @@ class VideoJob:
 
     `start` and `end` are seconds from the first frame; frames with start ≤ time < end are taken,
     at most `frames` of them. With `stages`, pictures of every stage are made of the first of them
-    at or after the second `at`.
+    at or after the second `at`. With `lanes`, the lane is found too, and all is drawn on the
+    undistorted frames.
     """
 
     source: Path
@@ -40,15 +42,7 @@ class VideoJob:
     frames: int | None = None
     stages: Path | None = None
     at: Fraction = Fraction(0)
-
-
-@dataclass(frozen=True, slots=True)
-class FrameResult:
-    """A frame, what was found in it, and the cars that are shown."""
-
-    frame: Frame
-    detection: Detection
-    tracks: tuple[Track, ...]
+    lanes: LaneRequest | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +73,9 @@ def follow(
     height: int,
     *,
     threads: int = 1,
+    watch: RoadWatch | None = None,
 ) -> Iterator[FrameResult]:
-    """Find and follow the cars through frames of one size, in order.
+    """Find and follow the cars through frames of one size, in order; and the lane, with `watch`.
 
     The search of several frames may run in `threads` at once; what follows it, frame by frame,
     gives the same result whatever their number.
@@ -92,11 +87,16 @@ def follow(
     """
     detector = Detector(model, settings, width, height)
     cars = Cars(scale_lengths(settings.tracker, height / settings.reference_height))
-    with each_with(lambda frame: detector.search(frame.image), frames, threads) as searched:
-        for frame, windows in searched:
+
+    def search(frame: Frame) -> tuple[Windows, Look | None]:
+        return detector.search(frame.image), watch.look(frame.image) if watch else None
+
+    with each_with(search, frames, threads) as searched:
+        for frame, (windows, look) in searched:
             detection = detector.accumulate(windows)
             tracks = cars.update(frame.image, detection.regions)
-            yield FrameResult(frame, detection, tuple(tracks))
+            road = watch.follow(look) if watch and look else None
+            yield FrameResult(frame, detection, tuple(tracks), road)
 
 
 def process_video(
@@ -122,7 +122,8 @@ def process_video(
     Raises
     ------
     VideoError, OutputError
-        The video cannot be read; an output cannot be written. No output is left then.
+        The video cannot be read or searched, or the camera of `job.lanes` took frames of another
+        shape; an output cannot be written. No output is left then.
     """
     began = time.perf_counter()
     ids: set[int] = set()
@@ -132,18 +133,21 @@ def process_video(
         reader = stack.enter_context(
             VideoReader(job.source, start=job.start, end=job.end, frames=job.frames)
         )
+        watch = _road_watch(job.lanes, settings, reader.info)
         tracks = stack.enter_context(track_writer(job.tracks))
         video = stack.enter_context(_video_writer(job, reader, settings.output))
         encode = stack.enter_context(behind(video.write))
         read = stack.enter_context(ahead(reader))
-        pictures = _StagePictures(job, reader.info.start, settings, model.features)
+        at = reader.info.start + job.at
+        pictures = StagePictures(job.stages, at, settings, model.features)
         advance = progress(reader.expected)
-        results = _follow_all(read, reader.info, model, settings, threads or os.cpu_count() or 1)
-        for result in stack.enter_context(closing(results)):
+        size = reader.info.width, reader.info.height
+        threads = threads or os.cpu_count() or 1
+        results = follow(read, model, settings, *size, threads=threads, watch=watch)
+        for result in stack.enter_context(closing(_named(results, job.source))):
             pictures.offer(result)
-            tracks.write(result.frame, result.tracks)
-            draw_tracks(result.frame.image, result.tracks)
-            encode(result.frame)
+            tracks.write(result.frame, result.tracks, result.road)
+            encode(annotate(result))
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
@@ -157,36 +161,16 @@ def _video_writer(job: VideoJob, reader: VideoReader, output: OutputSettings) ->
     return VideoWriter(job.video, reader.info, output, whole_sound=not part)
 
 
-def _follow_all(
-    frames: Iterator[Frame], info: VideoInfo, model: LinearModel, settings: Settings, threads: int
-) -> Generator[FrameResult]:
+def _road_watch(lanes: LaneRequest | None, settings: Settings, info: VideoInfo) -> RoadWatch | None:
     try:
-        yield from follow(frames, model, settings, info.width, info.height, threads=threads)
-    except ImageError as error:
+        return RoadWatch(lanes, settings.lanes, info.width, info.height) if lanes else None
+    except ConfigError as error:
         raise VideoError(f"{info.path}: {error}") from error
 
 
-class _StagePictures:
-    """Makes the stage pictures of a job when their frame comes."""
-
-    def __init__(
-        self, job: VideoJob, start: Fraction, settings: Settings, features: FeatureSettings
-    ) -> None:
-        self._folder = job.stages
-        self._at = start + job.at
-        self._settings = settings
-        self._features = features
-
-    def offer(self, result: FrameResult) -> None:
-        """Make them of this frame if it is the first at or after the time asked for."""
-        if self._folder is None or result.frame.time < self._at:
-            return
-        write_stages(
-            self._folder,
-            result.frame.image,
-            result.detection,
-            [(track.box, track_label(track)) for track in result.tracks],
-            settings=self._settings,
-            features=self._features,
-        )
-        self._folder = None
+def _named(results: Iterator[FrameResult], source: Path) -> Generator[FrameResult]:
+    """Put the video's name before an error of the search."""
+    try:
+        yield from results
+    except ImageError as error:
+        raise VideoError(f"{source}: {error}") from error

@@ -1,20 +1,25 @@
-"""Vehicles in pictures: read, detected, drawn, listed."""
+"""Vehicles, and the lane, in pictures: read, detected, drawn, listed."""
 
 import json
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from vdet.config.schema import Settings
 from vdet.detection import detect_still, still_boxes
-from vdet.errors import ImageError, OutputError
+from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import check_output, replacing
 from vdet.geometry import Box
-from vdet.images import SUFFIXES, read_image, write_image
+from vdet.images import SUFFIXES, Image, read_image, write_image
+from vdet.lanes.drawing import draw_lane
+from vdet.lanes.record import lane_record
+from vdet.lanes.road import LaneRequest, Road, RoadWatch
 from vdet.model import LinearModel
 from vdet.overlay.drawing import color_of, draw_box
-from vdet.overlay.stages import write_stages
+from vdet.overlay.stages import LabelledBox, write_lane_stages, write_stages
+from vdet.stream import quiet_libraries
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +33,17 @@ class StillJob:
 
 @dataclass(frozen=True, slots=True)
 class StillResult:
-    """Boxes found in a picture of `width` × `height` pixels, each with its region's peak heat."""
+    """Boxes found in a picture of `width` × `height` pixels, each with its region's peak heat.
+
+    Boxes are in pixels of the picture as it was read; `road`, None where lanes were not looked for,
+    is the undistorted one.
+    """
 
     source: Path
     width: int
     height: int
     boxes: tuple[tuple[Box, float], ...]
+    road: Road | None = None
 
 
 def find_images(paths: Sequence[Path]) -> list[Path]:
@@ -97,54 +107,84 @@ def _make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
 
 
-def process_still(job: StillJob, model: LinearModel, settings: Settings) -> StillResult:
+def process_still(
+    job: StillJob, model: LinearModel, settings: Settings, lanes: LaneRequest | None = None
+) -> StillResult:
     """Search a picture and write what the job asks for. Raises `ImageError`, `OutputError`."""
     image = read_image(job.source)
     height, width = image.shape[:2]
     try:
-        detection = detect_still(model, settings, image)
+        with quiet_libraries():
+            detection = detect_still(model, settings, image)
     except ImageError as error:
         raise ImageError(f"{job.source}: {error}") from error
+    road = _road(job.source, image, settings, lanes) if lanes else None
     boxes = still_boxes(detection, settings, height)
     labelled = [(box, f"heat {peak:.1f}") for box, peak in boxes]
     if job.stages:
         write_stages(
             job.stages, image, detection, labelled, settings=settings, features=model.features
         )
+        if road:
+            write_lane_stages(job.stages, road)
     if job.picture:
-        for number, (box, label) in enumerate(labelled, start=1):
+        write_image(job.picture, _annotated(image, labelled, road))
+    return StillResult(job.source, width, height, tuple(boxes), road)
+
+
+def _road(source: Path, image: Image, settings: Settings, lanes: LaneRequest) -> Road:
+    height, width = image.shape[:2]
+    try:
+        watch = RoadWatch(lanes, settings.lanes, width, height)
+    except ConfigError as error:
+        raise ImageError(f"{source}: {error}") from error
+    return watch.follow(watch.look(image))
+
+
+def _annotated(image: Image, boxes: Sequence[LabelledBox], road: Road | None) -> Image:
+    """Draw boxes into the picture; with a road, and its lane, into the undistorted one."""
+    if road:
+        image = road.image
+        boxes = [(road.place(box), label) for box, label in boxes]
+        if road.lane:
+            draw_lane(image, road.lane)
+    for number, (box, label) in enumerate(boxes, start=1):
+        if box.area:
             draw_box(image, box, color_of(number), label)
-        write_image(job.picture, image)
-    return StillResult(job.source, width, height, tuple(boxes))
+    return image
 
 
 def write_json(results: Iterable[StillResult], target: str) -> None:
     """Write results as a JSON list to the file `target`, or to standard output for `-`.
 
     Each item has `image`, `width`, `height` and `boxes`, a list of objects with `x`, `y`, `width`,
-    `height` (pixels) and `peak` (heat). Raises `OutputError`.
+    `height` (pixels of the input picture) and `peak` (heat); where lanes were looked for also
+    `lane` as in `.jsonl` tracks. Raises `OutputError`.
     """
-    items = [
-        {
-            "image": str(result.source),
-            "width": result.width,
-            "height": result.height,
-            "boxes": [
-                {
-                    "x": box.x,
-                    "y": box.y,
-                    "width": box.width,
-                    "height": box.height,
-                    "peak": round(peak, 3),
-                }
-                for box, peak in result.boxes
-            ],
-        }
-        for result in results
-    ]
-    text = json.dumps(items, indent=2) + "\n"
+    text = json.dumps([_item(result) for result in results], indent=2) + "\n"
     if target == "-":
         sys.stdout.write(text)
         return
     with replacing(Path(target)) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _item(result: StillResult) -> dict[str, Any]:
+    item: dict[str, Any] = {
+        "image": str(result.source),
+        "width": result.width,
+        "height": result.height,
+        "boxes": [
+            {
+                "x": box.x,
+                "y": box.y,
+                "width": box.width,
+                "height": box.height,
+                "peak": round(peak, 3),
+            }
+            for box, peak in result.boxes
+        ],
+    }
+    if result.road:
+        item["lane"] = lane_record(result.road.lane)
+    return item

@@ -48,13 +48,13 @@ class _Channel(Generic[T]):
     def __iter__(self) -> Iterator[T]:
         while not isinstance(item := self._queue.get(), _End):
             yield item
-        if item.error:
+        if item.error is not None:
             raise item.error
 
 
 @contextlib.contextmanager
 def ahead(items: Iterable[T], depth: int = 4) -> Iterator[Iterator[T]]:
-    """Go through `items` in a thread, at most `depth` of them ahead of the reader."""
+    """Go through `items` in a thread; at most `depth` wait for the reader, and one for room."""
     channel: _Channel[T] = _Channel(depth)
 
     def fill() -> None:

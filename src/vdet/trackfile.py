@@ -5,11 +5,17 @@
 | `.txt`   | a box              | `frame, id, left, top, width, height, 1, -1, -1, -1`, no heading |
 | `.csv`   | a box              | `frame,time,id,x,y,width,height,from_match`, with heading        |
 | `.jsonl` | a frame, even if   | `frame`, `time`, `tracks`: a list of objects with `id`, `x`, `y`,|
-|          | nothing is in it   | `width`, `height`, `from_match`                                  |
+|          | nothing is in it   | `width`, `height`, `from_match`; with `--lanes` also `lane`      |
 
 In `.csv` and `.jsonl` frames count from 0 from the start of the file, `time` is in seconds, and
 `x, y` is the top-left pixel of the box, counted from 0. In `.txt` frames and pixels count from 1,
 as MOTChallenge has it (Milan et al., "MOT16", 2016).
+
+Boxes are in pixels of the input frame, also where the frame is drawn undistorted, so they can be
+compared with labels of the input. `lane` is null where none is shown, else an object with `radius`
+(metres, null on a straight road), `offset` (of the camera from the lane's middle, metres, positive
+to the right), `width` (metres), `left` and `right`: each line as `[[x, y], …]`, pixels of the
+undistorted frame counted from 0, the nearest point first.
 """
 
 import csv
@@ -17,10 +23,12 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol, TextIO
+from typing import Any, Protocol, TextIO
 
 from vdet.errors import OutputError
 from vdet.files import replacing
+from vdet.lanes.record import lane_record
+from vdet.lanes.road import Road
 from vdet.tracking.track import Track
 from vdet.video import Frame
 
@@ -28,14 +36,14 @@ from vdet.video import Frame
 class TrackWriter(Protocol):
     """Takes the shown tracks of one frame after the other."""
 
-    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
-        """Add the tracks of a frame."""
+    def write(self, frame: Frame, tracks: Sequence[Track], road: Road | None = None, /) -> None:
+        """Add the tracks of a frame, and its lane where the format has a place for it."""
 
 
 class NoTracks:
     """Takes tracks and writes nothing."""
 
-    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+    def write(self, frame: Frame, tracks: Sequence[Track], road: Road | None = None, /) -> None:
         """Do nothing."""
 
 
@@ -43,7 +51,7 @@ class _Mot:
     def __init__(self, file: TextIO) -> None:
         self._file = file
 
-    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+    def write(self, frame: Frame, tracks: Sequence[Track], *_: object) -> None:
         for track in tracks:
             box = track.box
             self._file.write(
@@ -57,7 +65,7 @@ class _Csv:
         self._rows = csv.writer(file, lineterminator="\n")
         self._rows.writerow(["frame", "time", "id", "x", "y", "width", "height", "from_match"])
 
-    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+    def write(self, frame: Frame, tracks: Sequence[Track], *_: object) -> None:
         for track in tracks:
             box = track.box
             place = (box.x, box.y, box.width, box.height)
@@ -69,7 +77,7 @@ class _JsonLines:
     def __init__(self, file: TextIO) -> None:
         self._file = file
 
-    def write(self, frame: Frame, tracks: Sequence[Track]) -> None:
+    def write(self, frame: Frame, tracks: Sequence[Track], road: Road | None = None, /) -> None:
         boxes = [
             {
                 "id": track.id,
@@ -81,7 +89,13 @@ class _JsonLines:
             }
             for track in tracks
         ]
-        record = {"frame": frame.index, "time": round(float(frame.time), 6), "tracks": boxes}
+        record: dict[str, Any] = {
+            "frame": frame.index,
+            "time": round(float(frame.time), 6),
+            "tracks": boxes,
+        }
+        if road:
+            record["lane"] = lane_record(road.lane)
         self._file.write(json.dumps(record) + "\n")
 
 

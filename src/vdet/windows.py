@@ -70,8 +70,8 @@ class WindowGrid:
 
     @property
     def share(self) -> float:
-        """One over the number of windows that cover a pixel, (step / size)²."""
-        return float((self.step / self.size) ** 2)
+        """One over the number of windows that cover a pixel, (step / size)²; at most 1."""
+        return min(1.0, float((self.step / self.size) ** 2))
 
 
 def lay_grid(
@@ -107,12 +107,13 @@ def lay_grid(
     return WindowGrid(size, step, Fraction(0), Fraction(settings.top), columns, rows)
 
 
-def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, int]:
+def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, Fraction]:
     if settings.step is not None:
-        return Fraction(settings.step * settings.size, cells), 0
+        step = Fraction(settings.step * settings.size, cells)
+        return step, settings.size - step
     assert settings.overlap is not None  # one of the two is always given
-    step = max(1, int(settings.size * (1 - settings.overlap)))
-    return Fraction(step), int(settings.size * settings.overlap)
+    step = Fraction(max(1, int(settings.size * (1 - settings.overlap))))
+    return step, Fraction(int(settings.size * settings.overlap))
 
 
 def every_nth(grid: WindowGrid, n: int, across: int, down: int) -> WindowGrid:

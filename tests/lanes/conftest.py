@@ -16,7 +16,7 @@ YELLOW = (60, 180, 225)
 NEAR, FAR = 6.0, 42.0
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def settings_for() -> Callable[[Camera], LaneSettings]:
     """Make settings whose view is the road from 6 m to 42 m ahead of a level camera."""
 
@@ -41,7 +41,7 @@ def settings_for() -> Callable[[Camera], LaneSettings]:
     return make
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_road() -> Callable[..., Scene]:
     """Make a scene: a yellow line to the left, a dashed white one to the right, 3.7 m apart."""
 

@@ -7,8 +7,10 @@ import click
 
 from vdet.cli.options import (
     PathOf,
+    lane_options,
     model_option,
     overwrite_option,
+    read_lanes,
     read_model,
     read_settings,
     settings_options,
@@ -27,6 +29,7 @@ log = logging.getLogger("vdet")
 )
 @click.option("--json", "json_target", metavar="FILE", help="The boxes; - for standard output.")
 @click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage.")
+@lane_options
 @model_option
 @settings_options
 @overwrite_option
@@ -36,6 +39,8 @@ def detect_image(
     output: Path | None,
     json_target: str | None,
     stages: Path | None,
+    lanes: bool,
+    camera_path: Path | None,
     model_path: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
@@ -44,6 +49,7 @@ def detect_image(
     """Find vehicles in each IMAGE: files, or folders of them."""
     if not (output or json_target or stages):
         raise click.UsageError("nothing would be written; give -o, --json or --stages")
+    request = read_lanes(lanes, camera_path)
     loaded = read_settings(config_name, assignments)
     model = read_model(model_path, loaded)
     if json_target not in (None, "-"):
@@ -53,7 +59,7 @@ def detect_image(
     failures: list[ImageError] = []
     for job in jobs:
         try:
-            results.append(process_still(job, model, loaded.settings))
+            results.append(process_still(job, model, loaded.settings, request))
         except ImageError as error:
             failures.append(error)
     if json_target and (results or not failures):

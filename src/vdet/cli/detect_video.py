@@ -8,8 +8,10 @@ import click
 from vdet.cli.options import (
     PathOf,
     Time,
+    lane_options,
     model_option,
     overwrite_option,
+    read_lanes,
     read_model,
     read_settings,
     settings_options,
@@ -31,6 +33,7 @@ from vdet.pipeline import VideoJob, check_job, process_video
 @click.option("--threads", type=click.IntRange(min=1), help="Of the search; else one a core.")
 @click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage …")
 @click.option("--at", type=Time(), help="… of the frame at this time.")
+@lane_options
 @model_option
 @settings_options
 @overwrite_option
@@ -48,6 +51,8 @@ def detect_video(
     threads: int | None,
     stages: Path | None,
     at: Fraction | None,
+    lanes: bool,
+    camera_path: Path | None,
     model_path: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
@@ -62,9 +67,11 @@ def detect_video(
         raise click.UsageError("--stages and --at go together")
     if start is not None and end is not None and end <= start:
         raise click.UsageError("--end must be later than --start")
+    request = read_lanes(lanes, camera_path)
     loaded = read_settings(config_name, assignments)
     model = read_model(model_path, loaded)
-    job = VideoJob(source, output, tracks, start, end, frames, stages, at or Fraction(0))
+    moment = at or Fraction(0)
+    job = VideoJob(source, output, tracks, start, end, frames, stages, moment, request)
     check_job(job, overwrite=overwrite)
     with progress_bar(" frames", quiet=quiet) as progress:
         summary = process_video(job, model, loaded.settings, threads=threads, progress=progress)

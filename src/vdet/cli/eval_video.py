@@ -8,6 +8,7 @@ from vdet.cli.eval_options import give_results, results_options
 from vdet.cli.options import PathOf, model_option, read_model, read_settings, settings_options
 from vdet.cli.progress import progress_bar
 from vdet.evaluation.output import check_outputs
+from vdet.resources import shipped_model
 
 
 @click.command()
@@ -63,7 +64,8 @@ def video(
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     swept = grid(sweeps)
     loaded = [read_settings(config_name, (*assignments, *extra)) for extra in swept]
-    model, *_ = [read_model(model_path, each) for each in loaded]  # all fit it, or it says so
+    path = model_path or shipped_model(loaded[0].settings.features)
+    model, *_ = [read_model(path, each) for each in loaded]  # all fit it, or it says so
     check_outputs(json_target, report, overwrite=overwrite)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
     variants = [Variant(extra, each.settings) for extra, each in zip(swept, loaded, strict=True)]

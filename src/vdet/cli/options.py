@@ -1,5 +1,6 @@
 """Options that several commands share, so that one flag means one thing everywhere."""
 
+import logging
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -8,10 +9,14 @@ from typing import Any, TypeVar
 import click
 
 from vdet.config.loading import LoadedSettings, load_settings
+from vdet.lanes.camera_file import load_camera
+from vdet.lanes.road import LaneRequest
 from vdet.model import LinearModel, load_model
 from vdet.resources import find_config, shipped_model
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+log = logging.getLogger("vdet")
 
 
 class PathOf(click.Path):
@@ -84,6 +89,32 @@ def read_model(model_path: Path | None, loaded: LoadedSettings) -> LinearModel:
     if model_path is None:
         return load_model(shipped_model(loaded.settings.features))
     return load_model(model_path, loaded.features)
+
+
+def lane_options(command: F) -> F:
+    """Add `--lanes` and `--camera FILE`; read them with `read_lanes`."""
+    command = click.option(
+        "--camera",
+        "camera_path",
+        type=PathOf(),
+        metavar="FILE",
+        help="Undistort with this camera, from vdet calibrate; goes with --lanes.",
+    )(command)
+    return click.option(
+        "--lanes", is_flag=True, help="Find and draw the lane too, on undistorted pictures."
+    )(command)
+
+
+def read_lanes(lanes: bool, camera_path: Path | None) -> LaneRequest | None:
+    """Read what `lane_options` gave."""
+    if camera_path is not None and not lanes:
+        raise click.UsageError("--camera goes with --lanes")
+    if not lanes:
+        return None
+    if camera_path is None:
+        log.warning("--lanes without --camera: pictures are taken as undistorted")
+        return LaneRequest()
+    return LaneRequest(load_camera(camera_path))
 
 
 overwrite_option = click.option(

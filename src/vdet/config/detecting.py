@@ -30,7 +30,7 @@ class WindowSettings(Section):
         if self.bottom - self.top < self.size:
             raise ValueError("bottom must be at least top + size")
         if (self.overlap is None) == (self.step is None):
-            raise ValueError("one of overlap and step must be given")
+            raise ValueError("one of overlap and step must be given, the other left out or null")
         if self.overlap is not None and int(self.size * (1 - self.overlap)) < 1:
             raise ValueError("overlap leaves a step of less than a pixel")
         return self

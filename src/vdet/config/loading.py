@@ -28,7 +28,7 @@ def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> 
     """Read settings: defaults, then the file at `path`, then assignments such as `heat.frames=3`.
 
     A list in a later layer replaces the whole list of an earlier one; an assignment may name one
-    item of it (`search.windows.0.overlap=0.75`).
+    item of it (`search.windows.0.step=2`).
 
     Raises
     ------

@@ -13,6 +13,7 @@ from vdet.config.detecting import (
     TrackerSettings,
     WindowSettings,
 )
+from vdet.config.lanes import LaneSettings
 from vdet.config.learning import (
     CalibrationSettings,
     ColorSpace,
@@ -32,6 +33,7 @@ __all__ = [
     "HeatSettings",
     "HistogramSettings",
     "HogSettings",
+    "LaneSettings",
     "OutputSettings",
     "SearchSettings",
     "Section",
@@ -69,4 +71,5 @@ class Settings(Section):
     search: SearchSettings = SearchSettings()
     heat: HeatSettings = HeatSettings()
     tracker: TrackerSettings = TrackerSettings()
+    lanes: LaneSettings = LaneSettings()
     output: OutputSettings = OutputSettings()

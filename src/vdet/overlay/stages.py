@@ -9,6 +9,7 @@ from vdet.config.schema import FeatureSettings, Settings
 from vdet.detection import Detection
 from vdet.geometry import Box
 from vdet.images import Image, write_image
+from vdet.lanes.road import Road
 from vdet.overlay.drawing import GREEN, WHITE, blend_heat, color_of, draw_box, draw_label
 from vdet.overlay.patches import patch_sheet
 from vdet.search.engine import lay_grids
@@ -37,7 +38,6 @@ def write_stages(
     features
         Those of the model.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     height, width = image.shape[:2]
     pictures = {
         "1-patches": patch_sheet(_examples(image, detection.windows), features),
@@ -46,6 +46,17 @@ def write_stages(
         "4-heat": _draw_heat(image, detection),
         "5-boxes": _draw_boxes(image, detection, boxes),
     }
+    _write(folder, pictures)
+
+
+def write_lane_stages(folder: Path, road: Road) -> None:
+    """Write `6-road.png` … `9-fit.png` likewise: how the lane was found."""
+    numbered = enumerate(road.pictures().items(), start=6)
+    _write(folder, {f"{number}-{name}": picture for number, (name, picture) in numbered})
+
+
+def _write(folder: Path, pictures: dict[str, Image]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
     for name, picture in pictures.items():
         write_image(folder / f"{name}.png", picture)
 

@@ -28,7 +28,7 @@ class FramePyramid:
         top, bottom = rows.start - self._top, rows.stop - self._top
         level = 0
         sides = (top, bottom, columns.start, columns.stop)
-        while _halves_exactly(sides) and sides[1] - sides[0] >= 2 * height:
+        while _halves_exactly(sides) and _is_twice(sides, width, height):
             sides = (sides[0] // 2, sides[1] // 2, sides[2] // 2, sides[3] // 2)
             level += 1
         part = self._level(level)[sides[0] : sides[1], sides[2] : sides[3]]
@@ -44,3 +44,7 @@ class FramePyramid:
 
 def _halves_exactly(sides: tuple[int, int, int, int]) -> bool:
     return all(side % 2 == 0 for side in sides)
+
+
+def _is_twice(sides: tuple[int, int, int, int], width: int, height: int) -> bool:
+    return sides[1] - sides[0] >= 2 * height and sides[3] - sides[2] >= 2 * width

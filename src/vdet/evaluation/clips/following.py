@@ -12,6 +12,7 @@ from vdet.detection import Detector
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.pipeline import follow
+from vdet.stream import quiet_libraries
 from vdet.tracking.cars import Cars
 from vdet.tracking.track import Track
 from vdet.video import Frame
@@ -38,15 +39,17 @@ def follow_under_all(
         No search window fits into such a frame.
     """
     if len(variants) == 1:
-        for result in follow(frames, model, variants[0], width, height):
-            yield result.frame, [result.tracks]
+        with quiet_libraries():
+            for result in follow(frames, model, variants[0], width, height):
+                yield result.frame, [result.tracks]
         return
     followers = [_Follower(model, settings, width, height) for settings in variants]
     searchers = {follower.search_key: follower for follower in followers}
-    for frame in frames:
-        found = {key: searcher.search(frame.image) for key, searcher in searchers.items()}
-        tracks = [each.update(frame.image, found[each.search_key]) for each in followers]
-        yield frame, tracks
+    with quiet_libraries():
+        for frame in frames:
+            found = {key: searcher.search(frame.image) for key, searcher in searchers.items()}
+            tracks = [each.update(frame.image, found[each.search_key]) for each in followers]
+            yield frame, tracks
 
 
 def _search_key(settings: Settings) -> tuple[int, SearchSettings]:

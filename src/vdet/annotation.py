@@ -1,0 +1,65 @@
+"""What is drawn on the frames of a video: shown cars and the lane, or a moment's stages."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from vdet.config.schema import FeatureSettings, Settings
+from vdet.frame_result import FrameResult
+from vdet.lanes.drawing import draw_lane
+from vdet.overlay.drawing import draw_tracks, track_label
+from vdet.overlay.stages import write_lane_stages, write_stages
+from vdet.video import Frame
+
+
+def annotate(result: FrameResult) -> Frame:
+    """Return the frame with its cars, drawn into the image it came with.
+
+    Where lanes are looked for, it is the undistorted frame with the lane, and the cars' boxes are
+    carried through the same undistortion.
+    """
+    frame, road, tracks = result.frame, result.road, result.tracks
+    if road:
+        frame = replace(frame, image=road.image)
+        placed = (replace(track, box=road.place(track.box)) for track in tracks)
+        tracks = tuple(track for track in placed if track.box.area)
+        if road.lane:
+            draw_lane(frame.image, road.lane)
+    draw_tracks(frame.image, tracks)
+    return frame
+
+
+class StagePictures:
+    """Makes the pictures of every stage of one moment, when its frame comes.
+
+    Parameters
+    ----------
+    folder
+        Where they go; None for no pictures.
+    at
+        Time of the moment in the file, seconds.
+    """
+
+    def __init__(
+        self, folder: Path | None, at: Fraction, settings: Settings, features: FeatureSettings
+    ) -> None:
+        self._folder = folder
+        self._at = at
+        self._settings = settings
+        self._features = features
+
+    def offer(self, result: FrameResult) -> None:
+        """Make them of this frame if it is the first at or after the time asked for."""
+        if self._folder is None or result.frame.time < self._at:
+            return
+        write_stages(
+            self._folder,
+            result.frame.image,
+            result.detection,
+            [(track.box, track_label(track)) for track in result.tracks],
+            settings=self._settings,
+            features=self._features,
+        )
+        if result.road:
+            write_lane_stages(self._folder, result.road)
+        self._folder = None

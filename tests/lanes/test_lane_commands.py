@@ -1,0 +1,380 @@
+"""Lanes through the whole commands, on a clip that a strongly distorting lens took."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from conftest import Outcome, Run
+from red_cars import COLOUR, SETTINGS, red_finder
+from vdet.config.lanes import LaneSettings
+from vdet.config.schema import OutputSettings, SearchSettings, Settings, WindowSettings
+from vdet.geometry import Box
+from vdet.images import Image, read_image, write_image
+from vdet.lanes.camera import Camera
+from vdet.lanes.camera_file import save_camera
+from vdet.lanes.undistortion import Undistorter
+from vdet.model import save_model
+from vdet.overlay.drawing import color_of
+from vdet.synthetic.camera import Camera as RoadCamera
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import Scene
+from vdet.video import Frame, VideoInfo, VideoReader, VideoWriter
+
+WIDTH, HEIGHT, COUNT = 640, 480, 10
+LENS = Camera(WIDTH, HEIGHT, (480, 480), (320, 240), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+CAR = Box(500, 300, 64, 56)  # near the edge; where the lens shows it
+CORNER = np.s_[400:, 600:]
+"""Pixels that nothing is drawn on, and that undistortion moves far."""
+STAGES = [
+    "1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png",
+    "6-road.png", "7-above.png", "8-mask.png", "9-fit.png",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Files:
+    """What the commands are given."""
+
+    clip: Path
+    """A road in a bend as the lens shows it, and a red car that goes along with the camera."""
+    picture: Path
+    """Its first frame."""
+    plain: Path
+    """The road without lens or car."""
+    bare: Path
+    """A picture of nothing but grey."""
+    camera: Path
+    settings: Path
+    model: Path
+
+    @property
+    def red(self) -> tuple[str | Path, ...]:
+        """The options that find red cars."""
+        return "-c", self.settings, "--model", self.model
+
+    @property
+    def lanes(self) -> tuple[str | Path, ...]:
+        """These, and those that find the lane."""
+        return *self.red, "--lanes", "--camera", self.camera
+
+
+@pytest.fixture(scope="module")
+def undistorter() -> Undistorter:
+    return Undistorter(LENS, WIDTH, HEIGHT)
+
+
+@pytest.fixture(scope="module")
+def road(make_road: Callable[..., Scene]) -> Scene:
+    return make_road(curvature=1 / 500, size=(WIDTH, HEIGHT), frames=COUNT)
+
+
+@pytest.fixture(scope="module")
+def files(
+    road: Scene,
+    undistorter: Undistorter,
+    settings_for: Callable[[RoadCamera], LaneSettings],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Files:
+    folder = tmp_path_factory.mktemp("lanes")
+    names = ("clip.mp4", "frame.png", "plain.png", "bare.png", "camera.yaml", "my.yaml", "red.npz")
+    made = Files(*(folder / name for name in names))
+    renderer = Renderer(road)
+    seen = [with_car(distorted(renderer.image(i), undistorter)) for i in range(COUNT)]
+    write_video(made.clip, seen)
+    write_image(made.picture, seen[0])
+    write_image(made.plain, renderer.image(0))
+    write_image(made.bare, np.full((HEIGHT, WIDTH, 3), 90, np.uint8))
+    save_camera(LENS, made.camera)
+    settings = red_settings(settings_for(road.camera))
+    values = settings.model_dump(mode="json", exclude_none=True)
+    made.settings.write_text(yaml.safe_dump(values), encoding="utf-8")
+    save_model(red_finder(), made.model)
+    return made
+
+
+def distorted(image: Image, undistorter: Undistorter) -> Image:
+    """Show an ideal camera's picture as the lens would."""
+    columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+    pixels = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64)
+    x, y = undistorter.points(pixels).T.reshape(2, HEIGHT, WIDTH).astype(np.float32)
+    return np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR), np.uint8)
+
+
+def with_car(image: Image) -> Image:
+    image[CAR.y : CAR.bottom, CAR.x : CAR.right] = (0, 0, 255)
+    return image
+
+
+def write_video(path: Path, images: list[Image]) -> None:
+    info = VideoInfo(path, WIDTH, HEIGHT, Fraction(25), Fraction(1, 25), frames=len(images))
+    with VideoWriter(path, info, OutputSettings(crf=10)) as writer:
+        for index, image in enumerate(images):
+            writer.write(Frame(index, Fraction(index, 25), image))
+
+
+def red_settings(lanes: LaneSettings) -> Settings:
+    windows = WindowSettings(size=32, overlap=0.75, top=280, bottom=400)
+    changes = {
+        "reference_height": HEIGHT,
+        "features": COLOUR,
+        "search": SearchSettings(windows=(windows,)),
+        "lanes": lanes,
+        "output": OutputSettings(crf=4),
+    }
+    return SETTINGS.model_copy(update=changes)
+
+
+def video_images(path: Path) -> list[Image]:
+    with VideoReader(path) as reader:
+        return [frame.image for frame in reader]
+
+
+def read_records(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def box_of(item: dict[str, Any]) -> Box:
+    return Box(item["x"], item["y"], item["width"], item["height"])
+
+
+def check_lane(lane: dict[str, Any], camera: RoadCamera) -> None:
+    """Compare a lane as JSON has it with the road that was drawn."""
+    assert set(lane) == {"radius", "offset", "width", "left", "right"}
+    assert lane["radius"] == pytest.approx(1 / camera.curvature, rel=0.25)
+    assert lane["offset"] == pytest.approx(0, abs=0.1)
+    assert lane["width"] == pytest.approx(3.7, abs=0.1)
+    for name, lateral in (("left", -1.85), ("right", 1.85)):
+        x, y = np.array(lane[name]).T
+        distance = camera.focal * camera.above_ground / (y - camera.horizon)
+        truth = np.column_stack([np.full_like(x, lateral), np.zeros_like(x), distance])
+        metres = (x - camera.project(truth)[:, 0]) * distance / camera.focal
+        assert np.abs(metres).max() < 0.3
+        assert abs(metres[0]) < 0.1
+        assert (np.diff(y) < 0).all()
+
+
+def sits_on(box: Box, car: Box) -> bool:
+    """Tell whether a box holds all of a car, with it in the middle."""
+    (x, y), (car_x, car_y) = box.center, car.center
+    return box.intersection(car) == car and abs(x - car_x) < 6 and abs(y - car_y) < 6
+
+
+def red_in(image: Image) -> Box:
+    """Give the box around what is as red as the car."""
+    x, y, width, height = cv2.boundingRect(cv2.inRange(image, (0, 0, 180), (80, 80, 255)))
+    return Box(x, y, width, height)
+
+
+def has_outline(image: Image, box: Box, color: tuple[int, int, int]) -> bool:
+    """Tell whether the lower side of a box is drawn."""
+    side = image[box.bottom - 1, box.x + 4 : box.right - 4].astype(int)
+    return bool((np.abs(side - color).max(axis=1) < 60).mean() > 0.8)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where `TestVideo.records` puts its outputs."""
+    return tmp_path_factory.mktemp("out")
+
+
+class TestVideo:
+    @pytest.fixture
+    def records(self, run: Run, files: Files, folder: Path) -> list[dict[str, Any]]:
+        """The records of one run, done once, which also wrote `out.mp4`."""
+        if not (folder / "t.jsonl").exists():
+            outputs = (folder / "out.mp4", "--tracks", folder / "t.jsonl")
+            result = run("detect-video", files.clip, *outputs, *files.lanes)
+            assert result.code == 0, result.err
+        return read_records(folder / "t.jsonl")
+
+    def test_every_record_has_the_lane_of_the_undistorted_frame(
+        self, records: list[dict[str, Any]], road: Scene
+    ) -> None:
+        assert len(records) == COUNT
+        for record in records:
+            check_lane(record["lane"], road.camera)
+
+    def test_metres_have_three_decimals_and_pixels_one(self, records: list[dict[str, Any]]) -> None:
+        lane = records[0]["lane"]
+        for key in ("radius", "offset", "width"):
+            assert lane[key] == round(lane[key], 3)
+        points = np.array(lane["left"] + lane["right"])
+        assert (points == points.round(1)).all()
+
+    def test_boxes_are_told_where_they_are_in_the_input(
+        self, records: list[dict[str, Any]]
+    ) -> None:
+        boxes = [box_of(track) for record in records for track in record["tracks"]]
+        assert len(boxes) > COUNT // 2
+        assert all(sits_on(box, CAR) for box in boxes)
+
+    def test_at_the_edge_a_box_is_drawn_where_undistortion_puts_it(
+        self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
+    ) -> None:
+        (track,) = records[-1]["tracks"]
+        told, placed = box_of(track), undistorter.box(box_of(track))
+        drawn = video_images(folder / "out.mp4")[-1]
+        assert has_outline(drawn, placed, color_of(track["id"]))
+        assert not has_outline(drawn, told, color_of(track["id"]))
+        car = red_in(undistorter.image(video_images(files.clip)[-1]))
+        assert sits_on(placed, car)
+        assert told.right < car.right - 15, "an unmoved box would miss a quarter of the car"
+
+    def test_the_video_is_the_undistorted_one(
+        self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
+    ) -> None:
+        before, after = video_images(files.clip), video_images(folder / "out.mp4")
+        assert len(after) == len(records) == COUNT
+        for old, new in zip(before, after, strict=True):
+            straight = undistorter.image(old)[CORNER].astype(int)
+            assert np.abs(new[CORNER] - straight).mean() < 2
+            assert np.abs(new[CORNER] - old[CORNER].astype(int)).mean() > 8
+
+    def test_the_lane_is_painted(
+        self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
+    ) -> None:
+        lane = records[0]["lane"]
+        (x0, y), (x1, _) = lane["left"][6], lane["right"][6]
+        row, middle = int(y), int((x0 + x1) / 2)
+        before = undistorter.image(video_images(files.clip)[0])[row, middle].astype(int)
+        blue, green, red = video_images(folder / "out.mp4")[0][row, middle].astype(int) - before
+        assert green > 15
+        assert green > max(blue, red)
+
+    def test_the_number_of_threads_changes_nothing(
+        self, run: Run, files: Files, tmp_path: Path
+    ) -> None:
+        for threads in ("1", "3"):
+            outputs = (tmp_path / f"{threads}.mp4", "--tracks", tmp_path / f"{threads}.jsonl")
+            options = (*files.lanes, "--threads", threads)
+            assert run("detect-video", files.clip, *outputs, *options).code == 0
+        assert (tmp_path / "1.jsonl").read_bytes() == (tmp_path / "3.jsonl").read_bytes()
+        for one, three in zip(*(video_images(tmp_path / f"{n}.mp4") for n in "13"), strict=True):
+            assert (one == three).all()
+
+    def test_without_lanes_records_are_as_ever(
+        self, run: Run, files: Files, records: list[dict[str, Any]], tmp_path: Path
+    ) -> None:
+        path = tmp_path / "t.jsonl"
+        options = ("--no-video", "--tracks", path, *files.red)
+        assert run("detect-video", files.clip, *options).code == 0
+        assert read_records(path) == [
+            {key: value for key, value in record.items() if key != "lane"} for record in records
+        ]
+
+    def test_stages_show_how_the_lane_was_found(
+        self, run: Run, files: Files, tmp_path: Path
+    ) -> None:
+        options = ("--no-video", "--stages", tmp_path / "s", "--at", "0.2", "--frames", "7")
+        assert run("detect-video", files.clip, *options, *files.lanes).code == 0
+        assert sorted(path.name for path in (tmp_path / "s").iterdir()) == STAGES
+
+    def test_a_camera_of_another_shape_is_refused(
+        self, run: Run, files: Files, tmp_path: Path
+    ) -> None:
+        wide = tmp_path / "wide.yaml"
+        save_camera(Camera(1280, 720, (960, 960), (640, 360), (0, 0, 0, 0, 0), 0), wide)
+        out, tracks = tmp_path / "out.mp4", tmp_path / "t.csv"
+        options = ("--tracks", tracks, *files.red, "--lanes", "--camera", wide)
+        result = run("detect-video", files.clip, out, *options)
+        assert result.code == 1
+        assert f"{files.clip}: the camera was calibrated for 1280×720" in result.err
+        assert "another shape" in result.err
+        assert list(tmp_path.iterdir()) == [wide]
+
+
+class TestPictures:
+    def json_of(self, result: Outcome) -> list[dict[str, Any]]:
+        assert result.code == 0, result.err
+        items: list[dict[str, Any]] = json.loads(result.out)
+        return items
+
+    def test_the_lane_and_the_boxes_are_told_and_drawn(
+        self, run: Run, files: Files, tmp_path: Path, road: Scene, undistorter: Undistorter
+    ) -> None:
+        out = tmp_path / "out.png"
+        options = ("-o", out, "--json", "-", *files.lanes)
+        (item,) = self.json_of(run("detect-image", files.picture, *options))
+        check_lane(item["lane"], road.camera)
+        (told,) = map(box_of, item["boxes"])
+        assert sits_on(told, CAR)
+        drawn = read_image(out)
+        assert has_outline(drawn, undistorter.box(told), color_of(1))
+        assert not has_outline(drawn, told, color_of(1))
+        straight = undistorter.image(read_image(files.picture))
+        assert (drawn[CORNER] == straight[CORNER]).all()
+
+    def test_without_a_camera_pictures_are_taken_as_undistorted_with_one_warning(
+        self, run: Run, files: Files, road: Scene, tmp_path: Path
+    ) -> None:
+        pictures, out = (files.plain, files.bare), tmp_path / "out"
+        result = run("detect-image", *pictures, "-o", out, "--json", "-", *files.red, "--lanes")
+        plain, bare = self.json_of(result)
+        check_lane(plain["lane"], road.camera)
+        assert bare["lane"] is None
+        assert result.err.count("warning") == 1
+        assert "--lanes without --camera: pictures are taken as undistorted" in result.err
+        assert (read_image(out / "bare.png") == read_image(files.bare)).all()
+
+    def test_without_lanes_none_is_told(self, run: Run, files: Files) -> None:
+        (item,) = self.json_of(run("detect-image", files.plain, "--json", "-", *files.red))
+        assert "lane" not in item
+
+    def test_stages_show_how_the_lane_was_found(
+        self, run: Run, files: Files, tmp_path: Path
+    ) -> None:
+        stages = tmp_path / "s"
+        assert run("detect-image", files.picture, "--stages", stages, *files.lanes).code == 0
+        assert sorted(path.name for path in stages.iterdir()) == STAGES
+        assert read_image(stages / "6-road.png").shape == (HEIGHT, WIDTH, 3)
+
+    def test_a_picture_of_another_shape_does_not_stop_the_others(
+        self, run: Run, files: Files, tmp_path: Path
+    ) -> None:
+        other = tmp_path / "other.png"
+        write_image(other, read_image(files.plain)[:400])
+        out = tmp_path / "out"
+        result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
+        assert result.code == 1
+        assert "other.png: the camera was calibrated for 640×480" in result.err
+        assert [path.name for path in out.iterdir()] == ["frame.png"]
+
+
+class TestWrongUse:
+    @pytest.mark.parametrize("command", ["detect-video", "detect-image"])
+    def test_a_camera_without_lanes(self, run: Run, files: Files, command: str) -> None:
+        outputs = ("out.mp4",) if command == "detect-video" else ("-o", "out.png")
+        result = run(command, files.clip, *outputs, "--camera", files.camera)
+        assert result.code == 2
+        assert "--camera goes with --lanes" in result.err
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            (None, "cannot be read"),
+            ("width: [", "my-camera.yaml:1"),
+            ("width: 640\nheight: 480\n", "matrix: is missing"),
+        ],
+    )
+    @pytest.mark.parametrize("command", ["detect-video", "detect-image"])
+    def test_a_file_that_is_no_camera(
+        self, run: Run, files: Files, tmp_path: Path, text: str | None, words: str, command: str
+    ) -> None:
+        path = tmp_path / "my-camera.yaml"
+        if text:
+            path.write_text(text)
+        source = files.clip if command == "detect-video" else files.picture
+        out = tmp_path / f"out{source.suffix}"
+        outputs = (out,) if command == "detect-video" else ("-o", out)
+        result = run(command, source, *outputs, "--lanes", "--camera", path)
+        assert result.code == 1
+        assert words in result.err
+        assert not out.exists()
