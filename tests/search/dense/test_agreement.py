@@ -1,0 +1,170 @@
+"""Dense and patch engine on the same windows: the promise that lets the fast one be the default."""
+
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from search.dense.reference import (
+    SEED_FEATURES,
+    Scores,
+    cars,
+    compare,
+    fitted,
+    grid_of,
+    log_odds,
+    road,
+)
+from seed import SEED
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings, Settings
+from vdet.features import FeatureExtractor, Layout, to_patch
+from vdet.images import Image
+from vdet.model import LinearModel, load_model
+from vdet.resources import shipped_model
+from vdet.search.dense import dense_search
+from vdet.search.dense.aligned import AlignedSearch, PhasedSearch
+from vdet.search.dense.hog import describe_blocks
+from vdet.search.dense.located import LocatedSearch
+from vdet.search.dense.strips import Strip
+from vdet.search.engine import FrameSearch, lay_grids
+from vdet.search.pyramid import FramePyramid
+from vdet.windows import WindowGrid, every_nth
+
+SHIPPED = {"seed": SEED, "default": Settings()}
+GRIDS = {
+    "a cell": (AlignedSearch, grid_of(64, step=1)),
+    "two cells": (AlignedSearch, grid_of(96, step=2)),
+    "three cells": (AlignedSearch, grid_of(64, step=3)),
+    "one and a half": (PhasedSearch, grid_of(64, overlap=0.8)),
+    "half pixels": (LocatedSearch, grid_of(128, overlap=0.8)),
+    "third pixels": (LocatedSearch, grid_of(96, overlap=0.8)),
+    "enlarged": (PhasedSearch, grid_of(48, overlap=0.8)),
+    "enlarged, third pixels": (LocatedSearch, grid_of(48, overlap=0.85)),
+}
+FEATURES = {
+    "no histogram": FeatureSettings(histogram=HistogramSettings(bins=0)),
+    "fine histogram": FeatureSettings(histogram=HistogramSettings(bins=256)),
+    "luma only": FeatureSettings(hog=HogSettings(channels=(0,))),
+    "other order": FeatureSettings(hog=HogSettings(channels=(2, 0))),
+    "12 orientations": FeatureSettings(hog=HogSettings(orientations=12)),
+    "large blocks": FeatureSettings(hog=HogSettings(block=3)),
+    "single cells": FeatureSettings(hog=HogSettings(block=1)),
+    "patch of 48": FeatureSettings(patch=48, hog=HogSettings(cell=6)),
+    "HSV": FeatureSettings(color_space="HSV"),
+    "LUV": FeatureSettings(color_space="LUV"),
+    "HLS": FeatureSettings(color_space="HLS"),
+    "YUV": FeatureSettings(color_space="YUV"),
+    "RGB": FeatureSettings(color_space="RGB"),
+}
+
+
+FEW = 0.92
+"""Decisions of so small a grid that one or two near 0.5 are a few percent."""
+
+
+def assert_agree(scores: Scores, correlation: float = 0.99, same: float = 0.99) -> None:
+    assert (scores.patch > 0).any(), "nothing is found: decisions cannot differ"
+    assert scores.correlation >= correlation
+    assert scores.same >= same
+
+
+@pytest.mark.parametrize(("name", "members"), [("seed", 3), ("default", 1), ("default", 3)])
+def test_the_engines_agree_on_a_drawn_road(name: str, members: int) -> None:
+    model = fitted(SHIPPED[name].features, members)
+    grids = lay_grids(SHIPPED[name], model.features, 1280, 720)
+    assert_agree(compare(model, grids, road()))
+
+
+@pytest.mark.parametrize("kind", GRIDS)
+def test_they_agree_whatever_the_step(kind: str) -> None:
+    search, grid = GRIDS[kind]
+    model = fitted(SEED_FEATURES, members=2)
+    assert type(dense_search(model, grid)) is search
+    assert_agree(compare(model, [grid], cars()), same=FEW)
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_they_agree_whatever_the_features(name: str) -> None:
+    grids = [grid_of(96, step=1), grid_of(96, overlap=0.7)]
+    model = fitted(FEATURES[name])
+    assert {type(dense_search(model, grid)) for grid in grids} == {AlignedSearch, LocatedSearch}
+    assert_agree(compare(model, grids, cars()), same=FEW)
+
+
+def _right_of_the_middle(grids: list[WindowGrid]) -> list[WindowGrid]:
+    return [every_nth(grid, 1, grid.columns * 2 // 5, 0) for grid in grids]  # the cars are there
+
+
+@pytest.mark.parametrize(("width", "height"), [(640, 360), (960, 540), (1920, 1080), (1277, 719)])
+def test_they_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
+    model = fitted(SEED_FEATURES)
+    grids = _right_of_the_middle(lay_grids(SEED, model.features, width, height))
+    assert_agree(compare(model, grids, road(width, height)))
+
+
+@pytest.mark.parametrize(("width", "height"), [(960, 540), (1920, 1080), (853, 480)])
+def test_they_agree_less_where_strips_halve_otherwise_than_windows(width: int, height: int) -> None:
+    # A window of 72 pixels, 9 from the next, is halved on its own; half of them lie at odd pixels.
+    model = fitted(FeatureSettings())
+    grids = _right_of_the_middle(lay_grids(Settings(), model.features, width, height))
+    assert_agree(compare(model, grids, road(width, height)), correlation=0.97, same=0.95)
+
+
+@pytest.fixture(scope="module")
+def real_frames(real_data: Path) -> list[Image]:
+    """Give frames 250, 500 and 750 of the project video, those that can be sought."""
+    images = []
+    with av.open(real_data / "project_video.mp4") as container:
+        for second in (10, 20, 30):
+            container.seek(second * av.time_base)
+            frame = next(container.decode(video=0))
+            assert frame.time == second
+            images.append(np.asarray(frame.to_ndarray(format="bgr24"), np.uint8))
+    return images
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image]) -> None:
+    settings = SHIPPED[name]
+    model = load_model(shipped_model(settings.features))
+    grids = lay_grids(settings, model.features, 1280, 720)
+    scores = [compare(model, grids, image) for image in real_frames]
+    dense, patch = (np.concatenate([getattr(s, e) for s in scores]) for e in ("dense", "patch"))
+    assert_agree(Scores(dense, patch))
+
+
+def _windows_of_blocks(model: LinearModel, grid: WindowGrid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the blocks of each window, from its strip and from its patch, `(n, 7, 7, d)`."""
+    features, image = model.features, cars()
+    every = describe_blocks(Strip(grid, features).cut(FramePyramid(image)), features)
+    extractor, layout = FeatureExtractor(features), Layout.of(features)
+    by_strip, by_patch = [], []
+    for i, (x, y, w, h) in enumerate(grid.boxes.tolist()):
+        row, column = divmod(i, grid.columns)
+        by_strip.append(every[column : column + 7, row : row + 7])
+        vector = extractor.describe(to_patch(image[y : y + h, x : x + w], features.patch))
+        parts = [vector[part].reshape(7, 7, -1) for part in layout.hog]
+        by_patch.append(np.concatenate(parts, axis=-1))
+    return np.array(by_strip), np.array(by_patch)
+
+
+@pytest.mark.parametrize("size", [64, 128])
+@pytest.mark.parametrize("features", [SEED_FEATURES, FeatureSettings()], ids=["seed", "default"])
+def test_blocks_away_from_the_edge_of_a_patch_are_the_same(
+    features: FeatureSettings, size: int
+) -> None:
+    by_strip, by_patch = _windows_of_blocks(fitted(features), grid_of(size, step=1))
+    inner = np.s_[:, 1:-1, 1:-1]
+    np.testing.assert_allclose(by_strip[inner], by_patch[inner], atol=1e-4, rtol=0)
+    assert np.abs(by_patch).max() > 0.1
+
+
+def test_a_frame_is_searched_at_all_windows_of_all_sets_in_order() -> None:
+    model, image = fitted(FeatureSettings()), road()
+    found = FrameSearch(model, Settings(), 1280, 720).search(image)
+    grids = lay_grids(Settings(), model.features, 1280, 720)
+    np.testing.assert_array_equal(found.boxes, np.concatenate([grid.boxes for grid in grids]))
+    one_by_one = compare(model, grids, image)
+    np.testing.assert_allclose(log_odds(found.probabilities), one_by_one.dense, atol=1e-3)

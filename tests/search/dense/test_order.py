@@ -1,0 +1,96 @@
+"""Each window's score stands at its place: a texture drawn into one window is found there."""
+
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.features import FeatureExtractor
+from vdet.images import Image
+from vdet.model import LinearModel
+from vdet.search.dense import dense_search
+from vdet.search.dense.aligned import AlignedSearch, PhasedSearch
+from vdet.search.dense.located import LocatedSearch
+from vdet.search.patch import PatchSearch
+from vdet.search.pyramid import FramePyramid
+from vdet.windows import WindowGrid
+
+FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=0))
+GRIDS = [
+    (AlignedSearch, 64, 8),
+    (AlignedSearch, 64, 16),
+    (AlignedSearch, 64, 24),
+    (AlignedSearch, 128, 16),
+    (PhasedSearch, 64, 12),
+    (PhasedSearch, 128, 24),
+    (PhasedSearch, 48, 9),
+    (LocatedSearch, 64, 7),
+    (LocatedSearch, 128, 25),
+    (LocatedSearch, 96, 19),
+    (LocatedSearch, 48, 7),
+    (LocatedSearch, 80, 13),
+]
+
+
+def texture(side: int) -> Image:
+    coarse = np.random.default_rng(3).integers(0, 256, (8, 8, 3), dtype=np.uint8)
+    return np.asarray(cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def texture_finder(members: int) -> LinearModel:
+    """Return a model that is surest of the texture."""
+    vector = FeatureExtractor(FEATURES).describe(texture(64))
+    weights = np.tile(vector / np.linalg.norm(vector) ** 2, (members, 1))
+    return LinearModel(
+        FEATURES,
+        weights,
+        biases=np.full(members, -0.7, np.float32),
+        slopes=np.full(members, -8, np.float32),
+        offsets=np.linspace(-1, 1, members, dtype=np.float32)
+        if members > 1
+        else np.zeros(1, np.float32),
+    )
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+@pytest.mark.parametrize("members", [1, 2])
+def test_a_texture_scores_highest_in_the_window_it_fills(
+    kind: type, size: int, step: int, members: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder(members)
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    for index in (0, 6, 9, 17, 28, 34):
+        x, y, w, h = grid.boxes[index].tolist()
+        frame = np.full((2 * size + 6 * step, 2 * size + 8 * step, 3), 100, np.uint8)
+        frame[y : y + h, x : x + w] = texture(size)
+        found = search.search(FramePyramid(frame))
+        assert found.shape == (35,)
+        assert found.dtype == np.float32
+        assert int(found.argmax()) == index
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (1, 4), (5, 1), (2, 2)])
+def test_a_grid_may_be_a_window_a_row_or_a_column(
+    kind: type, size: int, step: int, columns: int, rows: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(3), columns, rows)
+    model = texture_finder(1)
+    frame = FramePyramid(np.asarray(texture(256), np.uint8))
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    expected = PatchSearch(model, grid).search(frame)
+    np.testing.assert_allclose(search.search(frame), expected, atol=0.1)
+
+
+def test_a_search_remembers_nothing() -> None:
+    for _, size, step in GRIDS:
+        grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
+        search = dense_search(texture_finder(1), grid)
+        first = search.search(FramePyramid(texture(256)))
+        search.search(FramePyramid(255 - texture(256)))
+        np.testing.assert_array_equal(search.search(FramePyramid(texture(256))), first)
