@@ -30,8 +30,8 @@ SETTINGS = Settings(
     reference_height=HEIGHT,
     features=COLOUR,
     search=SearchSettings(windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),)),
-    heat=HeatSettings(frames=2, blur=5, threshold=1.4),
-    tracker=TrackerSettings(min_region=30),
+    heat=HeatSettings(frames=2, weight="none", shrink=1, blur=5, threshold=1.4),
+    tracker=TrackerSettings(min_region=30, confident_peak=4),
 )
 
 

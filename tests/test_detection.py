@@ -1,85 +1,43 @@
 import numpy as np
 import pytest
 
-from vdet.config.schema import (
-    FeatureSettings,
-    HeatSettings,
-    HistogramSettings,
-    HogSettings,
-    SearchSettings,
-    Settings,
-    TrackerSettings,
-    WindowSettings,
-)
-from vdet.detection import Detector, detect_still, still_boxes
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
+from vdet.config.schema import HeatSettings, Settings, TrackerSettings
+from vdet.detection import Detection, Detector, detect_still, still_boxes
 from vdet.errors import ImageError
 from vdet.geometry import Box
 from vdet.images import Image
-from vdet.model import LinearModel
 
-COLOUR = FeatureSettings(
-    color_space="RGB", hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
-)
-SETTINGS = Settings(
-    reference_height=240,
-    features=COLOUR,
-    search=SearchSettings(windows=(WindowSettings(size=32, overlap=0.75, top=80, bottom=240),)),
-    heat=HeatSettings(frames=2, blur=5, threshold=1.4),
-    tracker=TrackerSettings(min_region=30),
-)
-
-
-def red_finder() -> LinearModel:
-    """Give a model that is sure of a window where 44 % of the pixels are bright red."""
-    weights = np.zeros((1, 24), np.float32)
-    weights[0, 7] = 1 / (64 * 64)
-    return LinearModel(
-        COLOUR,
-        weights,
-        np.array([-0.44], np.float32),
-        np.array([-20], np.float32),
-        np.zeros(1, np.float32),
-    )
-
-
-def road(*boxes: Box) -> Image:
-    image = np.full((240, 320, 3), 90, np.uint8)
-    for box in boxes:
-        image[box.y : box.bottom, box.x : box.right] = (0, 0, 255)
-    return image
-
-
-CAR = Box(96, 120, 64, 48)
 MODEL = red_finder()
 
 
+def watch(*images: Image, settings: Settings = SETTINGS) -> list[Detection]:
+    """Give the detections in consecutive frames."""
+    detector = Detector(MODEL, settings, WIDTH, HEIGHT)
+    return [detector.accumulate(detector.search(image)) for image in images]
+
+
 def test_a_car_in_consecutive_frames_becomes_a_region_around_it() -> None:
-    detector = Detector(MODEL, SETTINGS, 320, 240)
-    detector.detect(road(CAR))
-    detection = detector.detect(road(CAR))
+    *_, detection = watch(road(CAR), road(CAR))
     (region,) = detection.regions
     assert region.box.intersection(CAR) == CAR
     assert region.box.iou(CAR) > 0.35
-    assert region.peak == detection.heat.max() > 1.4
+    assert region.peak == detection.heat.peak > 1.4
 
 
 def test_the_first_frame_alone_is_half_as_hot_as_two() -> None:
-    detector = Detector(MODEL, SETTINGS, 320, 240)
-    first, second = detector.detect(road(CAR)), detector.detect(road(CAR))
-    np.testing.assert_allclose(second.heat, 2 * first.heat, rtol=1e-5)
+    first, second = watch(road(CAR), road(CAR))
+    np.testing.assert_allclose(second.heat.values, 2 * first.heat.values, rtol=1e-5)
 
 
 def test_the_heat_of_a_car_that_has_gone_is_forgotten() -> None:
-    detector = Detector(MODEL, SETTINGS, 320, 240)
-    detector.detect(road(CAR))
-    detector.detect(road())
-    detection = detector.detect(road())
-    assert detection.heat.max() == 0
+    *_, detection = watch(road(CAR), road(), road())
+    assert detection.heat.peak == 0
     assert detection.regions == ()
 
 
 def test_hits_are_the_windows_of_at_least_the_probability() -> None:
-    detection = Detector(MODEL, SETTINGS, 320, 240).detect(road(CAR))
+    (detection,) = watch(road(CAR))
     expected = detection.windows.probabilities >= 0.5
     assert 0 < expected.sum() < len(detection.windows)
     np.testing.assert_array_equal(detection.hits.boxes, detection.windows.boxes[expected])
@@ -89,15 +47,15 @@ def test_only_hits_make_heat() -> None:
     strict = SETTINGS.model_copy(
         update={"search": SETTINGS.search.model_copy(update={"probability": 1.0})}
     )
-    detection = Detector(MODEL, strict, 320, 240).detect(road(CAR))
+    (detection,) = watch(road(CAR), settings=strict)
     assert len(detection.hits) == 0
-    assert detection.heat.max() == 0
+    assert detection.heat.peak == 0
 
 
 def test_an_empty_road_has_no_regions() -> None:
     detection = detect_still(MODEL, SETTINGS, road())
     assert detection.regions == ()
-    assert detection.heat.shape == (240, 320)
+    assert detection.heat.values.shape == (240, 320)
 
 
 def test_two_cars_apart_are_two_regions() -> None:
@@ -109,11 +67,20 @@ def test_two_cars_apart_are_two_regions() -> None:
 def test_a_still_is_as_hot_as_a_video_that_stands_still(frames: int) -> None:
     heat = SETTINGS.heat.model_copy(update={"frames": frames})
     settings = SETTINGS.model_copy(update={"heat": heat})
-    detector = Detector(MODEL, settings, 320, 240)
-    video = [detector.detect(road(CAR)) for _ in range(frames)][-1]
+    *_, video = watch(*[road(CAR)] * frames, settings=settings)
     still = detect_still(MODEL, settings, road(CAR))
-    np.testing.assert_allclose(still.heat, video.heat, rtol=1e-5)
+    np.testing.assert_allclose(still.heat.values, video.heat.values)
     assert [region.box for region in still.regions] == [region.box for region in video.regions]
+
+
+def test_the_default_heat_finds_the_same_car_in_coarser_pixels() -> None:
+    fine = SETTINGS.model_copy(update={"heat": HeatSettings(shrink=1, threshold=2)})
+    coarse = SETTINGS.model_copy(update={"heat": HeatSettings(threshold=2)})
+    (expected,) = detect_still(MODEL, fine, road(CAR)).regions
+    (region,) = detect_still(MODEL, coarse, road(CAR)).regions
+    assert expected.box.iou(CAR) > 0.5
+    assert region.box.iou(expected.box) > 0.8
+    assert region.peak == pytest.approx(expected.peak, rel=0.05)
 
 
 def test_lengths_scale_with_the_frame() -> None:

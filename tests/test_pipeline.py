@@ -16,7 +16,9 @@ import numpy as np
 import pytest
 
 from conftest import Run
+from quick import QUICK
 from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, red_finder, road
+from vdet.config.loading import load_settings
 from vdet.config.schema import OutputSettings, SearchSettings, Settings, WindowSettings
 from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.model import load_model
@@ -60,8 +62,7 @@ def since_first(path: Path) -> list[Fraction]:
 
 class TestFollow:
     def test_finds_the_vehicle_of_a_drawn_scene(self, scene: Scene, model_path: Path) -> None:
-        sets = (WindowSettings(size=96, overlap=0.8, top=370, bottom=560),)
-        settings = Settings(search=SearchSettings(windows=sets))
+        settings = load_settings(None, QUICK).settings
         drawn = islice(frames(scene), 16)
         results = list(follow(drawn, load_model(model_path), settings, 320, 180))
         assert [result.frame.index for result in results] == list(range(16))
@@ -81,6 +82,16 @@ class TestFollow:
             (track,) = result.tracks
             assert track.id == 1
             assert track.box.iou(car_at(result.frame.index)) > 0.3
+
+    def test_gives_the_same_whatever_the_number_of_threads(self) -> None:
+        one, many = (
+            list(follow(drive(20), red_finder(), SETTINGS, WIDTH, HEIGHT, threads=threads))
+            for threads in (1, 5)
+        )
+        assert [result.tracks for result in many] == [result.tracks for result in one]
+        assert [result.frame.index for result in many] == list(range(20))
+        for first, second in zip(one, many, strict=True):
+            np.testing.assert_array_equal(first.detection.heat.values, second.detection.heat.values)
 
     def test_shows_nothing_on_an_empty_road(self) -> None:
         empty = (replace(frame, image=road()) for frame in drive(15))
@@ -129,7 +140,7 @@ class TestMemory:
                 held.append(sum(isinstance(item, Frame) for item in gc.get_objects()))
 
         job = VideoJob(red_clip, tmp_path / "out.mp4", tmp_path / "out.csv")
-        process_video(job, red_finder(), SETTINGS, lambda _: advance)
+        process_video(job, red_finder(), SETTINGS, threads=2, progress=lambda _: advance)
         assert held
         assert 0 < max(held) <= QUEUED
 
@@ -147,7 +158,7 @@ class TestOutputs:
             told.append(total)
             return told.append
 
-        process_video(VideoJob(red_clip, frames=20), red_finder(), SETTINGS, progress)
+        process_video(VideoJob(red_clip, frames=20), red_finder(), SETTINGS, progress=progress)
         assert told[0] == 20
         assert sum(advance or 0 for advance in told[1:]) == 20
 
@@ -228,7 +239,7 @@ class TestBreakage:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            process_video(job, red_finder(), SETTINGS, lambda _: interrupt)
+            process_video(job, red_finder(), SETTINGS, progress=lambda _: interrupt)
 
     def test_the_work_is_interrupted(self, job: VideoJob, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(Cars, "update", _breaking(Cars.update, KeyboardInterrupt()))

@@ -5,6 +5,7 @@ the later ones, to which most of the photographs belong, are kept back for an in
 """
 
 import json
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
@@ -12,25 +13,47 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from vdet.config.loading import load_settings
+from seed import SEED
+from vdet.config.schema import Settings
 from vdet.dataset import find_patches, read_patches
 from vdet.detection import detect_still, still_boxes
-from vdet.features import FeatureExtractor
+from vdet.features import FeatureExtractor, to_patch
 from vdet.geometry import Box
 from vdet.images import Image, read_image
 from vdet.model import LinearModel, load_model
-from vdet.resources import find_config, shipped_model
+from vdet.resources import shipped_model
 from vdet.training.splits import hold_out
 from vdet.video import VideoReader
 
 pytestmark = pytest.mark.realdata
-SEED = load_settings(find_config("seed"), ()).settings
 
 
-@pytest.fixture(scope="module")
-def model(real_data: Path) -> LinearModel:
+WINDOW_BY_WINDOW = SEED.model_copy(
+    update={"search": SEED.search.model_copy(update={"engine": "patch"})}
+)
+"""The original's settings, searched as it searched."""
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """Settings that ship, and the model for them."""
+
+    settings: Settings
+    model: LinearModel
+
+    def find(self, image: Image) -> list[Box]:
+        detection = detect_still(self.model, self.settings, image)
+        return [box for box, _ in still_boxes(detection, self.settings, image.shape[0])]
+
+
+def with_model(settings: Settings) -> Shipped:
+    return Shipped(settings, load_model(shipped_model(settings.features)))
+
+
+@pytest.fixture(scope="module", params=["default", "seed"])
+def shipped(real_data: Path, request: pytest.FixtureRequest) -> Shipped:
     assert real_data.is_dir()
-    return load_model(shipped_model())
+    return with_model(WINDOW_BY_WINDOW if request.param == "seed" else Settings())
 
 
 def frame(real_data: Path, index: int) -> Image:
@@ -43,58 +66,55 @@ def frame(real_data: Path, index: int) -> Image:
     return read.image
 
 
-def found(model: LinearModel, image: Image) -> list[Box]:
-    boxes = still_boxes(detect_still(model, SEED, image), SEED, image.shape[0])
-    return [box for box, _ in boxes]
-
-
 def is_on(box: Box, car: Box) -> bool:
     """Tell whether a box is about where a car is: its middle on the car, a fair part in common."""
     return car.contains(box.center) and box.iou(car) > 0.25
 
 
 def test_the_shipped_model_knows_patches_of_the_end_of_every_folder(
-    real_data: Path, model: LinearModel
+    real_data: Path, shipped: Shipped
 ) -> None:
     files = find_patches([real_data / "vehicles.zip", real_data / "non-vehicles.zip"])
     held = hold_out(np.array([file.group for file in files]), "tail", 0.2, seed=0)
     chosen = [files[i] for i in np.flatnonzero(held)[::10]]
-    extractor = FeatureExtractor(model.features)
+    extractor = FeatureExtractor(shipped.model.features)
+    side = shipped.model.features.patch
     patches = [patch.image for patch in read_patches(chosen)]
-    vectors = extractor.describe_all(patch for patch in patches if patch is not None)
+    vectors = extractor.describe_all(to_patch(p, side) for p in patches if p is not None)
     assert len(vectors) == len(chosen) > 300
-    said = model.probabilities(vectors) >= 0.5
+    said = shipped.model.probabilities(vectors) >= 0.5
     assert np.mean(said == [file.vehicle for file in chosen]) >= 0.95
 
 
 @pytest.mark.parametrize("index", [24, 74])
-def test_nothing_is_found_on_an_empty_road(real_data: Path, model: LinearModel, index: int) -> None:
-    assert found(model, frame(real_data, index)) == []
+def test_nothing_is_found_on_an_empty_road(real_data: Path, shipped: Shipped, index: int) -> None:
+    assert shipped.find(frame(real_data, index)) == []
 
 
 @pytest.mark.parametrize(
     ("index", "car"),
     [(299, Box(1005, 406, 214, 102)), (499, Box(892, 406, 122, 67))],
 )
-def test_the_white_car_is_found(real_data: Path, model: LinearModel, index: int, car: Box) -> None:
-    assert any(is_on(box, car) for box in found(model, frame(real_data, index)))
+def test_the_white_car_is_found(real_data: Path, shipped: Shipped, index: int, car: Box) -> None:
+    assert any(is_on(box, car) for box in shipped.find(frame(real_data, index)))
 
 
-def test_the_white_car_is_found_in_a_photograph(real_data: Path, model: LinearModel) -> None:
-    (box,) = found(model, read_image(real_data / "test_images" / "test3.jpg"))
+def test_the_white_car_is_found_in_a_photograph(real_data: Path, shipped: Shipped) -> None:
+    (box,) = shipped.find(read_image(real_data / "test_images" / "test3.jpg"))
     assert is_on(box, Box(873, 416, 88, 53))
 
 
-def test_the_white_and_the_black_car_are_found_apart(real_data: Path, model: LinearModel) -> None:
-    boxes = found(model, frame(real_data, 729))
+def test_the_seed_finds_the_white_and_the_black_car_apart(real_data: Path) -> None:
+    boxes = with_model(WINDOW_BY_WINDOW).find(frame(real_data, 729))
     white = [box for box in boxes if is_on(box, Box(864, 413, 84, 51))]
     black = [box for box in boxes if is_on(box, Box(981, 397, 299, 206))]
     assert (len(white), len(black)) == (1, 1)
     assert white != black
 
 
-def test_every_photograph_is_searched(run: Run, real_data: Path) -> None:
-    result = run("detect-image", real_data / "test_images", "--json", "-", "-c", "seed")
+@pytest.mark.parametrize("config", ["default", "seed"])
+def test_every_photograph_is_searched(run: Run, real_data: Path, config: str) -> None:
+    result = run("detect-image", real_data / "test_images", "--json", "-", "-c", config)
     assert result.code == 0, result.err
     items = json.loads(result.out)
     assert [Path(item["image"]).name for item in items] == [f"test{i}.jpg" for i in range(1, 7)]
@@ -106,14 +126,15 @@ def test_every_photograph_is_searched(run: Run, real_data: Path) -> None:
             assert frame_box.intersection(box) == box
 
 
+@pytest.mark.parametrize("config", ["default", "seed"])
 def test_both_cars_are_followed_through_the_video(
-    run: Run, real_data: Path, tmp_path: Path
+    run: Run, real_data: Path, tmp_path: Path, config: str
 ) -> None:
     first, count = 739, 12
     options = (
         "--no-video", "--tracks", tmp_path / "tracks.jsonl",
         "--start", str(first / 25), "--frames", str(count),
-        "-c", "seed", "--set", "tracker.confident_detections_needed=2",
+        "-c", config, "--set", "tracker.confident_detections_needed=2",
     )  # fmt: skip
     result = run("detect-video", real_data / "project_video.mp4", *options)
     assert result.code == 0, result.err

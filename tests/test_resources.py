@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from vdet.config.loading import load_settings
-from vdet.config.schema import Settings
-from vdet.errors import ConfigError
+from vdet.config.schema import FeatureSettings, Settings
+from vdet.errors import ConfigError, ModelError
 from vdet.model import load_model
 from vdet.resources import find_config, shipped_model
 
@@ -14,8 +14,9 @@ def _somewhere_else(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def test_the_seed_config_is_found_by_its_name() -> None:
-    assert load_settings(find_config("seed")).settings == Settings()
+def test_shipped_configs_are_found_by_their_names() -> None:
+    assert load_settings(find_config("default")).settings == Settings()
+    assert load_settings(find_config("seed")).settings.features.patch == 64
 
 
 def test_a_path_is_taken_as_it_is(tmp_path: Path) -> None:
@@ -31,11 +32,21 @@ def test_a_file_of_the_name_goes_before_the_shipped_config(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("name", ["no", "seed.yaml", "../configs/seed"])
 def test_an_unknown_name_names_the_shipped_configs(name: str) -> None:
-    with pytest.raises(ConfigError, match=rf"^{name}: no such file; shipped configs are: .*seed"):
+    with pytest.raises(ConfigError) as error:
         find_config(name)
+    assert str(error.value) == f"{name}: no such file; shipped configs are: default, seed"
 
 
-def test_the_shipped_model_has_the_features_of_the_seed_config() -> None:
-    model = load_model(shipped_model(), Settings().features)
-    assert model.weights.shape[1] == 4800
+@pytest.mark.parametrize(("name", "length"), [("default", 4800), ("seed", 4800)])
+def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> None:
+    features = load_settings(find_config(name)).settings.features
+    path = shipped_model(features)
+    assert path.stem == name
+    model = load_model(path, features)
+    assert model.weights.shape[1] == length
     assert "data_sha256" in model.provenance
+
+
+def test_features_that_no_shipped_model_has_are_refused_with_advice() -> None:
+    with pytest.raises(ModelError, match=r"no shipped model .* give --model, or train one"):
+        shipped_model(FeatureSettings(color_space="HSV"))

@@ -133,7 +133,7 @@ def _other_version(model: Path, target: Path) -> None:
         (_truncate, "is not a vdet model, or is damaged"),
         (_text, "is not a vdet model, or is damaged"),
         (_not_a_number, "hold a value that is not a number"),
-        (_other_features, "its features need (3, 4800)"),
+        (_other_features, "its features need (1, 4800)"),
         (_other_version, "is a model of version 9"),
         (lambda *_: None, "cannot be read: No such file"),
     ],

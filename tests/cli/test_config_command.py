@@ -7,13 +7,13 @@ import yaml
 
 from conftest import Run
 
-SEED = Path(__file__).parents[2] / "configs" / "seed.yaml"
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 
 def test_prints_the_built_in_settings_as_commented_yaml(run: Run) -> None:
     result = run("config")
     assert result.code == 0
-    assert result.out == SEED.read_text(encoding="utf-8")
+    assert result.out == (CONFIGS / "default.yaml").read_text(encoding="utf-8")
     assert yaml.safe_load(result.out)["tracker"]["history"] == 10
 
 
@@ -21,7 +21,9 @@ def test_a_file_and_then_assignments_change_them(run: Run, tmp_path: Path) -> No
     file = tmp_path / "my.yaml"
     file.write_text("heat: {frames: 3, threshold: 2}\n")
     printed = yaml.safe_load(run("config", "-c", file, "--set", "heat.threshold=5").out)
-    assert printed["heat"] == {"frames": 3, "blur": 15, "threshold": 5.0}
+    assert printed["heat"] == {
+        "frames": 3, "weight": "coverage", "shrink": 4, "blur": 15, "threshold": 5.0,
+    }  # fmt: skip
 
 
 def test_what_is_printed_can_be_given_back(run: Run, tmp_path: Path) -> None:
@@ -30,8 +32,12 @@ def test_what_is_printed_can_be_given_back(run: Run, tmp_path: Path) -> None:
     assert run("config", "-c", file).out == file.read_text(encoding="utf-8")
 
 
-def test_shipped_configs_are_known_by_name(run: Run) -> None:
-    assert run("config", "-c", "seed").out == run("config", "-c", SEED).out
+@pytest.mark.parametrize("name", ["default", "seed"])
+def test_shipped_configs_are_known_by_name(run: Run, name: str) -> None:
+    printed = run("config", "-c", name).out
+    assert printed == run("config", "-c", CONFIGS / f"{name}.yaml").out
+    shipped = (CONFIGS / f"{name}.yaml").read_text(encoding="utf-8")
+    assert printed.splitlines()[1:] == shipped.splitlines()[1:]
 
 
 def test_a_config_that_is_not_there(run: Run, tmp_path: Path) -> None:

@@ -8,14 +8,9 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
+from quick import QUICK_OPTIONS
 from vdet.images import read_image
 from vdet.video import VideoReader
-
-# Fewer windows than the seed's, and cars shown sooner: the tests need not be slow.
-QUICK = (
-    "--set", "search.windows=[{size: 96, overlap: 0.75, top: 380, bottom: 572}]",
-    "--set", "tracker.confident_detections_needed=2",
-)  # fmt: skip
 
 
 def _times(path: Path) -> list[Fraction]:
@@ -27,7 +22,7 @@ def test_writes_a_video_of_the_same_frames(
     run: Run, clip_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out.mp4"
-    result = run("detect-video", clip_path, out, "--model", model_path, *QUICK)
+    result = run("detect-video", clip_path, out, "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     assert _times(out) == _times(clip_path)
     assert f"{clip_path}: 30 frames" in result.err
@@ -47,7 +42,7 @@ def test_tracks_agree_in_every_format(
 ) -> None:
     for suffix in ("jsonl", "csv", "txt"):
         tracks = tmp_path / f"t.{suffix}"
-        options = ("--no-video", "--tracks", tracks, "--model", model_path, *QUICK)
+        options = ("--no-video", "--tracks", tracks, "--model", model_path, *QUICK_OPTIONS)
         assert run("detect-video", clip_path, *options).code == 0
     records = [json.loads(line) for line in (tmp_path / "t.jsonl").read_text().splitlines()]
     assert [record["frame"] for record in records] == list(range(30))
@@ -71,7 +66,7 @@ def test_two_runs_give_the_same_tracks(
     run: Run, clip_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
     for name in ("a.csv", "b.csv"):
-        options = ("--no-video", "--tracks", tmp_path / name, "--model", model_path, *QUICK)
+        options = ("--no-video", "--tracks", tmp_path / name, "--model", model_path, *QUICK_OPTIONS)
         assert run("detect-video", clip_path, *options).code == 0
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
@@ -79,7 +74,7 @@ def test_two_runs_give_the_same_tracks(
 def test_a_part_of_the_video(run: Run, clip_path: Path, model_path: Path, tmp_path: Path) -> None:
     tracks = tmp_path / "t.jsonl"
     options = ("--start", "0:00.4", "--end", "0.8", "--tracks", tracks, "--model", model_path)
-    assert run("detect-video", clip_path, tmp_path / "out.mp4", *options, *QUICK).code == 0
+    assert run("detect-video", clip_path, tmp_path / "out.mp4", *options, *QUICK_OPTIONS).code == 0
     frames = [json.loads(line)["frame"] for line in tracks.read_text().splitlines()]
     assert frames == list(range(10, 20))
     assert _times(tmp_path / "out.mp4") == [Fraction(i, 25) for i in range(10)]
@@ -89,7 +84,7 @@ def test_a_picture_of_every_stage_of_one_moment(
     run: Run, clip_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
     options = ("--no-video", "--stages", tmp_path / "stages", "--at", "0.2", "--frames", "8")
-    assert run("detect-video", clip_path, *options, "--model", model_path, *QUICK).code == 0
+    assert run("detect-video", clip_path, *options, "--model", model_path, *QUICK_OPTIONS).code == 0
     assert len(list((tmp_path / "stages").glob("*.png"))) == 5
     assert read_image(tmp_path / "stages" / "4-heat.png").shape == (180, 320, 3)
 

@@ -7,14 +7,12 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
+from quick import QUICK_OPTIONS
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
-# Fewer windows than the seed's, and cars shown sooner: the tests need not be slow.
-QUICK = (
-    "--set", "search.windows=[{size: 96, overlap: 0.75, top: 380, bottom: 572}]",
-    "--set", "tracker.confident_detections_needed=2",
-)  # fmt: skip
+TWO_SHIPPED = "features={patch: 32, hog: {cell: 4}},{patch: 64, hog: {cell: 8}}"
+"""Features of two shipped models; all settings of a sweep are compared under one."""
 
 
 @pytest.fixture
@@ -28,7 +26,7 @@ def test_scores_agree_with_those_of_the_tracks_written(
     run: Run, clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
     tracks, folder = tmp_path / "found.jsonl", tmp_path / "report"
-    common = ("--model", model_path, *QUICK)
+    common = ("--model", model_path, *QUICK_OPTIONS)
     made = run(
         "detect-video", clip_path, "--no-video", "--tracks", tracks, "--frames", "8", *common
     )
@@ -51,7 +49,7 @@ def test_several_videos_and_a_sweep(
     sweeps = ("--sweep", "heat.threshold=1,5000", "--sweep", "tracker.history=5,10")
     target, folder = tmp_path / "s.json", tmp_path / "report"
     results = ("--json", target, "--report", folder)
-    result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK)
+    result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     runs = json.loads(target.read_text())["sweep"]
     assert [each["settings"]["heat.threshold"] for each in runs] == ["1", "1", "5000", "5000"]
@@ -70,7 +68,9 @@ def test_several_videos_and_a_sweep(
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--truth", "gt.txt", "--sweep", "heat.threshold"), 1, "expected KEY=VALUE,VALUE"),
         (("--truth", "gt.txt", "--sweep", "heat.treshold=1,2"), 1, "did you mean threshold?"),
-        (("--truth", "gt.txt", "--sweep", "features.hog.cell=8,16"), 1, "other features"),
+        (("--truth", "gt.txt", "--sweep", "features.hog.cell=8,16"), 1, "no shipped model"),
+        (("--truth", "gt.txt", "--sweep", "features.hog.cell=4,8"), 1, "other features"),
+        (("--truth", "gt.txt", "--sweep", TWO_SHIPPED), 1, "other features"),
     ],
 )
 def test_what_cannot_be_is_said_before_any_work(
@@ -87,6 +87,7 @@ def test_truth_of_a_longer_video(
 ) -> None:
     truth = tmp_path / "long.txt"
     truth.write_text("40,1,10,10,50,50,1,3,1\n")
-    result = run("eval", "video", clip_path, "--truth", truth, "--model", model_path, *QUICK)
+    options = ("--truth", truth, "--model", model_path, *QUICK_OPTIONS)
+    result = run("eval", "video", clip_path, *options)
     assert result.code == 1
     assert "long.txt:1: the frame is number 40 of a video of 30" in result.err

@@ -148,7 +148,7 @@ def test_a_value_that_cannot_be_understood_is_named(text: str) -> None:
     assert refusal(f"a: 1\nb: {text}").startswith("my.yaml:2:4: cannot be understood: ")
 
 
-@pytest.mark.parametrize("text", ["[" * 20_000, "a: " + "{b: " * 20_000, "- " * 20_000])
+@pytest.mark.parametrize("text", ["[" * 5_000, "a: " + "{b: " * 5_000, "- " * 5_000])
 def test_very_deep_nesting_is_refused(text: str) -> None:
     assert refusal(text) == "my.yaml: is nested too deeply"
 

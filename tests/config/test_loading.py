@@ -5,7 +5,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdet.config.loading import LoadedSettings, format_key, load_settings
-from vdet.config.schema import FeatureSettings, Settings
+from vdet.config.schema import FeatureSettings, Settings, WindowSettings
 from vdet.errors import ConfigError
 
 
@@ -56,9 +56,15 @@ def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
 
 
 def test_an_assignment_may_name_one_item_of_a_list() -> None:
-    windows = load_settings(None, ["search.windows.1.overlap=0.5"]).settings.search.windows
-    default = Settings().search.windows
-    assert windows == (default[0], default[1].model_copy(update={"overlap": 0.5}))
+    windows = load_settings(None, ["search.windows.1.step=2"]).settings.search.windows
+    first, second, *others = Settings().search.windows
+    assert windows == (first, second.model_copy(update={"step": 2}), *others)
+
+
+def test_an_assignment_may_give_overlap_in_place_of_step() -> None:
+    assignments = ["search.windows.0.overlap=0.5", "search.windows.0.step=null"]
+    window = load_settings(None, assignments).settings.search.windows[0]
+    assert (window.overlap, window.step) == (0.5, None)
 
 
 def test_an_assignment_may_name_an_item_of_a_list_in_the_file(path: Path) -> None:
@@ -68,9 +74,10 @@ def test_an_assignment_may_name_an_item_of_a_list_in_the_file(path: Path) -> Non
 
 
 def test_an_assignment_may_replace_a_whole_item() -> None:
-    item = "{size: 64, overlap: 0.5, top: 0, bottom: 70}"
-    loaded = load_settings(None, [f"search.windows.0={item}"]).settings
-    assert [window.bottom for window in loaded.search.windows] == [70, 500]
+    item = "{size: 64, step: 3, top: 0, bottom: 70}"
+    windows = load_settings(None, [f"search.windows.0={item}"]).settings.search.windows
+    replaced = WindowSettings(size=64, step=3, top=0, bottom=70)
+    assert windows == (replaced, *Settings().search.windows[1:])
 
 
 @pytest.mark.parametrize(
@@ -84,7 +91,7 @@ def test_features_are_told_apart_where_they_are_asked_for(
 
 
 def test_features_asked_for_as_they_are_by_default_are_asked_for(path: Path) -> None:
-    assert load(path, "features: {patch: 64}").features == FeatureSettings()
+    assert load(path, "features: {patch: 32}").features == FeatureSettings()
 
 
 def test_features_are_not_asked_for_by_other_settings(path: Path) -> None:
@@ -114,7 +121,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
     ("text", "message"),
     [
         ("tracker: {histroy: 3}", "1:11: tracker.histroy: is no setting; did you mean history?"),
-        ("heat: {x: 3}", "1:8: heat.x: is no setting; known here: frames, blur, threshold"),
+        ("heat: {x: 3}", "1:8: heat.x: is no setting; known here: frames, weight, shrink, "),
         ("features: {hog: {cel: 3}}", "1:18: features.hog.cel: is no setting; did you mean cell?"),
         ("heat: 3", "1:1: heat: should be a section, key: value (got 3)"),
         ("heat:", "1:1: heat: should be a section, key: value (got None)"),
@@ -124,7 +131,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         ("heat: {threshold: -.inf}", "1:8: heat.threshold: should be a finite number (got -inf)"),
         ("heat: {frames: 2.5}", "1:8: heat.frames: should be a valid integer, got a number with a"),
         ("features: {color_space: BGR}", "1:12: features.color_space: should be 'YCrCb', 'HSV', "),
-        ("features: {patch: 60}", "1:1: features: patch must be a multiple of hog.cell (8)"),
+        ("features: {patch: 62}", "1:1: features: patch must be a multiple of hog.cell (4)"),
         ("features: {hog: {block: 8, cell: 16}}", "1:1: features: hog.block × hog.cell must not"),
         ("features: {hog: {channels: [0, 0]}}", "1:12: features.hog: channels must differ"),
         (
@@ -142,6 +149,21 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
             "search: {windows: [{size: 64, overlap: 0.99, top: 0, bottom: 64}]}",
             "1:20: search.windows[0]: overlap leaves a step of less than a pixel",
         ),
+        (
+            "search: {windows: [{size: 64, top: 0, bottom: 64}]}",
+            "1:20: search.windows[0]: one of overlap and step must be given, the other left out",
+        ),
+        (
+            "search: {windows: [{size: 64, overlap: 0.5, step: 1, top: 0, bottom: 64}]}",
+            "1:20: search.windows[0]: one of overlap and step must be given, the other left out",
+        ),
+        (
+            "search: {windows: [{size: 64, step: 0, top: 0, bottom: 64}]}",
+            "1:31: search.windows[0].step: should be greater than or equal to 1 (got 0)",
+        ),
+        ("heat: {shrink: 3}", "1:8: heat.shrink: should be 1, 2, 4 or 8 (got 3)"),
+        ("heat: {weight: some}", "1:8: heat.weight: should be 'none' or 'coverage' (got 'some')"),
+        ("search: {engine: fast}", "1:10: search.engine: should be 'auto', 'dense' or 'patch' (go"),
         ("'': 1", "1:1: : is no setting; known here: reference_height, features, "),
     ],
 )
@@ -151,8 +173,8 @@ def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str)
 
 
 def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
-    assert refusal(path, "search: {windows: [{size: 64, top: 0}]}") == [
-        "my.yaml:1:20: search.windows[0].overlap: is missing",
+    assert refusal(path, "search: {windows: [{size: 64, step: 1}]}") == [
+        "my.yaml:1:20: search.windows[0].top: is missing",
         "my.yaml:1:20: search.windows[0].bottom: is missing",
     ]
 
@@ -163,7 +185,7 @@ def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
         ("heat.frames=x", "heat.frames: should be a valid integer"),
         ("heat.frames.0=5", "heat.frames: should be a valid integer"),
         ("search.windows.0.sise=3", "search.windows[0].sise: is no setting; did you mean size?"),
-        ("search.windows.2.size=3", "search.windows: should be a list, or in --set the number of"),
+        ("search.windows.32.size=3", "search.windows: should be a list, or in --set the number of"),
         ("search.windows.-1.size=3", "search.windows: should be a list, or in --set the number of"),
         ("search.windows.x.size=3", "search.windows: should be a list, or in --set the number of"),
         ("search.windows.0.0=3", "search.windows[0][0]: is no setting; known here: size, "),

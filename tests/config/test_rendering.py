@@ -5,10 +5,13 @@ from typing import Any, get_args
 import pytest
 import yaml
 from hypothesis import given
+from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from pydantic.fields import FieldInfo
 
+from seed import SEED
 from vdet.config.document import parse_document
+from vdet.config.loading import load_settings
 from vdet.config.rendering import render
 from vdet.config.schema import (
     FeatureSettings,
@@ -23,7 +26,7 @@ from vdet.config.schema import (
     WindowSettings,
 )
 
-SEED = Path(__file__).parents[2] / "configs" / "seed.yaml"
+CONFIGS = Path(__file__).parents[2] / "configs"
 
 
 def read_back(text: str) -> Settings:
@@ -51,8 +54,9 @@ finite = st.floats(allow_nan=False, allow_infinity=False)
 def windows(draw: st.DrawFn) -> WindowSettings:
     size, top = draw(st.integers(10, 500)), draw(st.integers(0, 1000))
     bottom = top + size + draw(st.integers(0, 1000))
-    overlap = draw(st.floats(0, 0.85))
-    return WindowSettings(size=size, overlap=overlap, top=top, bottom=bottom)
+    if draw(st.booleans()):
+        return WindowSettings(size=size, step=draw(st.integers(1, 99)), top=top, bottom=bottom)
+    return WindowSettings(size=size, overlap=draw(st.floats(0, 0.85)), top=top, bottom=bottom)
 
 
 some_settings = st.builds(
@@ -75,27 +79,49 @@ some_settings = st.builds(
         probability=st.floats(0, 1),
         windows=st.lists(windows(), min_size=1, max_size=3).map(tuple),
     ),
-    heat=st.builds(HeatSettings, threshold=finite.map(abs)),
+    heat=st.builds(
+        HeatSettings,
+        weight=st.sampled_from(["none", "coverage"]),
+        shrink=st.sampled_from([1, 2, 4, 8]),
+        threshold=finite.map(abs),
+    ),
     tracker=st.builds(TrackerSettings, good_fraction=st.floats(0, 1)),
 )
 
 
 @given(some_settings)
+@hypothesis_settings(max_examples=40)
 def test_printed_settings_are_read_back_the_same(settings: Settings) -> None:
     assert read_back(render(settings)) == settings
 
 
-def test_the_seed_config_is_the_defaults_printed() -> None:
-    assert SEED.read_text(encoding="utf-8") == render(Settings())
+def test_the_default_config_is_the_defaults_printed() -> None:
+    path = CONFIGS / "default.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert load_settings(path).settings == Settings()
+    assert text == render(Settings())
 
 
-def test_every_setting_is_printed() -> None:
-    printed = parse_document(render(Settings()), "printed").values
-    assert printed == Settings().model_dump(mode="json")
+def test_the_seed_config_is_printed_but_for_its_first_line() -> None:
+    path = CONFIGS / "seed.yaml"
+    first, *rest = path.read_text(encoding="utf-8").splitlines()
+    assert first.startswith("# The original system")
+    assert rest == render(load_settings(path).settings).splitlines()[1:]
+
+
+def test_no_other_config_ships() -> None:
+    assert sorted(path.name for path in CONFIGS.iterdir()) == ["default.yaml", "seed.yaml"]
+
+
+@pytest.mark.parametrize("settings", [Settings(), SEED], ids=["default", "seed"])
+def test_every_setting_that_is_given_is_printed(settings: Settings) -> None:
+    printed = parse_document(render(settings), "printed").values
+    assert printed == settings.model_dump(mode="json", exclude_none=True)
 
 
 def test_the_keys_of_list_items_are_looked_at_too() -> None:
-    assert {"search.windows.overlap", "features.hog.cell", "output.crf"} <= FIELDS.keys()
+    keys = {"search.windows.overlap", "search.windows.step", "features.hog.cell", "output.crf"}
+    assert keys <= FIELDS.keys()
 
 
 @pytest.mark.parametrize("key", FIELDS)

@@ -2,16 +2,13 @@ from typing import Any
 
 import pytest
 
+from seed import SEED
 from vdet.config.scaling import scale_lengths
 from vdet.config.schema import HeatSettings, SearchSettings, Settings, WindowSettings
 
+SETS = range(len(Settings().search.windows))
 LENGTHS = {
-    "search.windows.0.size",
-    "search.windows.0.top",
-    "search.windows.0.bottom",
-    "search.windows.1.size",
-    "search.windows.1.top",
-    "search.windows.1.bottom",
+    *(f"search.windows.{i}.{key}" for i in SETS for key in ("size", "top", "bottom")),
     "heat.blur",
     "tracker.min_region",
     "tracker.near",
@@ -32,8 +29,8 @@ def leaves(value: Any, key: str = "") -> dict[str, Any]:
     return {k: v for n, item in items for k, v in leaves(item, f"{key}.{n}".lstrip(".")).items()}
 
 
-def scaled(rows: int) -> Settings:
-    return scale_lengths(Settings(), rows / Settings().reference_height)
+def scaled(rows: int, settings: Settings | None = None) -> Settings:
+    return scale_lengths(settings or Settings(), rows / 720)
 
 
 def test_at_the_reference_height_nothing_changes() -> None:
@@ -59,7 +56,7 @@ def test_every_frame_length_is_scaled_and_nothing_else() -> None:
 def test_windows_keep_their_place_in_a_frame_of_another_height(
     rows: int, large: tuple[int, ...], small: tuple[int, ...]
 ) -> None:
-    windows = scaled(rows).search.windows
+    windows = scaled(rows, SEED).search.windows
     assert [(w.size, w.top, w.bottom) for w in windows] == [large, small]
     assert [w.overlap for w in windows] == [0.8, 0.8]
 

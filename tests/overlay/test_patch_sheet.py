@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import seed
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
 from vdet.images import Image
 from vdet.overlay.patches import TILE, patch_sheet
 
 PITCH = (TILE + 32, TILE + 8)  # of tiles with their frames, down and across
-SEED = FeatureSettings()
+SEED = seed.SEED.features
 FIRST_HOG = 4
 SPACES = ["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from seed import SEED, tracker_but
 from vdet.config.schema import TrackerSettings
 from vdet.geometry import Box
 from vdet.heatmap import Region
@@ -10,7 +11,7 @@ from vdet.tracking.association import Association
 from vdet.tracking.car import Car
 from vdet.tracking.template import Image
 
-SETTINGS = TrackerSettings()
+SETTINGS = SEED.tracker
 LEFT, RIGHT = Box(100, 200, 100, 80), Box(320, 200, 100, 80)
 
 
@@ -115,7 +116,7 @@ def test_a_region_of_several_cars_with_none_confirmed_is_the_nearest_ones() -> N
 @pytest.mark.parametrize(("distance", "confirmed"), [(50, True), (49, False)])
 def test_a_car_is_confirmed_within_the_match_distance(distance: int, confirmed: bool) -> None:
     cars = two_cars()
-    settings = TrackerSettings(match_distance=distance)
+    settings = tracker_but(match_distance=distance)
     result = associate(cars, [AROUND_BOTH], road(LEFT.moved_to(150, 200), RIGHT), settings)
     assert (cars[0] in result.places) is confirmed
 
@@ -124,7 +125,7 @@ def test_a_car_is_confirmed_by_a_match_of_the_least_score() -> None:
     cars = two_cars()
     noisy = road(LEFT, RIGHT)
     noisy[200:280, 100:200] = noisy[200:280, 100:200] // 2 + road(None, LEFT)[200:280, 100:200] // 2
-    strict = TrackerSettings(match_score=0.9)
+    strict = tracker_but(match_score=0.9)
     assert cars[0] in associate(cars, [AROUND_BOTH], noisy).places
     assert cars[0] not in associate(cars, [AROUND_BOTH], noisy, strict).places
 
@@ -177,7 +178,7 @@ def test_cars_merge_when_they_overlap_by_more_than_the_setting(
     merge_overlap: int, cars_left: int
 ) -> None:
     cars, frame = overlapping_cars(None, None)
-    settings = TrackerSettings(merge_overlap=merge_overlap)
+    settings = tracker_but(merge_overlap=merge_overlap)
     assert len(associate(cars, [Box(95, 195, 160, 90)], frame, settings).cars) == cars_left
 
 
@@ -204,7 +205,7 @@ def test_a_peak_above_4_makes_the_car_inside_need_only_3_detections(
 
 
 def test_the_confident_peak_and_its_count_are_settings() -> None:
-    settings = TrackerSettings(confident_peak=1.5, confident_detections_needed=2)
+    settings = tracker_but(confident_peak=1.5, confident_detections_needed=2)
     car = a_car(LEFT, road())
     associate([car], [LEFT], settings=settings, peak=2.0)
     assert car.needed == 2
@@ -226,7 +227,7 @@ def test_a_region_wider_than_200_pixels_is_added_to_any_car(width: int, added: b
 
 def test_what_is_wide_and_what_share_is_good_are_settings() -> None:
     narrow = Box(120, 200, 60, 80)
-    for settings in (TrackerSettings(wide=59), TrackerSettings(good_fraction=0.5)):
+    for settings in (tracker_but(wide=59), tracker_but(good_fraction=0.5)):
         car = a_car(LEFT, road())
         assert car in associate([car], [narrow], settings=settings).places
 
@@ -247,7 +248,7 @@ def test_a_region_of_good_size_within_50_pixels_of_a_car_is_added_to_it(
 def test_near_is_a_setting() -> None:
     car = a_car(LEFT, road())
     beside = Box(230, 200, 80, 80)
-    assert car not in associate([car], [beside], settings=TrackerSettings(near=29)).places
+    assert car not in associate([car], [beside], settings=tracker_but(near=29)).places
 
 
 @pytest.mark.parametrize(("width", "added"), [(66, False), (67, True)])
@@ -323,9 +324,9 @@ def test_a_region_that_a_car_has_already_is_combined_with_one_beside_it() -> Non
 
 def test_how_wide_the_combined_regions_may_be_is_a_setting() -> None:
     car = a_car(LORRY, road())
-    at_limit = associate([car], [ITS_FRONT, ITS_REAR], settings=TrackerSettings(max_combined=230))
+    at_limit = associate([car], [ITS_FRONT, ITS_REAR], settings=tracker_but(max_combined=230))
     assert car not in at_limit.cars
-    below = associate([car], [ITS_FRONT, ITS_REAR], settings=TrackerSettings(max_combined=231))
+    below = associate([car], [ITS_FRONT, ITS_REAR], settings=tracker_but(max_combined=231))
     assert below.cars == [car]
 
 
@@ -339,7 +340,7 @@ def test_regions_that_are_not_the_cars_size_combined_are_judged_alone() -> None:
 
 def test_what_is_about_the_cars_size_is_a_setting() -> None:
     car = a_car(LORRY, road())
-    strict = TrackerSettings(combined_tolerance=0.1)
+    strict = tracker_but(combined_tolerance=0.1)
     assert car not in associate([car], [ITS_FRONT, ITS_REAR], settings=strict).places
 
 
@@ -390,7 +391,7 @@ def test_a_region_with_no_car_near_is_a_new_car(peak: float, needed: int) -> Non
 
 
 def test_how_many_detections_a_new_car_needs_is_set() -> None:
-    settings = TrackerSettings(detections_needed=6, confident_detections_needed=2)
+    settings = tracker_but(detections_needed=6, confident_detections_needed=2)
     assert associate([], [LEFT], settings=settings, peak=2).cars[0].needed == 6
     assert associate([], [LEFT], settings=settings, peak=5).cars[0].needed == 2
 

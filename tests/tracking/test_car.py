@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vdet.config.schema import TrackerSettings
+from seed import SEED, tracker_but
 from vdet.geometry import Box
 from vdet.tracking.car import Car
 from vdet.tracking.template import Image
@@ -117,13 +117,13 @@ def test_the_latest_image_is_looked_for_around_the_latest_box() -> None:
     car = Car(needed=10, history=10)
     car.see(Box(0, 0, 60, 60), (30, 30), FRAME)
     car.see(BOX, (140, 90), FRAME)
-    assert car.find_in(shifted(FRAME, 7, -4), TrackerSettings()) == BOX.moved_to(107, 56)
+    assert car.find_in(shifted(FRAME, 7, -4), SEED.tracker) == BOX.moved_to(107, 56)
 
 
 def test_the_settings_limit_the_search() -> None:
     moved = shifted(FRAME, 30, 0)
-    assert seen().find_in(moved, TrackerSettings(match_distance=30)) == BOX.moved_to(130, 60)
-    assert seen().find_in(moved, TrackerSettings(match_distance=29)) is None
+    assert seen().find_in(moved, tracker_but(match_distance=30)) == BOX.moved_to(130, 60)
+    assert seen().find_in(moved, tracker_but(match_distance=29)) is None
 
 
 def test_two_cars_alike_are_two_cars() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vdet.config.schema import TrackerSettings
+from seed import SEED, tracker_but
 from vdet.geometry import Box
 from vdet.heatmap import Region
 from vdet.tracking.cars import Cars
@@ -50,14 +50,14 @@ def ids(tracks: list[Track]) -> list[int]:
 
 
 def test_regions_that_are_too_small_are_ignored() -> None:
-    settings = TrackerSettings(detections_needed=1)
+    settings = tracker_but(detections_needed=1)
     assert see(Cars(settings), Box(100, 200, 49, 80), Box(300, 200, 80, 49)) == [[]]
     assert len(see(Cars(settings), Box(100, 200, 50, 50))[0]) == 1
 
 
 # Rule 12
 
-ONE_PLACE = TrackerSettings(history=1)  # so that a car's rectangle is its latest one
+ONE_PLACE = tracker_but(history=1)  # so that a car's rectangle is its latest one
 BUS = Box(230, 200, 120, 100)
 BOTH = Box(90, 190, 270, 120)
 
@@ -88,7 +88,7 @@ def test_the_absorbing_car_takes_over_the_id_if_it_was_never_shown() -> None:
 
 
 def test_the_absorbing_car_keeps_its_own_id_if_it_was_shown_and_the_other_ends() -> None:
-    cars = Cars(TrackerSettings(history=1, detections_needed=1))
+    cars = Cars(tracker_but(history=1, detections_needed=1))
     see_side_by_side(cars, frames=8)
     assert ids(hide_sedan_behind_bus(cars)) == [2]
     assert cars.update(road(SEDAN), []) == []  # it is not even looked for
@@ -125,7 +125,7 @@ def test_a_car_beside_the_other_ones_rectangle_is_not_absorbed() -> None:
 
 
 def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
-    cars = Cars(TrackerSettings(history=1))
+    cars = Cars(tracker_but(history=1))
     show(cars, SEDAN)
     moved = SEDAN.moved_to(130, 240)
     assert cars.update(road(moved), []) == [Track(1, moved, from_match=True)]
@@ -133,7 +133,7 @@ def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
 
 
 def test_a_match_counts_in_the_average_box() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     show(cars, SEDAN)
     (track,) = cars.update(road(SEDAN.moved_to(140, 200)), [])
     assert track.box == SEDAN.moved_to(104, 200)
@@ -141,7 +141,7 @@ def test_a_match_counts_in_the_average_box() -> None:
 
 @pytest.mark.parametrize(("distance", "found"), [(50, 1), (49, 0)])
 def test_the_match_is_looked_for_within_the_distance(distance: int, found: int) -> None:
-    cars = Cars(TrackerSettings(match_distance=distance))
+    cars = Cars(tracker_but(match_distance=distance))
     show(cars, SEDAN)
     assert len(cars.update(road(SEDAN.moved_to(150, 200)), [])) == found
 
@@ -149,7 +149,7 @@ def test_the_match_is_looked_for_within_the_distance(distance: int, found: int) 
 def test_the_least_score_of_a_match_is_a_setting() -> None:
     noisy = road(SEDAN) // 2 + road(None, SEDAN) // 2
     for least, found in ((0.5, 1), (0.9, 0)):
-        cars = Cars(TrackerSettings(match_score=least))
+        cars = Cars(tracker_but(match_score=least))
         show(cars, SEDAN)
         assert len(cars.update(noisy, [])) == found
 
@@ -157,13 +157,13 @@ def test_the_least_score_of_a_match_is_a_setting() -> None:
 def test_the_method_of_the_match_is_a_setting() -> None:
     darker = road(SEDAN) // 3
     for method, found in (("ccoeff_normed", 1), ("sqdiff_normed", 0)):
-        cars = Cars(TrackerSettings.model_validate({"match_method": method, "match_score": 0.8}))
+        cars = Cars(tracker_but(match_method=method, match_score=0.8))
         show(cars, SEDAN)
         assert len(cars.update(darker, [])) == found
 
 
 def test_a_car_that_was_never_shown_is_not_looked_for() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     for _ in range(8):
         cars.update(road(SEDAN), [region(SEDAN)])
     assert cars.update(road(SEDAN), []) == []
@@ -171,7 +171,7 @@ def test_a_car_that_was_never_shown_is_not_looked_for() -> None:
 
 
 def test_a_car_shown_before_is_still_looked_for_after_a_miss() -> None:
-    cars = Cars(TrackerSettings(detections_needed=1, young=0))
+    cars = Cars(tracker_but(detections_needed=1, young=0))
     show(cars, SEDAN, times=1)
     assert see(cars) == [[]]
     assert [track.from_match for track in cars.update(road(SEDAN), [])] == [True]
@@ -184,19 +184,19 @@ def test_a_car_shown_before_is_still_looked_for_after_a_miss() -> None:
 def test_a_car_is_shown_after_ten_detections_in_a_row_or_three_confident_ones(
     peak: float, first_shown: int
 ) -> None:
-    shown = see(Cars(TrackerSettings()), SEDAN, frames=12, peak=peak)
+    shown = see(Cars(SEED.tracker), SEDAN, frames=12, peak=peak)
     assert [bool(tracks) for tracks in shown].index(True) == first_shown - 1
     assert all(shown[first_shown - 1 :])
 
 
 def test_how_many_detections_are_enough_is_a_setting() -> None:
-    settings = TrackerSettings(detections_needed=4, confident_detections_needed=2)
+    settings = tracker_but(detections_needed=4, confident_detections_needed=2)
     assert [len(tracks) for tracks in see(Cars(settings), SEDAN, frames=4)] == [0, 0, 0, 1]
     assert [len(tracks) for tracks in see(Cars(settings), SEDAN, frames=2, peak=5)] == [0, 1]
 
 
 def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     show(cars, SEDAN)
     assert see(cars) == [[]]
     shown = see(cars, SEDAN, frames=10)
@@ -213,7 +213,7 @@ def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
 def test_a_car_with_fewer_detections_than_seven_is_deleted_at_its_first_miss(
     detections: int, young: int, id_after: int
 ) -> None:
-    cars = Cars(TrackerSettings(young=young, detections_needed=1))
+    cars = Cars(tracker_but(young=young, detections_needed=1))
     see(cars, SEDAN, frames=detections)
     see(cars)
     assert ids(see(cars, SEDAN)[0]) == [id_after]
@@ -221,7 +221,7 @@ def test_a_car_with_fewer_detections_than_seven_is_deleted_at_its_first_miss(
 
 @pytest.mark.parametrize("max_matches", [12, 4])
 def test_a_car_whose_last_detections_all_were_matches_is_deleted(max_matches: int) -> None:
-    cars = Cars(TrackerSettings(max_matches=max_matches))
+    cars = Cars(tracker_but(max_matches=max_matches))
     show(cars, SEDAN)
     matched = [cars.update(road(SEDAN), []) for _ in range(max_matches)]
     assert [ids(tracks) for tracks in matched] == [[1]] * (max_matches - 1) + [[]]
@@ -230,7 +230,7 @@ def test_a_car_whose_last_detections_all_were_matches_is_deleted(max_matches: in
 
 
 def test_a_region_in_between_ends_the_row_of_matches() -> None:
-    cars = Cars(TrackerSettings(max_matches=3))
+    cars = Cars(tracker_but(max_matches=3))
     show(cars, SEDAN)
     for regions in ([], [], [region(SEDAN)], [], []):
         assert ids(cars.update(road(SEDAN), regions)) == [1]
@@ -242,7 +242,7 @@ def test_a_region_in_between_ends_the_row_of_matches() -> None:
 def test_a_car_missed_five_frames_in_a_row_is_deleted(
     misses: int, max_misses: int, id_after: int
 ) -> None:
-    cars = Cars(TrackerSettings(max_misses=max_misses, detections_needed=1))
+    cars = Cars(tracker_but(max_misses=max_misses, detections_needed=1))
     see(cars, SEDAN, frames=7)
     assert see(cars, frames=misses) == [[]] * misses
     assert ids(see(cars, SEDAN)[0]) == [id_after]
@@ -253,12 +253,12 @@ def test_a_car_missed_five_frames_in_a_row_is_deleted(
 
 def test_ids_start_at_1_in_every_video() -> None:
     for _ in range(2):
-        shown = see(Cars(TrackerSettings()), SEDAN, VAN, frames=10)
+        shown = see(Cars(SEED.tracker), SEDAN, VAN, frames=10)
         assert ids(shown[-1]) == [1, 2]
 
 
 def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     see(cars, SEDAN, frames=5)
     see(cars, SEDAN, VAN, frames=5)
     shown = see(cars, VAN, SEDAN, frames=5)
@@ -266,21 +266,21 @@ def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
 
 
 def test_a_shown_box_is_the_average_of_the_last_ten() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     for x in range(100, 124, 2):
         tracks = cars.update(road(), [region(SEDAN.moved_to(x, 200))])
     assert tracks == [Track(1, SEDAN.moved_to(113, 200), from_match=False)]
 
 
 def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     see(cars, Box(100, 200, 260, 100), frames=10)
     (tracks,) = see(cars, Box(70, 200, 120, 100), Box(250, 200, 110, 100))
     assert [(track.id, track.box.x) for track in tracks] == [(1, 250), (2, 70)]
 
 
 def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() -> None:
-    cars = Cars(TrackerSettings())
+    cars = Cars(SEED.tracker)
     behind = Box(150, 200, 100, 80)
     frame = road(SEDAN, behind)
     for _ in range(10):

@@ -1,11 +1,11 @@
 import pytest
 
-from vdet.config.schema import TrackerSettings
+from seed import SEED, tracker_but
 from vdet.geometry import Box
 from vdet.heatmap import Region
 from vdet.tracking.regions import any_overlap, combine, is_about_size, is_good_size, large_enough
 
-SETTINGS = TrackerSettings()
+SETTINGS = SEED.tracker
 
 
 def region(x: int, y: int, width: int, height: int, peak: float = 2.0) -> Region:
@@ -28,8 +28,8 @@ def test_a_region_of_50_by_50_pixels_is_kept() -> None:
 
 def test_the_least_size_is_a_setting() -> None:
     small = [region(10, 10, 30, 30)]
-    assert large_enough(small, 640, 360, TrackerSettings(min_region=30)) == small
-    assert large_enough(small, 640, 360, TrackerSettings(min_region=31)) == []
+    assert large_enough(small, 640, 360, tracker_but(min_region=30)) == small
+    assert large_enough(small, 640, 360, tracker_but(min_region=31)) == []
 
 
 def test_what_lies_outside_the_frame_does_not_count() -> None:
@@ -44,7 +44,7 @@ def test_what_lies_outside_the_frame_does_not_count() -> None:
 
 def test_an_empty_region_is_ignored_whatever_the_setting() -> None:
     empty = [region(10, 10, 0, 60), region(700, 10, 60, 60)]
-    assert large_enough(empty, 640, 360, TrackerSettings(min_region=0)) == []
+    assert large_enough(empty, 640, 360, tracker_but(min_region=0)) == []
 
 
 # Sizes of rules 4 and 7 to 10
@@ -63,8 +63,8 @@ def test_good_size_is_over_two_thirds_of_the_car_or_over_200_pixels(
 def test_good_size_is_set_by_share_and_width() -> None:
     region, car = Box(0, 0, 90, 50), Box(0, 0, 150, 50)
     assert not is_good_size(region, car, SETTINGS)
-    assert is_good_size(region, car, TrackerSettings(good_fraction=0.5))
-    assert is_good_size(region, car, TrackerSettings(wide=89))
+    assert is_good_size(region, car, tracker_but(good_fraction=0.5))
+    assert is_good_size(region, car, tracker_but(wide=89))
 
 
 @pytest.mark.parametrize(("width", "about"), [(79, False), (80, True), (160, True), (161, False)])

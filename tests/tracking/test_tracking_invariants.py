@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from seed import tracker_but
 from vdet.config.schema import TrackerSettings
 from vdet.geometry import Box
 from vdet.heatmap import Region
@@ -16,7 +17,7 @@ TEXTURED = np.random.default_rng(0).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=n
 PICTURES = [TEXTURED, np.roll(TEXTURED, 9, axis=1), np.full_like(TEXTURED, 128)]
 
 # Small lengths, so that every rule has its turn in a small frame.
-EAGER = TrackerSettings(
+EAGER = tracker_but(
     min_region=10,
     near=15,
     wide=60,

@@ -90,7 +90,7 @@ def test_patches_are_described_in_order_with_their_class_and_group(files: list[P
     last = cv2.imread(str(files[-1].source / files[-1].name))
     assert last is not None
     extractor = FeatureExtractor(SETTINGS.features)
-    assert vectors.vectors.shape == (57, extractor.length)
+    assert vectors.vectors.shape == (57, extractor.layout.length)
     expected = extractor.describe(np.asarray(last, np.uint8))
     np.testing.assert_array_equal(vectors.vectors[-1], expected)
 
@@ -182,7 +182,7 @@ def test_nothing_but_broken_patches_is_an_error_however_tolerant(
 def test_the_report_counts_patches_and_features(files: list[PatchFile]) -> None:
     _, report = train(files, SETTINGS, jobs=1)
     assert (report.vehicles, report.non_vehicles, report.broken) == (32, 25, 0)
-    assert report.features == FeatureExtractor(SETTINGS.features).length
+    assert report.features == FeatureExtractor(SETTINGS.features).layout.length
     assert report.milliseconds_per_prediction > 0
 
 

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from quick import QUICK
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.errors import TruthError
@@ -16,11 +17,6 @@ from vdet.synthetic.scene import Scene
 from vdet.video import VideoReader
 
 FRAMES = 10
-QUICK = (
-    "search.windows=[{size: 96, overlap: 0.75, top: 380, bottom: 572}]",
-    "tracker.confident_detections_needed=2",
-    "tracker.min_region=20",
-)
 
 
 def settings(*assignments: str) -> Settings:
@@ -43,8 +39,8 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     clip_path: Path, model: LinearModel
 ) -> None:
     variants = [
-        settings("heat.threshold=0.8"),
-        settings("heat.threshold=3", "heat.frames=1"),
+        settings("heat.threshold=0.1"),
+        settings("heat.threshold=0.3", "heat.frames=3"),
         settings("search.probability=0.8"),
         settings("tracker.history=2"),
     ]

@@ -5,7 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings, Settings
+from vdet.config.schema import (
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    Settings,
+    TrainingSettings,
+)
 from vdet.dataset import find_patches
 from vdet.evaluation.patches import evaluate_model, evaluate_splits
 from vdet.images import write_image
@@ -14,7 +20,7 @@ from vdet.training import train
 FEATURES = FeatureSettings(
     patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
 )
-SETTINGS = Settings(features=FEATURES)
+SETTINGS = Settings(features=FEATURES, training=TrainingSettings(C=1))
 
 
 @pytest.fixture

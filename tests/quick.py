@@ -1,0 +1,13 @@
+"""Settings with which tests find vehicles quickly in the small clip, by the small model.
+
+One set of windows, about as large as the nearest vehicle; and since the model has seen few
+patches, less heat makes a region, and less of it a confident one.
+"""
+
+QUICK = (
+    "search.windows=[{size: 80, step: 1, top: 380, bottom: 520}]",
+    "heat={frames: 4, weight: coverage, shrink: 4, blur: 15, threshold: 0.2}",
+    "tracker.confident_peak=0.3",
+    "tracker.confident_detections_needed=2",
+)
+QUICK_OPTIONS = tuple(word for assignment in QUICK for word in ("--set", assignment))
