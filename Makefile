@@ -25,7 +25,7 @@ tests: $(READY)
 bench: $(READY)  ## how fast it is, as ratios measured in one run
 	$(BIN)/python -m benchmarks
 
-data:  ## fetch the data set (124 MB) into data/; data/README.md tells what it is
+data:  ## fetch the data set (125 MB) into data/; data/README.md tells what it is
 	cd data && for name in vehicles non-vehicles; do \
 		curl --fail --location --continue-at - --output $$name.zip \
 			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
@@ -48,4 +48,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $@
 
 clean:
-	rm -rf $(VENV) demo dist build .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) demo bench.json dist build .mypy_cache .pytest_cache .ruff_cache .hypothesis

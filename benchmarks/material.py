@@ -34,7 +34,8 @@ def config(name: str) -> Config:
 
 def video(folder: Path) -> Path:
     """Return the project video, or make a 720p clip in `folder`."""
-    places = [os.environ.get("VDET_DATA"), Path(__file__).parents[2] / "shared" / "data"]
+    root = Path(__file__).parents[1]
+    places = [os.environ.get("VDET_DATA"), root / "data", root.parent / "shared" / "data"]
     for place in places:
         if place and (path := Path(place) / "project_video.mp4").exists():
             return path

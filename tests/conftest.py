@@ -78,7 +78,8 @@ def clip_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """The folder of the real data set; the test is skipped where it is not found."""
-    places = [os.environ.get("VDET_DATA"), Path(__file__).parents[2] / "shared" / "data"]
+    root = Path(__file__).parents[1]
+    places = [os.environ.get("VDET_DATA"), root / "data", root.parent / "shared" / "data"]
     for place in places:
         if place and (Path(place) / "vehicles.zip").exists():
             return Path(place)

@@ -115,4 +115,10 @@ def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
 def test_a_new_or_an_empty_folder_will_do(tmp_path: Path) -> None:
     check_demo(DemoFiles(tmp_path), overwrite=False)
     check_demo(DemoFiles(tmp_path / "new" / "demo"), overwrite=False)
-    assert list(tmp_path.iterdir()) == []
+    assert (tmp_path / "new" / "demo").is_dir()
+
+
+def test_a_file_is_no_folder_for_a_demo(tmp_path: Path) -> None:
+    (tmp_path / "demo").touch()
+    with pytest.raises(OutputError, match="cannot be made a folder"):
+        check_demo(DemoFiles(tmp_path / "demo"), overwrite=False)

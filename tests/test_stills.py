@@ -66,7 +66,17 @@ class TestPlan:
     def test_without_an_output_no_picture_is_written(self, tmp_path: Path) -> None:
         (job,) = plan([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
         assert job.picture is None
-        assert list(tmp_path.iterdir()) == []
+        assert [path.name for path in tmp_path.iterdir()] == ["stages"]
+
+    def test_stages_of_two_inputs_of_one_stem_are_refused(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "a.jpg"]
+        with pytest.raises(OutputError, match="wanted by two inputs"):
+            plan(sources, None, tmp_path / "stages", overwrite=False)
+
+    def test_earlier_stages_are_kept(self, tmp_path: Path) -> None:
+        (tmp_path / "5-boxes.png").write_text("precious")
+        with pytest.raises(OutputError, match="--overwrite"):
+            plan([tmp_path / "a.png"], None, tmp_path, overwrite=False)
 
     def test_stages_of_one_picture_go_into_the_folder_itself(self, tmp_path: Path) -> None:
         (job,) = plan([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)

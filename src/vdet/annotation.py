@@ -48,6 +48,11 @@ class StagePictures:
         self._settings = settings
         self._features = features
 
+    @property
+    def missing(self) -> bool:
+        """Whether they are still to be made."""
+        return self._folder is not None
+
     def offer(self, result: FrameResult) -> None:
         """Make them of this frame if it is the first at or after the time asked for."""
         if self._folder is None or result.frame.time < self._at:

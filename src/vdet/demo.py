@@ -9,7 +9,7 @@ from vdet.dataset import find_patches
 from vdet.evaluation.predictions import read_predictions
 from vdet.evaluation.scores import Scores, score
 from vdet.evaluation.truth import read_truth
-from vdet.files import check_output
+from vdet.files import check_output, make_folder
 from vdet.model import save_model
 from vdet.pipeline import VideoJob, process_video
 from vdet.synthetic.clip import write_clip, write_truth
@@ -79,11 +79,11 @@ class DemoResult:
 
 
 def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
-    """Refuse to write over an earlier demo. Raises `OutputError`."""
-    if files.folder.exists():
-        outputs = (files.clip, files.truth, files.model, files.report, files.result, files.tracks)
-        for path in outputs:
-            check_output(path, overwrite=overwrite)
+    """Make the folder, and refuse to write over an earlier demo. Raises `OutputError`."""
+    make_folder(files.folder)
+    outputs = (files.clip, files.truth, files.model, files.report, files.result, files.tracks)
+    for path in outputs:
+        check_output(path, overwrite=overwrite)
 
 
 def run_demo(
@@ -105,7 +105,6 @@ def run_demo(
     progress
         As `process_video` takes it, for the longer steps.
     """
-    files.folder.mkdir(parents=True, exist_ok=True)
     say(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
     write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
     scene = default_clip(seed)

@@ -1,6 +1,6 @@
 """One frame → its windows, heat and regions: what still pictures and video have in common."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vdet.config.scaling import scale_lengths
 from vdet.config.schema import Settings
@@ -42,6 +42,7 @@ class Detector:
 
     def __init__(self, model: LinearModel, settings: Settings, width: int, height: int) -> None:
         self._search = FrameSearch(model, settings, width, height)
+        self._size = width, height
         self._probability = settings.search.probability
         self._heat = scale_lengths(settings.heat, height / settings.reference_height)
         self._map = HeatMap(width, height, self._heat)
@@ -54,7 +55,9 @@ class Detector:
         """Add the windows of the next frame to the heat."""
         hits = windows.detected(self._probability)
         heat = self._map.update(hits)
-        return Detection(windows, hits, heat, tuple(find_regions(heat, self._heat.threshold)))
+        regions = find_regions(heat, self._heat.threshold)
+        inside = tuple(replace(region, box=region.box.clipped(*self._size)) for region in regions)
+        return Detection(windows, hits, heat, inside)
 
 
 def detect_still(model: LinearModel, settings: Settings, image: Image) -> Detection:

@@ -3,20 +3,28 @@
 import contextlib
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from vdet.errors import OutputError, VdetError
 
 
-def check_output(path: Path, *, overwrite: bool) -> None:
+def check_output(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
     """Refuse an output that could not be written, before any work is done.
+
+    Parameters
+    ----------
+    inputs
+        Files that the work reads; they are never written over.
 
     Raises
     ------
     OutputError
-        `path` is a folder, is there already (and not `overwrite`), or its folder cannot be written.
+        `path` is an input, is a folder, is there already (and not `overwrite`), or its folder
+        cannot be written.
     """
+    if path.resolve() in {source.resolve() for source in inputs}:
+        raise OutputError(f"{path}: is the input itself; give another output")
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file")
     if path.exists() and not overwrite:
@@ -25,6 +33,14 @@ def check_output(path: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{path}: the folder {path.parent} does not exist; make it first")
     if not os.access(path.parent, os.W_OK):
         raise OutputError(f"{path}: the folder {path.parent} cannot be written to")
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it, where it is missing. Raises `OutputError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
 
 
 @contextlib.contextmanager

@@ -1,5 +1,6 @@
 """The stream: frames → search → heat → tracker → annotation → writer."""
 
+import logging
 import os
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
@@ -12,16 +13,19 @@ from vdet.annotation import StagePictures, annotate
 from vdet.config.scaling import scale_lengths
 from vdet.config.schema import OutputSettings, Settings
 from vdet.detection import Detector
-from vdet.errors import ConfigError, ImageError, OutputError, VideoError
+from vdet.errors import ConfigError, ImageError, VideoError
 from vdet.files import check_output
 from vdet.frame_result import FrameResult
 from vdet.lanes.road import LaneRequest, Look, RoadWatch
 from vdet.model import LinearModel
+from vdet.overlay.stages import check_stages
 from vdet.stream import ahead, behind, each_with, quiet_libraries
 from vdet.trackfile import check_suffix, track_writer
 from vdet.tracking.cars import Cars
 from vdet.video import Frame, FrameWriter, NullWriter, VideoInfo, VideoReader, VideoWriter
 from vdet.windows import Windows
+
+log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +61,12 @@ class Summary:
 def check_job(job: VideoJob, *, overwrite: bool) -> None:
     """Refuse, before any work, a job whose outputs could not be written. Raises `OutputError`."""
     for path in (job.video, job.tracks):
-        if path is not None and path.resolve() == job.source.resolve():
-            raise OutputError(f"{path}: is the input itself; give another output")
         if path is not None:
-            check_output(path, overwrite=overwrite)
+            check_output(path, overwrite=overwrite, inputs=[job.source])
     if job.tracks is not None:
         check_suffix(job.tracks)
+    if job.stages is not None:
+        check_stages(job.stages, overwrite=overwrite)
 
 
 def follow(
@@ -151,6 +155,10 @@ def process_video(
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
+        if not frames:
+            raise VideoError(f"{job.source}: no frame lies in the times given; check them")
+        if pictures.missing:
+            log.warning("%s: no frame at or after --at; no stage pictures", job.source)
     return Summary(frames, len(ids), time.perf_counter() - began)
 
 

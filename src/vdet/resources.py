@@ -38,7 +38,7 @@ def find_config(name: str) -> Path:
         There is neither.
     """
     path = Path(name)
-    if path.exists():
+    if path.is_file():
         return path
     shipped = {file.stem: file for folder in _CONFIGS for file in sorted(folder.glob("*.yaml"))}
     if name in shipped:

@@ -10,15 +10,16 @@ from typing import Any
 from vdet.config.schema import Settings
 from vdet.detection import detect_still, still_boxes
 from vdet.errors import ConfigError, ImageError, OutputError
-from vdet.files import check_output, replacing
+from vdet.files import check_output, make_folder, replacing
 from vdet.geometry import Box
 from vdet.images import SUFFIXES, Image, read_image, write_image
 from vdet.lanes.drawing import draw_lane
+from vdet.lanes.lane import Lane
 from vdet.lanes.record import lane_record
 from vdet.lanes.road import LaneRequest, Road, RoadWatch
 from vdet.model import LinearModel
 from vdet.overlay.drawing import color_of, draw_box
-from vdet.overlay.stages import LabelledBox, write_lane_stages, write_stages
+from vdet.overlay.stages import LabelledBox, check_stages, write_lane_stages, write_stages
 from vdet.stream import quiet_libraries
 
 
@@ -35,15 +36,16 @@ class StillJob:
 class StillResult:
     """Boxes found in a picture of `width` × `height` pixels, each with its region's peak heat.
 
-    Boxes are in pixels of the picture as it was read; `road`, None where lanes were not looked for,
-    is the undistorted one.
+    Boxes are in pixels of the picture as it was read; `lane`, in those of the undistorted one, is
+    looked for where `with_lane` says so, and None where none is shown.
     """
 
     source: Path
     width: int
     height: int
     boxes: tuple[tuple[Box, float], ...]
-    road: Road | None = None
+    with_lane: bool = False
+    lane: Lane | None = None
 
 
 def find_images(paths: Sequence[Path]) -> list[Path]:
@@ -57,7 +59,7 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() in SUFFIXES)
+            inside = sorted(p for p in path.iterdir() if _is_picture(p))
             if not inside:
                 raise ImageError(f"{path}: holds no pictures ({', '.join(sorted(SUFFIXES))})")
             found += inside
@@ -66,6 +68,10 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
         else:
             raise ImageError(f"{path}: no such file or folder")
     return list(dict.fromkeys(found))
+
+
+def _is_picture(path: Path) -> bool:
+    return path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
 
 
 def plan(
@@ -88,23 +94,17 @@ def plan(
         folder = stages / source.stem if stages and len(sources) > 1 else stages
         jobs.append(StillJob(source, picture, folder))
     pictures = [job.picture for job in jobs if job.picture]
-    for job, picture in zip(jobs, pictures, strict=False):
-        if pictures.count(picture) > 1:
-            raise OutputError(f"{picture}: wanted by two inputs of one name; run them separately")
-        if picture.resolve() == job.source.resolve():
-            raise OutputError(f"{picture}: is the input itself; give another output")
+    folders = [job.stages for job in jobs if job.stages]
+    for wanted in (pictures, folders):
+        if twice := [path for path in wanted if wanted.count(path) > 1]:
+            raise OutputError(f"{twice[0]}: wanted by two inputs of one name; run them separately")
     if out is not None and not single_file:
-        _make_folder(out)
+        make_folder(out)
     for picture in pictures:
-        check_output(picture, overwrite=overwrite)
+        check_output(picture, overwrite=overwrite, inputs=sources)
+    for folder in folders:
+        check_stages(folder, overwrite=overwrite)
     return jobs
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
 
 
 def process_still(
@@ -129,7 +129,8 @@ def process_still(
             write_lane_stages(job.stages, road)
     if job.picture:
         write_image(job.picture, _annotated(image, labelled, road))
-    return StillResult(job.source, width, height, tuple(boxes), road)
+    lane = road.lane if road else None
+    return StillResult(job.source, width, height, tuple(boxes), road is not None, lane)
 
 
 def _road(source: Path, image: Image, settings: Settings, lanes: LaneRequest) -> Road:
@@ -185,6 +186,6 @@ def _item(result: StillResult) -> dict[str, Any]:
             for box, peak in result.boxes
         ],
     }
-    if result.road:
-        item["lane"] = lane_record(result.road.lane)
+    if result.with_lane:
+        item["lane"] = lane_record(result.lane)
     return item

@@ -80,7 +80,8 @@ def lay_grid(
     """Lay a set's windows over its band of rows and the width of the frame.
 
     With `overlap`, each product is truncated to an integer: step = int(size·(1 - overlap)),
-    buffer = int(size·overlap), count = int((span - buffer) / step), across and down. With `step`,
+    buffer = int(size·overlap), count = int((span - buffer) / step), across and down, or as many as
+    fit. With `step`,
     a whole number of cells, as many windows as the span holds.
 
     Parameters
@@ -97,7 +98,8 @@ def lay_grid(
     The grid; without windows where the band or the frame is smaller than a window.
     """
     size = settings.size
-    spans = frame_width, min(settings.bottom, frame_height) - settings.top
+    bottom = max(settings.bottom, settings.top + size)  # rounding may have cut a row off the band
+    spans = frame_width, min(bottom, frame_height) - settings.top
     if size <= 0 or min(spans) < size:
         return WindowGrid(max(1, size), Fraction(1), Fraction(0), Fraction(settings.top), 0, 0)
     step, buffer = _step_and_buffer(settings, cells)

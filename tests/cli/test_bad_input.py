@@ -93,7 +93,7 @@ def test_a_frame_too_small_for_any_window(run: Run, clip_path: Path, out: Path) 
 
 
 def test_a_part_without_frames(run: Run, clip_path: Path, out: Path) -> None:
-    assert "there was no frame" in _failure(run, clip_path, out, "--start", "1:00")
+    assert "no frame lies in the times given" in _failure(run, clip_path, out, "--start", "1:00")
 
 
 Damage = Callable[[Path, Path], None]

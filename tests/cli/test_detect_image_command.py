@@ -155,3 +155,24 @@ def test_a_picture_that_is_not_there(run: Run, tmp_path: Path) -> None:
     result = run("detect-image", tmp_path / "none.png", "-o", tmp_path / "out.png")
     assert result.code == 1
     assert "no such file or folder" in result.err
+
+
+def test_boxes_never_go_over_the_input(run: Run, picture: Path) -> None:
+    before = picture.read_bytes()
+    result = run("detect-image", picture, "--json", picture, "--overwrite")
+    assert result.code == 1
+    assert "is the input itself" in result.err
+    assert picture.read_bytes() == before
+
+
+def test_boxes_lie_in_the_picture_whatever_its_size(
+    run: Run, scene: Scene, model_path: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "odd.png"
+    write_image(path, render(scene, 10)[:179, :318])
+    loose = ("--set", "heat.threshold=0.01", "--set", "search.probability=0.05")
+    result = run("detect-image", path, "--json", "-", "--model", model_path, *loose)
+    (item,) = json.loads(result.out)
+    assert item["boxes"]
+    assert all(box["x"] + box["width"] <= 318 for box in item["boxes"])
+    assert all(box["y"] + box["height"] <= 179 for box in item["boxes"])

@@ -98,6 +98,9 @@ def test_a_picture_of_every_stage_of_one_moment(
         (("out.mp4", "--stages", "x"), "--stages and --at go together"),
         (("out.mp4", "--start", "5", "--end", "5"), "--end must be later"),
         (("out.mp4", "--start", "soon"), "is no time"),
+        (("out.mp4", "--start", "1:2:3:4"), "is no time"),
+        (("out.mp4", "--start", "1:-5"), "is no time"),
+        (("out.mp4", "--start", "1e9"), "is no time"),
         (("out.mp4", "--frames", "0"), "is not in the range"),
     ],
 )
@@ -142,3 +145,27 @@ def test_tracks_of_unknown_kind(run: Run, clip_path: Path, tmp_path: Path) -> No
     result = run("detect-video", clip_path, "--no-video", "--tracks", tmp_path / "t.xml")
     assert result.code == 1
     assert "tracks are written as .txt, .csv, .jsonl" in result.err
+
+
+def test_tracks_of_no_frames_are_an_error_too(run: Run, clip_path: Path, tmp_path: Path) -> None:
+    tracks = tmp_path / "t.csv"
+    tracks.write_text("precious")
+    options = ("--no-video", "--tracks", tracks, "--overwrite", "--start", "50")
+    result = run("detect-video", clip_path, *options)
+    assert result.code == 1
+    assert "no frame lies in the times given" in result.err
+    assert tracks.read_text() == "precious"
+
+
+def test_a_moment_that_never_comes_is_warned_of(run: Run, clip_path: Path, tmp_path: Path) -> None:
+    options = ("--no-video", "--stages", tmp_path / "stages", "--at", "50", "--frames", "2")
+    result = run("detect-video", clip_path, *options)
+    assert result.code == 0
+    assert "no frame at or after --at; no stage pictures" in result.err
+
+
+def test_earlier_stages_are_kept(run: Run, clip_path: Path, tmp_path: Path) -> None:
+    (tmp_path / "5-boxes.png").write_text("precious")
+    result = run("detect-video", clip_path, "--no-video", "--stages", tmp_path, "--at", "0")
+    assert result.code == 1
+    assert "--overwrite" in result.err

@@ -87,3 +87,13 @@ def test_too_many_broken_patches_are_an_error(run: Run, patches_path: Path, tmp_
     assert result.code == 1
     assert "3 of 200 patches are broken, more than the 1.0% of training.max_broken" in result.err
     assert not (tmp_path / "m.npz").exists()
+
+
+def test_a_model_is_named_npz(run: Run, patches_path: Path, tmp_path: Path) -> None:
+    result = run("train", patches_path, "-o", tmp_path / "m.json")
+    assert result.code == 1
+    assert "models are written as .npz" in result.err
+
+
+def test_no_processes_is_wrong_usage(run: Run, patches_path: Path, tmp_path: Path) -> None:
+    assert run("train", patches_path, "-o", tmp_path / "m.npz", "--jobs", "0").code == 2

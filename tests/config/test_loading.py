@@ -124,7 +124,6 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         ("heat: {x: 3}", "1:8: heat.x: is no setting; known here: frames, weight, shrink, "),
         ("features: {hog: {cel: 3}}", "1:18: features.hog.cel: is no setting; did you mean cell?"),
         ("heat: 3", "1:1: heat: should be a section, key: value (got 3)"),
-        ("heat:", "1:1: heat: should be a section, key: value (got None)"),
         ("heat: {frames: 2001-01-01}", "1:8: heat.frames: should be a valid integer (got datetime"),
         ("heat: {threshold: .nan}", "1:8: heat.threshold: should be a finite number (got nan)"),
         ("heat: {threshold: 1e999}", "1:8: heat.threshold: should be a finite number (got inf)"),
@@ -263,3 +262,9 @@ def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
         assert str(error).startswith("--set")  # noqa: PT017
     else:
         assert isinstance(loaded.settings, Settings)
+
+
+def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text("heat:\n  # threshold: 2\n")
+    assert load_settings(file).settings == load_settings().settings

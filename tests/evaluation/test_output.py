@@ -9,15 +9,15 @@ from vdet.evaluation.output import check_outputs, write_json, write_page
 
 
 def test_the_folder_of_a_report_is_made(tmp_path: Path) -> None:
-    check_outputs(None, tmp_path / "a" / "b", overwrite=False)
+    check_outputs(None, tmp_path / "a" / "b", overwrite=False, inputs=[])
     assert write_page("<p>", tmp_path / "a" / "b").read_text() == "<p>"
 
 
 def test_an_earlier_report_is_kept(tmp_path: Path) -> None:
     write_page("precious", tmp_path)
     with pytest.raises(OutputError, match=r"report\.html: is there already; give --overwrite"):
-        check_outputs(None, tmp_path, overwrite=False)
-    check_outputs(None, tmp_path, overwrite=True)
+        check_outputs(None, tmp_path, overwrite=False, inputs=[])
+    check_outputs(None, tmp_path, overwrite=True, inputs=[])
 
 
 def test_earlier_numbers_are_kept(tmp_path: Path) -> None:
@@ -25,13 +25,13 @@ def test_earlier_numbers_are_kept(tmp_path: Path) -> None:
     write_json({"f1": 0.5}, target)
     assert json.loads(Path(target).read_text()) == {"f1": 0.5}
     with pytest.raises(OutputError, match="is there already"):
-        check_outputs(target, None, overwrite=False)
+        check_outputs(target, None, overwrite=False, inputs=[])
 
 
 def test_a_file_is_no_folder_for_a_report(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be made a folder"):
-        check_outputs(None, tmp_path / "file", overwrite=True)
+        check_outputs(None, tmp_path / "file", overwrite=True, inputs=[])
 
 
 def test_without_matplotlib_the_error_says_how_to_get_it(
@@ -39,9 +39,16 @@ def test_without_matplotlib_the_error_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(OutputError, match=r'needs matplotlib; pip install "vdet\[report\]"'):
-        check_outputs(None, tmp_path / "report", overwrite=False)
+        check_outputs(None, tmp_path / "report", overwrite=False, inputs=[])
     assert not (tmp_path / "report").exists()
-    check_outputs("-", None, overwrite=False)
+    check_outputs("-", None, overwrite=False, inputs=[])
+
+
+def test_numbers_never_go_over_what_is_read(tmp_path: Path) -> None:
+    truth = tmp_path / "gt.txt"
+    truth.write_text("precious")
+    with pytest.raises(OutputError, match="is the input itself"):
+        check_outputs(str(truth), None, overwrite=True, inputs=[truth])
 
 
 def test_numbers_go_to_standard_output_for_a_dash(capsys: pytest.CaptureFixture[str]) -> None:

@@ -88,7 +88,7 @@ class TestCaptions:
         patch_sheet({"car": random_patch()}, SEED.model_copy(update={"color_space": "HSV"}))
         assert written == [
             "car", "HSV [0]", "HSV [1]", "HSV [2]", "HOG [0]", "HOG [1]", "HOG [2]",
-            "histogram, 32 bins a channel",
+            "histogram, 32 bins",
         ]  # fmt: skip
 
     def test_of_hog_keep_the_number_of_the_channel(self, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from vdet.cli.options import PathOf, overwrite_option
+from vdet.errors import OutputError
 from vdet.files import check_output
 from vdet.lanes.calibration import Pattern
 from vdet.lanes.calibration import calibrate as fit_camera
@@ -69,8 +70,10 @@ def calibrate(
 
     PHOTO: files, or folders of them; ten or more, of the whole board from different sides.
     """
-    check_output(output, overwrite=overwrite)
+    if output.suffix.lower() not in (".yaml", ".yml"):
+        raise OutputError(f"{output}: cameras are written as .yaml; name it so")
     found = find_images(photos)
+    check_output(output, overwrite=overwrite, inputs=found)
     if preview:
         check_previews(preview, found, overwrite=overwrite)
     calibration = fit_camera(found, pattern)

@@ -52,9 +52,10 @@ def detect_image(
     request = read_lanes(lanes, camera_path)
     loaded = read_settings(config_name, assignments)
     model = read_model(model_path, loaded)
+    sources = find_images(images)
     if json_target not in (None, "-"):
-        check_output(Path(json_target), overwrite=overwrite)
-    jobs = plan(find_images(images), output, stages, overwrite=overwrite)
+        check_output(Path(json_target), overwrite=overwrite, inputs=sources)
+    jobs = plan(sources, output, stages, overwrite=overwrite)
     results: list[StillResult] = []
     failures: list[ImageError] = []
     for job in jobs:
@@ -62,7 +63,7 @@ def detect_image(
             results.append(process_still(job, model, loaded.settings, request))
         except ImageError as error:
             failures.append(error)
-    if json_target and (results or not failures):
+    if json_target and results:
         write_json(results, json_target)
     if failures:
         *others, last = failures

@@ -29,7 +29,7 @@ from vdet.model import load_model
     help="Only this split; may be given often. groups: leave one group out.",
 )
 @settings_options
-@click.option("--jobs", default=-1, show_default=True, help="Processes; -1 for one a core.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes; else one a core.")
 @results_options
 @click.pass_obj
 def patches(
@@ -40,7 +40,7 @@ def patches(
     splits: tuple[str, ...],
     config_name: str | None,
     assignments: tuple[str, ...],
-    jobs: int,
+    jobs: int | None,
     json_target: str | None,
     report: Path | None,
     overwrite: bool,
@@ -54,14 +54,19 @@ def patches(
         raise click.UsageError("--split trains afresh; leave it out, or --model")
     loaded = read_settings(config_name, assignments)
     model = load_model(model_path, loaded.features) if model_path else None
-    check_outputs(json_target, report, overwrite=overwrite)
+    inputs = [*data, *([model_path] if model_path else [])]
+    check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
     files = find_patches(data)
     with progress_bar("", quiet=quiet) as progress:
         if model is None:
             chosen = [split for split in SPLITS if split in (splits or SPLITS)]
-            result = evaluate_splits(files, loaded.settings, chosen, jobs=jobs, progress=progress)
+            result = evaluate_splits(
+                files, loaded.settings, chosen, jobs=jobs or -1, progress=progress
+            )
         else:
-            result = evaluate_model(files, model, loaded.settings, jobs=jobs, progress=progress)
+            result = evaluate_model(
+                files, model, loaded.settings, jobs=jobs or -1, progress=progress
+            )
     give_results(
         lines(result),
         plain(result),

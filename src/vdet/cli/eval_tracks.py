@@ -39,7 +39,7 @@ def tracks(
     from vdet.evaluation.clips.text import plain_clip, run_lines
     from vdet.evaluation.report.video_page import video_page
 
-    check_outputs(json_target, report, overwrite=overwrite)
+    check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
     run = judge_files(prediction, truth, until=until, rate=rate)
     give_results(
         run_lines([run]),

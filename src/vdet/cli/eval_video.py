@@ -66,7 +66,8 @@ def video(
     loaded = [read_settings(config_name, (*assignments, *extra)) for extra in swept]
     path = model_path or shipped_model(loaded[0].settings.features)
     model, *_ = [read_model(path, each) for each in loaded]  # all fit it, or it says so
-    check_outputs(json_target, report, overwrite=overwrite)
+    inputs = [*videos, *truths, path]
+    check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
     variants = [Variant(extra, each.settings) for extra, each in zip(swept, loaded, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:

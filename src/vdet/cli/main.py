@@ -55,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except BrokenPipeError:  # the reader of our output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        sys.exit(_complain(f"{error.filename or 'input'}: {error.strerror or error}", 1))
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}".split())
         sys.exit(

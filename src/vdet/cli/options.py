@@ -1,6 +1,7 @@
 """Options that several commands share, so that one flag means one thing everywhere."""
 
 import logging
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,8 @@ from vdet.lanes.camera_file import load_camera
 from vdet.lanes.road import LaneRequest
 from vdet.model import LinearModel, load_model
 from vdet.resources import find_config, shipped_model
+
+_TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -37,16 +40,13 @@ class Time(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4
         """Return the time in exact seconds."""
         if isinstance(value, Fraction):
             return value
-        seconds = Fraction(0)
-        try:
-            for part in str(value).split(":"):
-                seconds = seconds * 60 + Fraction(part)
-        except (ValueError, ZeroDivisionError):
-            seconds = Fraction(-1)
-        if seconds < 0:
+        if not _TIME.fullmatch(str(value)):
             self.fail(
                 f"{value!r} is no time; give seconds or HH:MM:SS, as in 1:23.5", param, context
             )
+        seconds = Fraction(0)
+        for part in str(value).split(":"):
+            seconds = seconds * 60 + Fraction(part)
         return seconds
 
 

@@ -7,6 +7,7 @@ import click
 from vdet.cli.options import PathOf, overwrite_option, read_settings, settings_options
 from vdet.cli.progress import progress_bar
 from vdet.dataset import find_patches
+from vdet.errors import OutputError
 from vdet.files import check_output
 from vdet.model import save_model
 
@@ -15,7 +16,7 @@ from vdet.model import save_model
 @click.argument("data", nargs=-1, required=True, type=PathOf(), metavar="DATA...")
 @click.option("-o", "--output", required=True, type=PathOf(), help="The model to write, .npz.")
 @settings_options
-@click.option("--jobs", default=-1, show_default=True, help="Processes; -1 for one a core.")
+@click.option("--jobs", type=click.IntRange(min=1), help="Processes; else one a core.")
 @overwrite_option
 @click.pass_obj
 def train(
@@ -25,7 +26,7 @@ def train(
     output: Path,
     config_name: str | None,
     assignments: tuple[str, ...],
-    jobs: int,
+    jobs: int | None,
     overwrite: bool,
 ) -> None:
     """Train a model on DATA: folders or zip files of labelled patches.
@@ -36,12 +37,14 @@ def train(
     from vdet.training import train as fit_model
 
     settings = read_settings(config_name, assignments).settings
+    if output.suffix.lower() != ".npz":
+        raise OutputError(f"{output}: models are written as .npz; name it so")
     report_path = output.with_suffix(".json")
     for path in (output, report_path):
-        check_output(path, overwrite=overwrite)
+        check_output(path, overwrite=overwrite, inputs=data)
     files = find_patches(data)
     with progress_bar(" patches", quiet=quiet) as start:
-        model, report = fit_model(files, settings, jobs=jobs, progress=start(len(files)))
+        model, report = fit_model(files, settings, jobs=jobs or -1, progress=start(len(files)))
     save_model(model, output)
     report.write(report_path)
     click.echo("\n".join(report.lines()))

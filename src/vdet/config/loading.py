@@ -64,6 +64,8 @@ def _merge(values: dict[str, Any], layers: Sequence[Document]) -> tuple[Any, dic
 
 
 def _overlay(below: Any, above: Any) -> Any:
+    if isinstance(below, dict) and above is None:  # a section of which nothing is given
+        return below
     if isinstance(below, dict) and isinstance(above, dict):
         return below | {key: _overlay(below.get(key), value) for key, value in above.items()}
     if (

@@ -3,18 +3,22 @@
 import importlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from vdet.errors import OutputError
-from vdet.files import check_output, replacing
+from vdet.files import check_output, make_folder, replacing
 
 PAGE = "report.html"
 
 
-def check_outputs(json_target: str | None, report: Path | None, *, overwrite: bool) -> None:
+def check_outputs(
+    json_target: str | None, report: Path | None, *, overwrite: bool, inputs: Iterable[Path]
+) -> None:
     """Refuse, before any work, what could not be written; the folder of a report is made.
+
+    `inputs` are the files that the work reads.
 
     Raises
     ------
@@ -23,10 +27,10 @@ def check_outputs(json_target: str | None, report: Path | None, *, overwrite: bo
         draws the report, is not installed.
     """
     if json_target not in (None, "-"):
-        check_output(Path(json_target), overwrite=overwrite)
+        check_output(Path(json_target), overwrite=overwrite, inputs=inputs)
     if report is not None:
         _check_matplotlib()
-        _make_folder(report)
+        make_folder(report)
         check_output(report / PAGE, overwrite=overwrite)
 
 
@@ -52,10 +56,3 @@ def _check_matplotlib() -> None:
         importlib.import_module("matplotlib")
     except ImportError as error:
         raise OutputError('--report needs matplotlib; pip install "vdet[report]"') from error
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error

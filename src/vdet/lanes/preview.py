@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.errors import OutputError
-from vdet.files import check_output
+from vdet.files import check_output, make_folder
 from vdet.images import read_image, write_image
 from vdet.lanes.calibration import Calibration, Pattern
 from vdet.lanes.undistortion import Undistorter
@@ -15,15 +15,12 @@ from vdet.lanes.undistortion import Undistorter
 
 def check_previews(folder: Path, photos: Sequence[Path], *, overwrite: bool) -> None:
     """Make the folder, and refuse what cannot be written into it. Raises `OutputError`."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
+    make_folder(folder)
     pictures = [_preview_of(photo, folder) for photo in photos]
     for picture in pictures:
         if pictures.count(picture) > 1:
             raise OutputError(f"{picture}: wanted by two photographs of one name; rename one")
-        check_output(picture, overwrite=overwrite)
+        check_output(picture, overwrite=overwrite, inputs=photos)
 
 
 def write_previews(folder: Path, calibration: Calibration, pattern: Pattern) -> None:

@@ -39,7 +39,7 @@ def _row(name: str, crop: Image, settings: FeatureSettings) -> Image:
     ]
     if bins := settings.histogram.bins:
         counts = np.stack([histogram(np.asarray(c, np.uint8), bins) for c in channels])
-        tiles.append(_captioned(_histogram_tile(counts), f"histogram, {bins} bins a channel"))
+        tiles.append(_captioned(_histogram_tile(counts), f"histogram, {bins} bins"))
     return np.hstack(tiles)
 
 

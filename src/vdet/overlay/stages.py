@@ -7,6 +7,7 @@ import numpy as np
 
 from vdet.config.schema import FeatureSettings, Settings
 from vdet.detection import Detection
+from vdet.files import check_output, make_folder
 from vdet.geometry import Box
 from vdet.images import Image, write_image
 from vdet.lanes.road import Road
@@ -15,7 +16,15 @@ from vdet.overlay.patches import patch_sheet
 from vdet.search.engine import lay_grids
 from vdet.windows import WindowGrid, Windows
 
+LAST_STAGE = "5-boxes"
+
 LabelledBox = tuple[Box, str]
+
+
+def check_stages(folder: Path, *, overwrite: bool) -> None:
+    """Make the folder, and refuse to write over earlier stages. Raises `OutputError`."""
+    make_folder(folder)
+    check_output(folder / f"{LAST_STAGE}.png", overwrite=overwrite)
 
 
 def write_stages(
@@ -44,7 +53,7 @@ def write_stages(
         "2-windows": _draw_window_sets(image, lay_grids(settings, features, width, height)),
         "3-hits": _draw_hits(image, detection.hits),
         "4-heat": _draw_heat(image, detection),
-        "5-boxes": _draw_boxes(image, detection, boxes),
+        LAST_STAGE: _draw_boxes(image, detection, boxes),
     }
     _write(folder, pictures)
 
@@ -56,7 +65,7 @@ def write_lane_stages(folder: Path, road: Road) -> None:
 
 
 def _write(folder: Path, pictures: dict[str, Image]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     for name, picture in pictures.items():
         write_image(folder / f"{name}.png", picture)
 

@@ -14,7 +14,7 @@ def large_enough(
 ) -> list[Region]:
     """Return the regions, clipped to the frame, that are not narrower or lower than allowed.
 
-    Rule 1. What a region has outside the frame (a heatmap's never has) does not count.
+    Rule 1. What a region has outside the frame does not count.
     """
     least = max(1, settings.min_region)
     clipped = [replace(r, box=r.box.clipped(frame_width, frame_height)) for r in regions]
