@@ -7,9 +7,10 @@ import pytest
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.detection import detect_still, still_boxes
 from vdet.errors import ImageError, OutputError
+from vdet.files import write_json
 from vdet.geometry import Box
 from vdet.images import read_image, write_image
-from vdet.stills import StillJob, StillResult, find_images, plan, process_still, write_json
+from vdet.stills import StillJob, StillResult, find_images, list_results, plan, process_still
 
 
 def touch(*paths: Path) -> None:
@@ -172,17 +173,17 @@ class TestJson:
 
     def test_has_an_item_a_picture_with_a_list_of_boxes(self, tmp_path: Path) -> None:
         path = tmp_path / "boxes.json"
-        write_json(self.RESULTS, str(path))
+        write_json(list_results(self.RESULTS), str(path))
         assert json.loads(path.read_text(encoding="utf-8")) == list(self.ITEMS)
 
     def test_a_dash_is_standard_output(self, capsys: pytest.CaptureFixture[str]) -> None:
-        write_json(self.RESULTS, "-")
+        write_json(list_results(self.RESULTS), "-")
         assert json.loads(capsys.readouterr().out) == list(self.ITEMS)
 
     def test_of_no_pictures_is_an_empty_list(self, tmp_path: Path) -> None:
-        write_json([], str(tmp_path / "boxes.json"))
+        write_json(list_results([]), str(tmp_path / "boxes.json"))
         assert json.loads((tmp_path / "boxes.json").read_text()) == []
 
     def test_a_file_that_cannot_be_written_is_named(self, tmp_path: Path) -> None:
         with pytest.raises(OutputError, match=r"boxes\.json: cannot be written"):
-            write_json(self.RESULTS, str(tmp_path / "none" / "boxes.json"))
+            write_json(list_results(self.RESULTS), str(tmp_path / "none" / "boxes.json"))

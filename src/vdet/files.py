@@ -1,10 +1,13 @@
 """Output files that appear under their names only when complete."""
 
 import contextlib
+import json
 import os
 import secrets
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from vdet.errors import OutputError, VdetError
 
@@ -68,3 +71,13 @@ def replacing(path: Path) -> Iterator[Path]:
         if isinstance(error, OSError) and not isinstance(error, VdetError):
             raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
         raise
+
+
+def write_json(values: Any, target: str) -> None:
+    """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
+    text = json.dumps(values, indent=2, allow_nan=False) + "\n"
+    if target == "-":
+        sys.stdout.write(text)
+        return
+    with replacing(Path(target)) as temporary:
+        temporary.write_text(text, encoding="utf-8")

@@ -54,8 +54,7 @@ def _to_uint8(image: npt.NDArray[np.generic]) -> Image:
         return image.astype(np.uint8, copy=False)
     if image.dtype == np.uint16:
         return (image.astype(np.float32) / 257 + 0.5).astype(np.uint8)
-    low, high = 0.0, 1.0  # floating-point pictures hold 0 to 1
-    scaled = np.nan_to_num(image.astype(np.float32)).clip(low, high)
+    scaled = np.nan_to_num(image.astype(np.float32)).clip(0, 1)  # such pictures hold 0 to 1
     return (scaled * 255 + 0.5).astype(np.uint8)
 
 

@@ -1,7 +1,5 @@
 """Vehicles, and the lane, in pictures: read, detected, drawn, listed."""
 
-import json
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any
 from vdet.config.schema import Settings
 from vdet.detection import detect_still, still_boxes
 from vdet.errors import ConfigError, ImageError, OutputError
-from vdet.files import check_output, make_folder, replacing
+from vdet.files import check_output, make_folder
 from vdet.geometry import Box
 from vdet.images import SUFFIXES, Image, read_image, write_image
 from vdet.lanes.drawing import draw_lane
@@ -155,19 +153,14 @@ def _annotated(image: Image, boxes: Sequence[LabelledBox], road: Road | None) ->
     return image
 
 
-def write_json(results: Iterable[StillResult], target: str) -> None:
-    """Write results as a JSON list to the file `target`, or to standard output for `-`.
+def list_results(results: Iterable[StillResult]) -> list[dict[str, Any]]:
+    """Return results as plain values for JSON, an item a picture.
 
     Each item has `image`, `width`, `height` and `boxes`, a list of objects with `x`, `y`, `width`,
     `height` (pixels of the input picture) and `peak` (heat); where lanes were looked for also
-    `lane` as in `.jsonl` tracks. Raises `OutputError`.
+    `lane` as in `.jsonl` tracks.
     """
-    text = json.dumps([_item(result) for result in results], indent=2) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-        return
-    with replacing(Path(target)) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    return [_item(result) for result in results]
 
 
 def _item(result: StillResult) -> dict[str, Any]:

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import OutputError
-from vdet.evaluation.output import check_outputs, write_json, write_page
+from vdet.evaluation.output import check_outputs, write_page
+from vdet.files import write_json
 
 
 def test_the_folder_of_a_report_is_made(tmp_path: Path) -> None:

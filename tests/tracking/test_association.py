@@ -1,9 +1,9 @@
 """Rules 2 to 11, each on a scene of textured rectangles; the n-th has always the same texture."""
 
-import numpy as np
 import pytest
 
 from seed import SEED, tracker_but
+from textured_road import textured_road
 from vdet.config.schema import TrackerSettings
 from vdet.geometry import Box
 from vdet.heatmap import Region
@@ -16,14 +16,7 @@ LEFT, RIGHT = Box(100, 200, 100, 80), Box(320, 200, 100, 80)
 
 
 def road(*boxes: Box | None) -> Image:
-    frame = np.random.default_rng(99).integers(80, 90, (480, 900, 3), dtype=np.uint8)
-    for seed, box in enumerate(boxes):
-        if box is not None:
-            piece = np.random.default_rng(seed).integers(
-                0, 256, (box.height, box.width, 3), dtype=np.uint8
-            )
-            frame[box.y : box.bottom, box.x : box.right] = piece
-    return frame
+    return textured_road(900, 480, *boxes)
 
 
 def a_car(box: Box, frame: Image, shown_as: int | None = None) -> Car:

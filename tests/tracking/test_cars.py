@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from seed import SEED, tracker_but
+from textured_road import textured_road
 from vdet.geometry import Box
 from vdet.heatmap import Region
 from vdet.tracking.cars import Cars
@@ -15,14 +16,7 @@ GREY = np.full((360, 640, 3), 90, np.uint8)
 
 
 def road(*boxes: Box | None) -> Image:
-    frame = np.random.default_rng(99).integers(80, 90, (360, 640, 3), dtype=np.uint8)
-    for seed, box in enumerate(boxes):
-        if box is not None:
-            piece = np.random.default_rng(seed).integers(
-                0, 256, (box.height, box.width, 3), dtype=np.uint8
-            )
-            frame[box.y : box.bottom, box.x : box.right] = piece
-    return frame
+    return textured_road(640, 360, *boxes)
 
 
 def region(box: Box, peak: float = 2.0) -> Region:

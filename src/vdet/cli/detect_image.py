@@ -16,8 +16,8 @@ from vdet.cli.options import (
     settings_options,
 )
 from vdet.errors import ImageError
-from vdet.files import check_output
-from vdet.stills import StillResult, find_images, plan, process_still, write_json
+from vdet.files import check_output, write_json
+from vdet.stills import StillResult, find_images, list_results, plan, process_still
 
 log = logging.getLogger("vdet")
 
@@ -64,7 +64,7 @@ def detect_image(
         except ImageError as error:
             failures.append(error)
     if json_target and results:
-        write_json(results, json_target)
+        write_json(list_results(results), json_target)
     if failures:
         *others, last = failures
         for failure in others:

@@ -42,9 +42,8 @@ def _section(section: Section, indent: str, *, comments: bool = True) -> Iterato
 
 
 def _items(items: tuple[Section, ...], indent: str) -> Iterator[str]:
-    if fields := type(items[0]).model_fields:
-        for name, field in fields.items():
-            yield from _comment(f"{name}: {field.description}", indent)
+    for name, field in type(items[0]).model_fields.items():
+        yield from _comment(f"{name}: {field.description}", indent)
     for item in items:
         first, *rest = _section(item, indent + "  ", comments=False)
         yield f"{indent}- {first.strip()}"

@@ -1,11 +1,8 @@
-"""Where results go: JSON to a file or standard output, a report into a folder."""
+"""Where results go: numbers to a file or standard output, a report into a folder."""
 
 import importlib
-import json
-import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder, replacing
@@ -32,16 +29,6 @@ def check_outputs(
         _check_matplotlib()
         make_folder(report)
         check_output(report / PAGE, overwrite=overwrite)
-
-
-def write_json(values: Mapping[str, Any], target: str) -> None:
-    """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
-    text = json.dumps(values, indent=2, allow_nan=False) + "\n"
-    if target == "-":
-        sys.stdout.write(text)
-        return
-    with replacing(Path(target)) as temporary:
-        temporary.write_text(text, encoding="utf-8")
 
 
 def write_page(html: str, folder: Path) -> Path:

@@ -1,6 +1,5 @@
 """What `vdet train` says of a model: plain numbers, printed and kept as JSON."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from vdet.files import replacing
+from vdet.files import write_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +79,7 @@ class TrainingReport:
 
     def write(self, path: Path) -> None:
         """Write the report as JSON. Raises `OutputError`."""
-        with replacing(path) as temporary:
-            temporary.write_text(json.dumps(asdict(self), indent=2) + "\n", encoding="utf-8")
+        write_json(asdict(self), str(path))
 
 
 _SPLITS = {

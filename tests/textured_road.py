@@ -1,0 +1,17 @@
+"""A grey road with textured rectangles for cars; the n-th has always the same texture."""
+
+import numpy as np
+
+from vdet.geometry import Box
+from vdet.images import Image
+
+
+def textured_road(width: int, height: int, *boxes: Box | None) -> Image:
+    frame = np.random.default_rng(99).integers(80, 90, (height, width, 3), dtype=np.uint8)
+    for seed, box in enumerate(boxes):
+        if box is not None:
+            piece = np.random.default_rng(seed).integers(
+                0, 256, (box.height, box.width, 3), dtype=np.uint8
+            )
+            frame[box.y : box.bottom, box.x : box.right] = piece
+    return frame
