@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from vdet.cli import main
 from vdet.config.schema import Settings
@@ -14,6 +15,10 @@ from vdet.model import save_model
 from vdet.synthetic import default_clip, write_clip, write_patches
 from vdet.synthetic.scene import Scene
 from vdet.training import train
+
+# Seeded, so that a run of the tests says the same twice; and no test is a timing.
+settings.register_profile("vdet", derandomize=True, deadline=None)
+settings.load_profile("vdet")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from vdet.lanes.curves import Curves, Paint, seen_width
@@ -52,6 +52,8 @@ def test_no_pitch_makes_a_width_vanish() -> None:
 
 
 @given(any_lane)
+@example(Curves(bend=1 / 400, heading=0.0, left=-1.5, right=1.5, pitch=0.005859375))
+@example(Curves(bend=-1 / 400, heading=-0.05, left=-1.2, right=2.5, pitch=0.006))
 def test_the_fit_of_a_lane_s_own_paint_is_the_lane(curves: Curves) -> None:
     found = solve(evidence_of(curves), curves.width)
     for line, truth in zip(found.at(Z), curves.at(Z), strict=True):

@@ -15,7 +15,7 @@ _PITCH = 4  # its place among the five numbers, in the order of `Curves`
 
 # What is known without paint, as a number of rows of paint (0.1 m each) with a usual deviation:
 _BEND_WEIGHT = (0.1 / 0.001) ** 2
-_PITCH_WEIGHT = (0.1 / 0.002) ** 2
+_PITCH_WEIGHT = (0.1 / 0.003) ** 2
 _WIDTH_WEIGHT = (0.1 / 0.2) ** 2
 _ANY_WEIGHT = 1e-3  # keeps the equations solvable
 
