@@ -1,6 +1,10 @@
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from vdet.config.document import MAX_BYTES, parse_assignment, parse_document, read_document
 from vdet.errors import ConfigError
@@ -10,6 +14,36 @@ def refusal(text: str) -> str:
     with pytest.raises(ConfigError) as error:
         parse_document(text, "my.yaml")
     return str(error.value)
+
+
+TEXTS = st.text(max_size=20)
+WORDS = st.none() | st.booleans() | st.integers(-(2**63), 2**63) | TEXTS
+VALUES: st.SearchStrategy[Any] = st.recursive(
+    WORDS | st.floats(allow_nan=False),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXTS, inner, max_size=3),
+    max_leaves=5,
+)
+MARKS = (
+    *("a", "1", ":", ": ", "- ", "? ", "\n", " ", "{", "}", "[", "]", ",", "&a ", "*a", "!!x "),
+    *("'", '"', "\\", "\\U", "\\x", "|", ">", "%", "%YAML ", "---", "...", "#", "\t", "\0", "é"),
+)
+
+
+@settings(max_examples=50)
+@given(st.dictionaries(TEXTS, VALUES, max_size=3))
+def test_plain_values_are_read_as_they_were_written(values: dict[str, Any]) -> None:
+    assert parse_document(yaml.safe_dump(values), "my.yaml").values == values
+
+
+@given(st.lists(st.sampled_from(MARKS), max_size=30).map("".join) | st.text())
+def test_any_text_is_a_document_or_refused_line_by_line(text: str) -> None:
+    try:
+        document = parse_document(text, "my.yaml")
+    except ConfigError as error:
+        lines = str(error).split("\n")
+        assert all(line.startswith("my.yaml:") and line.isprintable() for line in lines)
+    else:
+        assert isinstance(document.values, dict)
 
 
 def test_every_key_has_the_place_where_it_stands() -> None:
@@ -180,7 +214,7 @@ def test_a_file_that_is_not_utf_8_is_refused(tmp_path: Path, data: bytes) -> Non
 def test_a_huge_file_is_refused_unparsed(tmp_path: Path) -> None:
     path = tmp_path / "my.yaml"
     path.write_bytes(b"#" * (MAX_BYTES + 1))
-    with pytest.raises(ConfigError, match=r"my\.yaml: is larger than 1000000 bytes"):
+    with pytest.raises(ConfigError, match=r"my\.yaml: is larger than 100,000 bytes"):
         read_document(path)
 
 

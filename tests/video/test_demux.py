@@ -49,5 +49,9 @@ def test_a_file_of_nothing_but_errors_ends() -> None:
     assert read(*(error() for _ in range(1000)), A) == ([], 1)
 
 
+def test_a_stream_that_appears_late_ends_nothing_but_the_reading() -> None:
+    assert read(A, B, IndexError("list index out of range")) == ([A, B], 0)
+
+
 def test_empty_packets_are_dropped() -> None:
     assert read(SimpleNamespace(size=0), A) == ([A], 0)

@@ -12,14 +12,38 @@ import pytest
 from av.stream import Disposition
 from numpy.typing import NDArray
 
+from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.video import VideoReader
+from vdet.video import Frame, VideoReader
 
 Image = NDArray[np.uint8]
 Number = Callable[[Image], int]
 Writer = Callable[..., Path]
 Warnings = Callable[[], list[str]]
 GOPS = {"options": {"g": "10", "bf": "2"}, "count": 60}
+DAMAGED: dict[str, dict[str, Any]] = {
+    "mp4": {"movflags": "+faststart"},
+    "webm": {"codec": "libvpx-vp9", "options": {"deadline": "realtime", "g": "10"}},
+    "mkv": {"codec": "libsvtav1", "options": {"preset": "12", "g": "10"}},
+    "avi": {"codec": "mpeg4", "options": {"g": "10", "bf": "2", "q": "2"}},
+    "ts": {"codec": "libx264"},
+}
+TOLERANT = InputSettings(max_damaged=1)
+
+
+def overwrite(path: Path, places: int, size: int = 40) -> None:
+    """Put noise over some places of the last two thirds of a file."""
+    data = bytearray(path.read_bytes())
+    rng = np.random.default_rng(0)
+    for place in np.linspace(0.7, 0.4, places) * len(data):
+        data[int(place) : int(place) + size] = rng.bytes(size)
+    path.write_bytes(data)
+
+
+def read_damaged(path: Path, threads: int) -> tuple[list[Frame], int]:
+    """The frames, and how many were damaged or lost."""
+    with VideoReader(path, threads=threads, settings=TOLERANT) as reader:
+        return list(reader), reader.damaged
 
 
 def cut_off(path: Path, share: float) -> Path:
@@ -125,7 +149,7 @@ def test_a_cover_picture_is_not_the_video(
 
 
 def test_frames_of_another_size_are_scaled_to_the_first(
-    tmp_path: Path, write_clip: Writer, read_number: Number
+    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
 ) -> None:
     small = write_clip(tmp_path / "small.h264", count=6)
     large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
@@ -136,6 +160,7 @@ def test_frames_of_another_size_are_scaled_to_the_first(
     assert {frame.image.shape for frame in frames} == {(96, 160, 3)}
     assert [read_number(frame.image) for frame in frames] == [*range(6), *range(9)]
     assert [frame.time for frame in frames] == [Fraction(index, 25) for index in range(15)]
+    assert warnings() == [f"{path}: frames of 320×192 pixels scaled to 160×96"]
 
 
 class TestFaults:
@@ -175,30 +200,47 @@ class TestFaults:
         with pytest.raises(VideoError, match=r"cut\.mp4: is not a video, or one that was cut off"):
             VideoReader(path)
 
-    @pytest.mark.parametrize("threads", [None, 1])
-    def test_damage_in_the_middle_is_skipped_counted_and_told(
-        self,
-        threads: int | None,
-        *,
-        tmp_path: Path,
-        write_clip: Writer,
-        read_number: Number,
-        warnings: Warnings,
+    @pytest.mark.parametrize("kind", DAMAGED)
+    def test_damage_is_skipped_counted_and_told_alike_whatever_the_number_of_threads(
+        self, kind: str, *, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / f"damaged.{kind}", **(GOPS | DAMAGED[kind]))
+        overwrite(path, 4 if kind == "mp4" else 2)
+        (frames, damaged), *others = (read_damaged(path, threads) for threads in (1, 2, 5))
+        for other, count in others:
+            assert count == damaged
+            assert [frame.time for frame in other] == [frame.time for frame in frames]
+            for one, another in zip(frames, other, strict=True):
+                np.testing.assert_array_equal(one.image, another.image)
+        assert 0 <= 60 - len(frames) <= damaged
+        assert damaged > 0
+        (warning,) = set(warnings())
+        assert f"{path}: {damaged} of " in warning
+
+    def test_damage_in_the_middle_leaves_both_ends(
+        self, tmp_path: Path, write_clip: Writer, read_number: Number
     ) -> None:
         path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
-        data = bytearray(path.read_bytes())
-        pictures = data.index(b"mdat")
-        first = pictures + (len(data) - pictures) * 2 // 5
-        data[first : first + 600] = np.random.default_rng(0).bytes(600)
-        path.write_bytes(data)
-        with VideoReader(path, threads=threads) as reader:
+        overwrite(path, 1, size=600)
+        with VideoReader(path, settings=TOLERANT) as reader:
             frames = list(reader)
         assert [read_number(frame.image) for frame in frames[:10]] == list(range(10))
         assert read_number(frames[-1].image) == 59
         assert frames[-1].time == Fraction(59, 25)
-        assert 30 <= len(frames) < 60
-        assert reader.damaged > 0
-        assert warnings() == [f"{path}: {reader.damaged} frames damaged or lost"]
+
+    def test_more_damage_than_is_tolerated_is_an_error_after_the_last_frame(
+        self, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
+        overwrite(path, 4)
+        with (
+            VideoReader(path) as reader,
+            pytest.raises(VideoError, match=r"more than input\.max_damaged \(0.05\)"),
+        ):
+            for _ in reader:
+                pass
+        assert reader.damaged > 3
+        assert warnings() == []
 
     def test_damage_is_not_told_of_a_part_that_was_not_read(
         self, tmp_path: Path, write_clip: Writer, warnings: Warnings

@@ -2,16 +2,24 @@
 
 import re
 import reprlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from vdet.errors import ConfigError
+from vdet.untrusted import printable, read_whole
 
-MAX_BYTES = 1_000_000
+MAX_BYTES = 100_000
+"""Ten times what all settings with all their comments take."""
 MAX_INTEGER_BITS = 64
+MAX_MISTAKES = 20
+"""Shown of one file; the others are only counted."""
+
+_INTEGER = "tag:yaml.org,2002:int"
 
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
@@ -44,6 +52,14 @@ class _Loader(yaml.SafeLoader):
         raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
 
 
+def mistakes(lines: Iterable[str], count: int) -> ConfigError:
+    """Return the error for `count` mistakes, of which the first `lines` are looked at."""
+    shown = list(islice(lines, MAX_MISTAKES))
+    if count > len(shown):
+        shown.append(f"… and {count - len(shown)} more mistakes")
+    return ConfigError("\n".join(shown))
+
+
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)[eE][-+]?[0-9]+$"),
@@ -59,13 +75,7 @@ def read_document(path: Path) -> Document:
     ConfigError
         The file cannot be read, is not YAML, or gives a key twice (all such places are named).
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(data) > MAX_BYTES:
-        raise ConfigError(f"{path}: is larger than {MAX_BYTES} bytes; that is no settings file")
+    data = read_whole(path, most=MAX_BYTES, what="settings file", error=ConfigError)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -83,7 +93,7 @@ def parse_document(text: str, name: str) -> Document:
         got = reprlib.repr(values)
         walk.errors.append(f"{name}:1:1: expected settings (key: value), got {got}")
     if walk.errors:
-        raise ConfigError("\n".join(walk.errors))
+        raise mistakes(walk.errors, len(walk.errors))
     return Document(values, walk.places)
 
 
@@ -104,7 +114,7 @@ def parse_assignment(text: str) -> Document:
     path: Key = tuple(int(part) if _is_number(part) else part for part in parts)
     nested = walk.value(_compose(value, name), path)
     if walk.errors:
-        raise ConfigError("\n".join(walk.errors))
+        raise mistakes(walk.errors, len(walk.errors))
     for part in reversed(path):
         nested = {part: nested}
     places = dict.fromkeys(walk.places, name) | {path: name}
@@ -122,7 +132,7 @@ def _compose(text: str, name: str) -> yaml.Node | None:
         mark = error.problem_mark or error.context_mark
         place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
         raise ConfigError(f"{place}: is not YAML: {error.problem or error.context}") from error
-    except yaml.YAMLError as error:  # a character that YAML forbids
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # no character, or a forbidden one
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error
@@ -155,7 +165,7 @@ class _Walk:
                 continue
             name = name_node.value
             if name in values:
-                self.errors.append(f"{place}: {name}: is given twice; keep one")
+                self.errors.append(f"{place}: {printable(name)}: is given twice; keep one")
             self.places[(*key, name)] = place
             values[name] = self.value(value_node, (*key, name))
         return values
@@ -163,6 +173,8 @@ class _Walk:
     def _scalar(self, node: yaml.Node) -> Any:
         constructor = yaml.constructor.SafeConstructor()
         try:
+            if node.tag == _INTEGER and len(node.value) > MAX_INTEGER_BITS + len("-0b"):
+                raise OverflowError("the number is too large")
             value = constructor.construct_object(node)
             if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
                 raise OverflowError("the number is too large")

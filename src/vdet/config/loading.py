@@ -1,6 +1,7 @@
 """Layers of settings → one `Settings`: built-in, then a YAML file, then assignments."""
 
 import difflib
+import itertools
 import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,9 +11,10 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from vdet.config.document import Document, Key, parse_assignment, read_document
+from vdet.config.document import Document, Key, mistakes, parse_assignment, read_document
 from vdet.config.schema import FeatureSettings, Settings
 from vdet.errors import ConfigError
+from vdet.untrusted import printable
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,12 +46,14 @@ def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> 
         except ConfigError as error:
             errors.append(str(error))
     values, places = _merge(defaults, layers)
+    details: list[ErrorDetails] = []
     try:
         settings = Settings.model_validate(values)
     except ValidationError as error:
-        errors += [_describe(detail, places) for detail in error.errors() if _is_true(detail)]
-    if errors:
-        raise ConfigError("\n".join(errors))
+        details = [detail for detail in error.errors() if _is_true(detail)]
+    if errors or details:
+        described = (_describe(detail, places) for detail in details)
+        raise mistakes(itertools.chain(errors, described), len(errors) + len(details))
     given = any("features" in layer.values for layer in layers)
     return LoadedSettings(settings, settings.features if given else None)
 
@@ -100,7 +104,8 @@ def format_key(key: Key) -> str:
     """Write a path as a user would: `search.windows[0].size`."""
     text = ""
     for part in key:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+        name = printable(str(part))
+        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
     return text
 
 

@@ -23,7 +23,7 @@ from vdet.config.learning import (
     SpatialSettings,
     TrainingSettings,
 )
-from vdet.config.section import FRAME_LENGTH, Section
+from vdet.config.section import FRAME_LENGTH, Fraction, Section
 
 __all__ = [
     "FRAME_LENGTH",
@@ -33,6 +33,7 @@ __all__ = [
     "HeatSettings",
     "HistogramSettings",
     "HogSettings",
+    "InputSettings",
     "LaneSettings",
     "OutputSettings",
     "SearchSettings",
@@ -43,6 +44,18 @@ __all__ = [
     "TrainingSettings",
     "WindowSettings",
 ]
+
+
+class InputSettings(Section):
+    """The video that is read."""
+
+    max_damaged: Fraction = Field(
+        0.05,
+        description="share of damaged or lost frames that is tolerated; above it the video fails",
+    )
+    frame_rate: float = Field(
+        25.0, ge=0.01, le=1000, description="frames a second of numbered pictures (img_%04d.png)"
+    )
 
 
 class OutputSettings(Section):
@@ -72,4 +85,5 @@ class Settings(Section):
     heat: HeatSettings = HeatSettings()
     tracker: TrackerSettings = TrackerSettings()
     lanes: LaneSettings = LaneSettings()
+    input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()

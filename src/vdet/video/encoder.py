@@ -41,9 +41,11 @@ class Encoder:
         *,
         origin: Fraction,
         whole_sound: bool,
+        threads: int | None = None,
     ) -> None:
         self._origin = origin
         self._whole_sound = whole_sound
+        self._threads = threads
         self._period = 1 / info.rate
         self._time_base = info.time_base
         if info.time_base.denominator > _FINEST:
@@ -94,6 +96,7 @@ class Encoder:
         context = stream.codec_context
         context.width = info.width + info.width % 2
         context.height = info.height + info.height % 2
+        context.thread_count = self._threads or 0
         context.pix_fmt = "yuv420p"
         context.time_base = self._time_base
         context.sample_aspect_ratio = info.pixel_aspect

@@ -9,6 +9,7 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
+from vdet.video.demux import MAX_PIXELS, MAX_SIDE
 from vdet.video.frame import ColorTags, VideoInfo
 from vdet.video.pixels import quarter_turns
 
@@ -33,12 +34,21 @@ def picture_stream(container: InputContainer, path: Path) -> VideoStream:
     raise VideoError(f"{path}: has no moving pictures; give a video file")
 
 
+def check_size(path: Path, width: int, height: int) -> None:
+    """Refuse frames that are too large, before there is memory for any. Raises `VideoError`."""
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise VideoError(
+            f"{path}: frames of {width}×{height} pixels are too large ({MAX_PIXELS // 10**6} "
+            f"million pixels and sides of {MAX_SIDE} at most); scale it down first"
+        )
+
+
 def describe(
     path: Path, container: InputContainer, stream: VideoStream, first: av.VideoFrame
 ) -> VideoInfo:
     """Gather what is known once the `first` picture of `stream` has been decoded."""
-    time_base = stream.time_base or Fraction(1, 90_000)
-    rate = _rate(stream)
+    time_base = _time_base(stream)
+    rate = _first_sensible(stream.average_rate, stream.guessed_rate)
     start = (first.pts or 0) * time_base
     duration = stated_duration(stream, start) or _longest(container)
     rotation = quarter_turns(first)
@@ -81,6 +91,21 @@ def _longest(container: InputContainer) -> Fraction | None:
     return Fraction(container.duration, av.time_base) if container.duration else None
 
 
-def _rate(stream: VideoStream) -> Fraction:
-    rate = stream.average_rate or stream.guessed_rate or _USUAL_RATE
-    return rate.limit_denominator(_LARGEST_TERM) or _USUAL_RATE
+def period_of(stream: VideoStream) -> Fraction:
+    """Return the usual time from one picture to the next, in units of the time base.
+
+    It is not the average where pictures were left out.
+    """
+    rate = _first_sensible(stream.guessed_rate, stream.average_rate)
+    return 1 / (rate * _time_base(stream))
+
+
+def _time_base(stream: VideoStream) -> Fraction:
+    return stream.time_base or Fraction(1, 90_000)
+
+
+def _first_sensible(*rates: Fraction | None) -> Fraction:
+    for rate in rates:
+        if rate and (near := rate.limit_denominator(_LARGEST_TERM)) > 0:
+            return near
+    return _USUAL_RATE

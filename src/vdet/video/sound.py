@@ -12,6 +12,7 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 
 from vdet.video.demux import open_input, packets
+from vdet.video.sound_trial import try_sounds
 
 _log = logging.getLogger("vdet")
 
@@ -64,19 +65,18 @@ class SoundCopy:
     def _add_streams(self) -> dict[int, AudioStream]:
         """Make the streams of the target; the keys are the indices of the same in the source."""
         streams = {}
+        kind = self._target.format.name
+        held = try_sounds(self._path, kind)
         for stream in self._source.streams:
             if not isinstance(stream, AudioStream):
                 stream.discard = Discard.all
                 continue
-            try:
-                streams[stream.index] = self._target.add_stream_from_template(stream)
-            except ValueError:
+            if not held.get(stream.index):
                 codec = stream.codec_context.name if stream.codec_context else "of unknown codec"
-                kind = self._target.format.name
-                _log.warning(
-                    "%s: its sound (%s) cannot go into %s; left out", self._path, codec, kind
-                )
+                fault = f"cannot go into {kind}" if stream.index in held else "is empty"
+                _log.warning("%s: its sound (%s) %s; left out", self._path, codec, fault)
                 continue
+            streams[stream.index] = self._target.add_stream_from_template(stream)
             if stream.language:
                 streams[stream.index].metadata["language"] = stream.language
         return streams

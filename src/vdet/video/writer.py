@@ -60,6 +60,8 @@ class VideoWriter:
     whole_sound
         True: the sound goes on to its own end. False: it ends with the last frame written, which
         is right where the frames are only a part of the source.
+    threads
+        Of the encoder; None lets it choose.
 
     Raises
     ------
@@ -70,7 +72,13 @@ class VideoWriter:
     """
 
     def __init__(
-        self, path: Path, info: VideoInfo, settings: OutputSettings, *, whole_sound: bool = True
+        self,
+        path: Path,
+        info: VideoInfo,
+        settings: OutputSettings,
+        *,
+        whole_sound: bool = True,
+        threads: int | None = None,
     ) -> None:
         if path.suffix.lower() not in SUFFIXES:
             raise OutputError(f"{path}: videos are written as {', '.join(SUFFIXES)}; name it so")
@@ -78,6 +86,7 @@ class VideoWriter:
         self._info = info
         self._settings = settings
         self._whole_sound = whole_sound
+        self._threads = threads
         self._encoder: Encoder | None = None
 
     def __enter__(self) -> Self:
@@ -105,6 +114,7 @@ class VideoWriter:
             self._settings,
             origin=first.time,
             whole_sound=self._whole_sound,
+            threads=self._threads,
         )
 
     def _refuse_none(self, *raised: Any) -> None:

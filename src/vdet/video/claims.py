@@ -1,0 +1,72 @@
+"""How many samples the index of an MP4 or MOV file claims, counted before memory is set aside.
+
+An index may say "so many samples of one size" in a few bytes, and the demultiplexer makes an entry
+for each: 5 kB of file can ask for gigabytes.
+"""
+
+import struct
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO
+
+from vdet.errors import VideoError
+
+_MOST = 4_000_000  # samples, for which memory is set aside at ease: 44 hours of video
+_MOST_BOXES = 200_000  # to be looked at; ten hours of one-second fragments have as many
+
+_PARENTS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"moof", b"traf"}
+_FIRST = {b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide", b"sidx", b"uuid"}
+_OWN_FIELDS = 0xF00  # flags of a track run: each sample has fields of its own in the file
+
+
+def check_claims(path: Path) -> None:
+    """Refuse an MP4 or MOV file that claims far more samples than it has bytes.
+
+    Raises
+    ------
+    VideoError
+        It does. A file that cannot be read is somebody else's to refuse.
+    """
+    if not path.is_file():  # to open a pipe would take its content away
+        return
+    try:
+        with path.open("rb") as file:
+            size = file.seek(0, 2)
+            claimed = sum(islice(_claims(file, size), _MOST_BOXES))
+    except OSError:
+        return
+    if claimed > max(_MOST, size):
+        raise VideoError(
+            f"{path}: claims {claimed:,} samples in {size:,} bytes, so it is damaged; "
+            "give a file that plays"
+        )
+
+
+def _claims(file: BinaryIO, size: int) -> Iterator[int]:
+    """Yield for each box the samples of one size that it claims."""
+    position = 0
+    while position + 8 <= size:
+        file.seek(position)
+        head = file.read(24)
+        length, kind = struct.unpack(">I4s", head[:8])
+        if position == 0 and kind not in _FIRST:
+            return
+        inside = 8
+        if length == 1 and len(head) >= 16:
+            length, inside = int.from_bytes(head[8:16]), 16
+        yield _claim(kind, head)
+        if kind in _PARENTS:
+            position += inside
+        elif length < inside:  # 0: to the end of the file; else damaged
+            return
+        else:
+            position += length
+
+
+def _claim(kind: bytes, head: bytes) -> int:
+    if kind == b"stsz" and len(head) >= 20 and any(head[12:16]):
+        return int.from_bytes(head[16:20])
+    if kind == b"trun" and len(head) >= 16 and not int.from_bytes(head[9:12]) & _OWN_FIELDS:
+        return int.from_bytes(head[12:16])
+    return 0

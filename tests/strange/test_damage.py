@@ -1,0 +1,121 @@
+"""Damage in a file: what is left is processed, the loss is told, and too much of it is an error."""
+
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from clips import read_number, write_clip
+from conftest import Run
+from strange.conftest import Process
+
+COUNT = 40
+# Every frame is coded by itself, so that damage does not spread.
+KINDS: dict[str, dict[str, Any]] = {
+    "mp4": {"movflags": "+faststart", "options": {"g": "1"}},
+    "ts": {"options": {"g": "1"}, "size": (640, 384)},
+    "mkv": {"options": {"g": "1"}},
+    "avi": {"codec": "mpeg4", "options": {"g": "1", "q": "2"}},
+    "webm": {"codec": "libvpx-vp9", "options": {"g": "1", "deadline": "realtime"}},
+}
+NOISE = {"mp4": (40, 0), "ts": (192, 376), "mkv": (40, 0), "avi": (40, 0), "webm": (6, 0)}
+"""How noise lies in a frame's packet: first byte, and end if not that of the frame.
+
+A transport stream is cut into pieces of 188 bytes, each with a header: it is the second one.
+"""
+
+
+def packets_of(path: Path) -> list[tuple[int, int]]:
+    """Where each packet lies, and its size, bytes."""
+    with av.open(str(path)) as container:
+        packets = [packet for packet in container.demux(video=0) if packet.size]
+    return [(packet.pos or 0, packet.size) for packet in packets]
+
+
+def damaged(folder: Path, suffix: str, frames: list[int]) -> Path:
+    """Write a clip, and noise over these of its frames."""
+    path = write_clip(folder / f"damaged.{suffix}", count=COUNT, **KINDS[suffix])
+    data = bytearray(path.read_bytes())
+    rng = np.random.default_rng(0)
+    places = packets_of(path)
+    for frame in frames:
+        position, size = places[frame]
+        begin, end = NOISE[suffix]
+        first, last = position + begin, position + (end or size)
+        data[first:last] = rng.bytes(last - first)
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_a_little_is_told_of_and_the_rest_is_processed(
+    suffix: str, tmp_path: Path, process: Process
+) -> None:
+    source = damaged(tmp_path, suffix, [22, 33])
+    shown = process(source)
+    assert all(earlier < later for earlier, later in pairwise(shown.times))
+    found = {round(time * 25): image for time, image in zip(shown.times, shown.images, strict=True)}
+    whole = set(range(COUNT)) - {22, 33}
+    assert whole <= found.keys()
+    assert {number: read_number(found[number]) for number in whole} == {n: n for n in whole}
+    (warning,) = shown.warnings
+    assert f"damaged.{suffix}: 2 of 40 frames damaged or lost" in warning
+
+
+@pytest.mark.parametrize("suffix", KINDS)
+def test_too_much_is_an_error_and_nothing_is_written(suffix: str, run: Run, tmp_path: Path) -> None:
+    source = damaged(tmp_path, suffix, [11, 22, 33, 34])
+    (tmp_path / "out").mkdir()
+    out = tmp_path / "out" / "out.mp4"
+    result = run("detect-video", source, out, "--tracks", out.with_suffix(".csv"))
+    assert result.code == 1
+    assert result.err.count("\n") == 1, result.err
+    assert (
+        f"damaged.{suffix}: 4 of 40 frames damaged or lost, more than input.max_damaged (0.05) "
+        "allows; raise it to take what is left" in result.err
+    )
+    assert not list(out.parent.iterdir())
+
+
+def test_what_is_too_much_is_a_setting(tmp_path: Path, process: Process) -> None:
+    source = damaged(tmp_path, "mp4", [11, 22, 33, 34])
+    shown = process(source, "--set", "input.max_damaged=0.1")
+    assert "4 of 40 frames damaged or lost" in shown.warnings[0]
+
+
+def test_only_what_is_gone_through_counts(tmp_path: Path, process: Process) -> None:
+    source = damaged(tmp_path, "mp4", [31, 32, 33, 34])
+    shown = process(source, "--frames", "25")
+    assert [read_number(image) for image in shown.images] == list(range(25))
+    assert shown.warnings == []
+
+
+def test_frames_that_matroska_skips_unseen_are_counted_by_the_times(
+    run: Run, tmp_path: Path
+) -> None:
+    clusters = {"cluster_time_limit": "400"}  # ten frames each
+    path = write_clip(tmp_path / "hole.mkv", count=COUNT, muxing=clusters, **KINDS["mkv"])
+    data = bytearray(path.read_bytes())
+    (first, _), (last, _) = packets_of(path)[22], packets_of(path)[26]
+    data[first:last] = bytes(last - first)
+    path.write_bytes(data)
+    unseen = COUNT - len(packets_of(path))
+    assert unseen >= 4
+    result = run("detect-video", path, tmp_path / "out.mp4")
+    assert result.code == 1
+    assert f"hole.mkv: {unseen} of 40 frames damaged or lost" in result.err
+
+
+def test_frames_that_were_never_recorded_are_told_of_and_tolerated(
+    tmp_path: Path, process: Process
+) -> None:
+    times = [Fraction(index, 25) for index in range(COUNT) if index not in {11, 22, 33, 34}]
+    source = write_clip(tmp_path / "gaps.mp4", times=times)
+    shown = process(source)
+    assert shown.times == times
+    (warning,) = shown.warnings
+    assert "gaps.mp4: times jump as if 4 of 40 frames were missing" in warning

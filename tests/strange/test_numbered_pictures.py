@@ -1,0 +1,60 @@
+"""Numbered pictures in place of a video file."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from clips import draw_frame
+from conftest import Run
+from strange.conftest import Process, assert_whole
+
+
+def write_pictures(pattern: Path, numbers: range) -> Path:
+    pattern.parent.mkdir(exist_ok=True)
+    for number in numbers:
+        path = pattern.with_name(pattern.name % number)
+        assert cv2.imwrite(str(path), draw_frame(number, 160, 96))
+    return pattern
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg", "bmp", "tiff", "webp"])
+def test_they_are_a_video(suffix: str, tmp_path: Path, process: Process) -> None:
+    pattern = tmp_path / "pictures 100%" / f"img_%02d.{suffix}"
+    shown = process(write_pictures(pattern, range(9, 12)))  # not from 0, and with ever more digits
+    assert_whole(shown, [9, 10, 11])
+    assert shown.warnings == []
+
+
+def test_their_rate_is_a_setting(tmp_path: Path, process: Process) -> None:
+    pattern = write_pictures(tmp_path / "%d.png", range(5))
+    shown = process(pattern, "--set", "input.frame_rate=29.97")
+    assert_whole(shown, list(range(5)), Fraction(2997, 100))
+
+
+def test_sixteen_bits_of_grey_are_converted(tmp_path: Path, process: Process) -> None:
+    for number in range(3):
+        grey = draw_frame(number, 160, 96)[:, :, 1].astype(np.uint16) * 257
+        cv2.imwrite(str(tmp_path / f"{number:04d}.png"), grey)
+    assert_whole(process(tmp_path / "%04d.png"), [0, 1, 2])
+
+
+def test_a_damaged_one_is_counted_as_lost(tmp_path: Path, process: Process) -> None:
+    pattern = write_pictures(tmp_path / "%d.png", range(30))
+    (tmp_path / "20.png").write_text("no picture")
+    shown = process(pattern)
+    assert len(shown.images) == 29
+    assert shown.times[20] == Fraction(21, 25)
+    (warning,) = shown.warnings
+    assert "%d.png: 1 of 30 frames damaged or lost" in warning
+
+
+def test_one_that_is_missing_is_named(run: Run, tmp_path: Path) -> None:
+    pattern = write_pictures(tmp_path / "img_%03d.png", range(5))
+    (tmp_path / "img_002.png").unlink()
+    result = run("detect-video", pattern, tmp_path / "out.mp4")
+    assert result.code == 1
+    assert "img_%03d.png: picture 2 is missing, between 1 and 3" in result.err
+    assert not (tmp_path / "out.mp4").exists()

@@ -1,0 +1,137 @@
+"""What a file may hold besides one picture of one size: it neither hinders nor gets lost."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import pytest
+from av.stream import Disposition
+
+from clips import write_clip
+from conftest import Run
+from strange.conftest import Process, Shown, assert_whole
+
+
+def _joined(first: Path, second: Path, path: Path) -> Path:
+    path.write_bytes(first.read_bytes() + second.read_bytes())
+    return path
+
+
+def test_a_cover_picture_is_not_the_video(tmp_path: Path, process: Process) -> None:
+    path = tmp_path / "cover.mp4"
+    source = write_clip(tmp_path / "plain.mp4", sounds=["aac"])
+    with av.open(str(source)) as original, av.open(str(path), "w") as target:
+        cover = target.add_stream("png", rate=1)
+        assert isinstance(cover, av.VideoStream)
+        cover.width, cover.height, cover.pix_fmt = 32, 32, "rgb24"
+        cover.disposition = Disposition.attached_pic
+        copies = {s.index: target.add_stream_from_template(s) for s in original.streams}
+        target.mux(cover.encode(av.VideoFrame(32, 32, "rgb24")) + cover.encode(None))
+        for packet in original.demux():
+            if packet.size:
+                packet.stream = copies[packet.stream.index]
+                target.mux(packet)
+    shown = process(path)
+    assert_whole(shown, list(range(12)))
+    assert list(shown.sounds) == ["1 aac"]
+    assert shown.warnings == []
+
+
+def test_subtitles_do_not_hinder(tmp_path: Path, process: Process) -> None:
+    texts = tmp_path / "texts.srt"
+    texts.write_text("1\n00:00:00,000 --> 00:00:00,300\nhello\n")
+    source, path = write_clip(tmp_path / "plain.mkv"), tmp_path / "subtitled.mkv"
+    with (
+        av.open(str(source)) as original,
+        av.open(str(texts)) as text,
+        av.open(str(path), "w") as target,
+    ):
+        copies = [target.add_stream_from_template(each.streams[0]) for each in (original, text)]
+        for each, copy in zip((original, text), copies, strict=True):
+            for packet in each.demux():
+                if packet.size:
+                    packet.stream = copy
+                    target.mux(packet)
+    with av.open(str(path)) as container:
+        assert len(container.streams.subtitles) == 1
+    shown = process(path)
+    assert_whole(shown, list(range(12)))
+    assert shown.warnings == []
+
+
+def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
+    tmp_path: Path, process: Process
+) -> None:
+    source = write_clip(tmp_path / "clip.avi", codec="mpeg4", sounds=["pcm_mulaw"])
+    shown = process(source)
+    assert_whole(shown, list(range(12)))
+    assert shown.sounds == {}
+    (warning,) = shown.warnings
+    assert "clip.avi: its sound (pcm_mulaw) cannot go into mp4; left out" in warning
+
+
+def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
+    tmp_path: Path, process: Process
+) -> None:
+    small = write_clip(tmp_path / "small.h264", count=6)
+    large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
+    shown = process(_joined(small, large, tmp_path / "both.h264"))
+    assert {image.shape for image in shown.images} == {(96, 160, 3)}
+    assert_whole(shown, [*range(6), *range(9)])
+    (warning,) = shown.warnings
+    assert "both.h264: frames of 320×192 pixels scaled to 160×96" in warning
+
+
+def test_frames_that_begin_to_lie_on_their_side_are_scaled_too(
+    tmp_path: Path, process: Process
+) -> None:
+    wide = write_clip(tmp_path / "wide.h264", count=3)
+    high = write_clip(tmp_path / "high.h264", count=3, size=(96, 160))
+    shown = process(_joined(wide, high, tmp_path / "both.h264"))
+    assert {image.shape for image in shown.images} == {(96, 160, 3)}
+    assert_whole(shown, [0, 1, 2, 0, 1, 2])
+
+
+def _tiny(path: Path, size: tuple[int, int]) -> Path:
+    return write_clip(path, size=size, count=5, codec="ffv1", pix_fmt="bgr0")
+
+
+def assert_complete(shown: Shown, size: tuple[int, int]) -> None:
+    """The numbers cannot be read in frames so small: only the times tell them apart."""
+    width, height = size
+    shape = (height + height % 2, width + width % 2, 3)
+    assert [image.shape for image in shown.images] == [shape] * 5
+    assert shown.times == [Fraction(index, 25) for index in range(5)]
+
+
+@pytest.mark.parametrize("size", [(1, 1), (2, 2), (2, 200), (200, 2)])
+def test_frames_too_small_for_any_window_pass_with_a_warning(
+    size: tuple[int, int], tmp_path: Path, process: Process
+) -> None:
+    shown = process(_tiny(tmp_path / "tiny.mkv", size))
+    assert_complete(shown, size)
+    (warning,) = shown.warnings
+    width, height = size
+    assert f"tiny.mkv: no search window fits into its frames of {width}×{height}" in warning
+
+
+@pytest.mark.parametrize("size", [(16, 16), (15, 9)])
+def test_frames_smaller_than_a_patch_are_searched_in_windows_as_small(
+    size: tuple[int, int], tmp_path: Path, process: Process
+) -> None:
+    shown = process(_tiny(tmp_path / "tiny.mkv", size))
+    assert_complete(shown, size)
+    assert shown.warnings == []
+
+
+def test_frames_so_wide_that_no_search_of_them_would_end_are_refused_by_name(
+    run: Run, tmp_path: Path
+) -> None:
+    source = write_clip(
+        tmp_path / "wide.mkv", size=(16_000, 100), count=1, codec="ffv1", pix_fmt="bgr0"
+    )
+    fine = "search.windows=[{size: 60, overlap: 0.9, top: 0, bottom: 720}]"
+    result = run("detect-video", source, tmp_path / "out.mp4", "--set", fine)
+    assert result.code == 1
+    assert "wide.mkv: " in result.err
+    assert "search windows would be laid" in result.err
