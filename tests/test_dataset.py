@@ -1,4 +1,7 @@
+import os
+import re
 import shutil
+import stat
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
@@ -7,6 +10,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vdet.dataset import MAX_PATCH_BYTES, PatchFile, find_patches, read_patches
 from vdet.errors import DataError
@@ -237,17 +242,72 @@ def test_a_patch_of_unreasonable_size_is_not_unpacked(tmp_path: Path) -> None:
     assert patch.image is None
 
 
-def test_names_in_a_zip_file_that_lead_outside_are_only_names(tmp_path: Path) -> None:
-    secret = tmp_path / "vehicles" / "far" / "1.png"
-    names = ["../vehicles/far/1.png", "/vehicles/far/2.png", "non-vehicles/road/1.png"]
-    (tmp_path / "inner").mkdir()
-    archive = make_zip(tmp_path / "inner" / "set.zip", names)
-    before = sorted(tmp_path.rglob("*"))
-    patches = list(read_patches(find_patches([archive])))
-    assert sorted(tmp_path.rglob("*")) == before
-    assert not secret.exists()
-    for patch in patches:
-        np.testing.assert_array_equal(patch.image, PATCH)
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("../vehicles/far/1.png", "has '..' in its name"),
+        ("vehicles/../../far/1.png", "has '..' in its name"),
+        ("vehicles\\..\\1.png", "has '..' in its name"),
+        ("/vehicles/far/2.png", "has an absolute name"),
+        ("\\vehicles\\far\\2.png", "has an absolute name"),
+        ("C:/vehicles/far/2.png", "has an absolute name"),
+        (BOTH[0], "is in it twice"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_a_zip_file_with_a_name_that_no_data_set_has_is_refused(
+    tmp_path: Path, name: str, words: str
+) -> None:
+    archive = make_zip(tmp_path / "set.zip", [*BOTH, name])
+    with pytest.raises(DataError, match=r"set\.zip: its member .*" + re.escape(words)):
+        find_patches([archive])
+
+
+def test_a_symbolic_link_in_a_zip_file_is_refused(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", BOTH)
+    link = zipfile.ZipInfo("vehicles/far/link.png")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    with zipfile.ZipFile(archive, "a") as file:
+        file.writestr(link, "/etc/passwd")
+    with pytest.raises(DataError, match=r"its member vehicles/far/link\.png is a symbolic link"):
+        find_patches([archive])
+
+
+def test_a_name_from_a_zip_file_is_shown_without_what_a_terminal_obeys(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", [*BOTH, "vehicles/far/\x1b[2J\n.png"])
+    shown = [str(file) for file in find_patches([archive])]
+    assert shown[2] == rf"{archive}: 'vehicles/far/\x1b[2J\n.png'"
+
+
+def test_a_folder_whose_name_is_no_text_is_a_group_all_the_same(tmp_path: Path) -> None:
+    make_folder(tmp_path, [*BOTH, os.fsdecode(b"vehicles/\xff\x1b[2J/1.png")])
+    groups = [file.group for file in find_patches([tmp_path])]
+    assert groups == [r"'vehicles/\udcff\x1b[2J'", "non-vehicles/road", "vehicles/far"]
+    assert all(patch.image is not None for patch in read_patches(find_patches([tmp_path])))
+
+
+def test_a_number_in_a_name_may_have_any_number_of_digits(tmp_path: Path) -> None:
+    names = [f"vehicles/{digits}.png" for digits in ("2" * 5000, "1" * 5000, "0003", "20")]
+    archive = make_zip(tmp_path / "set.zip", [*names, BOTH[1]])
+    ordered = [names[2], names[3], names[1], names[0]]
+    assert [name for name, _ in listed(archive)][1:] == ordered
+
+
+@given(st.lists(st.integers(0, 10**30), min_size=2, max_size=6, unique=True), st.integers(0, 3))
+def test_numbers_of_any_length_come_in_their_order(
+    tmp_path_factory: pytest.TempPathFactory, numbers: list[int], zeros: int
+) -> None:
+    names = [f"vehicles/{'0' * zeros}{number}.png" for number in numbers]
+    path = make_zip(tmp_path_factory.getbasetemp() / "numbers.zip", [*names, BOTH[1]])
+    ordered = [name for _, name in sorted(zip(numbers, names, strict=True))]
+    assert [name for name, _ in listed(path)][1:] == ordered
+
+
+def test_devices_and_pipes_in_a_folder_are_no_patches(tmp_path: Path) -> None:
+    make_folder(tmp_path, BOTH)
+    os.mkfifo(tmp_path / "vehicles/far/2.png")
+    (tmp_path / "vehicles/far/3.png").symlink_to("/dev/zero")
+    assert [name for name, _ in listed(tmp_path)] == BOTH[::-1]
 
 
 def test_a_patch_names_its_source_and_its_place_in_it(tmp_path: Path) -> None:

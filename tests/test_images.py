@@ -5,6 +5,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vdet.errors import ImageError, OutputError
 from vdet.images import Image, decode_image, read_image, write_image
@@ -136,6 +138,16 @@ def test_what_is_no_picture_is_named(tmp_path: Path, data: bytes) -> None:
     path.write_bytes(data)
     with pytest.raises(ImageError, match=r"broken\.png: is not a picture, or is damaged"):
         read_image(path)
+
+
+@given(
+    st.sampled_from([".png", ".jpg", ".bmp", ".tiff", ".webp"]),
+    st.integers(0, 300),
+    st.binary(max_size=40),
+)
+def test_any_bytes_are_a_picture_or_none(suffix: str, kept: int, junk: bytes) -> None:
+    image = decode_image(encoded(suffix, PICTURE)[:kept] + junk)
+    assert image is None or (image.dtype == np.uint8 and image.ndim == 3)
 
 
 def test_a_picture_of_a_trillion_pixels_is_refused_unread() -> None:

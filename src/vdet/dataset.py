@@ -13,6 +13,15 @@ from pathlib import Path, PurePosixPath
 
 from vdet.errors import DataError
 from vdet.images import SUFFIXES, Image, decode_image
+from vdet.untrusted import (
+    ArchiveError,
+    escaped,
+    list_members,
+    open_archive,
+    printable,
+    read_member,
+    read_whole,
+)
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
 MAX_PATCH_BYTES = 16_000_000
@@ -29,7 +38,7 @@ class PatchFile:
     vehicle: bool
 
     def __str__(self) -> str:
-        return f"{self.source}: {self.name}"
+        return f"{self.source}: {printable(self.name)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +56,8 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
     Raises
     ------
     DataError
-        A source cannot be read or holds no patch, or one of the two classes has none.
+        A source cannot be read, holds no patch, or is a zip file with a name in it that is given
+        twice, leads out of the archive or is a symbolic link; or one of the two classes has none.
     """
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
     for name, vehicle in CLASSES.items():
@@ -62,7 +72,7 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
 
 def _find_in(source: Path) -> list[PatchFile]:
     if source.is_dir():
-        names = [path.relative_to(source).as_posix() for path in source.rglob("*")]
+        names = [path.relative_to(source).as_posix() for path in _files(source)]
     elif source.exists():
         names = _zip_names(source)
     else:
@@ -76,12 +86,16 @@ def _find_in(source: Path) -> list[PatchFile]:
     return files
 
 
+def _files(folder: Path) -> Iterator[Path]:
+    """Give the files below a folder; no devices and pipes, which may have no end."""
+    return (path for path in folder.rglob("*") if path.is_file())
+
+
 def _zip_names(source: Path) -> list[str]:
     try:
-        with zipfile.ZipFile(source) as archive:
-            return [info.filename for info in archive.infolist() if not info.is_dir()]
-    except (OSError, zipfile.BadZipFile, NotImplementedError, ValueError) as error:
-        raise DataError(f"{source}: is neither a folder nor a readable zip file") from error
+        return list_members(source)
+    except ArchiveError as error:
+        raise DataError(f"{source}: {error}") from error
 
 
 def _patch_file(source: Path, name: str) -> PatchFile | None:
@@ -93,14 +107,15 @@ def _patch_file(source: Path, name: str) -> PatchFile | None:
     folders = [source.resolve().name, *path.parts[:-1]]
     for depth in range(len(folders) - 1, -1, -1):
         if folders[depth] in CLASSES:
-            group = "/".join(folders[depth:])
+            group = escaped("/".join(folders[depth:]))
             return PatchFile(source, name, group, CLASSES[folders[depth]])
     return None
 
 
 def _numeric(name: str) -> list[tuple[int, str]]:
-    """Sort key in which image10 follows image9."""
-    return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"(\d+)", name)]
+    """Sort key in which image10 follows image9; a number may have any number of digits."""
+    parts = re.split(r"0*([0-9]+)", name)
+    return [(len(part) if part.isdecimal() else 0, part) for part in parts]
 
 
 def read_patches(files: Iterable[PatchFile]) -> Iterator[Patch]:
@@ -119,10 +134,10 @@ def _read_bytes(file: PatchFile, archives: dict[Path, zipfile.ZipFile]) -> bytes
     """Return the encoded picture; nothing where it cannot be had."""
     try:
         if file.source.is_dir():
-            return (file.source / file.name).read_bytes()
+            path = file.source / file.name
+            return read_whole(path, most=MAX_PATCH_BYTES, what="patch", error=DataError)
         if file.source not in archives:
-            archives[file.source] = zipfile.ZipFile(file.source)
-        info = archives[file.source].getinfo(file.name)
-        return archives[file.source].read(info) if info.file_size <= MAX_PATCH_BYTES else b""
-    except Exception:  # zipfile raises a dozen kinds on damaged, encrypted and foreign members
+            archives[file.source] = open_archive(file.source)
+        return read_member(archives[file.source], file.name, most=MAX_PATCH_BYTES)
+    except (DataError, ArchiveError):
         return b""

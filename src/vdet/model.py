@@ -7,10 +7,12 @@ weights, so that a score is one dot product with the raw features.
 
 import io
 import json
+import math
+import warnings
 import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +22,12 @@ from vdet.config.schema import FeatureSettings
 from vdet.errors import ModelError
 from vdet.features import Layout
 from vdet.files import replacing
+from vdet.untrusted import open_archive, read_member, read_whole
 
 FORMAT_VERSION = 1
 MAX_MEMBERS = 20
+MAX_VALUE = 1e9
+"""Of a weight and its like, either way: beyond it a score or its sigmoid could overflow."""
 _MAX_BYTES = 64_000_000
 _ARRAYS = ("weights", "biases", "slopes", "offsets")
 
@@ -81,7 +86,8 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
     ------
     ModelError
         The file cannot be read, is damaged, of another version, of other features than it says or
-        than asked for, or holds a value that is not finite. Nothing in it is ever run.
+        than asked for, or holds a value that is not finite or beyond `MAX_VALUE`. Nothing in it
+        is ever run.
     """
     header, arrays = _read(path)
     model = LinearModel(_features(header, path), **arrays, provenance=header.get("provenance", {}))
@@ -95,41 +101,45 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
+    data = read_whole(path, most=_MAX_BYTES, what="model", error=ModelError)
     try:
-        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
-            if sum(info.file_size for info in archive.infolist()) > _MAX_BYTES:
-                raise ModelError(f"{path}: is far too large for a model")
-            header = _parse_header(_read_array(archive, "header"), path)
-            arrays = {name: _read_array(archive, name) for name in _ARRAYS}
+        with open_archive(io.BytesIO(data)) as archive, warnings.catch_warnings(action="error"):
+            unpacked = sum(member.file_size for member in archive.infolist())
+            if unpacked > _MAX_BYTES:
+                raise ModelError(
+                    f"{path}: is far too large for a model: {unpacked:,} bytes when unpacked, "
+                    f"at most {_MAX_BYTES:,} are read"
+                )
+            header = _parse_header(_read_array(archive, "header", path), path)
+            arrays = {name: _read_array(archive, name, path) for name in _ARRAYS}
             return header, arrays
     except ModelError:
         raise
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # zipfile, zlib, NumPy and json raise a dozen kinds on damaged data
+    except Exception as error:  # NumPy and json raise a dozen kinds on damaged data
         raise ModelError(
             f"{path}: is not a vdet model, or is damaged; make one with vdet train"
         ) from error
 
 
-def _read_array(archive: zipfile.ZipFile, name: str) -> npt.NDArray[Any]:
-    data = archive.read(f"{name}.npy")  # whole: only then is the checksum compared
-    _check_declared_size(io.BytesIO(data), len(data))
+def _read_array(archive: zipfile.ZipFile, name: str, path: Path) -> npt.NDArray[Any]:
+    data = read_member(archive, f"{name}.npy", most=_MAX_BYTES)
+    _check_declared_size(data, name, path)
     array: npt.NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     return array
 
 
-def _check_declared_size(file: IO[bytes], size: int) -> None:
+def _check_declared_size(data: bytes, name: str, path: Path) -> None:
     """Refuse a shape that the file does not hold, before memory is set aside for it."""
+    file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     if version != (1, 0):
         raise ValueError("not the array format that vdet writes")
     shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    count = 1
-    for length in shape:
-        count *= length
-    if count * dtype.itemsize != size - file.tell():
-        raise ValueError("shape and size disagree")
+    if math.prod(shape) * dtype.itemsize != len(data) - file.tell():
+        raise ModelError(
+            f"{path}: its part {name} is damaged: the file does not hold the shape {shape!s:.60}; "
+            "make a model with vdet train"
+        )
 
 
 def _parse_header(array: npt.NDArray[Any], path: Path) -> dict[str, Any]:
@@ -174,6 +184,8 @@ def _check_array(array: Floats, shape: tuple[int, ...], name: str, path: Path) -
         raise ModelError(f"{path}: {name} are damaged; train it again")
     if not np.isfinite(array).all():
         raise ModelError(f"{path}: {name} hold a value that is not a number; train it again")
+    if np.abs(array).max() > MAX_VALUE:
+        raise ModelError(f"{path}: {name} hold a value beyond {MAX_VALUE:g}; train it again")
 
 
 def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:

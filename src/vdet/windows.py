@@ -40,6 +40,9 @@ class Windows:
         return Windows(self.boxes[keep], self.probabilities[keep], self.shares[keep])
 
 
+NO_WINDOWS = Windows(np.empty((0, 4), np.int32), np.empty(0, np.float32), np.empty(0, np.float32))
+
+
 @dataclass(frozen=True, slots=True)
 class WindowGrid:
     """A set's square windows, in columns and rows.

@@ -1,9 +1,11 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from vdet.errors import TruthError
-from vdet.evaluation.text import number, numbered_lines, read_text, whole
+from vdet.evaluation.text import LIMIT, number, numbered_lines, read_text, whole
 
 
 def test_lines_are_counted_with_the_blank_ones_and_whatever_their_ends() -> None:
@@ -15,6 +17,25 @@ def test_lines_are_counted_with_the_blank_ones_and_whatever_their_ends() -> None
 )
 def test_a_decimal_number_is_read(text: str, value: float) -> None:
     assert number(text) == value
+
+
+@given(st.floats(-LIMIT, LIMIT))
+def test_every_float_within_the_limit_is_read_back(value: float) -> None:
+    assert number(repr(value)) == value
+
+
+@given(st.text(st.sampled_from("0123456789+-.eE_xnaif ٣"), max_size=12))
+def test_what_is_read_as_a_number_is_one_to_python_too(text: str) -> None:
+    try:
+        value = number(text)
+    except ValueError:
+        return
+    assert value == float(text)
+
+
+def test_a_long_row_of_digits_is_refused_as_fast_as_a_short_one() -> None:
+    with pytest.raises(ValueError, match="is not a number"):  # hours, where digits are tried twice
+        number("1" * 1_000_000 + "x")
 
 
 @pytest.mark.parametrize("text", ["", "nan", "inf", "-inf", "1_0", "0x1", "1,5", "٣", "car", "1 2"])

@@ -8,7 +8,8 @@ import pytest
 
 from lanes.chessboards import PATTERN, photographs
 from vdet.errors import ImageError
-from vdet.images import write_image
+from vdet.images import Image, write_image
+from vdet.lanes import calibration as calibration_module
 from vdet.lanes.calibration import Calibration, calibrate, find_corners
 from vdet.lanes.camera import Camera
 
@@ -54,6 +55,28 @@ def test_the_distortion_found_moves_points_as_the_true_one_does(
         for camera in (calibration.camera, true_camera)
     ]
     assert np.abs(moved[0] - moved[1]).max() < 2.5
+
+
+def test_the_board_is_looked_for_in_a_reduced_picture_and_found_in_the_large_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    large = Camera(2560, 1920, (2240.0, 2232.0), (1289.5, 945.5), (0.0, 0.0, 0.0, 0.0, 0.0), 0)
+    image = photographs(large, 1)[0]
+    searched = []
+    search = cv2.findChessboardCorners
+
+    def spy(picture: Image, pattern: tuple[int, int]) -> object:
+        searched.append(picture.size)
+        return search(picture, pattern)
+
+    monkeypatch.setattr(cv2, "findChessboardCorners", spy)
+    corners = find_corners(image, PATTERN)
+    monkeypatch.setattr(calibration_module, "MAX_SEARCHED", image.size)
+    whole = find_corners(image, PATTERN)
+    assert corners is not None
+    assert whole is not None
+    assert np.abs(corners - whole).max() < 0.05
+    assert searched[0] < 1_310_000 < searched[1]
 
 
 def test_corners_are_found_to_a_fraction_of_a_pixel(true_camera: Camera) -> None:

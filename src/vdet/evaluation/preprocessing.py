@@ -11,6 +11,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from vdet.errors import TruthError
 from vdet.evaluation.assignment import assign, at_least
 from vdet.evaluation.boxes import coverage, iou_matrix
 from vdet.evaluation.comparison import ComparedFrame, Comparison, joined
@@ -18,6 +19,13 @@ from vdet.evaluation.labelled_video import Flags, Integers, LabelledVideo
 
 MATCH_IOU = 0.5
 """From this overlap on a prediction finds a vehicle."""
+
+MAX_IDS = 10_000
+"""Vehicles, and tracks, of one video."""
+MAX_IN_FRAME = 1000
+"""Boxes of either in one frame."""
+MAX_PAIRS = 25_000_000
+"""Of a vehicle and a track; and of their boxes in one frame, summed over the frames."""
 
 _IGNORED_SHARE = 0.5
 
@@ -34,7 +42,13 @@ def compare(
     ----------
     rate
         Frames a second; where it is not given, that of the predictions or the truth.
+
+    Raises
+    ------
+    TruthError
+        There are more than `MAX_IDS`, `MAX_IN_FRAME` or `MAX_PAIRS`, far beyond what a road shows.
     """
+    _check_size(prediction, truth)
     numbers = np.union1d(prediction.frames, truth.frames).tolist()
     kept = [_kept(prediction.frame(number), truth.frame(number)) for number in numbers]
     vehicle_ids = _distinct(vehicles.ids for vehicles, _ in kept)
@@ -54,6 +68,26 @@ def compare(
     ]
     seconds = _seconds(prediction, truth, rate)
     return Comparison(tuple(frames), vehicle_ids, track_ids, seconds)
+
+
+def _check_size(prediction: LabelledVideo, truth: LabelledVideo) -> None:
+    """Refuse what would take hours and gigabytes to compare, before it does."""
+    tracks, vehicles = (len(np.unique(each.ids)) for each in (prediction, truth))
+    found, found_counts = np.unique(prediction.frames, return_counts=True)
+    true, true_counts = np.unique(truth.frames, return_counts=True)
+    _, in_found, in_true = np.intersect1d(found, true, return_indices=True)
+    in_frames = int(np.sum(found_counts[in_found] * true_counts[in_true]))
+    most = max(found_counts.max(initial=0), true_counts.max(initial=0))
+    if (
+        max(tracks, vehicles) > MAX_IDS
+        or most > MAX_IN_FRAME
+        or max(tracks * vehicles, in_frames) > MAX_PAIRS
+    ):
+        raise TruthError(
+            f"{tracks:,} tracks with {len(prediction):,} boxes and {vehicles:,} vehicles with "
+            f"{len(truth):,}, up to {most:,} in one frame, are too many to compare; cut the video "
+            "into parts"
+        )
 
 
 def _kept(tracks: LabelledVideo, truth: LabelledVideo) -> tuple[LabelledVideo, LabelledVideo]:

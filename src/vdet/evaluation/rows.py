@@ -9,6 +9,9 @@ import numpy as np
 from vdet.errors import TruthError
 from vdet.evaluation.labelled_video import LabelledVideo
 
+MAX_ROWS = 500_000
+"""In one file: five hours of video with one vehicle in sight."""
+
 NO_ID = -1
 """The id of an ignore region that has none; the only id that may come twice in a frame."""
 
@@ -50,11 +53,13 @@ def collect(
     ------
     TruthError
         A frame before the first or beyond `frame_count`, a negative id of a vehicle, an id twice
-        in a frame, or a box of no area.
+        in a frame, a box of no area, or more than `MAX_ROWS` boxes.
     """
     checked: list[Row] = []
     lines: dict[tuple[int, int], int] = {}
     for row in rows:
+        if len(checked) == MAX_ROWS:
+            raise refusal(path, row.line, f"has more than {MAX_ROWS:,} boxes; cut it into parts")
         complaint = _complaint(row, frame_count)
         key = row.frame, row.id
         if complaint is None and key in lines and row.id != NO_ID:

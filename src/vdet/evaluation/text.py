@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vdet.errors import TruthError
+from vdet.untrusted import read_whole
 
 LIMIT = 10_000_000
 """No frame, id or pixel is beyond it: what is larger is damage, and would overflow further on."""
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+MAX_BYTES = 64_000_000
+"""Of a file of boxes."""
+
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 def read_text(path: Path) -> str:
@@ -19,12 +23,11 @@ def read_text(path: Path) -> str:
     Raises
     ------
     TruthError
-        The file cannot be read or is not text.
+        The file cannot be read, is larger than `MAX_BYTES` or is not text.
     """
+    data = read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes") from error
     if "\0" in text:

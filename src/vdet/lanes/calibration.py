@@ -1,5 +1,6 @@
 """Chessboard photographs → a camera (Zhang 2000, as OpenCV does it)."""
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,9 @@ from vdet.lanes.camera import Camera
 MIN_VIEWS = 5
 SIZE_TOLERANCE = 2
 """Pixels by which a photograph's sides may differ from the others'."""
+MAX_SEARCHED = 1_300_000
+"""Pixels of the picture in which a board is looked for: a larger photograph is reduced to it first,
+for on large ones of grass or gravel OpenCV's search takes minutes."""
 SPOILING = 3.0
 """A view is dropped where its error is more than this many times the median of all views."""
 MIN_SLANT = 15.0
@@ -89,12 +93,16 @@ def calibrate(photos: Iterable[Path], pattern: Pattern) -> Calibration:
 def find_corners(image: Image, pattern: Pattern) -> Corners | None:
     """Return a board's inner corners, pixels `(n, 2)` with decimals; None where there is none."""
     gray = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    found, corners = cv2.findChessboardCorners(gray, pattern)
+    scale = min(1.0, math.sqrt(MAX_SEARCHED / gray.size))
+    method = cv2.INTER_AREA
+    small = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=method) if scale < 1 else gray
+    found, corners = cv2.findChessboardCorners(small, pattern)
     if not found:
         return None
+    corners = np.asarray((corners + 0.5) / scale - 0.5, np.float32)
     points = corners.reshape(pattern[1], pattern[0], 2)
     square = float(np.linalg.norm(np.diff(points, axis=1), axis=2).min())
-    half = int(np.clip(square / 3, 2, 11))  # the window must not reach the next corner
+    half = int(np.clip(square / 3, 2, 11 / scale))  # the window must not reach the next corner
     stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 0.005)
     refined = cv2.cornerSubPix(gray, corners, (half, half), (-1, -1), stop)
     return np.asarray(refined, np.float32).reshape(-1, 2)

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from vdet.config.document import Document, Key, read_document
+from vdet.config.document import Document, Key, mistakes, read_document
 from vdet.config.loading import format_key
 from vdet.config.section import Section
 from vdet.errors import ConfigError
@@ -66,8 +66,8 @@ def load_camera(path: Path) -> Camera:
     try:
         read = _CameraFile.model_validate(document.values)
     except ValidationError as error:
-        lines = [_describe(detail, document, path) for detail in error.errors()]
-        raise ConfigError("\n".join(lines)) from error
+        lines = (_describe(detail, document, path) for detail in error.errors())
+        raise mistakes(lines, error.error_count()) from error
     (fx, _, cx), (_, fy, cy), _ = read.matrix
     camera = Camera(read.width, read.height, (fx, fy), (cx, cy), read.distortion, read.rms)
     if camera.flaw:

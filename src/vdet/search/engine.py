@@ -15,6 +15,9 @@ from vdet.search.patch import PatchSearch
 from vdet.search.pyramid import FramePyramid
 from vdet.windows import Floats, WindowGrid, Windows, lay_grid
 
+MAX_WINDOWS = 100_000
+"""In a frame; more take minutes. The shipped settings lay about 1,500 over a frame of 16:9."""
+
 _ROW_MULTIPLE = 16  # so that the pyramid's levels begin at whole pixels
 
 log = logging.getLogger("vdet")
@@ -38,7 +41,7 @@ class FrameSearch:
     Raises
     ------
     ImageError
-        No search window fits into such a frame.
+        No search window fits into such a frame, or more than `MAX_WINDOWS` do.
     ConfigError
         The dense engine is asked for, and the model's features cannot be computed densely.
     """
@@ -49,6 +52,11 @@ class FrameSearch:
             raise ImageError(
                 f"no search window fits into a frame of {width}×{height} pixels; "
                 "give a larger one, or other search.windows"
+            )
+        if (count := sum(map(len, grids))) > MAX_WINDOWS:
+            raise ImageError(
+                f"{count:,} search windows would be laid over a frame of {width}×{height} pixels, "
+                f"more than {MAX_WINDOWS:,}; give search.windows larger steps, or fewer rows"
             )
         dense = _is_dense(settings.search, model.features)
         self._searches: list[GridSearch] = [

@@ -8,7 +8,10 @@ import numpy as np
 from vdet.features import FeatureExtractor, to_patch
 from vdet.model import LinearModel
 from vdet.search.pyramid import FramePyramid
-from vdet.windows import Floats, WindowGrid
+from vdet.windows import Boxes, Floats, WindowGrid
+
+BATCH = 1024
+"""Windows described before they are scored: more would only take memory."""
 
 
 class PatchSearch:
@@ -21,9 +24,11 @@ class PatchSearch:
 
     def search(self, frame: FramePyramid) -> Floats:
         """Return each window's probability, float32 `(n,)`."""
+        batches = range(0, len(self._boxes), BATCH)
+        return np.concatenate([self._score(frame, self._boxes[i : i + BATCH]) for i in batches])
+
+    def _score(self, frame: FramePyramid, boxes: Boxes) -> Floats:
         side = self._model.features.patch
-        vectors = np.empty((len(self._boxes), self._extractor.layout.length), np.float32)
-        for i, (x, y, width, height) in enumerate(self._boxes.tolist()):
-            crop = frame.image[y : y + height, x : x + width]
-            vectors[i] = self._extractor.describe(to_patch(crop, side))
+        crops = (frame.image[y : y + h, x : x + w] for x, y, w, h in boxes.tolist())
+        vectors = self._extractor.describe_all(to_patch(crop, side) for crop in crops)
         return self._model.probabilities(vectors)

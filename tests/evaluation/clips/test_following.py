@@ -10,8 +10,8 @@ from vdet.errors import TruthError
 from vdet.evaluation.clips.clip import detect, open_clip
 from vdet.evaluation.clips.evaluate import Variant, evaluate_clips
 from vdet.evaluation.clips.following import follow_under_all
+from vdet.following import follow
 from vdet.model import LinearModel, load_model
-from vdet.pipeline import follow
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 from vdet.video import VideoReader

@@ -67,7 +67,7 @@ def detect(
     """
     rows: list[list[Row]] = [[] for _ in variants]
     frames = 0
-    with VideoReader(clip.video, frames=clip.until) as reader:
+    with VideoReader(clip.video, frames=clip.until, settings=variants[0].input) as reader:
         info = reader.info
         advance = progress(reader.expected)
         try:

@@ -9,9 +9,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from vdet.config.scaling import scale_lengths
 from vdet.config.schema import SearchSettings, Settings
 from vdet.detection import Detector
+from vdet.following import follow
 from vdet.images import Image
 from vdet.model import LinearModel
-from vdet.pipeline import follow
 from vdet.stream import quiet_libraries
 from vdet.tracking.cars import Cars
 from vdet.tracking.track import Track

@@ -6,8 +6,10 @@ from typing import Annotated
 
 from pydantic import BaseModel, Field, ValidationError
 
-from vdet.evaluation.rows import Row, refusal
+from vdet.evaluation.rows import MAX_ROWS, Row, refusal
 from vdet.evaluation.text import LIMIT, numbered_lines
+
+MAX_RECORDS = MAX_ROWS
 
 _Whole = Annotated[int, Field(ge=0, le=LIMIT, strict=True)]
 _Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False, strict=True)]
@@ -37,10 +39,13 @@ def json_records(path: Path, text: str) -> Iterator[tuple[int, Record]]:
     Raises
     ------
     TruthError
-        A line is not such a record, or its frame does not come after the one before.
+        A line is not such a record, its frame does not come after the one before, or there are more
+        than `MAX_RECORDS`.
     """
     last = -1
-    for line, content in numbered_lines(text):
+    for count, (line, content) in enumerate(numbered_lines(text)):
+        if count == MAX_RECORDS:
+            raise refusal(path, line, f"has more than {MAX_RECORDS:,} frames; cut it into parts")
         try:
             record = Record.model_validate_json(content)
         except ValidationError as error:

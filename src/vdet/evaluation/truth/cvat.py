@@ -10,6 +10,9 @@ from vdet.evaluation.rows import Row, refusal
 from vdet.evaluation.text import number, whole
 from vdet.evaluation.truth.labels import Role, role_of
 
+MAX_DEPTH = 32
+"""Of elements in one another; the format has 4."""
+
 _Attributes = dict[str, str]
 
 
@@ -22,7 +25,8 @@ def cvat_rows(path: Path, text: str) -> list[Row]:
     Raises
     ------
     TruthError
-        The XML is broken, declares a document type, or is not of this kind.
+        The XML is broken, declares a document type, is nested deeper than `MAX_DEPTH`, or is not
+        of this kind.
     """
     reader = _Reader()
     try:
@@ -52,6 +56,8 @@ class _Reader:
         raise ValueError("the XML declares a document type, which truth has no use for; remove it")
 
     def _start(self, name: str, attributes: _Attributes) -> None:
+        if len(self._open) == MAX_DEPTH:
+            raise ValueError(f"more than {MAX_DEPTH} elements in one another")
         self._open.append(name)
         match self._open:
             case ["annotations", "track"]:

@@ -21,6 +21,9 @@ from vdet.search.dense.weights import DenseWeights
 from vdet.search.pyramid import FramePyramid
 from vdet.windows import Floats, WindowGrid, every_nth
 
+BATCH = 8192
+"""Windows described before they are scored: more would only take memory."""
+
 Indices = npt.NDArray[np.intp]
 
 
@@ -50,16 +53,21 @@ class LocatedSearch:
         probabilities = np.zeros(self._windows, np.float32)
         for phase in self._phases:
             strip = phase.strip.cut(frame)
-            vectors = self._describe(strip, phase)
-            scores = vectors @ self._model.weights[:, : vectors.shape[1]].T + self._model.biases
-            side = self._model.features.patch
-            scores += table_sums(strip, self._tables, side, phase.x, phase.y).T
-            probabilities[phase.numbers] = self._model.probabilities_of_scores(scores)
+            for i in range(0, len(phase.numbers), BATCH):
+                some = slice(i, i + BATCH)
+                scores = self._scores(strip, phase.x[some], phase.y[some])
+                probabilities[phase.numbers[some]] = self._model.probabilities_of_scores(scores)
         return probabilities
 
-    def _describe(self, strip: Image, phase: _Phase) -> Vectors:
+    def _scores(self, strip: Image, x: Indices, y: Indices) -> Floats:
+        vectors = self._describe(strip, x, y)
+        scores = vectors @ self._model.weights[:, : vectors.shape[1]].T + self._model.biases
+        side = self._model.features.patch
+        return np.asarray(scores + table_sums(strip, self._tables, side, x, y).T, np.float32)
+
+    def _describe(self, strip: Image, x: Indices, y: Indices) -> Vectors:
         """Return the HOG of each window, float32 `(n, features)`, channel by channel."""
-        locations = list(zip(phase.x.tolist(), phase.y.tolist(), strict=True))
+        locations = list(zip(x.tolist(), y.tolist(), strict=True))
         described = [
             self._hog.compute(channel_of(strip, number), locations=locations)
             for number in self._model.features.hog.channels

@@ -1,0 +1,216 @@
+"""Damaged and wicked zip files of patches through `vdet train`."""
+
+import io
+import stat
+import struct
+import warnings
+import zipfile
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hostile.mutations import mutated
+from hostile.trials import Trial, broken_promises, files_in, try_all
+
+SMALL = (
+    *("--set", "features={patch: 16, hog: {channels: []}, histogram: {bins: 8}}"),
+    *("--set", "training.max_broken=0", "--jobs", "1"),
+)
+SECONDS = 20.0
+EACH = 12  # patches of each class
+Members = list[tuple[zipfile.ZipInfo | str, bytes]]
+
+
+def picture(red: int, number: int) -> bytes:
+    noise = np.random.default_rng(number).integers(0, 99, (16, 16, 3), dtype=np.uint8)
+    noise[..., 2] += np.uint8(red)
+    return cv2.imencode(".png", noise)[1].tobytes()
+
+
+def patches() -> Members:
+    """Give the members of a data set that is whole."""
+    return [
+        (f"{kind}/{group}/{number}.png", picture(red, number))
+        for kind, red in (("vehicles", 150), ("non-vehicles", 0))
+        for number in range(EACH)
+        for group in ["far" if number % 2 else "near"]
+    ]
+
+
+def zipped(members: Members, compression: int = zipfile.ZIP_DEFLATED) -> bytes:
+    file = io.BytesIO()
+    with (
+        zipfile.ZipFile(file, "w", compression) as archive,
+        warnings.catch_warnings(action="ignore"),  # a name that is there twice
+    ):
+        for name, data in members:
+            archive.writestr(name, data)
+    return file.getvalue()
+
+
+def with_field(data: bytes, local: int, central: int, kind: str, value: int) -> bytes:
+    """Set a field in the headers of all members."""
+    changed = bytearray(data)
+    for mark, offset in ((b"PK\x03\x04", local), (b"PK\x01\x02", central)):
+        at = changed.find(mark)
+        while at >= 0:
+            struct.pack_into(kind, changed, at + offset, value)
+            at = changed.find(mark, at + 4)
+    return bytes(changed)
+
+
+def huge_picture() -> bytes:
+    png = picture(0, 0)
+    header = b"IHDR" + struct.pack(">II", 100_000, 100_000) + png[24:29]
+    return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
+
+
+def special(name: str, mode: int) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name)
+    info.external_attr = mode << 16
+    return info
+
+
+def many(name: str, data: bytes) -> Members:
+    return [(f"vehicles/far/{name}{number}.png", data) for number in range(EACH - 1)]
+
+
+BAD_NAMES = {
+    "../vehicles/far/x.png": "has '..' in its name",
+    "vehicles/far/../../../x.png": "has '..' in its name",
+    "vehicles\\..\\x.png": "has '..' in its name",
+    "/vehicles/far/x.png": "has an absolute name",
+    "//host/vehicles/x.png": "has an absolute name",
+    "\\\\host\\vehicles\\x.png": "has an absolute name",
+    "C:\\vehicles\\x.png": "has an absolute name",
+    "vehicles/far/1.png": "is in it twice",
+}
+ALL_BROKEN = "24 of 24 patches are broken"
+SOME_BROKEN = "11 of 35 patches are broken"
+WICKED = BAD_NAMES | {
+    "a symbolic link": "its member vehicles/far/x.png is a symbolic link",
+    "a link to a folder": "its member vehicles/x is a symbolic link",
+    "encrypted": ALL_BROKEN,
+    "wrong checksums": ALL_BROKEN,
+    "unknown compression": ALL_BROKEN,
+    "unpacked in one go": ALL_BROKEN,
+    "other sizes than claimed": ALL_BROKEN,
+    "bombs": SOME_BROKEN,
+    "bombs that claim to be small": "35 of 35 patches are broken",
+    "pictures of 10¹⁰ pixels": SOME_BROKEN,
+    "no pictures": SOME_BROKEN,
+    "empty pictures": ALL_BROKEN,
+    "a set in a set": "no pictures in vehicles/",
+    "nothing": "no pictures in vehicles/",
+    "one class": "no patches of the class non-vehicles",
+}
+"""What is refused, and the words that say why."""
+
+
+def wicked_sets() -> dict[str, bytes]:
+    whole = patches()
+    packed, stored = zipped(whole), zipped(whole, zipfile.ZIP_STORED)
+    bombs = zipped([*whole, *many("bomb", bytes(17_000_000))])
+    link = special("vehicles/far/x.png", stat.S_IFLNK | 0o777)
+    folder_link = special("vehicles/x", stat.S_IFLNK | 0o777)
+    return {name: zipped([*whole, (name, b"")]) for name in BAD_NAMES} | {
+        "a symbolic link": zipped([*whole, (link, b"/etc/passwd")]),
+        "a link to a folder": zipped([*whole, (folder_link, b"/")]),
+        "encrypted": with_field(packed, 6, 8, "<H", 1),
+        "wrong checksums": with_field(stored, 14, 16, "<I", 7),
+        "unknown compression": with_field(packed, 8, 10, "<H", 99),
+        "unpacked in one go": zipped(whole, zipfile.ZIP_BZIP2),
+        "other sizes than claimed": with_field(packed, 22, 24, "<I", 10),
+        "bombs": bombs,
+        "bombs that claim to be small": with_field(bombs, 22, 24, "<I", 100),
+        "pictures of 10¹⁰ pixels": zipped([*whole, *many("huge", huge_picture())]),
+        "no pictures": zipped([*whole, *many("text", b"text")]),
+        "empty pictures": zipped([(name, b"") for name, _ in whole]),
+        "a set in a set": zipped([("vehicles/set.zip", packed)]),
+        "nothing": zipped([]),
+        "one class": zipped(whole[:EACH]),
+    }
+
+
+ODD = (
+    "nested",
+    "a bomb",
+    "a long number",
+    "control characters",
+    "a folder",
+    "a remark",
+    "a script",
+)
+"""What holds a whole set, and something beside it that is passed over."""
+
+
+def odd_sets() -> dict[str, bytes]:
+    whole = patches()
+    packed = zipped(whole)
+    number = "vehicles/" + "9" * 6000 + ".png"
+    contents = (
+        zipped([*whole, ("vehicles/set.zip", packed)]),
+        zipped([*whole, ("readme.txt", bytes(50_000_000))]),
+        zipped([*whole, (number, whole[0][1])]),
+        zipped([*whole, ("vehicles/\x1b[2J\r\n.png", whole[0][1])]),
+        zipped([*whole, ("vehicles/far/x.png/", b"")]),
+        packed[:-2] + struct.pack("<H", 8) + b"\x1b[2J\n !!",
+        b"#!/bin/sh\n" + packed,
+    )
+    return dict(zip(ODD, contents, strict=True))
+
+
+def bad_sets() -> dict[str, bytes]:
+    """Give 100 sets, wicked, odd and damaged."""
+    sets = wicked_sets() | odd_sets()
+    for compression in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        count = (100 - len(sets)) // (1 + (compression == zipfile.ZIP_STORED))
+        damaged = mutated(zipped(patches(), compression), seed=compression, count=count)
+        sets |= {f"damaged {compression}-{number}": data for number, data in enumerate(damaged)}
+    return sets
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("sets")
+
+
+@pytest.fixture(scope="module")
+def trials(folder: Path) -> dict[str, Trial]:
+    inside, out = folder / "a" / "in", folder / "out"
+    inside.mkdir(parents=True)
+    out.mkdir()
+    names: list[str] = []
+    runs: list[list[str | Path]] = []
+    for number, (name, data) in enumerate(bad_sets().items()):
+        path = inside / f"{number}.zip"
+        path.write_bytes(data)
+        names.append(name)
+        runs.append(["train", path, "-o", out / f"{number}.npz", *SMALL])
+    before = files_in(inside)
+    done = try_all(runs, seconds=SECONDS)
+    assert files_in(inside) == before
+    return dict(zip(names, done, strict=True))
+
+
+def test_100_bad_sets_are_learnt_from_or_refused(trials: dict[str, Trial], folder: Path) -> None:
+    assert len(trials) == 100
+    assert broken_promises(list(trials.values())) == []
+    assert len(ODD) <= sum(trial.code == 0 for trial in trials.values()) < 50
+    inside, out = folder / "a" / "in", folder / "out"
+    assert {path.parent for path in folder.rglob("*")} == {folder, folder / "a", inside, out}
+    assert {path.suffix for path in out.iterdir()} == {".npz", ".json"}
+
+
+@pytest.mark.parametrize("name", WICKED)
+def test_a_wicked_set_is_refused_by_name(trials: dict[str, Trial], name: str) -> None:
+    assert trials[name].code == 1
+    assert WICKED[name] in trials[name].err
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_what_is_only_odd_is_passed_over(trials: dict[str, Trial], name: str) -> None:
+    assert trials[name].code == 0, trials[name].err

@@ -1,0 +1,236 @@
+"""Damaged and wicked models through `vdet detect-image --model`."""
+
+import io
+import json
+import struct
+import tracemalloc
+import warnings
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from hostile.mutations import mutated, with_other_words
+from hostile.trials import broken_promises, files_in, try_all
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.errors import ModelError
+from vdet.features import Layout
+from vdet.model import load_model
+
+FEATURES = FeatureSettings(
+    patch=16,
+    hog=HogSettings(orientations=4, cell=8, block=1, channels=(0,)),
+    histogram=HistogramSettings(bins=8),
+)
+LENGTH = Layout.of(FEATURES).length
+HEADER = json.dumps(
+    {
+        "format": "vdet model",
+        "version": 1,
+        "features": FEATURES.model_dump(mode="json"),
+        "provenance": {"data_sha256": "0" * 64, "accuracy": 0.5},
+    }
+)
+WORDS = (
+    *("0", "-1", "1", "2", "64", "256", "1000000000", "1e999", "NaN", "Infinity", "-Infinity"),
+    *("null", "true", '""', "[]", "{}", "[[[[[[]]]]]]", "9" * 5000, '"\\ud800"', "HSV"),
+)
+TOKENS = (*WORDS, "{", "}", "[" * 500, '"', ":", ",", "\\u0000", "\xff", "\0")
+SHAPES = (
+    *("(1000000000,)", "(1, 1000000000)", "(1000000000, 1000000000)", "(-1,)", "(True,)", "()"),
+    *("(1.0,)", "'x'", "None", "((1,),)", "(1, 40)", "(40, 1)", "(1,)", "(0,)", "[1]", "(1, 0)"),
+    "(" * 300 + ")" * 300,
+)
+KINDS = (
+    "<f4",
+    ">f4",
+    "<f8",
+    "|O",
+    "|S4",
+    "<U9",
+    "|V4",
+    "<M8[s]",
+    "<c8",
+    "|b1",
+    "a5",
+    "x",
+    "<f4,<f4",
+)
+VALUES = (np.nan, np.inf, -np.inf, 3e38, -3e38, 1e9, -1e9, 1e-45, 0.0)
+SECONDS = 20.0
+
+
+def npy(array: npt.NDArray[Any]) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def npy_header(kind: str, shape: str) -> bytes:
+    text = f"{{'descr': {kind!r}, 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text
+
+
+def members(header: str | bytes = HEADER) -> dict[str, bytes]:
+    """Give the parts of a model that is whole."""
+    text = header if isinstance(header, bytes) else header.encode()
+    ones = np.ones(1, np.float32)
+    return {
+        "header": npy(np.frombuffer(text, np.uint8)),
+        "weights": npy(np.random.default_rng(0).normal(size=(1, LENGTH)).astype(np.float32)),
+        "biases": npy(ones),
+        "slopes": npy(-ones),
+        "offsets": npy(ones),
+    }
+
+
+def zipped(parts: dict[str, bytes]) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in parts.items():
+            archive.writestr(f"{name}.npy", data)
+    return file.getvalue()
+
+
+def bad_models() -> Iterator[bytes]:
+    """Give 500 models with a fault: in the file, in a part of it, in a number."""
+    yield from mutated(zipped(members()), seed=1, count=100)
+    for header in mutated(HEADER.encode(), seed=2, count=80, tokens=TOKENS):
+        yield zipped(members(header))
+    for header in with_other_words(HEADER, WORDS, seed=3, count=80):
+        yield zipped(members(header))
+    whole = members()
+    for seed, name in enumerate(whole):
+        for part in mutated(whole[name], seed=seed, count=20):
+            yield zipped(whole | {name: part})
+    rng = np.random.default_rng(4)
+    names = list(whole)
+    for _ in range(70):
+        name, kind = rng.choice(names), str(rng.choice(KINDS))
+        data = npy_header(kind, SHAPES[rng.integers(len(SHAPES))]) + bytes(4 * LENGTH)
+        yield zipped(whole | {name: data})
+    for _ in range(70):
+        name = rng.choice(names[1:])
+        array = np.load(io.BytesIO(whole[name])).copy()
+        array.flat[rng.integers(array.size)] = rng.choice(VALUES)
+        yield zipped(whole | {name: npy(array)})
+
+
+def test_500_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
+    picture, inside, out = tmp_path / "picture.png", tmp_path / "in", tmp_path / "out"
+    noise = np.random.default_rng(0).integers(0, 256, (90, 160, 3), dtype=np.uint8)
+    cv2.imwrite(str(picture), noise)
+    inside.mkdir()
+    out.mkdir()
+    for number, data in enumerate(bad_models()):
+        (inside / f"{number}.npz").write_bytes(data)
+    before = files_in(inside)
+    assert len(before) == 500
+    trials = try_all(
+        [
+            ["detect-image", picture, "--model", path, "-o", out / f"{path.stem}.png"]
+            for path in before
+        ],
+        seconds=SECONDS,
+    )
+    assert broken_promises(trials) == []
+    assert files_in(inside) == before
+    assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
+    assert 20 < sum(trial.code == 0 for trial in trials) < 250
+
+
+def claiming(data: bytes, size: int) -> bytes:
+    """Return a zip file of one member that claims another size than it has."""
+    changed = bytearray(data)
+    struct.pack_into("<I", changed, 22, size)
+    struct.pack_into("<I", changed, data.find(b"PK\x01\x02") + 24, size)
+    return bytes(changed)
+
+
+def bombs() -> dict[str, tuple[bytes, str]]:
+    whole = members()
+    billion = npy_header("<f4", "(1, 1000000000)")
+    many = FEATURES.model_dump(mode="json") | {
+        "patch": 256,
+        "hog": {"orientations": 32, "cell": 2, "block": 8, "channels": [0, 1, 2]},
+    }
+    asking = json.dumps({"format": "vdet model", "version": 1, "features": many})
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("header.npy", bytes(300_000_000))
+    return {
+        "a billion features, claimed": (
+            zipped(whole | {"weights": billion + bytes(100)}),
+            r"weights is damaged: the file does not hold the shape \(1, 1000000000\)",
+        ),
+        "a billion features, packed": (
+            zipped(whole | {"weights": billion + bytes(65_000_000)}),
+            r"is far too large for a model: 65,\d+,\d+ bytes when unpacked",
+        ),
+        "ninety million features, asked for": (
+            zipped(members(asking)),
+            r"has weights of shape \(1, 40\), its features need \(1, 89\d{6}\)",
+        ),
+        "more than it claims to be": (
+            claiming(zipped({"header": bytes(300_000_000)}), 1000),
+            "is not a vdet model, or is damaged",
+        ),
+        "packed in another way": (
+            claiming(file.getvalue(), 1000),
+            "is not a vdet model, or is damaged",
+        ),
+        "a header like a book": (
+            zipped(members('{"a": ' * 100_000)),
+            "is not a vdet model, or is damaged",
+        ),
+    }
+
+
+BOMBS = bombs()
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_bomb_is_refused_before_memory_is_set_aside_for_it(tmp_path: Path, name: str) -> None:
+    data, words = BOMBS[name]
+    path = tmp_path / "model.npz"
+    path.write_bytes(data)
+    tracemalloc.start()
+    with pytest.raises(ModelError, match=words):
+        load_model(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10_000_000
+
+
+def test_a_file_without_an_end_is_no_model() -> None:
+    with pytest.raises(ModelError, match="/dev/zero: is larger than 64,000,000 bytes"):
+        load_model(Path("/dev/zero"))
+
+
+@pytest.mark.parametrize("value", [1.1e9, -3e38])
+@pytest.mark.parametrize("part", ["weights", "biases", "slopes", "offsets"])
+def test_values_that_could_overflow_are_refused(tmp_path: Path, part: str, value: float) -> None:
+    array = np.load(io.BytesIO(members()[part])).copy()
+    array.flat[0] = value
+    path = tmp_path / "model.npz"
+    path.write_bytes(zipped(members() | {part: npy(array)}))
+    with pytest.raises(ModelError, match=f"{part} hold a value beyond 1e\\+09"):
+        load_model(path)
+
+
+def test_the_largest_values_that_are_read_give_probabilities(tmp_path: Path) -> None:
+    most = {
+        name: npy(np.sign(np.load(io.BytesIO(data))) * np.float32(1e9))
+        for name, data in members().items()
+        if name != "header"
+    }
+    path = tmp_path / "model.npz"
+    path.write_bytes(zipped(members() | most))
+    vectors = np.full((3, LENGTH), 65_536, np.float32)
+    with warnings.catch_warnings(action="error"):
+        assert np.isfinite(load_model(path).probabilities(vectors)).all()

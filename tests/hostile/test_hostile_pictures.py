@@ -1,0 +1,135 @@
+"""Damaged and wicked pictures through `vdet detect-image`."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hostile.mutations import mutated
+from hostile.trials import broken_promises, files_in, try_all
+from vdet.errors import ImageError
+from vdet.images import read_image
+
+PICTURE = cv2.resize(np.random.default_rng(0).integers(0, 256, (6, 8, 3), dtype=np.uint8), (64, 48))
+FORMATS: dict[str, tuple[str, list[int]]] = {
+    "8-bit.png": (".png", []),
+    "16-bit.png": (".png", []),
+    "baseline.jpg": (".jpg", []),
+    "progressive.jpg": (".jpg", [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]),
+    "restarts.jpg": (".jpg", [cv2.IMWRITE_JPEG_RST_INTERVAL, 4]),
+    "plain.bmp": (".bmp", []),
+    "lzw.tiff": (".tiff", [cv2.IMWRITE_TIFF_COMPRESSION, 5]),
+    "deflate.tiff": (".tiff", [cv2.IMWRITE_TIFF_COMPRESSION, 8]),
+    "lossy.webp": (".webp", [cv2.IMWRITE_WEBP_QUALITY, 80]),
+    "lossless.webp": (".webp", [cv2.IMWRITE_WEBP_QUALITY, 101]),
+}
+MUTATIONS = 30  # of each
+SECONDS = 20.0
+FEW_WINDOWS = ("--set", "search.windows=[{size: 160, overlap: 0.5, top: 380, bottom: 600}]")
+
+
+def encoded(suffix: str, picture: cv2.typing.MatLike, options: list[int] | None = None) -> bytes:
+    written, data = cv2.imencode(suffix, picture, options or [])
+    assert written
+    return data.tobytes()
+
+
+def black(width: int, height: int) -> bytes:
+    return encoded(".png", np.zeros((height, width), np.uint8))
+
+
+def png_of(width: int, height: int) -> bytes:
+    """Give a small PNG whose header, with the right checksum, claims another size."""
+    png = encoded(".png", PICTURE)
+    header = b"IHDR" + struct.pack(">II", width, height) + png[24:29]
+    return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
+
+
+def with_size(suffix: str, old: bytes, new: bytes) -> bytes:
+    """Give a small picture in which the bytes that tell its size are other ones."""
+    data = encoded(suffix, PICTURE)
+    assert data.count(old) == 1
+    return data.replace(old, new)
+
+
+BOMBS = {
+    "claims 10¹⁰ pixels.png": png_of(100_000, 100_000),
+    "as many as OpenCV would read.png": png_of(32_768, 32_767),
+    "64 million black pixels.png": black(8000, 8000),
+    "a long line.png": black(40_000, 16),
+    "claims.bmp": with_size(".bmp", struct.pack("<ii", 64, 48), struct.pack("<ii", 30_000, 30_000)),
+    "claims.jpg": with_size(".jpg", struct.pack(">HH", 48, 64), struct.pack(">HH", 65_000, 65_000)),
+}
+
+
+def test_300_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
+    inside, out = tmp_path / "in", tmp_path / "out"
+    inside.mkdir()
+    out.mkdir()
+    for seed, (name, (suffix, options)) in enumerate(FORMATS.items()):
+        picture = PICTURE.astype(np.uint16) * 257 if name == "16-bit.png" else PICTURE
+        whole = encoded(suffix, picture, options)
+        for number, data in enumerate(mutated(whole, seed=seed, count=MUTATIONS)):
+            (inside / f"{number}-{name}").write_bytes(data)
+    for name, data in BOMBS.items():
+        (inside / name).write_bytes(data)
+    before = files_in(inside)
+    assert len(before) == 300 + len(BOMBS)
+    trials = try_all(
+        [["detect-image", path, "-o", out, *FEW_WINDOWS] for path in before], seconds=SECONDS
+    )
+    assert broken_promises(trials) == []
+    assert {trial.code for trial in trials} == {0, 1}
+    assert files_in(inside) == before
+    assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
+    written = sum(trial.code == 0 for trial in trials)
+    assert len(list(out.iterdir())) == written > 30
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_picture_of_too_many_pixels_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(BOMBS[name])
+    with pytest.raises(ImageError, match="has more than 33,554,432 pixels, or a side of more than"):
+        read_image(path)
+
+
+def test_a_frame_of_8k_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "8k.png"
+    path.write_bytes(black(7680, 4320))
+    assert read_image(path).shape == (4320, 7680, 3)
+
+
+def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
+    with pytest.raises(ImageError, match=r"/dev/zero: is larger than 256,000,000 bytes"):
+        read_image(Path("/dev/zero"))
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".ppm", ".jp2", ".ras"])
+def test_formats_that_are_not_named_are_not_read(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / "picture.png"
+    path.write_bytes(encoded(suffix, PICTURE))
+    with pytest.raises(ImageError, match=r"is not a picture, .* \(PNG, JPEG, BMP, TIFF, WebP\)"):
+        read_image(path)
+
+
+def test_a_panorama_with_a_million_windows_is_refused(tmp_path: Path) -> None:
+    path, out = tmp_path / "wide.png", tmp_path / "out.png"
+    path.write_bytes(black(32_000, 24))
+    (trial,) = try_all([["detect-image", path, "-o", out]], seconds=SECONDS)
+    assert trial.code == 1
+    assert "search windows would be laid over a frame of 32000×24 pixels" in trial.err
+    assert broken_promises([trial]) == []
+
+
+def test_a_damaged_jpeg_that_can_be_read_is_warned_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "damaged.jpg"
+    whole = encoded(".jpg", PICTURE)
+    path.write_bytes(whole[:-400] + b"\xff\xd9")
+    assert read_image(path).shape == PICTURE.shape
+    assert "damaged.jpg: is damaged, and read as far as can be (Corrupt JPEG data" in caplog.text

@@ -1,0 +1,198 @@
+"""Damaged and wicked YAML, as settings through the whole of `vdet detect-image`, and as cameras."""
+
+import codecs
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from hostile.mutations import mutated, with_other_words
+from hostile.trials import broken_promises, files_in, try_all
+from vdet.config.document import MAX_BYTES, MAX_MISTAKES
+from vdet.config.loading import load_settings
+from vdet.errors import ConfigError
+from vdet.lanes.camera_file import load_camera
+
+SETTINGS = """\
+# looked at: one picture
+reference_height: 720
+search:
+  engine: auto
+  probability: 0.5
+  windows:
+  - {size: 160, overlap: 0.5, top: 380, bottom: 600}
+  - size: 240
+    step: 2
+    top: 300
+    bottom: 700
+heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
+tracker:
+  history: 10
+  min_region: 50
+  match_method: ccoeff_normed
+lanes:
+  view: {top: 0.63, bottom: 0.93, length: 37.0, across: 30.0}
+  track: {memory: 0.6, carry: 12}
+output:
+  preset: 'superfast'
+  crf: 20
+"""
+CAMERA = """\
+# frame size, pixels
+width: 1280
+height: 720
+matrix:
+  - [1157.0, 0.0, 668.0]
+  - [0.0, 1153.5, 388.25]
+  - [0.0, 0.0, 1.0]
+distortion: [-0.25, 1e-2, 0.0, 0.0, 0.0]
+rms: 0.7
+"""
+TOKENS = (
+    *("&a ", "*a", "<<: *a", "!!python/object/apply:os.system [id]", "!!binary x", "!!set {a, b}"),
+    *("---\n", "...\n", "%YAML 9.9\n", "%TAG ! x\n", "? ", "- ", ": ", "{", "}", "[", "]", "|\n"),
+    *("'", '"', "#", "\t", "\r", "\0", "\n", "  ", "\x85", "\ufeff", '"\\UFFFFFFFF"', '"\\ud800"'),
+    *("0", "-1", "1e999", ".inf", ".nan", "9" * 30, "0x" + "f" * 40, "1:60:60", "99999", "null"),
+    *("true", "~", "2001-99-99", "heat", "windows", "1e-300", "100000", "0.99", "\xff", "é", "🚗"),
+)
+NUMBERS = (
+    *(
+        "0",
+        "1",
+        "2",
+        "-1",
+        "0.01",
+        "0.99",
+        "0.999999",
+        "1",
+        "8",
+        "16",
+        "99999",
+        "100000",
+        "1000000",
+    ),
+    *("4294967296", "-9223372036854775808", "1e-300", "1e300", "1e999", ".inf", "-.inf", ".nan"),
+    *("true", "null", "[]", "{}", "[1, 2, 3]", "2001-01-01", "1:60:60", "none", "patch", "dense"),
+)
+SECONDS = 20.0
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("picture") / "picture.png"
+    noise = np.random.default_rng(0).integers(0, 256, (9, 16, 3), dtype=np.uint8)
+    cv2.imwrite(str(path), cv2.resize(noise, (160, 90)))
+    return path
+
+
+def test_500_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Path) -> None:
+    inside, out = tmp_path / "in", tmp_path / "out"
+    inside.mkdir()
+    out.mkdir()
+    settings = mutated(SETTINGS.encode(), seed=1, count=150, tokens=TOKENS)
+    settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=200)
+    cameras = mutated(CAMERA.encode(), seed=3, count=50, tokens=TOKENS)
+    cameras += with_other_words(CAMERA, NUMBERS, seed=4, count=100)
+    few = ("--set", "search.windows=[{size: 160, overlap: 0.5, top: 380, bottom: 600}]")
+    runs = []
+    for number, data in enumerate(settings + cameras):
+        path = inside / f"{number}.yaml"
+        path.write_bytes(data)
+        of_settings = number < len(settings)
+        options = ("-c", path) if of_settings else ("--lanes", "--camera", path, *few)
+        runs.append(["detect-image", picture, "-o", out / f"{number}.png", *options])
+    assert len(runs) == 500
+    before = files_in(inside)
+    trials = try_all(runs, seconds=SECONDS)
+    assert broken_promises(trials, lines=MAX_MISTAKES + 1) == []
+    assert files_in(inside) == before
+    assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
+    read = [trial.code == 0 for trial in trials]
+    assert sum(read[: len(settings)]) > 10
+    assert sum(read[len(settings) :]) > 10
+
+
+ALIAS_BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{new}: &{new} [{', '.join([f'*{old}'] * 9)}]\n" for old, new in pairwise("abcdefghi")
+)
+WICKED = {
+    "alias bomb": (ALIAS_BOMB, r"2:8: is not YAML: aliases \(\*name\) are not accepted"),
+    "alias to itself": ("heat: &a [*a]", "aliases"),
+    "merge key": ("heat: &a {frames: 2}\nsearch: {<<: *a}", "aliases"),
+    "python object": ("heat: !!python/object/apply:os.system [id]", r"1:7: .*tags \(!name\)"),
+    "binary": ("heat: !!binary aGVhdA==", r"tags \(!name\) are not accepted"),
+    "deep list": ("[" * 90_000, "is nested too deeply"),
+    "deep map": ("{a: " * 20_000, "is nested too deeply"),
+    "deep block": ("- " * 45_000, "is nested too deeply"),
+    "deep keys": ("? " * 45_000, "is nested too deeply"),
+    "huge number": ("heat: {frames: " + "9" * 90_000 + "}", "1:16: .*the number is too large"),
+    "huge hexadecimal": ("heat: {frames: 0x" + "f" * 90_000 + "}", "the number is too large"),
+    "huge base 60": ("heat: {frames: " + "1:" * 40_000 + "1}", "the number is too large"),
+    "base 60 fraction": ("heat: {frames: " + "1:" * 40_000 + "1.5}", "cannot be understood"),
+    "huge version": ("%YAML " + "1" * 5000 + ".1\n---\nheat: {}", "is not YAML"),
+    "no such character": (r'heat: "\UFFFFFFFF"', "is not YAML"),
+    "half a character": (r'heat: {weight: "\ud800"}', r"heat\.weight: .*got '\\ud800'"),
+    "half a character as key": (r'heat: {"\ud800": 1}', "heat"),
+    "time before time": ("heat: {frames: 0001-01-01T00:00:00+23:59}", "should be a valid integer"),
+    "infinity": ("heat: {threshold: .inf}", "heat.threshold: should be a finite number"),
+    "not a number": ("heat: {threshold: .nan}", "heat.threshold: should be a finite number"),
+    "NUL": ("heat: {frames: \0}", "is not YAML: unacceptable character #x0000"),
+    "several documents": ("heat: {frames: 2}\n---\nheat: {frames: 3}\n", "but found another doc"),
+    "one key 12,000 times": ("heat: 1\n" * 12_000, "is given twice"),
+    "9,000 unknown keys": ("".join(f"k{i}: 1\n" for i in range(9000)), "k0: is no setting"),
+    "15,000 wrong items": ("search:\n  windows:\n" + "  - 1\n" * 15_000, "should be a section"),
+    "control characters": (r'"a\n\e[2J": 1', r"'a\\n\\x1b\[2J': is no setting"),
+    "a long key": ("k" * 90_000 + ": 1", "mapping values are not allowed here"),
+    "a long quoted key": ('? "' + "k" * 90_000 + '"\n: 1', "k…: is no setting"),
+    "too large": ("#" * (MAX_BYTES + 1), "is larger than 100,000 bytes; that is no settings file"),
+}
+
+
+@pytest.mark.parametrize("name", WICKED)
+def test_wicked_yaml_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    text, words = WICKED[name]
+    path = tmp_path / "my.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError, match=words) as error:
+        load_settings(path)
+    lines = str(error.value).splitlines()
+    assert 1 <= len(lines) <= MAX_MISTAKES + 1
+    assert all(line.isprintable() and len(line) < 1000 for line in lines)
+
+
+@pytest.mark.parametrize("name", WICKED)
+def test_nor_is_it_a_camera(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "camera.yaml"
+    path.write_text(WICKED[name][0][:20_000], encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_camera(path)
+    lines = str(error.value).splitlines()
+    assert 1 <= len(lines) <= MAX_MISTAKES + 1
+    assert all(line.isprintable() and len(line) < 1000 for line in lines)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        "heat: {frames: 2}".encode("utf-16"),
+        "heat: {frames: 2}".encode("utf-32"),
+        "heat: {weight: é}".encode("latin-1"),
+        codecs.BOM_UTF16_LE,
+        b"heat: {weight: \xed\xa0\x80}",
+        b"\xc0\x80: 1",
+    ],
+)
+def test_other_encodings_than_utf_8_are_refused(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_bytes(data)
+    with pytest.raises(ConfigError, match=r"my\.yaml: is not UTF-8 text"):
+        load_settings(path)
+
+
+def test_what_is_not_shown_of_many_mistakes_is_counted(tmp_path: Path) -> None:
+    path = tmp_path / "my.yaml"
+    path.write_text("".join(f"k{i}: 1\n" for i in range(100)))
+    with pytest.raises(ConfigError, match=f"… and {100 - MAX_MISTAKES} more mistakes$"):
+        load_settings(path)

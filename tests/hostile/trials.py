@@ -1,0 +1,128 @@
+"""Many runs of the program on bad files, in one process that is watched.
+
+`try_all` starts this file as a program. There, every run has a time limit, the memory of all of
+them together one, and what each wrote on standard error is kept, down to the C libraries' own.
+"""
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import FrameType
+from typing import IO, NoReturn
+
+MEMORY = 1_000_000_000
+"""Bytes that the whole process may ever have resident."""
+_ADDRESSES = 4_000_000_000  # a stop for what would bring the machine down
+_PATIENCE = 300  # seconds for all runs
+
+
+@dataclass(frozen=True)
+class Trial:
+    """How a run ended: its exit code (None: not at all, in time), its words, and how long it took.
+
+    `memory` is the most that the process has had resident up to its end, bytes.
+    """
+
+    arguments: tuple[str, ...]
+    code: int | None
+    err: str
+    seconds: float
+    memory: int
+
+
+def try_all(runs: Sequence[Sequence[str | Path]], *, seconds: float) -> list[Trial]:
+    """Run the program with each list of arguments, each for so many seconds at most."""
+    orders = json.dumps([[str(word) for word in words] for words in runs])
+    command = [sys.executable, __file__, str(seconds)]
+    done = subprocess.run(
+        command, input=orders, capture_output=True, text=True, timeout=_PATIENCE, check=False
+    )
+    assert done.returncode == 0, f"the process died ({done.returncode}): {done.stderr[-2000:]}"
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    return [Trial(**{**record, "arguments": tuple(record["arguments"])}) for record in records]
+
+
+def broken_promises(trials: Sequence[Trial], *, lines: int = 1) -> list[str]:
+    """Return what is wrong with each run that is; a failure may have so many lines of error."""
+    return [
+        f"{' '.join(trial.arguments)}: {complaint}"
+        for trial in trials
+        if (complaint := _complaint(trial, lines))
+    ]
+
+
+def _complaint(trial: Trial, lines: int) -> str | None:
+    said = [line for line in trial.err.splitlines() if not line.startswith("vdet: warning: ")]
+    if trial.code is None:
+        return f"did not end in {trial.seconds:.0f} s"
+    if trial.code not in {0, 1}:
+        return f"exit code {trial.code}: {trial.err}"
+    if "internal error" in trial.err or not all(line.startswith("vdet: ") for line in said):
+        return f"not an error for people: {trial.err}"
+    if trial.code and not 1 <= len(said) <= lines:
+        return f"{len(said)} lines of error: {trial.err}"
+    if trial.memory > MEMORY:
+        return f"took {trial.memory / 1e6:.0f} MB"
+    return None
+
+
+def files_in(folder: Path) -> dict[Path, bytes]:
+    """Return all files below a folder with their content: what a run must leave as it is."""
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+class _TookTooLong(BaseException):
+    pass
+
+
+def _give_up(_: int, __: FrameType | None) -> None:
+    raise _TookTooLong
+
+
+def _main() -> None:
+    from vdet.cli import main
+
+    resource.setrlimit(resource.RLIMIT_AS, (_ADDRESSES, _ADDRESSES))
+    signal.signal(signal.SIGALRM, _give_up)
+    report = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    seconds = float(sys.argv[1])
+    with tempfile.TemporaryFile() as said, Path(os.devnull).open("w", encoding="utf-8") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+        os.dup2(said.fileno(), 2)
+        for arguments in json.load(sys.stdin):
+            trial = _try(main, arguments, seconds, said)
+            print(json.dumps(asdict(trial)), file=report, flush=True)
+
+
+def _try(
+    main: Callable[[Sequence[str]], NoReturn], arguments: list[str], seconds: float, said: IO[bytes]
+) -> Trial:
+    began = os.times().elapsed
+    code: int | None = None
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        main(arguments)
+    except SystemExit as end:
+        code = int(end.code or 0)
+    except _TookTooLong:
+        pass
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    sys.stderr.flush()
+    said.seek(0)
+    words = said.read().decode("utf-8", "replace")
+    said.seek(0)
+    said.truncate()
+    peak = Path("/proc/self/status").read_text(encoding="ascii").partition("VmHWM:")[2].split()[0]
+    return Trial(tuple(arguments), code, words, os.times().elapsed - began, int(peak) * 1024)
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,41 @@
+"""Runs `vdet detect-video` on every file of a folder, in one process: a line of JSON a run.
+
+Called as `video_worker.py IN OUT SECONDS OPTION…`. A run that takes longer than that ends the
+process, with a traceback on standard error; so does a crash. The last line then tells which file it
+was: it is written before the run, too.
+"""
+
+import contextlib
+import faulthandler
+import io
+import json
+import resource
+import sys
+from pathlib import Path
+
+from vdet.cli import main
+
+
+def run_all(sources: Path, outputs: Path, seconds: float, options: list[str]) -> None:
+    for source in sorted(sources.iterdir()):
+        report(source, None, "")
+        faulthandler.dump_traceback_later(seconds, exit=True)
+        said = io.StringIO()
+        code: object = None
+        with contextlib.redirect_stderr(said):
+            try:
+                main(["detect-video", str(source), str(outputs / f"{source.stem}.mp4"), *options])
+            except SystemExit as ended:
+                code = ended.code
+        faulthandler.cancel_dump_traceback_later()
+        report(source, code, said.getvalue())
+
+
+def report(source: Path, code: object, said: str) -> None:
+    """Write what came of a run; `code` is None before it, `peak` the peak memory so far, bytes."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    print(json.dumps({"source": source.name, "code": code, "said": said, "peak": peak}), flush=True)
+
+
+if __name__ == "__main__":
+    run_all(Path(sys.argv[1]), Path(sys.argv[2]), float(sys.argv[3]), sys.argv[4:])

@@ -1,0 +1,63 @@
+"""What `make soak` says of a run."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from benchmarks.soak import Sample, complaints, table, tenths
+
+STEADY = [
+    Sample(frames, frames / 100, 290 + frames % 7, min(300, 200 + frames), 20, 12)
+    for frames in range(0, 20_001, 50)
+]
+
+
+def ending_with(**changes: Any) -> list[Sample]:
+    """Give a steady run but for its last 100 frames."""
+    return [*STEADY[:-2], *(replace(sample, **changes) for sample in STEADY[-2:])]
+
+
+def test_of_a_steady_run_there_is_nothing_to_say() -> None:
+    assert complaints(STEADY) == []
+    assert tenths(STEADY) == pytest.approx((100, 100))
+
+
+def test_what_comes_before_the_500th_frame_does_not_count() -> None:
+    cold = [replace(s, files=3, threads=1) if s.frames < 500 else s for s in STEADY]
+    assert complaints(cold) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"peak": 331},
+            ["peak memory grew by 10.3% after the first 500 frames, from 300 to 331 MB"],
+        ),
+        ({"peak": 329}, []),
+        ({"files": 21}, ["the number of files went from 20 to 21"]),
+        ({"threads": 11}, ["the number of threads went from 11 to 12"]),
+    ],
+)
+def test_what_creeps_up_is_named(changes: dict[str, Any], words: list[str]) -> None:
+    assert complaints(ending_with(**changes)) == words
+
+
+def test_the_reader_may_go_when_it_has_read_all() -> None:
+    assert complaints([*STEADY[:-1], replace(STEADY[-1], files=19, threads=11)]) == []
+
+
+@pytest.mark.parametrize(("speed", "slow"), [(84.0, True), (86.0, False)])
+def test_a_run_that_gets_slower_is_named(speed: float, slow: bool) -> None:
+    slowing = [
+        replace(s, seconds=180 + (s.frames - 18_000) / speed) if s.frames > 18_000 else s
+        for s in STEADY
+    ]
+    words = [f"the last tenth ran at {speed:.1f} frames/s, the first at 100.0"]
+    assert complaints(slowing) == (words if slow else [])
+
+
+def test_the_table_has_a_line_a_tenth() -> None:
+    lines = table(STEADY)
+    assert len(lines) == 11
+    assert lines[-1].split() == ["20000", "100.0", "291", "300", "20", "12"]
