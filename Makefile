@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DATA ?= $(or $(VDET_DATA),data)
 
-.PHONY: demo test lint types tests bench data model clean
+.PHONY: demo test lint types tests bench soak data model clean
 
 demo: $(READY)  ## make a small data set and a road clip, train, detect, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
@@ -24,6 +24,9 @@ tests: $(READY)
 
 bench: $(READY)  ## how fast it is, as ratios measured in one run
 	$(BIN)/python -m benchmarks
+
+soak: $(READY)  ## one run over 20,000 frames: does anything creep up? (some minutes, 1 GB in $$TMPDIR)
+	$(BIN)/python -m benchmarks.soak
 
 data:  ## fetch the data set (125 MB) into data/; data/README.md tells what it is
 	cd data && for name in vehicles non-vehicles; do \

@@ -11,3 +11,10 @@ QUICK = (
     "tracker.confident_detections_needed=2",
 )
 QUICK_OPTIONS = tuple(word for assignment in QUICK for word in ("--set", assignment))
+FEW_OPTIONS = (
+    "--set",
+    "search.windows=[{size: 160, step: 8, top: 300, bottom: 620}]",
+    "--set",
+    "output.preset=ultrafast",
+)
+"""Options with which a run costs next to nothing, for tests of anything but what is found."""

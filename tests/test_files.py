@@ -114,7 +114,15 @@ def test_an_output_in_a_missing_folder_is_refused(tmp_path: Path) -> None:
         check_output(tmp_path / "no" / "out.txt", overwrite=True)
 
 
+def test_a_missing_folder_that_the_work_makes_must_have_one_above_it(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    check_output(tmp_path / "a" / "b" / "out.txt", overwrite=False, makes_folder=True)
+    with pytest.raises(OutputError, match="file is no folder"):
+        check_output(tmp_path / "file" / "b" / "out.txt", overwrite=False, makes_folder=True)
+    assert names(tmp_path) == ["file"]
+
+
 def test_an_output_below_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(OutputError, match="does not exist"):
+    with pytest.raises(OutputError, match="file is no folder"):
         check_output(tmp_path / "file" / "out.txt", overwrite=True)

@@ -21,8 +21,9 @@ from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, red_finder, road
 from vdet.config.loading import load_settings
 from vdet.config.schema import OutputSettings, SearchSettings, Settings, WindowSettings
 from vdet.errors import ImageError, OutputError, VdetError, VideoError
+from vdet.following import follow
 from vdet.model import load_model
-from vdet.pipeline import Summary, VideoJob, follow, process_video
+from vdet.pipeline import Summary, VideoJob, process_video
 from vdet.synthetic import frames, truth
 from vdet.synthetic.scene import Scene
 from vdet.tracking.cars import Cars

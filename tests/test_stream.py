@@ -4,13 +4,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
+from itertools import islice
 
 import cv2
 import pytest
 from threadpoolctl import threadpool_info
 
-from vdet.stream import ahead, behind, each_with, quiet_libraries
+from vdet.stream import Stalled, ahead, aside, behind, each_with, quiet_libraries
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
@@ -30,6 +31,17 @@ def ctrl_c() -> Iterator[Callable[[], None]]:
     assert main is not None
     yield lambda: signal.pthread_kill(main, signal.SIGINT)
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def hang(no_thread_is_left: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """What a thread can wait for as if for ever: the end of the test."""
+    assert no_thread_is_left is None
+    monkeypatch.setattr("vdet.stream._MOMENT", 0.1)
+    event = threading.Event()
+    yield event
+    event.set()
+    until(lambda: not any("vdet-" in thread.name for thread in threading.enumerate()))
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -118,6 +130,58 @@ class TestAhead:
         with ahead(iter(int, 1)) as items:
             assert next(items) == 0
 
+    @pytest.mark.parametrize("take", [1, 3])
+    def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
+        threads: list[threading.Thread] = []
+
+        def items() -> Iterator[int]:
+            threads.append(threading.current_thread())
+            try:
+                yield from range(3)
+            finally:
+                threads.append(threading.current_thread())
+
+        with ahead(items()) as read:
+            assert list(islice(read, take)) == list(range(take))
+        opened, closed = threads
+        assert opened is closed is not threading.current_thread()
+
+    def test_a_source_that_hangs_is_given_up_and_left_alone(self, hang: threading.Event) -> None:
+        def items() -> Iterator[int]:
+            yield 1
+            hang.wait()
+
+        read: list[int] = []
+        with pytest.raises(Stalled), ahead(items(), patience=0.2) as given:
+            read.extend(given)
+        assert read == [1]
+
+    def test_ctrl_c_ends_the_wait_for_a_source_that_hangs(
+        self, hang: threading.Event, ctrl_c: Callable[[], None]
+    ) -> None:
+        def items() -> Iterator[int]:
+            ctrl_c()
+            hang.wait()
+            yield 1
+
+        with pytest.raises(KeyboardInterrupt), ahead(items()) as given:
+            next(given)
+
+
+class TestAside:
+    def test_gives_what_the_call_gives(self) -> None:
+        assert aside(lambda: threading.current_thread().name) == "vdet-ahead"
+
+    def test_raises_what_the_call_raises(self) -> None:
+        error = ValueError("call")
+        with pytest.raises(ValueError, match="call") as caught:
+            aside(lambda: fail(error, after=1))
+        assert caught.value is error
+
+    def test_a_call_that_hangs_is_given_up(self, hang: threading.Event) -> None:
+        with pytest.raises(Stalled):
+            aside(hang.wait, patience=0.1)
+
 
 class TestBehind:
     @pytest.mark.parametrize("depth", [1, 4, 100])
@@ -178,6 +242,75 @@ class TestBehind:
         with pytest.raises(ValueError, match="taker") as caught, behind(take) as hand_over:
             hand_over(0)
         assert caught.value is error
+
+    def test_the_thread_enters_and_leaves_the_context(self) -> None:
+        seen: list[object] = []
+
+        @contextmanager
+        def within() -> Iterator[None]:
+            seen.append(threading.current_thread().name)
+            yield
+            seen.append("left")
+
+        with behind(seen.append, within=within()) as hand_over:
+            hand_over(1)
+        assert seen == ["vdet-behind", 1, "left"]
+
+    @Errors
+    def test_an_error_of_the_giver_is_one_in_the_context_too(
+        self, kind: type[BaseException]
+    ) -> None:
+        error = kind("giver")
+        seen: list[BaseException] = []
+
+        @contextmanager
+        def within() -> Iterator[None]:
+            try:
+                yield
+            except BaseException as inside:
+                seen.append(inside)
+                raise
+
+        taken: list[int] = []
+        with (
+            pytest.raises(kind) as caught,
+            behind(taken.append, within=within()) as hand_over,
+        ):
+            hand_all(failing(error, after=2), hand_over)
+        assert caught.value is error
+        assert taken == [0, 1]
+        assert len(seen) == 1
+
+    @pytest.mark.parametrize("place", ["enter", "exit"])
+    def test_an_error_of_the_context_is_raised(self, place: str) -> None:
+        @contextmanager
+        def within() -> Iterator[None]:
+            fail(ValueError(place), after=1) if place == "enter" else None
+            yield
+            raise ValueError(place)
+
+        with pytest.raises(ValueError, match=place), behind(int, within=within()) as hand_over:
+            hand_over(0)
+
+    def test_a_taker_that_hangs_is_given_up_and_left_alone(self, hang: threading.Event) -> None:
+        left: list[str] = []
+
+        @contextmanager
+        def within() -> Iterator[None]:
+            try:
+                yield
+            except BaseException as error:
+                left.append(type(error).__name__)
+                raise
+
+        with (
+            pytest.raises(Stalled),
+            behind(lambda _: hang.wait(), 1, within=within(), patience=0.2) as hand_over,
+        ):
+            hand_all(range(10), hand_over)
+        assert left == [], "the thread hangs: what it has open is not touched"
+        hang.set()
+        until(lambda: left == ["_Over"])
 
     @Errors
     def test_after_an_error_of_the_giver_what_was_given_is_still_taken(

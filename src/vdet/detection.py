@@ -9,7 +9,7 @@ from vdet.heatmap import Heat, HeatMap, Region, find_regions
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.engine import FrameSearch
-from vdet.windows import Windows
+from vdet.windows import NO_WINDOWS, Windows
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +58,13 @@ class Detector:
         regions = find_regions(heat, self._heat.threshold)
         inside = tuple(replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return Detection(windows, hits, heat, inside)
+
+
+def nothing_detected(settings: Settings, width: int, height: int) -> Detection:
+    """Return what is found in a frame of that size, pixels, where nothing is searched."""
+    scaled = scale_lengths(settings.heat, height / settings.reference_height)
+    heat = HeatMap(width, height, scaled).update(NO_WINDOWS)
+    return Detection(NO_WINDOWS, NO_WINDOWS, heat, ())
 
 
 def detect_still(model: LinearModel, settings: Settings, image: Image) -> Detection:

@@ -1,9 +1,13 @@
 """What can go wrong, by kind; each kind carries the exit code of the program.
 
-Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 130 interrupted.
+Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 3 some files of a batch
+failed, 130 interrupted.
 A message is one line (a `ConfigError` may be several, one for each mistake): what is wrong, where,
 and what to do about it.
 """
+
+SOME_FAILED = 3
+INTERRUPTED = 130
 
 
 class VdetError(Exception):
@@ -38,3 +42,21 @@ class OutputError(VdetError, OSError):
 
 class TruthError(VdetError, ValueError):
     """A file of labelled boxes, truth or tracks, cannot be used."""
+
+
+class BatchError(VdetError, ValueError):
+    """A batch cannot be begun as it was asked for."""
+
+
+class ClusterError(VdetError, OSError):
+    """A cluster cannot be used."""
+
+
+def in_one_line(error: Exception) -> str:
+    """Say of any error what it is; of one that is no `VdetError` or `OSError` that it is a bug."""
+    if isinstance(error, VdetError):
+        return str(error)
+    if isinstance(error, OSError):
+        return f"{error.filename or 'input'}: {error.strerror or error}"
+    text = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"internal error, please report it ({text}); VDET_DEBUG=1 shows more"

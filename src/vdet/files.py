@@ -3,22 +3,26 @@
 import contextlib
 import json
 import os
-import secrets
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from vdet.errors import OutputError, VdetError
+from vdet.temporaries import bring_to_disk, remove_forsaken, temporary_beside
 
 
-def check_output(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
+def check_output(
+    path: Path, *, overwrite: bool, inputs: Iterable[Path] = (), makes_folder: bool = False
+) -> None:
     """Refuse an output that could not be written, before any work is done.
 
     Parameters
     ----------
     inputs
         Files that the work reads; they are never written over.
+    makes_folder
+        The work makes the folder of the output if it is missing.
 
     Raises
     ------
@@ -32,10 +36,14 @@ def check_output(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) ->
         raise OutputError(f"{path}: is a folder; give the name of a file")
     if path.exists() and not overwrite:
         raise OutputError(f"{path}: is there already; give --overwrite to replace it")
-    if not path.parent.is_dir():
-        raise OutputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    if not os.access(path.parent, os.W_OK):
-        raise OutputError(f"{path}: the folder {path.parent} cannot be written to")
+    folder = path.parent
+    if makes_folder:
+        folder = next((parent for parent in path.parents if parent.exists()), folder)
+    if not folder.is_dir():
+        missing = "is no folder" if folder.exists() else "does not exist; make it first"
+        raise OutputError(f"{path}: the folder {folder} {missing}")
+    if not os.access(folder, os.W_OK):
+        raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
 def make_folder(folder: Path) -> None:
@@ -50,7 +58,8 @@ def make_folder(folder: Path) -> None:
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary file beside `path`, renamed to `path` at the end, removed on an error.
 
-    The temporary file keeps the suffix of `path`, for writers that choose a format by it.
+    The temporary file keeps the suffix of `path`, for writers that choose a format by it. It is on
+    the disk before it is renamed. Those that killed runs left in the folder are removed.
 
     Raises
     ------
@@ -58,19 +67,16 @@ def replacing(path: Path) -> Iterator[Path]:
         The file cannot be made or renamed, or an `OSError` that is not a `VdetError` already
         came out of the block.
     """
-    temporary = path.with_name(f".{path.stem}.{secrets.token_hex(4)}{path.suffix}")
+    remove_forsaken(path.parent)
     try:
-        temporary.touch(exist_ok=False)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror}") from error
-    try:
-        yield temporary
-        temporary.replace(path)
-    except BaseException as error:
-        temporary.unlink(missing_ok=True)
-        if isinstance(error, OSError) and not isinstance(error, VdetError):
-            raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        with temporary_beside(path) as temporary:
+            yield temporary
+            bring_to_disk(temporary)
+            temporary.replace(path)
+    except VdetError:
         raise
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def write_json(values: Any, target: str) -> None:

@@ -3,29 +3,29 @@
 import logging
 import os
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 from vdet.annotation import StagePictures, annotate
-from vdet.config.scaling import scale_lengths
 from vdet.config.schema import OutputSettings, Settings
-from vdet.detection import Detector
 from vdet.errors import ConfigError, ImageError, VideoError
 from vdet.files import check_output
+from vdet.following import follow, pass_on
 from vdet.frame_result import FrameResult
-from vdet.lanes.road import LaneRequest, Look, RoadWatch
+from vdet.lanes.road import LaneRequest, RoadWatch
 from vdet.model import LinearModel
 from vdet.overlay.stages import check_stages
-from vdet.stream import ahead, behind, each_with, quiet_libraries
+from vdet.search.engine import lay_grids
+from vdet.stream import Stalled, ahead, aside, behind, quiet_libraries
 from vdet.trackfile import check_suffix, track_writer
-from vdet.tracking.cars import Cars
 from vdet.video import Frame, FrameWriter, NullWriter, VideoInfo, VideoReader, VideoWriter
-from vdet.windows import Windows
 
 log = logging.getLogger("vdet")
+
+PATIENCE = 120.0  # seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +48,18 @@ class VideoJob:
     at: Fraction = Fraction(0)
     lanes: LaneRequest | None = None
 
+    @property
+    def outputs(self) -> tuple[Path, ...]:
+        """The files that are made: the video, the tracks, or both."""
+        return tuple(path for path in (self.video, self.tracks) if path is not None)
+
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a run did: frames, shown tracks (ids), seconds of wall time."""
+    """What a run did: upright frames of which size, shown tracks (ids), seconds of wall time."""
 
+    width: int
+    height: int
     frames: int
     tracks: int
     seconds: float
@@ -60,47 +67,12 @@ class Summary:
 
 def check_job(job: VideoJob, *, overwrite: bool) -> None:
     """Refuse, before any work, a job whose outputs could not be written. Raises `OutputError`."""
-    for path in (job.video, job.tracks):
-        if path is not None:
-            check_output(path, overwrite=overwrite, inputs=[job.source])
+    for path in job.outputs:
+        check_output(path, overwrite=overwrite, inputs=[job.source])
     if job.tracks is not None:
         check_suffix(job.tracks)
     if job.stages is not None:
         check_stages(job.stages, overwrite=overwrite)
-
-
-def follow(
-    frames: Iterable[Frame],
-    model: LinearModel,
-    settings: Settings,
-    width: int,
-    height: int,
-    *,
-    threads: int = 1,
-    watch: RoadWatch | None = None,
-) -> Iterator[FrameResult]:
-    """Find and follow the cars through frames of one size, in order; and the lane, with `watch`.
-
-    The search of several frames may run in `threads` at once; what follows it, frame by frame,
-    gives the same result whatever their number.
-
-    Raises
-    ------
-    ImageError
-        No search window fits into such a frame.
-    """
-    detector = Detector(model, settings, width, height)
-    cars = Cars(scale_lengths(settings.tracker, height / settings.reference_height))
-
-    def search(frame: Frame) -> tuple[Windows, Look | None]:
-        return detector.search(frame.image), watch.look(frame.image) if watch else None
-
-    with each_with(search, frames, threads) as searched:
-        for frame, (windows, look) in searched:
-            detection = detector.accumulate(windows)
-            tracks = cars.update(frame.image, detection.regions)
-            road = watch.follow(look) if watch and look else None
-            yield FrameResult(frame, detection, tuple(tracks), road)
 
 
 def process_video(
@@ -109,6 +81,8 @@ def process_video(
     settings: Settings,
     *,
     threads: int | None = None,
+    codec_threads: int | None = None,
+    patience: float = PATIENCE,
     progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
 ) -> Summary:
     """Run a job; its outputs appear under their names when all is done.
@@ -119,6 +93,12 @@ def process_video(
     ----------
     threads
         Of the search; None for one a core.
+    codec_threads
+        Of the decoder, and of the encoder; None lets them choose.
+    patience
+        Seconds in which the next frame must be read or written, else the job is given up: a disk
+        or a network that hangs must not stop a batch. What lies before `job.start` has as long
+        again as it lasts.
     progress
         Called once with the expected number of frames (None: unknown); what it returns is called
         with the number of frames done since the last call.
@@ -126,28 +106,36 @@ def process_video(
     Raises
     ------
     VideoError, OutputError
-        The video cannot be read or searched, or the camera of `job.lanes` took frames of another
-        shape; an output cannot be written. No output is left then.
+        The video cannot be read, too much of it is damaged, or the camera of `job.lanes` took
+        frames of another shape; an output cannot be written. No output is left then.
     """
     began = time.perf_counter()
     ids: set[int] = set()
     frames = 0
+    patience += float(job.start or 0)
     with ExitStack() as stack:
+        stack.enter_context(_naming_what_hangs(job, patience))
         stack.enter_context(quiet_libraries())
-        reader = stack.enter_context(
-            VideoReader(job.source, start=job.start, end=job.end, frames=job.frames)
-        )
+        reader = aside(lambda: _open(job, settings, codec_threads), patience=patience)
+        read = stack.enter_context(ahead(_frames(reader), patience=patience))
         watch = _road_watch(job.lanes, settings, reader.info)
         tracks = stack.enter_context(track_writer(job.tracks))
-        video = stack.enter_context(_video_writer(job, reader, settings.output))
-        encode = stack.enter_context(behind(video.write))
-        read = stack.enter_context(ahead(reader))
+        video = _video_writer(job, reader.info, settings.output, codec_threads)
+        encode = stack.enter_context(behind(video.write, within=video, patience=patience))
         at = reader.info.start + job.at
         pictures = StagePictures(job.stages, at, settings, model.features)
         advance = progress(reader.expected)
         size = reader.info.width, reader.info.height
         threads = threads or os.cpu_count() or 1
-        results = follow(read, model, settings, *size, threads=threads, watch=watch)
+        if lay_grids(settings, model.features, *size):
+            results = follow(read, model, settings, *size, threads=threads, watch=watch)
+        else:
+            log.warning(
+                "%s: no search window fits into its frames of %d×%d pixels; it gets no boxes",
+                job.source,
+                *size,
+            )
+            results = pass_on(read, settings, *size, watch)
         for result in stack.enter_context(closing(_named(results, job.source))):
             pictures.offer(result)
             tracks.write(result.frame, result.tracks, result.road)
@@ -159,14 +147,44 @@ def process_video(
             raise VideoError(f"{job.source}: no frame lies in the times given; check them")
         if pictures.missing:
             log.warning("%s: no frame at or after --at; no stage pictures", job.source)
-    return Summary(frames, len(ids), time.perf_counter() - began)
+    return Summary(*size, frames, len(ids), time.perf_counter() - began)
 
 
-def _video_writer(job: VideoJob, reader: VideoReader, output: OutputSettings) -> FrameWriter:
+def _open(job: VideoJob, settings: Settings, threads: int | None) -> VideoReader:
+    return VideoReader(
+        job.source,
+        start=job.start,
+        end=job.end,
+        frames=job.frames,
+        threads=threads,
+        settings=settings.input,
+    )
+
+
+def _frames(reader: VideoReader) -> Generator[Frame]:
+    """Give all frames, and close the reader in the thread that took them."""
+    with reader:
+        yield from reader
+
+
+@contextmanager
+def _naming_what_hangs(job: VideoJob, patience: float) -> Iterator[None]:
+    try:
+        yield
+    except Stalled as error:
+        raise VideoError(
+            f"{job.source}: nothing could be read or written for {patience:g} s; given up; look at "
+            "the disk or network"
+        ) from error
+
+
+def _video_writer(
+    job: VideoJob, info: VideoInfo, output: OutputSettings, threads: int | None
+) -> FrameWriter:
     if job.video is None:
         return NullWriter()
     part = (job.start, job.end, job.frames) != (None, None, None)
-    return VideoWriter(job.video, reader.info, output, whole_sound=not part)
+    return VideoWriter(job.video, info, output, whole_sound=not part, threads=threads)
 
 
 def _road_watch(lanes: LaneRequest | None, settings: Settings, info: VideoInfo) -> RoadWatch | None:

@@ -86,12 +86,6 @@ def test_a_video_cut_off_in_the_middle_gives_what_is_left(
         assert 5 < sum(1 for _ in container.decode(video=0)) < 30
 
 
-def test_a_frame_too_small_for_any_window(run: Run, clip_path: Path, out: Path) -> None:
-    wide = ("--set", "search.windows=[{size: 1400, overlap: 0.5, top: 0, bottom: 1400}]")
-    line = _failure(run, clip_path, out, *wide)
-    assert "road.mp4: no search window fits into a frame of 320×180" in line
-
-
 def test_a_part_without_frames(run: Run, clip_path: Path, out: Path) -> None:
     assert "no frame lies in the times given" in _failure(run, clip_path, out, "--start", "1:00")
 

@@ -1,4 +1,5 @@
 from fractions import Fraction
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -7,6 +8,9 @@ from seed import SEED
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
 from vdet.features import FeatureExtractor, Layout, to_patch
 from vdet.model import LinearModel
+from vdet.search import patch
+from vdet.search.dense import located
+from vdet.search.dense.located import LocatedSearch
 from vdet.search.patch import PatchSearch
 from vdet.search.pyramid import FramePyramid
 from vdet.windows import WindowGrid
@@ -36,8 +40,8 @@ def test_every_window_is_cropped_resized_described_and_scored(features: FeatureS
     found = PatchSearch(model, GRID).search(FramePyramid(FRAME))
     assert len(found) == 28
     for (x, y, w, h), probability in zip(GRID.boxes.tolist(), found, strict=True):
-        patch = to_patch(FRAME[y : y + h, x : x + w], features.patch)
-        expected = model.probabilities(extractor.describe(patch)[np.newaxis])[0]
+        crop = to_patch(FRAME[y : y + h, x : x + w], features.patch)
+        expected = model.probabilities(extractor.describe(crop)[np.newaxis])[0]
         assert probability == pytest.approx(expected, abs=1e-6)
 
 
@@ -54,6 +58,18 @@ def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing() -> None:
     engine.search(FramePyramid(255 - frame))
     np.testing.assert_array_equal(frame, FRAME)
     np.testing.assert_array_equal(engine.search(FramePyramid(frame)), first)
+
+
+@pytest.mark.parametrize(("engine", "module"), [(PatchSearch, patch), (LocatedSearch, located)])
+def test_windows_scored_some_at_a_time_are_scored_alike(
+    engine: type[PatchSearch | LocatedSearch],
+    module: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search = engine(model_of(FeatureSettings()), GRID)
+    together = search.search(FramePyramid(FRAME))
+    monkeypatch.setattr(module, "BATCH", 3)
+    np.testing.assert_allclose(search.search(FramePyramid(FRAME)), together, atol=1e-6)
 
 
 def test_what_lies_outside_a_window_does_not_matter() -> None:

@@ -1,4 +1,6 @@
 import logging
+import os
+import signal
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Literal
@@ -112,6 +114,17 @@ def test_several_processes_give_the_same_as_one(
     assert one.digest == two.digest
 
 
+def test_a_process_that_is_killed_is_an_error(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def be_killed(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    monkeypatch.setattr("vdet.training.extraction._describe_chunk", be_killed)
+    with pytest.raises(DataError, match="a process that described patches was killed"):
+        extract(files, SETTINGS.features, max_broken=0, jobs=2)
+
+
 def test_progress_adds_up_to_the_number_of_patches(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -134,6 +147,18 @@ def test_the_digest_tells_data_sets_apart(files: list[PatchFile]) -> None:
     assert whole == same
     assert len({whole, fewer, renamed}) == 3
     assert len(whole) == 64
+
+
+def test_a_file_whose_name_is_no_text_is_part_of_the_digest(tmp_path: Path) -> None:
+    picture = texture(np.random.default_rng(0), vehicle=True)
+    digests = set()
+    for name in (b"\xff.png", b"\xfe.png"):
+        path = tmp_path / name.hex() / "vehicles" / os.fsdecode(name)
+        path.parent.mkdir(parents=True)
+        write_image(path, picture)
+        odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
+        digests.add(extract([odd], SETTINGS.features, max_broken=0, jobs=1).digest)
+    assert len(digests) == 2
 
 
 def test_broken_patches_are_named_skipped_and_counted(

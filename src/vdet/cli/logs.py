@@ -2,15 +2,13 @@
 
 import logging
 
-import click
-from tqdm import tqdm
+from vdet.cli.progress import tell
 
 
 class _Lines(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         kind = "" if record.levelno < logging.WARNING else f"{record.levelname.lower()}: "
-        with tqdm.external_write_mode():
-            click.echo(f"vdet: {kind}{record.getMessage()}", err=True)
+        tell(f"vdet: {kind}{record.getMessage()}")
 
 
 def set_up_logs(*, verbose: bool, quiet: bool) -> None:

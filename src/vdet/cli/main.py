@@ -17,9 +17,7 @@ from vdet.cli.detect_video import detect_video
 from vdet.cli.eval import evaluate
 from vdet.cli.logs import set_up_logs
 from vdet.cli.train import train
-from vdet.errors import VdetError
-
-INTERRUPTED = 130
+from vdet.errors import INTERRUPTED, VdetError, in_one_line
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -38,7 +36,9 @@ for _command in (train, detect_image, detect_video, calibrate, evaluate, config,
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the program and exit: 0 success, 1 an error, 2 wrong usage, 130 interrupted.
+    """Run the program and exit: 0 success, 1 an error, 2 wrong usage, 3 a batch that is not whole.
+
+    Interrupted, it exits with 130.
 
     An error is one line on standard error; with `VDET_DEBUG=1` in the environment a traceback
     follows.
@@ -50,18 +50,12 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         sys.exit(error.exit_code)
     except (KeyboardInterrupt, click.Abort):
         sys.exit(_complain("interrupted", INTERRUPTED))
-    except VdetError as error:
-        sys.exit(_complain(str(error), error.exit_code))
     except BrokenPipeError:  # the reader of our output has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except OSError as error:
-        sys.exit(_complain(f"{error.filename or 'input'}: {error.strerror or error}", 1))
     except Exception as error:
-        text = " ".join(f"{type(error).__name__}: {error}".split())
-        sys.exit(
-            _complain(f"internal error, please report it ({text}); VDET_DEBUG=1 shows more", 1)
-        )
+        code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
+        sys.exit(_complain(in_one_line(error), code))
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -86,9 +86,12 @@ def model_option(command: F) -> F:
 
 def read_model(model_path: Path | None, loaded: LoadedSettings) -> LinearModel:
     """Read the model, and check it against the features that were asked for."""
-    if model_path is None:
-        return load_model(shipped_model(loaded.settings.features))
-    return load_model(model_path, loaded.features)
+    return load_model(find_model(model_path, loaded), loaded.features)
+
+
+def find_model(model_path: Path | None, loaded: LoadedSettings) -> Path:
+    """Return the model that was given, or else the shipped one that fits the settings."""
+    return model_path or shipped_model(loaded.settings.features)
 
 
 def lane_options(command: F) -> F:
@@ -119,4 +122,11 @@ def read_lanes(lanes: bool, camera_path: Path | None) -> LaneRequest | None:
 
 overwrite_option = click.option(
     "--overwrite", is_flag=True, help="Replace outputs that are there already."
+)
+
+scheduler_option = click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Work on the Dask cluster of this scheduler, as tcp://host:8786; files lie where all its "
+    "workers find them.",
 )

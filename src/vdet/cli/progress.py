@@ -1,8 +1,10 @@
 """Progress bars on standard error, where a person may be looking."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
+import click
 from tqdm import tqdm
 
 Advance = Callable[[int], object]
@@ -22,3 +24,28 @@ def progress_bar(unit: str, *, quiet: bool) -> Iterator[Callable[[int | None], A
             return stack.enter_context(bar).update
 
         yield start
+
+
+@contextmanager
+def files_bar(total: int, *, quiet: bool) -> Iterator[Advance]:
+    """Give a function that counts a file, told how many frames it had; the bar shows their rate."""
+    began = time.perf_counter()
+    frames = 0
+    with tqdm(
+        total=total, unit=" files", disable=True if quiet else None, dynamic_ncols=True
+    ) as bar:
+
+        def advance(more: int) -> None:
+            nonlocal frames
+            frames += more
+            rate = frames / (time.perf_counter() - began)
+            bar.set_postfix_str(f"{rate:.1f} frames/s", refresh=False)
+            bar.update()
+
+        yield advance
+
+
+def tell(line: str) -> None:
+    """Print a line on standard error that does not tear a bar."""
+    with tqdm.external_write_mode():
+        click.echo(line, err=True)

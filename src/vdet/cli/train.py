@@ -4,7 +4,13 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.options import PathOf, overwrite_option, read_settings, settings_options
+from vdet.cli.options import (
+    PathOf,
+    overwrite_option,
+    read_settings,
+    scheduler_option,
+    settings_options,
+)
 from vdet.cli.progress import progress_bar
 from vdet.dataset import find_patches
 from vdet.errors import OutputError
@@ -17,6 +23,7 @@ from vdet.model import save_model
 @click.option("-o", "--output", required=True, type=PathOf(), help="The model to write, .npz.")
 @settings_options
 @click.option("--jobs", type=click.IntRange(min=1), help="Processes; else one a core.")
+@scheduler_option
 @overwrite_option
 @click.pass_obj
 def train(
@@ -27,6 +34,7 @@ def train(
     config_name: str | None,
     assignments: tuple[str, ...],
     jobs: int | None,
+    scheduler: str | None,
     overwrite: bool,
 ) -> None:
     """Train a model on DATA: folders or zip files of labelled patches.
@@ -36,15 +44,21 @@ def train(
     """
     from vdet.training import train as fit_model
 
+    if jobs and scheduler:
+        raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
     settings = read_settings(config_name, assignments).settings
     if output.suffix.lower() != ".npz":
         raise OutputError(f"{output}: models are written as .npz; name it so")
     report_path = output.with_suffix(".json")
     for path in (output, report_path):
         check_output(path, overwrite=overwrite, inputs=data)
+    if scheduler:  # the workers stand in other folders
+        data = tuple(path.absolute() for path in data)
     files = find_patches(data)
     with progress_bar(" patches", quiet=quiet) as start:
-        model, report = fit_model(files, settings, jobs=jobs or -1, progress=start(len(files)))
+        model, report = fit_model(
+            files, settings, jobs=jobs or -1, scheduler=scheduler, progress=start(len(files))
+        )
     save_model(model, output)
     report.write(report_path)
     click.echo("\n".join(report.lines()))

@@ -2,7 +2,9 @@
 
 import hashlib
 import logging
+import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 
 import joblib
@@ -13,6 +15,7 @@ from vdet.config.schema import FeatureSettings
 from vdet.dataset import PatchFile, read_patches
 from vdet.errors import DataError
 from vdet.features import FeatureExtractor, Vectors, to_patch
+from vdet.workers import deaf_to_ctrl_c, end_with
 
 log = logging.getLogger("vdet")
 
@@ -58,17 +61,26 @@ def extract(
     Raises
     ------
     DataError
-        More patches than `max_broken` are unreadable.
+        More patches than `max_broken` are unreadable, or a process was killed.
     """
     chunks = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)]
-    work = joblib.Parallel(n_jobs=jobs, return_as="generator")
-    described: Iterator[_Chunk] = work(
-        joblib.delayed(_describe_chunk)(chunk, settings) for chunk in chunks
+    work = joblib.Parallel(
+        n_jobs=jobs, return_as="generator", initializer=end_with, initargs=(os.getpid(),)
     )
     done: list[_Chunk] = []
-    for chunk, part in zip(chunks, described, strict=True):
-        done.append(part)
-        progress(len(chunk))
+    try:
+        with deaf_to_ctrl_c():
+            described: Iterator[_Chunk] = work(
+                joblib.delayed(_describe_chunk)(chunk, settings) for chunk in chunks
+            )
+        for chunk, part in zip(chunks, described, strict=True):
+            done.append(part)
+            progress(len(chunk))
+    except BrokenExecutor as error:
+        raise DataError(
+            "a process that described patches was killed; there may be too little memory: try "
+            "fewer --jobs"
+        ) from error
     good = np.concatenate([part.good for part in done])
     _check_broken([file for file, ok in zip(files, good, strict=True) if not ok], files, max_broken)
     kept = [file for file, ok in zip(files, good, strict=True) if ok]
@@ -113,5 +125,6 @@ def _check_broken(
 def _digest(files: Sequence[PatchFile], checksums: Sequence[int]) -> str:
     digest = hashlib.sha256()
     for file, checksum in zip(files, checksums, strict=True):
-        digest.update(f"{file.group}/{file.name.rpartition('/')[2]} {checksum:08x}\n".encode())
+        line = f"{file.group}/{file.name.rpartition('/')[2]} {checksum:08x}\n"
+        digest.update(line.encode("utf-8", "surrogateescape"))  # a name may be no text at all
     return digest.hexdigest()

@@ -2,12 +2,14 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, replace
 
 import numpy as np
 import numpy.typing as npt
 
 import vdet
+from vdet.cluster import on_cluster
 from vdet.config.schema import Settings
 from vdet.dataset import PatchFile, read_patches
 from vdet.errors import DataError
@@ -26,6 +28,7 @@ def train(
     settings: Settings,
     *,
     jobs: int = -1,
+    scheduler: str | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> tuple[LinearModel, TrainingReport]:
     """Describe the patches, fit on the configured split, and on the other one for comparison.
@@ -34,6 +37,8 @@ def train(
     ----------
     jobs
         Processes, as joblib counts them: -1 for one a core.
+    scheduler
+        Address of a Dask scheduler whose workers describe the patches instead.
     progress
         Called with the number of patches described since the last call.
 
@@ -45,11 +50,14 @@ def train(
     Raises
     ------
     DataError
-        Too many patches are unreadable, or too few are left to learn from.
+        Too many patches are unreadable, or too few are left to learn from; or a process was killed.
+    ClusterError
+        The cluster of `scheduler` cannot be used.
     """
     began = time.perf_counter()
     broken = settings.training.max_broken
-    data = extract(files, settings.features, max_broken=broken, jobs=jobs, progress=progress)
+    with on_cluster(scheduler) if scheduler else nullcontext():
+        data = extract(files, settings.features, max_broken=broken, jobs=jobs, progress=progress)
     extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != settings.training.split)

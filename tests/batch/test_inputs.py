@@ -1,0 +1,113 @@
+"""Which videos a batch is made of."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from vdet.batch.inputs import find_sources
+from vdet.errors import BatchError
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder as a camera leaves it, which the program is started in."""
+    for name in (
+        "clips/b.mp4",
+        "clips/a.MOV",
+        "clips/a.srt",
+        "clips/._a.MOV",
+        "clips/.trash/old.mp4",
+        "clips/day1/c.avi",
+        "clips/day1/evening/d.ts",
+        "clips/day2/c.avi",
+        "odd [1].mp4",
+        "camera.raw",
+    ):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def found(*clips: str) -> list[tuple[str, str]]:
+    sources = find_sources([Path(clip) for clip in clips])
+    return [(str(source.path), str(source.place)) for source in sources]
+
+
+@pytest.mark.usefixtures("folder")
+class TestFound:
+    def test_a_file_is_taken_whatever_its_suffix(self) -> None:
+        assert found("clips/day1/c.avi", "camera.raw") == [
+            ("clips/day1/c.avi", "c.avi"),
+            ("camera.raw", "camera.raw"),
+        ]
+
+    def test_a_folder_gives_the_videos_in_it_and_below_but_no_hidden_ones(self) -> None:
+        assert found("clips") == [
+            ("clips/a.MOV", "a.MOV"),
+            ("clips/b.mp4", "b.mp4"),
+            ("clips/day1/c.avi", "day1/c.avi"),
+            ("clips/day1/evening/d.ts", "day1/evening/d.ts"),
+            ("clips/day2/c.avi", "day2/c.avi"),
+        ]
+
+    @pytest.mark.parametrize(
+        ("pattern", "places"),
+        [
+            ("clips/*.mp4", ["b.mp4"]),
+            ("clips/day?/c.avi", ["day1/c.avi", "day2/c.avi"]),
+            ("clips/**/*.avi", ["day1/c.avi", "day2/c.avi"]),
+            ("clips/day*", ["day1/c.avi", "day1/evening/d.ts", "day2/c.avi"]),
+            ("*.raw", ["camera.raw"]),
+        ],
+    )
+    def test_a_pattern_mirrors_what_lies_below_its_fixed_part(
+        self, pattern: str, places: list[str]
+    ) -> None:
+        assert [place for _, place in found(pattern)] == places
+
+    def test_an_absolute_pattern(self, folder: Path) -> None:
+        assert found(f"{folder}/clips/*/c.avi") == [
+            (f"{folder}/clips/day1/c.avi", "day1/c.avi"),
+            (f"{folder}/clips/day2/c.avi", "day2/c.avi"),
+        ]
+
+    def test_a_file_whose_name_looks_like_a_pattern_is_itself(self) -> None:
+        assert found("odd [1].mp4") == [("odd [1].mp4", "odd [1].mp4")]
+
+    def test_what_is_named_twice_is_taken_once(self, folder: Path) -> None:
+        (folder / "link").symlink_to(folder / "clips")
+        assert found("clips", "clips/b.mp4", "link/b.mp4", "clips/../clips") == found("clips")
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(
+    ("clip", "words"),
+    [
+        ("none.mp4", "none.mp4: there is no such file"),
+        ("none/", "none: there is no such file"),
+        ("empty", "empty: there is no video in this folder"),
+        ("*.mkv", r"\*.mkv: no file matches this pattern"),
+    ],
+)
+def test_what_stands_for_no_video_is_named(clip: str, words: str) -> None:
+    with pytest.raises(BatchError, match=f"^{words}"):
+        find_sources([Path("clips"), Path(clip)])
+
+
+def test_a_folder_that_cannot_be_read_is_named(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scan = os.scandir
+
+    def deny(path: str) -> object:
+        if Path(path).name == "day1":
+            raise PermissionError(13, "Permission denied", str(path))
+        return scan(path)
+
+    monkeypatch.setattr("os.scandir", deny)
+    with pytest.raises(BatchError, match=r"day1: cannot be read: Permission denied; leave it out$"):
+        find_sources([folder / "clips"])

@@ -1,0 +1,131 @@
+"""What a batch will do, and what it refuses before any work."""
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vdet.batch.plan import Plan, Wishes, make_plan
+from vdet.errors import BatchError, OutputError
+from vdet.pipeline import VideoJob
+
+COMMON = VideoJob(Path(), frames=7)
+Make = Callable[..., Plan]
+
+
+@pytest.fixture
+def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for name in ("a.mp4", "b.MKV", "c.avi", "day/a.mp4"):
+        path = tmp_path / "clips" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"clip")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "clips"
+
+
+def plan(*inputs: str, folder: str = "out", **wishes: object) -> Plan:
+    return make_plan([Path(p) for p in inputs], Path(folder), COMMON, Wishes(**wishes))  # type: ignore[arg-type]
+
+
+def outputs(jobs: tuple[VideoJob, ...]) -> list[list[str]]:
+    return [[str(path) for path in job.outputs] for job in jobs]
+
+
+@pytest.mark.usefixtures("clips")
+class TestJobs:
+    def test_outputs_mirror_inputs_in_a_container_that_can_be_written(self) -> None:
+        made = plan("clips")
+        assert [str(job.source) for job in made.jobs] == [
+            *("clips/a.mp4", "clips/b.MKV", "clips/c.avi", "clips/day/a.mp4"),
+        ]
+        assert outputs(made.jobs) == [
+            ["out/a.mp4"],
+            ["out/b.MKV"],
+            ["out/c.mp4"],
+            ["out/day/a.mp4"],
+        ]
+        assert made.manifest == Path("out/manifest.jsonl")
+        assert not Path("out").exists()
+
+    def test_all_have_what_is_common(self) -> None:
+        (job,) = plan("clips/a.mp4").jobs
+        assert job == replace(COMMON, source=Path("clips/a.mp4"), video=Path("out/a.mp4"))
+
+    def test_tracks_lie_beside_the_video_or_alone(self) -> None:
+        assert outputs(plan("clips/a.mp4", tracks=".csv").jobs) == [["out/a.mp4", "out/a.csv"]]
+        assert outputs(plan("clips/a.mp4", video=False, tracks=".csv").jobs) == [["out/a.csv"]]
+
+    def test_what_is_done_is_skipped_and_what_is_half_done_is_not(self) -> None:
+        Path("out").mkdir()
+        for name in ("a.mp4", "a.csv", "b.MKV"):
+            Path("out", name).touch()
+        made = plan("clips", tracks=".csv", skip_existing=True)
+        assert [job.source.name for job in made.skipped] == ["a.mp4"]
+        assert [str(job.source) for job in made.jobs] == [
+            *("clips/b.MKV", "clips/c.avi", "clips/day/a.mp4"),
+        ]
+
+    def test_an_output_that_is_there_is_kept_or_replaced_as_one_likes(self) -> None:
+        Path("out").mkdir()
+        Path("out/a.mp4").touch()
+        with pytest.raises(OutputError, match=r"^out/a\.mp4: is there already"):
+            plan("clips")
+        assert len(plan("clips", overwrite=True).jobs) == 4
+
+    def test_a_manifest_that_is_there_is_gone_on_with(self) -> None:
+        Path("out").mkdir()
+        Path("out/manifest.jsonl").touch()
+        assert len(plan("clips").jobs) == 4
+
+
+@pytest.mark.usefixtures("clips")
+class TestRefused:
+    def test_two_inputs_of_one_name_both_told(self) -> None:
+        words = r"^clips/a\.mp4 and clips/day/a\.mp4: both would become out/a\.mp4"
+        with pytest.raises(BatchError, match=words):
+            plan("clips/a.mp4", "clips/day/a.mp4")
+
+    def test_two_inputs_of_one_name_by_their_new_suffix(self) -> None:
+        Path("clips/c.mpg").touch()
+        with pytest.raises(BatchError, match=r"both would become out/c\.mp4"):
+            plan("clips")
+
+    def test_two_inputs_with_tracks_of_one_name(self) -> None:
+        Path("clips/a.mov").touch()
+        assert len(plan("clips").jobs) == 5
+        with pytest.raises(BatchError, match=r"both would become out/a\.txt"):
+            plan("clips", tracks=".txt")
+
+    def test_tracks_that_would_be_the_manifest(self) -> None:
+        Path("clips/a.mp4").rename("clips/manifest.mp4")
+        assert len(plan("clips").jobs) == 4
+        with pytest.raises(BatchError, match=r"clips/manifest\.mp4: .* which is the manifest"):
+            plan("clips", tracks=".jsonl")
+
+    @pytest.mark.parametrize("folder", ["clips", "clips/out", "clips/day", "."])
+    def test_inputs_and_outputs_in_one_another(self, folder: str) -> None:
+        with pytest.raises(BatchError, match=r"lies in the (input|output) folder"):
+            plan("clips", folder=folder)
+
+    def test_an_input_in_the_output_folder_by_another_name(self) -> None:
+        Path("out").symlink_to("clips")
+        with pytest.raises(BatchError, match=r"clips/a\.mp4: this input lies in the output folder"):
+            plan("clips/a.mp4")
+
+    def test_an_output_that_is_an_input(self) -> None:
+        Path("out").mkdir()
+        Path("out/a.mp4").symlink_to(Path("clips/a.mp4").absolute())
+        with pytest.raises(OutputError, match=r"out/a\.mp4: is an input itself"):
+            plan("clips", overwrite=True)
+
+    def test_a_folder_that_is_a_file(self) -> None:
+        Path("out").touch()
+        with pytest.raises(OutputError, match="the folder out is no folder"):
+            plan("clips")
+
+    def test_a_folder_that_cannot_be_written(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("os.access", lambda _, mode: mode != os.W_OK)
+        with pytest.raises(OutputError, match="cannot be written to"):
+            plan("clips")

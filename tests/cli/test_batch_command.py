@@ -1,0 +1,139 @@
+"""`vdet detect-video CLIP... -d DIR`."""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import vdet
+from conftest import Run
+from running import frames_of, names, write_drive
+from vdet.config.schema import Settings
+from vdet.resources import shipped_model
+
+
+@pytest.fixture
+def clips(tmp_path: Path) -> Path:
+    folder = tmp_path / "in"
+    (folder / "day2").mkdir(parents=True)
+    for name, frames in (("a", 12), ("day2/b", 6)):
+        write_drive(folder / f"{name}.mp4", frames)
+    return folder
+
+
+def records_of(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
+
+
+def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
+    run: Run, clips: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    arguments = ("detect-video", clips, "-d", out, "--jobs", "2", "--tracks", ".csv")
+    (clips / "bad.mp4").write_bytes(b"no video")
+
+    first = run(*arguments)
+    assert first.code == 3
+    assert f"{clips}/a.mp4: 12 frames, 0 vehicles, " in first.err
+    assert f"vdet: error: {clips}/bad.mp4: is not a video" in first.err
+    *_, summary, last = first.err.splitlines()
+    assert summary == f"{out}/manifest.jsonl: 2 files done, 1 failed"
+    assert last.startswith(f"failed: {clips}/bad.mp4: is not a video")
+    made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]
+    assert names(out) == made
+    assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
+    model = shipped_model(Settings().features)
+    for record in records_of(out):
+        assert record["program"] == f"vdet {vdet.__version__}"
+        assert record["model"] == model.name
+        assert record["model_sha256"] == hashlib.sha256(model.read_bytes()).hexdigest()
+
+    refused = run(*arguments)
+    assert refused.code == 1
+    assert refused.err == f"vdet: {out}/a.mp4: is there already; give --overwrite to replace it\n"
+
+    before = (out / "a.mp4").stat().st_mtime_ns
+    write_drive(clips / "bad.mp4", 3)
+    again = run(*arguments, "--skip-existing")
+    assert again.code == 0, again.err
+    assert "1 files done, 2 there already, 0 failed" in again.err
+    assert (out / "a.mp4").stat().st_mtime_ns == before
+    assert [Path(record["input"]).name for record in records_of(out)][-1] == "bad.mp4"
+
+    nothing = run(*arguments, "--skip-existing")
+    assert nothing.code == 0
+    assert nothing.err == "all of 3 files are there already\n"
+    assert len(records_of(out)) == 4
+
+
+def test_when_none_works_the_code_is_1(run: Run, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.mp4").write_bytes(b"no video")
+    result = run("detect-video", tmp_path / "*.mp4", "-d", tmp_path / "out", "--jobs", "2")
+    assert result.code == 1
+    assert result.err.count("\nfailed: ") == 2
+    assert names(tmp_path / "out") == ["manifest.jsonl"]
+
+
+def test_times_and_tracks_alone_and_nothing_said(run: Run, clips: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ("--no-video", "--tracks", ".jsonl", "--start", "0.08", "--frames", "3")
+    result = run("-q", "detect-video", clips, "-d", out, "--jobs", "2", *options)
+    assert (result.code, result.out, result.err) == (0, "", "")
+    assert names(out) == ["a.jsonl", "day2/b.jsonl", "manifest.jsonl"]
+    numbers = [json.loads(line)["frame"] for line in (out / "a.jsonl").read_text().splitlines()]
+    assert numbers == [2, 3, 4]
+
+
+def test_one_job_works_in_a_process_of_its_own_too(run: Run, clips: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = run("detect-video", clips / "a.mp4", "-d", out, "--jobs", "1", "--frames", "2")
+    assert result.code == 0, result.err
+    assert names(out) == ["a.mp4", "manifest.jsonl"]
+
+
+def test_a_dry_run_lists_and_does_nothing(run: Run, clips: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    result = run("detect-video", clips, "-d", out, "--tracks", ".txt", "--dry-run")
+    assert result.code == 0
+    assert result.out.splitlines() == [
+        f"{clips}/a.mp4 → {out}/a.mp4, {out}/a.txt",
+        f"{clips}/day2/b.mp4 → {out}/day2/b.mp4, {out}/day2/b.txt",
+    ]
+    assert not out.exists()
+    out.mkdir()
+    (out / "a.mp4").touch()
+    result = run("detect-video", clips, "-d", out, "--skip-existing", "--dry-run")
+    assert result.out.splitlines() == [
+        f"{clips}/a.mp4: {out}/a.mp4 there already",
+        f"{clips}/day2/b.mp4 → {out}/day2/b.mp4",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("-d", "out", "--tracks", "all.txt"), "with -d give --tracks a suffix: .txt, .csv, .jso"),
+        (("-d", "out", "--no-video"), "nothing would be written"),
+        (("-d", "out", "--stages", "x", "--at", "1"), "are for one video"),
+        (("-d", "out", "--overwrite", "--skip-existing"), "do not go together"),
+        (("-d", "out", "--jobs", "2", "--scheduler", "tcp://x:1"), "--jobs is for this machine"),
+        (("-d", "out", "--jobs", "0"), "is not in the range"),
+        (("-d", "out", "--start", "2", "--end", "1"), "--end must be later"),
+        (("out.mp4", "--dry-run"), "go with -d DIR"),
+        (("out.mp4", "--skip-existing"), "go with -d DIR"),
+        (("out.mp4", "--jobs", "2"), "go with -d DIR"),
+        (("out.mp4", "--scheduler", "tcp://x:1"), "go with -d DIR"),
+        (("b.mp4", "c.mp4"), "or -d DIR for several videos"),
+    ],
+)
+def test_wrong_usage(
+    run: Run, clips: Path, arguments: tuple[str, ...], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(clips)
+    result = run("detect-video", clips / "a.mp4", *arguments)
+    assert result.code == 2
+    assert words in result.err
+    assert names(clips) == ["a.mp4", "day2/b.mp4"]

@@ -1,0 +1,39 @@
+"""Clips that take a while, and the program as a process that nothing is left of."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from running import Running, start, write_drive
+
+Start = Callable[..., Running]
+
+
+@pytest.fixture
+def launch() -> Iterator[Start]:
+    """Start the program in the background; what a test leaves of it is ended."""
+    started: list[Running] = []
+
+    def launch_it(*arguments: str | Path, **options: object) -> Running:
+        started.append(start(arguments, **options))  # type: ignore[arg-type]
+        return started[-1]
+
+    yield launch_it
+    for running in started:
+        running.stop()
+
+
+@pytest.fixture(scope="session")
+def long_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clip that takes some seconds."""
+    return write_drive(tmp_path_factory.mktemp("long") / "long.mp4", frames=600)
+
+
+@pytest.fixture(scope="session")
+def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of two clips that take a second or two, and a short one."""
+    folder = tmp_path_factory.mktemp("clips")
+    for name, frames in (("a", 60), ("b", 60), ("short", 5)):
+        write_drive(folder / f"{name}.mp4", frames)
+    return folder

@@ -1,0 +1,97 @@
+"""kill -9, of the program and of its workers, in the middle."""
+
+import json
+import os
+import signal
+from pathlib import Path
+
+from faults.conftest import Start
+from running import frames_of, names, unfinished, until
+
+KILL = signal.SIGKILL
+
+
+def records_of(folder: Path) -> dict[str, dict[str, object]]:
+    lines = [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
+    return {Path(record["input"]).name: record for record in lines}
+
+
+def test_after_a_kill_the_next_run_needs_no_cleaning_up(
+    launch: Start, long_clip: Path, tmp_path: Path
+) -> None:
+    arguments = ("detect-video", long_clip, tmp_path / "out.mp4", "--tracks", tmp_path / "out.csv")
+    running = launch(*arguments)
+    until(lambda: bool(unfinished(tmp_path)))
+    running.send(KILL)
+    assert running.finish().code == -KILL
+    assert len(names(tmp_path)) == 2, "it was not in the middle, or something has its final name"
+    assert launch(*arguments, "--frames", "20").finish().code == 0
+    assert names(tmp_path) == ["out.csv", "out.mp4"]
+    assert frames_of(tmp_path / "out.mp4") == 20
+
+
+def test_when_a_batch_is_killed_its_workers_end_and_clean_up(
+    launch: Start, clips: Path, tmp_path: Path
+) -> None:
+    arguments = ("detect-video", clips, "-d", tmp_path / "out", "--jobs", "2", "--skip-existing")
+    running = launch(*arguments)
+    until(lambda: len(unfinished(tmp_path)) == 2)
+    running.send(KILL)
+    until(running.is_alone)
+    assert names(tmp_path) == ["out/manifest.jsonl"]
+    result = launch(*arguments, "--frames", "9").finish()
+    assert result.code == 0, result.err
+    assert names(tmp_path / "out") == ["a.mp4", "b.mp4", "manifest.jsonl", "short.mp4"]
+    assert frames_of(tmp_path / "out" / "a.mp4") == 9
+
+
+def test_when_a_worker_is_killed_its_file_is_done_again(
+    launch: Start, clips: Path, tmp_path: Path
+) -> None:
+    running = launch("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    until(lambda: len(unfinished(tmp_path)) == 2)
+    os.kill(running.workers()[0], KILL)
+    result = running.finish()
+    assert result.code == 0, result.err
+    assert names(tmp_path) == ["a.mp4", "b.mp4", "manifest.jsonl", "short.mp4"]
+    assert {name: r["frames"] for name, r in records_of(tmp_path).items()} == {
+        "a.mp4": 60,
+        "b.mp4": 60,
+        "short.mp4": 5,
+    }
+    until(running.is_alone)
+    assert "Traceback" not in result.err
+
+
+BREAKS_INSIDE = """
+import os, signal
+from vdet.batch import task
+
+process = task.process_video
+
+def breaking(job, *arguments, **options):
+    if job.source.name == "kills.mp4":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return process(job, *arguments, **options)
+
+task.process_video = breaking
+"""
+
+
+def test_a_file_that_always_kills_its_process_is_the_only_one_that_fails(
+    launch: Start, clips: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "sitecustomize.py").write_text(BREAKS_INSIDE)
+    for name in ("kills", "sound"):
+        os.link(clips / "short.mp4", tmp_path / "in" / f"{name}.mp4")
+    running = launch(
+        *("detect-video", tmp_path / "in", "-d", tmp_path / "out", "--jobs", "2"),
+        environment={"PYTHONPATH": str(tmp_path)},
+    )
+    result = running.finish()
+    assert result.code == 3, result.err
+    assert names(tmp_path / "out") == ["manifest.jsonl", "sound.mp4"]
+    records = records_of(tmp_path / "out")
+    assert "kills.mp4: its process was killed" in str(records["kills.mp4"]["error"])
+    assert records["sound.mp4"]["error"] is None

@@ -1,0 +1,93 @@
+"""Outputs that cannot be written, and the part of the program that breaks."""
+
+import ctypes
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from faults.conftest import Start
+from red_cars import SETTINGS, red_finder
+from running import names, write_drive
+from vdet.batch.task import process_file
+from vdet.pipeline import VideoJob
+from vdet.tracking.cars import Cars
+from vdet.video import Frame
+from vdet.video.encoder import Encoder
+
+LIMIT = 5_000  # bytes: the short clip is smaller, the others are not
+CAP_DAC_OVERRIDE = 1
+PR_CAPBSET_DROP = 24
+
+
+def test_a_full_disk_fails_what_does_not_fit(launch: Start, clips: Path, tmp_path: Path) -> None:
+    running = launch("detect-video", clips, "-d", tmp_path, "--jobs", "2", largest_file=LIMIT)
+    result = running.finish()
+    assert result.code == 3, result.err
+    assert names(tmp_path) == ["manifest.jsonl", "short.mp4"]
+    records = [json.loads(line) for line in (tmp_path / "manifest.jsonl").read_text().splitlines()]
+    errors = {Path(r["input"]).stem: r["error"] for r in records}
+    assert errors["short"] is None
+    for name in ("a", "b"):
+        assert errors[name] == f"{tmp_path / name}.mp4: cannot be written: File too large"
+        assert f"failed: {errors[name]}\n" in result.err
+
+
+def _without_the_powers_of_root() -> None:
+    if os.geteuid() == 0:
+        ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
+    launch: Start, clips: Path, tmp_path: Path
+) -> None:
+    tmp_path.chmod(0o555)
+    arguments = ("detect-video", clips, "-d", tmp_path / "out")
+    result = launch(*arguments, before=_without_the_powers_of_root).finish()
+    assert result.code == 1
+    assert f"the folder {tmp_path} cannot be written to" in result.err
+    assert result.err.count("\n") == 1
+    tmp_path.chmod(0o755)
+    assert names(tmp_path) == []
+
+
+@pytest.fixture
+def job(tmp_path: Path) -> VideoJob:
+    source = write_drive(tmp_path / "clip.mp4", 150)
+    return VideoJob(source, tmp_path / "out" / "clip.mp4", tmp_path / "out" / "clip.csv")
+
+
+def test_a_writer_that_fails_at_the_100th_frame(
+    job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = Encoder.write
+    written: list[int] = []
+
+    def write_99(encoder: Encoder, frame: Frame) -> None:
+        if len(written) == 99:
+            raise OSError(5, "Input/output error")
+        written.append(frame.index)
+        write(encoder, frame)
+
+    monkeypatch.setattr(Encoder, "write", write_99)
+    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
+    assert record.error == f"{job.video}: cannot be written: Input/output error"
+    assert written == list(range(99))
+    assert names(tmp_path / "out") == []
+
+
+def test_a_tracker_that_raises(
+    run: Run, job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def update(*_: object) -> None:
+        raise ZeroDivisionError("no\nscale")
+
+    monkeypatch.setattr(Cars, "update", update)
+    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
+    assert record.error is not None
+    assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
+    result = run("detect-video", job.source, tmp_path / "out" / "single.mp4")
+    assert (result.code, result.err.count("\n")) == (1, 1)
+    assert names(tmp_path / "out") == []

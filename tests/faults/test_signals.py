@@ -1,0 +1,72 @@
+"""Ctrl-C and SIGTERM: a prompt end, nothing half-written, exit code 130."""
+
+import signal
+from pathlib import Path
+
+import pytest
+
+from faults.conftest import Start
+from running import names, unfinished, until
+
+HALF_LOADED = """
+import sys, time
+
+class Slow:
+    @staticmethod
+    def find_spec(name, *_):
+        if name == "vdet.cli.main":
+            print("loading", file=sys.stderr, flush=True)
+            time.sleep(60)
+
+sys.meta_path.insert(0, Slow)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_in_the_middle_of_a_video(
+    launch: Start, long_clip: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    running = launch("detect-video", long_clip, tmp_path / "o.mp4", "--tracks", tmp_path / "o.csv")
+    until(lambda: bool(unfinished(tmp_path)))
+    running.send(number)
+    result = running.finish()
+    assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize(("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False)])
+def test_in_the_middle_of_a_batch(
+    launch: Start, clips: Path, tmp_path: Path, number: signal.Signals, to_all: bool
+) -> None:
+    running = launch("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    until(lambda: len(unfinished(tmp_path)) == 2)
+    running.send(number, to_all=to_all)
+    result = running.finish()
+    assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
+    until(running.is_alone)
+    assert names(tmp_path) == ["manifest.jsonl"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_while_the_program_is_loaded(launch: Start, tmp_path: Path, number: signal.Signals) -> None:
+    (tmp_path / "sitecustomize.py").write_text(HALF_LOADED)
+    running = launch("--version", environment={"PYTHONPATH": str(tmp_path)})
+    assert running.process.stderr is not None
+    assert running.process.stderr.readline() == "loading\n"
+    running.send(number)
+    result = running.finish()
+    assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
+
+
+def test_what_nohup_lets_the_program_ignore_is_ignored(
+    launch: Start, clips: Path, tmp_path: Path
+) -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        running = launch("detect-video", clips / "a.mp4", tmp_path / "out.mp4")
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    until(lambda: bool(unfinished(tmp_path)))
+    running.send(signal.SIGHUP)
+    assert running.finish().code == 0
+    assert names(tmp_path) == ["out.mp4"]
