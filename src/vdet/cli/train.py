@@ -6,7 +6,7 @@ import click
 
 from vdet.cli.options import PathOf, overwrite_option, read_settings, settings_options
 from vdet.cli.progress import progress_bar
-from vdet.dataset import find_patches
+from vdet.dataset import find_boxed, find_patches
 from vdet.errors import OutputError
 from vdet.files import check_output
 from vdet.model import save_model
@@ -31,8 +31,9 @@ def train(
 ) -> None:
     """Train a model on DATA: folders or zip files of labelled patches.
 
-    Patches lie in vehicles/<group>/ and non-vehicles/<group>/. The report is printed, and written
-    beside the model as JSON.
+    Patches lie in vehicles/<group>/ and non-vehicles/<group>/. Where a boxes.csv beside these
+    folders tells where in a patch the vehicle is, as in those of vdet mine, the model learns to
+    find its sides. The report is printed, and written beside the model as JSON.
     """
     from vdet.training import train as fit_model
 
@@ -42,9 +43,10 @@ def train(
     report_path = output.with_suffix(".json")
     for path in (output, report_path):
         check_output(path, overwrite=overwrite, inputs=data)
-    files = find_patches(data)
+    files, boxed = find_patches(data), find_boxed(data)
     with progress_bar(" patches", quiet=quiet) as start:
-        model, report = fit_model(files, settings, jobs=jobs or -1, progress=start(len(files)))
+        advance = start(len(files) + len(boxed))
+        model, report = fit_model(files, settings, boxed=boxed, jobs=jobs or -1, progress=advance)
     save_model(model, output)
     report.write(report_path)
     click.echo("\n".join(report.lines()))
