@@ -16,10 +16,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 250
 
 ROOMS = (
-    "cli", "demo", "evaluation", "pipeline", "stills", "annotation", "overlay", "frame_result",
-    "stream", "trackfile", "training", "detection", "tracking", "heatmap", "search", "lanes",
-    "resources", "model", "features", "windows", "dataset", "synthetic", "video", "images",
-    "files", "geometry", "config", "errors", "__init__",
+    "cli", "demo", "mining", "evaluation", "pipeline", "stills", "annotation", "overlay",
+    "frame_result", "stream", "trackfile", "training", "detection", "tracking", "votes", "heatmap",
+    "search", "lanes", "resources", "model", "features", "windows", "dataset", "synthetic", "video",
+    "images", "files", "overlaps", "geometry", "config", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

@@ -1,5 +1,6 @@
 """The stream: frames → search → heat → tracker → annotation → writer."""
 
+import itertools
 import logging
 import os
 import time
@@ -10,9 +11,8 @@ from fractions import Fraction
 from pathlib import Path
 
 from vdet.annotation import StagePictures, annotate
-from vdet.config.scaling import scale_lengths
 from vdet.config.schema import OutputSettings, Settings
-from vdet.detection import Detector
+from vdet.detection import Detector, horizon_of
 from vdet.errors import ConfigError, ImageError, VideoError
 from vdet.files import check_output
 from vdet.frame_result import FrameResult
@@ -21,9 +21,12 @@ from vdet.model import LinearModel
 from vdet.overlay.stages import check_stages
 from vdet.stream import ahead, behind, each_with, quiet_libraries
 from vdet.trackfile import check_suffix, track_writer
-from vdet.tracking.cars import Cars
+from vdet.tracking.choice import tracker_of
 from vdet.video import Frame, FrameWriter, NullWriter, VideoInfo, VideoReader, VideoWriter
 from vdet.windows import Windows
+
+HORIZON_FRAMES = 5
+"""From the first one on, in which the horizon is looked for."""
 
 log = logging.getLogger("vdet")
 
@@ -89,18 +92,29 @@ def follow(
     ImageError
         No search window fits into such a frame.
     """
-    detector = Detector(model, settings, width, height)
-    cars = Cars(scale_lengths(settings.tracker, height / settings.reference_height))
+    frames, horizon = seek_horizon(frames, settings)
+    detector = Detector(model, settings, width, height, horizon=horizon)
+    track = tracker_of(settings, width, height)
 
     def search(frame: Frame) -> tuple[Windows, Look | None]:
-        return detector.search(frame.image), watch.look(frame.image) if watch else None
+        windows = detector.search(frame.image, frame.index)
+        return windows, watch.look(frame.image) if watch else None
 
     with each_with(search, frames, threads) as searched:
         for frame, (windows, look) in searched:
             detection = detector.accumulate(windows)
-            tracks = cars.update(frame.image, detection.regions)
+            tracks = track(frame.image, detection.regions)
             road = watch.follow(look) if watch and look else None
             yield FrameResult(frame, detection, tuple(tracks), road)
+
+
+def seek_horizon(frames: Iterable[Frame], settings: Settings) -> tuple[Iterable[Frame], float]:
+    """Return the same frames, and the horizon's row as a share of their height."""
+    rest = iter(frames)
+    first = list(itertools.islice(rest, HORIZON_FRAMES))
+    horizon = horizon_of(settings, [frame.image for frame in first])
+    log.info("the horizon lies at %.2f of the height", horizon)
+    return itertools.chain(first, rest), horizon
 
 
 def process_video(
@@ -143,7 +157,7 @@ def process_video(
         encode = stack.enter_context(behind(video.write))
         read = stack.enter_context(ahead(reader))
         at = reader.info.start + job.at
-        pictures = StagePictures(job.stages, at, settings, model.features)
+        pictures = StagePictures(job.stages, at, model.features)
         advance = progress(reader.expected)
         size = reader.info.width, reader.info.height
         threads = threads or os.cpu_count() or 1

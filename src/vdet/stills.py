@@ -120,9 +120,7 @@ def process_still(
     boxes = still_boxes(detection, settings, height)
     labelled = [(box, f"heat {peak:.1f}") for box, peak in boxes]
     if job.stages:
-        write_stages(
-            job.stages, image, detection, labelled, settings=settings, features=model.features
-        )
+        write_stages(job.stages, image, detection, labelled, features=model.features)
         if road:
             write_lane_stages(job.stages, road)
     if job.picture:

@@ -8,22 +8,23 @@ import numpy as np
 from vdet.features import FeatureExtractor, to_patch
 from vdet.model import LinearModel
 from vdet.search.pyramid import FramePyramid
-from vdet.windows import Floats, WindowGrid
+from vdet.search.scored import Scored
+from vdet.windows import WindowGrid
 
 
 class PatchSearch:
-    """Scores the windows of one grid, all inside the frame."""
+    """Scores the windows of one grid."""
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
         self._boxes = grid.boxes
         self._extractor = FeatureExtractor(model.features)
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
-        side = self._model.features.patch
-        vectors = np.empty((len(self._boxes), self._extractor.layout.length), np.float32)
-        for i, (x, y, width, height) in enumerate(self._boxes.tolist()):
-            crop = frame.image[y : y + height, x : x + width]
-            vectors[i] = self._extractor.describe(to_patch(crop, side))
-        return self._model.probabilities(vectors)
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
+        side, layout = self._model.features.patch, self._extractor.layout
+        vectors = np.empty((len(self._boxes), layout.length), np.float32)
+        for i, box in enumerate(self._boxes.tolist()):
+            vectors[i] = self._extractor.describe(to_patch(frame.crop(*box), side))
+        probabilities = self._model.probabilities(vectors)
+        return Scored(probabilities, lambda numbers: vectors[numbers, : layout.hog_length])

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
-from vdet.features import Vectors, hog_descriptor
+from vdet.features import Layout, Vectors, hog_descriptor
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.dense.histogram import table_sums
@@ -19,9 +18,8 @@ from vdet.search.dense.hog import channel_of
 from vdet.search.dense.strips import Strip
 from vdet.search.dense.weights import DenseWeights
 from vdet.search.pyramid import FramePyramid
-from vdet.windows import Floats, WindowGrid, every_nth
-
-Indices = npt.NDArray[np.intp]
+from vdet.search.scored import Numbers, Scored
+from vdet.windows import WindowGrid, every_nth
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +27,9 @@ class _Phase:
     """The windows on one strip: their numbers in the grid, and their places in the strip."""
 
     strip: Strip
-    numbers: Indices
-    x: Indices
-    y: Indices
+    numbers: Numbers
+    x: Numbers
+    y: Numbers
 
 
 class LocatedSearch:
@@ -45,9 +43,10 @@ class LocatedSearch:
         side = model.features.patch
         self._hog = hog_descriptor(model.features, (side, side))
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
         probabilities = np.zeros(self._windows, np.float32)
+        hogs = np.zeros((self._windows, Layout.of(self._model.features).hog_length), np.float32)
         for phase in self._phases:
             strip = phase.strip.cut(frame)
             vectors = self._describe(strip, phase)
@@ -55,7 +54,8 @@ class LocatedSearch:
             side = self._model.features.patch
             scores += table_sums(strip, self._tables, side, phase.x, phase.y).T
             probabilities[phase.numbers] = self._model.probabilities_of_scores(scores)
-        return probabilities
+            hogs[phase.numbers] = vectors
+        return Scored(probabilities, lambda numbers: hogs[numbers])
 
     def _describe(self, strip: Image, phase: _Phase) -> Vectors:
         """Return the HOG of each window, float32 `(n, features)`, channel by channel."""
