@@ -9,7 +9,7 @@ import pytest
 from hypothesis import settings
 
 from vdet.cli import main
-from vdet.config.schema import Settings
+from vdet.config.schema import Settings, TrainingSettings, ViewSettings
 from vdet.dataset import find_patches
 from vdet.model import save_model
 from vdet.synthetic import default_clip, write_clip, write_patches
@@ -59,9 +59,10 @@ def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A model with the seed's features, trained on generated patches."""
+    """A model with the default features, trained on generated patches and nothing made of them."""
     path = tmp_path_factory.mktemp("model") / "model.npz"
-    model, _ = train(find_patches([patches_path]), Settings(), jobs=1)
+    plain = TrainingSettings(views=ViewSettings(mirror=False, cut=0, parts=0))
+    model, _ = train(find_patches([patches_path]), Settings(training=plain), jobs=1)
     save_model(model, path)
     return path
 

@@ -1,12 +1,15 @@
 """Settings with which tests find vehicles quickly in the small clip, by the small model.
 
-One set of windows, about as large as the nearest vehicle; and since the model has seen few
-patches, less heat makes a region, and less of it a confident one.
+One set of windows, about as large as the nearest vehicle, and the original's outlines and rules;
+and since the model has seen few patches, less heat makes a region, and less of it a confident one.
 """
 
 QUICK = (
     "search.windows=[{size: 80, step: 1, top: 380, bottom: 520}]",
-    "heat={frames: 4, weight: coverage, shrink: 4, blur: 15, threshold: 0.2}",
+    "search.perspective.sizes=[]",
+    "search.alternate=1",
+    "heat={frames: 4, weight: coverage, shrink: 4, blur: 15, threshold: 0.2, regions: outline}",
+    "tracker.method=rules",
     "tracker.confident_peak=0.3",
     "tracker.confident_detections_needed=2",
 )

@@ -83,7 +83,7 @@ def test_the_lane_lies_under_the_boxes() -> None:
 
 class TestStagePictures:
     def offered(self, folder: Path, at: Fraction, *results: FrameResult) -> list[str]:
-        pictures = StagePictures(folder, at, SETTINGS, COLOUR)
+        pictures = StagePictures(folder, at, COLOUR)
         for result in results:
             pictures.offer(result)
         return sorted(path.name for path in folder.glob("*"))
@@ -94,7 +94,7 @@ class TestStagePictures:
         assert len(self.offered(tmp_path / "b", Fraction(2), early, late)) == 5
 
     def test_are_made_once(self, tmp_path: Path) -> None:
-        pictures = StagePictures(tmp_path, Fraction(0), SETTINGS, COLOUR)
+        pictures = StagePictures(tmp_path, Fraction(0), COLOUR)
         pictures.offer(result_of())
         for path in tmp_path.iterdir():
             path.unlink()

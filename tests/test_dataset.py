@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.dataset import MAX_PATCH_BYTES, PatchFile, find_patches, read_patches
+from vdet.dataset import MAX_PATCH_BYTES, PatchFile, find_boxed, find_patches, read_patches
 from vdet.errors import DataError
 
 PATCH = np.random.default_rng(0).integers(0, 256, (8, 8, 3), dtype=np.uint8)
@@ -313,3 +313,91 @@ def test_devices_and_pipes_in_a_folder_are_no_patches(tmp_path: Path) -> None:
 def test_a_patch_names_its_source_and_its_place_in_it(tmp_path: Path) -> None:
     archive = make_zip(tmp_path / "set.zip", BOTH)
     assert str(first_of(archive)) == f"{archive}: non-vehicles/road/1.png"
+
+
+BOXED = [*BOTH, "boxes/far/2.png", "boxes/far/1.png"]
+ROWS = (
+    "name,left,top,right,bottom",
+    "vehicles/far/1.png,-0.5,-0.25,0.5,0.25",
+    "boxes/far/1.png,-0.75,-0.25,,0.5",
+    "boxes/far/2.png,,,,",
+)
+
+
+def with_table(tmp_path: Path, make: Maker, names: Iterable[str], *rows: str) -> Path:
+    source = make(tmp_path / "mined", names)
+    text = "\n".join(rows) + "\n"
+    if source.is_dir():
+        (source / "boxes.csv").write_text(text)
+    else:
+        with zipfile.ZipFile(source, "a", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("boxes.csv", text)
+    return source
+
+
+@pytest.mark.parametrize("make", [make_folder, make_zip])
+def test_a_table_says_where_in_a_patch_the_vehicle_is(tmp_path: Path, make: Maker) -> None:
+    source = with_table(tmp_path, make, BOXED, *ROWS)
+    assert [(file.group, file.vehicle, file.sides) for file in find_patches([source])] == [
+        ("non-vehicles/road", False, None),
+        ("vehicles/far", True, (-0.5, -0.25, 0.5, 0.25)),
+    ]
+    assert [(file.name, file.group, file.vehicle, file.sides) for file in find_boxed([source])] == [
+        ("boxes/far/1.png", "boxes/far", True, (-0.75, -0.25, None, 0.5)),
+        ("boxes/far/2.png", "boxes/far", True, (None,) * 4),
+    ]
+
+
+def test_a_table_is_of_its_own_source_alone(tmp_path: Path) -> None:
+    mined = with_table(tmp_path, make_folder, BOXED, *ROWS)
+    other = make_folder(tmp_path / "other", BOTH)
+    vehicles = [file for file in find_patches([mined, other]) if file.vehicle]
+    assert [(file.source, file.sides is None) for file in vehicles] == [
+        (mined, False),
+        (other, True),
+    ]
+    assert {file.source for file in find_boxed([other, mined])} == {mined}
+
+
+def test_a_picture_in_boxes_of_which_the_table_says_nothing_is_passed_over(tmp_path: Path) -> None:
+    source = with_table(tmp_path, make_folder, BOXED, *ROWS[:3])
+    assert [file.name for file in find_boxed([source])] == ["boxes/far/1.png"]
+    assert len(find_patches([source])) == 2
+
+
+def test_without_a_table_boxes_is_a_folder_as_any_other(tmp_path: Path) -> None:
+    make_folder(tmp_path, ["vehicles/boxes/1.png", "non-vehicles/1.png"])
+    assert listed(tmp_path)[1] == ("vehicles/boxes/1.png", "vehicles/boxes")
+    assert find_boxed([tmp_path]) == []
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        (),
+        ("name,left,top,right",),
+        ("vehicles/far/1.png,-0.5,-0.25,0.5,0.25",),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5"),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,0.25,0"),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,wide"),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,nan"),
+        (ROWS[0], ""),
+    ],
+)
+@pytest.mark.parametrize("make", [make_folder, make_zip])
+def test_a_table_that_is_none_is_refused(
+    tmp_path: Path, make: Maker, rows: tuple[str, ...]
+) -> None:
+    source = with_table(tmp_path, make, BOXED, *rows)
+    with pytest.raises(DataError, match=r"mined: boxes\.csv is damaged .*; mine it anew"):
+        find_patches([source])
+
+
+def test_a_table_that_cannot_be_unpacked_is_refused(tmp_path: Path) -> None:
+    source = with_table(tmp_path, make_zip, BOXED, *ROWS)
+    data = bytearray(source.read_bytes())
+    at = data.find(b"boxes.csv") + len(b"boxes.csv")
+    data[at + 8] ^= 0xFF
+    source.write_bytes(data)
+    with pytest.raises(DataError, match=r"boxes\.csv is damaged"):
+        find_boxed([source])

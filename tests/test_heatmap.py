@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Literal
 
 import cv2
@@ -13,7 +14,12 @@ from vdet.windows import Windows, lay_grid
 def found(*windows: tuple[int, int, int, int, float], share: float = 1) -> Windows:
     boxes = np.array([window[:4] for window in windows], np.int32).reshape(-1, 4)
     probabilities = np.array([window[4] for window in windows], np.float32)
-    return Windows(boxes, probabilities, np.full(len(windows), share, np.float32))
+    shares = np.full(len(windows), share, np.float32)
+    return Windows(boxes, probabilities, shares, boxes.astype(np.float32))
+
+
+def parts(windows: Windows) -> list[np.ndarray]:
+    return [windows.boxes, windows.probabilities, windows.shares, windows.vehicles]
 
 
 def heat_map(
@@ -139,18 +145,31 @@ def test_by_coverage_heat_does_not_depend_on_overlap(overlap: float) -> None:
     settings = WindowSettings(size=20, overlap=overlap, top=0, bottom=60)
     grid = lay_grid(settings, 100, 60)
     shares = np.full(len(grid), grid.share, np.float32)
-    windows = Windows(grid.boxes, np.ones(len(grid), np.float32), shares)
+    ones, boxes = np.ones(len(grid), np.float32), grid.boxes
+    windows = Windows(boxes, ones, shares, boxes.astype(np.float32))
     assert values_of(heat_map(weight="coverage"), windows)[30, 50] == pytest.approx(1)
 
 
 def test_by_coverage_sets_that_agree_add_up() -> None:
     heat = heat_map(weight="coverage")
-    both = Windows(
-        np.array([[0, 0, 40, 40], [20, 20, 20, 20]], np.int32),
-        np.ones(2, np.float32),
-        np.array([0.25, 0.0625], np.float32),
-    )
+    large, small = found((0, 0, 40, 40, 1), share=0.25), found((20, 20, 20, 20, 1), share=0.0625)
+    both = Windows(*(np.concatenate(pair) for pair in zip(parts(large), parts(small), strict=True)))
     assert values_of(heat, both)[30, 30] == 0.3125
+
+
+def test_a_window_heats_the_vehicle_that_it_shows_not_itself() -> None:
+    window = found((10, 10, 20, 20, 0.5))
+    shown = replace(window, vehicles=np.array([[14, 12, 30, 10]], np.float32))
+    expected = values_of(heat_map(), found((14, 12, 30, 10, 0.5)))
+    np.testing.assert_array_equal(values_of(heat_map(), shown), expected)
+
+
+@pytest.mark.parametrize(("x", "first"), [(9.4, 9), (9.6, 10), (-0.4, 0)])
+def test_sides_of_a_vehicle_between_pixels_go_to_the_nearest(x: float, first: int) -> None:
+    window = found((10, 10, 20, 20, 1))
+    shown = replace(window, vehicles=np.array([[x, 5, 20, 10]], np.float32))
+    (columns,) = np.nonzero(values_of(heat_map(), shown)[7])
+    assert columns.tolist() == list(range(first, first + 20))
 
 
 @pytest.mark.parametrize("shrink", [2, 4, 8])

@@ -16,11 +16,11 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 250
 
 ROOMS = (
-    "__main__", "cli", "demo", "batch", "evaluation", "pipeline", "following", "stills",
+    "__main__", "cli", "demo", "batch", "mining", "evaluation", "pipeline", "following", "stills",
     "annotation", "overlay", "frame_result", "stream", "trackfile", "training", "detection",
-    "tracking", "heatmap", "search", "lanes", "resources", "model", "features", "windows",
+    "tracking", "votes", "heatmap", "search", "lanes", "resources", "model", "features", "windows",
     "dataset", "synthetic", "video", "images", "files", "temporaries", "cluster", "workers",
-    "geometry", "config", "untrusted", "hushed", "errors", "__init__",
+    "overlaps", "geometry", "config", "untrusted", "hushed", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

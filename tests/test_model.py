@@ -5,6 +5,7 @@ import pickle
 import tracemalloc
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,16 @@ import pytest
 
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings, SpatialSettings
 from vdet.errors import ModelError, OutputError
-from vdet.model import LinearModel, load_model, save_model
+from vdet.model import BoxRegression, LinearModel, load_model, save_model
 
 # 8 bins a channel and nothing else: 24 features
 SMALL = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+# 4 × 4 cells, each a block of its own, 2 directions: 32 features, and 24 of the histogram
+WITH_HOG = FeatureSettings(
+    patch=16,
+    hog=HogSettings(cell=4, block=1, orientations=2, channels=(0,)),
+    histogram=HistogramSettings(bins=8),
+)
 
 
 def model_of(members: int, features: FeatureSettings = SMALL, length: int = 24) -> LinearModel:
@@ -28,9 +35,25 @@ def model_of(members: int, features: FeatureSettings = SMALL, length: int = 24) 
     return LinearModel(features, weights, biases, slopes, offsets, provenance)
 
 
-def header_of(**changes: Any) -> dict[str, Any]:
-    features = SMALL.model_dump(mode="json")
-    header = {"format": "vdet model", "version": 1, "features": features, "provenance": {}}
+def model_with_boxes() -> LinearModel:
+    rng = np.random.default_rng(9)
+    weights, biases = rng.normal(size=(4, 32)), rng.normal(size=4)
+    boxes = BoxRegression(weights.astype(np.float32), biases.astype(np.float32))
+    return replace(model_of(2, WITH_HOG, 56), boxes=boxes)
+
+
+def boxes_of(model: LinearModel) -> BoxRegression:
+    assert model.boxes is not None
+    return model.boxes
+
+
+def header_of(asked: FeatureSettings = SMALL, **changes: Any) -> dict[str, Any]:
+    header = {
+        "format": "vdet model",
+        "version": 2,
+        "features": asked.model_dump(mode="json"),
+        "provenance": {},
+    }
     return {key: value for key, value in (header | changes).items() if value is not ...}
 
 
@@ -43,6 +66,16 @@ def write_npz(path: Path, header: object, **arrays: npt.NDArray[Any]) -> Path:
     parts: dict[str, Any] = arrays_of(model_of(2)) | arrays
     np.savez_compressed(path, header=np.frombuffer(text, np.uint8), **parts)
     return path
+
+
+def box_arrays() -> dict[str, npt.NDArray[Any]]:
+    boxes = boxes_of(model_with_boxes())
+    return {"box_weights": boxes.weights, "box_biases": boxes.biases}
+
+
+def write_with_boxes(path: Path, **changes: npt.NDArray[Any]) -> Path:
+    arrays = arrays_of(model_with_boxes()) | box_arrays() | changes
+    return write_npz(path, header_of(WITH_HOG), **arrays)
 
 
 def write_members(path: Path, members: Mapping[str, bytes]) -> Path:
@@ -126,6 +159,62 @@ def test_the_features_of_a_model_come_with_it(path: Path) -> None:
     save_model(model_of(1, features, 1568 + 96 + 48), path)
     assert load_model(path).features == features
     assert load_model(path, features).features == features
+
+
+def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
+    weights = np.array([[1, 0], [0, 1], [2, 0], [0, -1]], np.float32)
+    regression = BoxRegression(weights, np.array([-0.5, -0.5, 0.5, 0.5], np.float32))
+    sides = regression.sides(np.array([[0.25, 1], [0, 0]], np.float32))
+    assert sides.tolist() == [[-0.25, 0.5, 1, -0.5], [-0.5, -0.5, 0.5, 0.5]]
+
+
+def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
+    saved = model_with_boxes()
+    save_model(saved, path)
+    loaded = load_model(path, WITH_HOG)
+    np.testing.assert_array_equal(loaded.weights, saved.weights)
+    for name in ("weights", "biases"):
+        array = getattr(boxes_of(loaded), name)
+        np.testing.assert_array_equal(array, getattr(boxes_of(saved), name))
+        assert array.dtype == np.float32
+
+
+def test_a_model_without_boxes_is_loaded_without(path: Path) -> None:
+    save_model(replace(model_with_boxes(), boxes=None), path)
+    assert load_model(path).boxes is None
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "message"),
+    [
+        ("box_weights", np.zeros((4, 31), np.float32), "box_weights are damaged; train it again"),
+        ("box_weights", np.zeros((4, 56), np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((3, 32), np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros(128, np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((4, 32)), "box_weights are damaged"),
+        ("box_weights", np.full((4, 32), np.nan, np.float32), "box_weights hold a value that is"),
+        ("box_biases", np.zeros(3, np.float32), "box_biases are damaged"),
+        ("box_biases", np.zeros((4, 1), np.float32), "box_biases are damaged"),
+        ("box_biases", np.zeros(4, "S4"), "box_biases are damaged"),
+        ("box_biases", np.array([0, 0, np.inf, 0], np.float32), "box_biases hold a value that is"),
+    ],
+)
+def test_a_regression_that_does_not_fit_is_refused(
+    path: Path, name: str, array: npt.NDArray[Any], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        load_model(write_with_boxes(path, **{name: array}))
+
+
+@pytest.mark.parametrize("missing", ["box_weights", "box_biases"])
+def test_half_a_regression_is_damage(path: Path, missing: str) -> None:
+    arrays = {name: array for name, array in box_arrays().items() if name != missing}
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(write_npz(path, header_of(WITH_HOG), **arrays_of(model_with_boxes()), **arrays))
+
+
+def test_a_regression_written_by_hand_is_read(path: Path) -> None:
+    assert boxes_of(load_model(write_with_boxes(path))).weights.shape == (4, 32)
 
 
 def test_a_model_without_provenance_has_an_empty_one(path: Path) -> None:
@@ -223,7 +312,7 @@ def test_another_compression_than_the_one_that_is_declared_is_damage(
         (b"{not json", "is not a vdet model"),
         (b"\xff\xfe\xff", "is not a vdet model"),
         (b"[" * 100_000, "is not a vdet model"),
-        (header_of(version=2), r"of version 2, this program reads version 1; train it again"),
+        (header_of(version=1), r"of version 1, this program reads version 2; train it again"),
         (header_of(version=[1]), r"of version \[1\]"),
         (header_of(version="1"), "of version '1'"),
         (header_of(version=...), "of version None"),

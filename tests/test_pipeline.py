@@ -4,7 +4,7 @@ import gc
 import json
 import threading
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import count, islice, pairwise
@@ -16,12 +16,23 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from quick import QUICK
-from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, red_finder, road
+from quick import QUICK, QUICK_OPTIONS
+from red_cars import (
+    HEIGHT,
+    PERSPECTIVE,
+    SETTINGS,
+    WIDTH,
+    by_perspective,
+    car_at,
+    drive,
+    red_finder,
+    road,
+)
 from vdet.config.loading import load_settings
-from vdet.config.schema import OutputSettings, SearchSettings, Settings, WindowSettings
+from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.errors import ImageError, OutputError, VdetError, VideoError
-from vdet.following import follow
+from vdet.following import HORIZON_FRAMES, follow, seek_horizon
+from vdet.images import Image
 from vdet.model import load_model
 from vdet.pipeline import Summary, VideoJob, process_video
 from vdet.synthetic import frames, truth
@@ -84,9 +95,24 @@ class TestFollow:
             assert track.id == 1
             assert track.box.iou(car_at(result.frame.index)) > 0.3
 
-    def test_gives_the_same_whatever_the_number_of_threads(self) -> None:
+    def test_follows_it_by_the_perspective_votes_and_motion_too(self) -> None:
+        results = list(follow(drive(20), red_finder(), PERSPECTIVE, WIDTH, HEIGHT))
+        shown = [result for result in results if result.tracks]
+        assert len(shown) > 15
+        for result in shown:
+            (track,) = result.tracks
+            assert track.id == 1
+            assert track.box.iou(car_at(result.frame.index)) > 0.5
+
+    def test_searches_each_frame_at_the_sets_whose_turn_it_is(self) -> None:
+        for result in follow(drive(5), red_finder(), PERSPECTIVE, WIDTH, HEIGHT, threads=2):
+            sizes = set(result.detection.windows.boxes[:, 2].tolist())
+            assert sizes == ({64} if result.frame.index % 2 else {48})
+
+    @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
+    def test_gives_the_same_whatever_the_number_of_threads(self, settings: Settings) -> None:
         one, many = (
-            list(follow(drive(20), red_finder(), SETTINGS, WIDTH, HEIGHT, threads=threads))
+            list(follow(drive(20), red_finder(), settings, WIDTH, HEIGHT, threads=threads))
             for threads in (1, 5)
         )
         assert [result.tracks for result in many] == [result.tracks for result in one]
@@ -115,6 +141,58 @@ class TestFollow:
     def test_a_frame_too_small_for_any_window_is_refused(self) -> None:
         with pytest.raises(ImageError, match="no search window fits into a frame of 20×240"):
             list(follow(drive(3), red_finder(), SETTINGS, 20, HEIGHT))
+
+
+class TestHorizon:
+    """Where it is not set, the first frames tell; and they are searched like all others."""
+
+    FREE = by_perspective(0)
+
+    @pytest.fixture
+    def asked(self, monkeypatch: pytest.MonkeyPatch) -> list[list[Image]]:
+        """The pictures in which it is looked for; it is always found at 0.35."""
+        asked: list[list[Image]] = []
+
+        def find(images: Sequence[Image]) -> float:
+            asked.append(list(images))
+            return 0.35
+
+        monkeypatch.setattr("vdet.detection.find_horizon", find)
+        return asked
+
+    def test_is_looked_for_in_the_first_frames_once(self, asked: list[list[Image]]) -> None:
+        list(follow(drive(12), red_finder(), self.FREE, WIDTH, HEIGHT))
+        ((*images,),) = asked
+        assert len(images) == HORIZON_FRAMES == 5
+        for index, image in enumerate(images):
+            np.testing.assert_array_equal(image, road(car_at(index)))
+
+    def test_that_is_set_is_not_looked_for(self, asked: list[list[Image]]) -> None:
+        list(follow(drive(6), red_finder(), PERSPECTIVE, WIDTH, HEIGHT))
+        assert asked == []
+
+    def test_that_is_found_is_as_good_as_one_that_is_set(self, asked: list[list[Image]]) -> None:
+        found, given = (
+            [(each.frame.index, each.tracks) for each in follow(drive(12), *rest, WIDTH, HEIGHT)]
+            for rest in ((red_finder(), self.FREE), (red_finder(), PERSPECTIVE))
+        )
+        assert found == given
+        assert [index for index, _ in found] == list(range(12))
+        assert asked
+
+    @pytest.mark.parametrize("count", [0, 1, 4])
+    def test_a_clip_may_be_shorter(self, asked: list[list[Image]], count: int) -> None:
+        results = list(follow(drive(count), red_finder(), self.FREE, WIDTH, HEIGHT))
+        assert [result.frame.index for result in results] == list(range(count))
+        assert [len(images) for images in asked] == [count]
+
+    def test_no_more_frames_are_read_than_it_needs(self, asked: list[list[Image]]) -> None:
+        frames = drive(12)
+        same, horizon = seek_horizon(frames, self.FREE)
+        assert horizon == 0.35
+        assert next(frames).index == HORIZON_FRAMES
+        assert [frame.index for frame in same] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
+        assert len(asked) == 1
 
 
 class TestMemory:
@@ -248,12 +326,16 @@ class TestBreakage:
             run_red(job)
 
     def test_the_command_is_interrupted(
-        self, run: Run, clip_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+        self,
+        run: Run,
+        clip_path: Path,
+        model_path: Path,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         monkeypatch.setattr(Cars, "update", _breaking(Cars.update, KeyboardInterrupt()))
-        few = "search.windows=[{size: 160, overlap: 0.5, top: 380, bottom: 600}]"
         outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "out.csv")
-        result = run("detect-video", clip_path, *outputs, "--set", few)
+        result = run("detect-video", clip_path, *outputs, "--model", model_path, *QUICK_OPTIONS)
         assert result.code == 130
         assert "interrupted" in result.err
         assert list(tmp_path.iterdir()) == []
@@ -375,7 +457,8 @@ class TestFidelity:
     def test_a_car_in_a_rotated_clip_is_found_upright(self, red_clip: Path, tmp_path: Path) -> None:
         source = _remuxed(red_clip, tmp_path / "in.mp4", rotation=180)
         whole = (WindowSettings(size=32, overlap=0.75, top=0, bottom=HEIGHT),)
-        settings = SETTINGS.model_copy(update={"search": SearchSettings(windows=whole)})
+        search = SETTINGS.search.model_copy(update={"windows": whole})
+        settings = SETTINGS.model_copy(update={"search": search})
         run_red(VideoJob(source, None, tmp_path / "out.jsonl", frames=15), settings)
         last = json.loads((tmp_path / "out.jsonl").read_text().splitlines()[-1])
         (track,) = last["tracks"]

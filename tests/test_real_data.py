@@ -43,7 +43,9 @@ class Shipped:
 
     def find(self, image: Image) -> list[Box]:
         detection = detect_still(self.model, self.settings, image)
-        return [box for box, _ in still_boxes(detection, self.settings, image.shape[0])]
+        return [
+            box for box, _ in still_boxes(detection, self.settings, image.shape[1], image.shape[0])
+        ]
 
 
 def with_model(settings: Settings) -> Shipped:

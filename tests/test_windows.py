@@ -186,10 +186,13 @@ def test_every_second_window_from_the_second_column_and_row_on() -> None:
 def test_detected_keeps_windows_of_at_least_the_probability_in_order() -> None:
     boxes = np.arange(16, dtype=np.int32).reshape(4, 4)
     probabilities = np.array([0.5, 0.25, 0.75, 0.499], np.float32)
-    windows = Windows(boxes, probabilities, np.array([1, 0.5, 0.25, 0.125], np.float32))
+    shares = np.array([1, 0.5, 0.25, 0.125], np.float32)
+    vehicles = boxes.astype(np.float32) + 0.5
+    windows = Windows(boxes, probabilities, shares, vehicles)
     found = windows.detected(0.5)
     assert found.boxes.tolist() == [[0, 1, 2, 3], [8, 9, 10, 11]]
     assert found.probabilities.tolist() == [0.5, 0.75]
     assert found.shares.tolist() == [1, 0.25]
+    assert found.vehicles.tolist() == [[0.5, 1.5, 2.5, 3.5], [8.5, 9.5, 10.5, 11.5]]
     assert len(windows) == 4
     assert len(found) == 2

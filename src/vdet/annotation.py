@@ -4,7 +4,7 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-from vdet.config.schema import FeatureSettings, Settings
+from vdet.config.schema import FeatureSettings
 from vdet.frame_result import FrameResult
 from vdet.lanes.drawing import draw_lane
 from vdet.overlay.drawing import draw_tracks, track_label
@@ -40,12 +40,9 @@ class StagePictures:
         Time of the moment in the file, seconds.
     """
 
-    def __init__(
-        self, folder: Path | None, at: Fraction, settings: Settings, features: FeatureSettings
-    ) -> None:
+    def __init__(self, folder: Path | None, at: Fraction, features: FeatureSettings) -> None:
         self._folder = folder
         self._at = at
-        self._settings = settings
         self._features = features
 
     @property
@@ -62,7 +59,6 @@ class StagePictures:
             result.frame.image,
             result.detection,
             [(track.box, track_label(track)) for track in result.tracks],
-            settings=self._settings,
             features=self._features,
         )
         if result.road:

@@ -49,6 +49,11 @@ class Layout:
         )
 
     @property
+    def hog_length(self) -> int:
+        """HOG features of a patch, which come first; 4,704 for the seed's settings."""
+        return int(self.histogram.start)
+
+    @property
     def length(self) -> int:
         """Features of a patch; 4,800 for the seed's settings."""
         return int(self.spatial.stop)

@@ -1,17 +1,23 @@
 """Frames of one size → what is found in each: search, heat, tracker, and lane."""
 
+import itertools
+import logging
 from collections.abc import Generator, Iterable
 
-from vdet.config.scaling import scale_lengths
 from vdet.config.schema import Settings
-from vdet.detection import Detector, nothing_detected
+from vdet.detection import Detector, horizon_of, nothing_detected
 from vdet.frame_result import FrameResult
 from vdet.lanes.road import Look, RoadWatch
 from vdet.model import LinearModel
 from vdet.stream import each_with
-from vdet.tracking.cars import Cars
+from vdet.tracking.choice import tracker_of
 from vdet.video import Frame
 from vdet.windows import Windows
+
+HORIZON_FRAMES = 5
+"""From the first one on, in which the horizon is looked for."""
+
+log = logging.getLogger("vdet")
 
 
 def follow(
@@ -34,18 +40,29 @@ def follow(
     ImageError
         No search window fits into such a frame.
     """
-    detector = Detector(model, settings, width, height)
-    cars = Cars(scale_lengths(settings.tracker, height / settings.reference_height))
+    frames, horizon = seek_horizon(frames, settings)
+    detector = Detector(model, settings, width, height, horizon=horizon)
+    track = tracker_of(settings, width, height)
 
     def search(frame: Frame) -> tuple[Windows, Look | None]:
-        return detector.search(frame.image), watch.look(frame.image) if watch else None
+        windows = detector.search(frame.image, frame.index)
+        return windows, watch.look(frame.image) if watch else None
 
     with each_with(search, frames, threads) as searched:
         for frame, (windows, look) in searched:
             detection = detector.accumulate(windows)
-            tracks = cars.update(frame.image, detection.regions)
+            tracks = track(frame.image, detection.regions)
             road = watch.follow(look) if watch and look else None
             yield FrameResult(frame, detection, tuple(tracks), road)
+
+
+def seek_horizon(frames: Iterable[Frame], settings: Settings) -> tuple[Iterable[Frame], float]:
+    """Return the same frames, and the horizon's row as a share of their height."""
+    rest = iter(frames)
+    first = list(itertools.islice(rest, HORIZON_FRAMES))
+    horizon = horizon_of(settings, [frame.image for frame in first])
+    log.info("the horizon lies at %.2f of the height", horizon)
+    return itertools.chain(first, rest), horizon
 
 
 def pass_on(

@@ -1,5 +1,7 @@
 """Detections of the last frames summed into a heatmap, and the regions where it is hot.
 
+A window heats the vehicle that it shows: with box regression that is tighter than the window.
+
 Source: seed section 3, "Combine frames to create a heatmap and find contours".
 """
 
@@ -35,7 +37,7 @@ class Region:
     """A connected part of the heatmap above the threshold.
 
     `box` is its bounding rectangle, `centroid` its centre of mass as `(x, y)` (both in full-frame
-    pixels), `peak` the highest heat in it.
+    pixels), `peak` the highest heat in it, or the weight of the votes for it (`votes`).
     """
 
     box: Box
@@ -79,9 +81,9 @@ class HeatMap:
         heats = detections.probabilities
         if self._settings.weight == "coverage":
             heats = heats * detections.shares
-        sides = detections.boxes.astype(np.int64)
+        sides = detections.vehicles.astype(np.float64)
         sides[:, 2:] += sides[:, :2]
-        sides = np.maximum(0, (sides + self._settings.shrink // 2) // self._settings.shrink)
+        sides = np.maximum(0, np.floor(sides / self._settings.shrink + 0.5)).astype(np.int64)
         for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
             values[top:bottom, left:right] += heat
         return values

@@ -24,14 +24,33 @@ from vdet.features import Layout
 from vdet.files import replacing
 from vdet.untrusted import open_archive, read_member, read_whole
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 MAX_MEMBERS = 20
 MAX_VALUE = 1e9
 """Of a weight and its like, either way: beyond it a score or its sigmoid could overflow."""
 _MAX_BYTES = 64_000_000
 _ARRAYS = ("weights", "biases", "slopes", "offsets")
+_BOX_ARRAYS = ("box_weights", "box_biases")
 
 Floats = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class BoxRegression:
+    """The sides of the vehicle that a window shows, linear in the window's HOG.
+
+    `weights` is float32 of shape `(4, h)`, `h` the HOG features of a patch; `biases` is float32 of
+    shape `(4,)`. The rows give left, top, right and bottom, measured from the window's centre in
+    sides of the window. Source: the bounding-box regression of Felzenszwalb et al., "Object
+    Detection with Discriminatively Trained Part-Based Models", 2010, section 7.
+    """
+
+    weights: Floats
+    biases: Floats
+
+    def sides(self, hogs: Floats) -> Floats:
+        """Return left, top, right, bottom for HOG vectors, `(m, h)` → `(m, 4)`."""
+        return hogs @ self.weights.T + self.biases
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +60,8 @@ class LinearModel:
     `weights` is float32 of shape `(k, n)`; `biases`, `slopes` and `offsets` are float32 of shape
     `(k,)`. The score of member i is `weights[i] · x + biases[i]`; its probability is
     `1 / (1 + exp(slopes[i] · score + offsets[i]))`. `provenance` says
-    where the model is from, as plain JSON values (data set, metrics, versions).
+    where the model is from, as plain JSON values (data set, metrics, versions). `boxes` is None
+    where the patches it learnt from came without boxes.
     """
 
     features: FeatureSettings
@@ -50,6 +70,7 @@ class LinearModel:
     slopes: Floats
     offsets: Floats
     provenance: dict[str, Any] = field(default_factory=dict)
+    boxes: BoxRegression | None = None
 
     def scores(self, vectors: Floats) -> Floats:
         """Return the SVMs' scores of `vectors`, `(m, n)` → `(m, k)`."""
@@ -74,6 +95,11 @@ def save_model(model: LinearModel, path: Path) -> None:
         "provenance": model.provenance,
     }
     arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
+    if model.boxes is not None:
+        parts = (model.boxes.weights, model.boxes.biases)
+        arrays |= {
+            name: part.astype(np.float32) for name, part in zip(_BOX_ARRAYS, parts, strict=True)
+        }
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
@@ -90,7 +116,13 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         is ever run.
     """
     header, arrays = _read(path)
-    model = LinearModel(_features(header, path), **arrays, provenance=header.get("provenance", {}))
+    boxes = [arrays.pop(name) for name in _BOX_ARRAYS if name in arrays]
+    model = LinearModel(
+        _features(header, path),
+        **arrays,
+        provenance=header.get("provenance", {}),
+        boxes=BoxRegression(*boxes) if boxes else None,
+    )
     _check_arrays(model, path)
     if features is not None and features != model.features:
         raise ModelError(
@@ -111,7 +143,9 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Floats]]:
                     f"at most {_MAX_BYTES:,} are read"
                 )
             header = _parse_header(_read_array(archive, "header", path), path)
-            arrays = {name: _read_array(archive, name, path) for name in _ARRAYS}
+            with_boxes = any(f"{name}.npy" in archive.namelist() for name in _BOX_ARRAYS)
+            names = _ARRAYS + (_BOX_ARRAYS if with_boxes else ())
+            arrays = {name: _read_array(archive, name, path) for name in names}
             return header, arrays
     except ModelError:
         raise
@@ -177,6 +211,9 @@ def _check_arrays(model: LinearModel, path: Path) -> None:
     for name in _ARRAYS[1:]:
         _check_array(getattr(model, name), (members,), name, path)
     _check_array(model.weights, expected, "weights", path)
+    if model.boxes is not None:
+        _check_array(model.boxes.weights, (4, layout.hog_length), _BOX_ARRAYS[0], path)
+        _check_array(model.boxes.biases, (4,), _BOX_ARRAYS[1], path)
 
 
 def _check_array(array: Floats, shape: tuple[int, ...], name: str, path: Path) -> None:

@@ -123,7 +123,7 @@ def process_video(
         video = _video_writer(job, reader.info, settings.output, codec_threads)
         encode = stack.enter_context(behind(video.write, within=video, patience=patience))
         at = reader.info.start + job.at
-        pictures = StagePictures(job.stages, at, settings, model.features)
+        pictures = StagePictures(job.stages, at, model.features)
         advance = progress(reader.expected)
         size = reader.info.width, reader.info.height
         threads = threads or os.cpu_count() or 1

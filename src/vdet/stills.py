@@ -117,12 +117,10 @@ def process_still(
     except ImageError as error:
         raise ImageError(f"{job.source}: {error}") from error
     road = _road(job.source, image, settings, lanes) if lanes else None
-    boxes = still_boxes(detection, settings, height)
+    boxes = still_boxes(detection, settings, width, height)
     labelled = [(box, f"heat {peak:.1f}") for box, peak in boxes]
     if job.stages:
-        write_stages(
-            job.stages, image, detection, labelled, settings=settings, features=model.features
-        )
+        write_stages(job.stages, image, detection, labelled, features=model.features)
         if road:
             write_lane_stages(job.stages, road)
     if job.picture:

@@ -24,12 +24,16 @@ class Windows:
 
     `boxes` is int32 of shape `(n, 4)`: x, y, width, height in full-frame pixels;
     `probabilities` is float32 of shape `(n,)`, 0 to 1; `shares` is float32 of shape `(n,)`: one
-    over the number of windows of the same set that cover a pixel.
+    over the number of windows of the same set that cover a pixel. `vehicles` is float32 of shape
+    `(n, 4)`: x, y, width, height of the vehicle that a window shows, which for windows that are no
+    detections, and without box regression, is the window itself. Windows and vehicles may reach
+    beyond the frame.
     """
 
     boxes: Boxes
     probabilities: Floats
     shares: Floats
+    vehicles: Floats
 
     def __len__(self) -> int:
         return len(self.boxes)
@@ -37,10 +41,17 @@ class Windows:
     def detected(self, probability: float) -> "Windows":
         """Return those of at least this probability, in the same order."""
         keep = self.probabilities >= probability
-        return Windows(self.boxes[keep], self.probabilities[keep], self.shares[keep])
+        return Windows(
+            self.boxes[keep], self.probabilities[keep], self.shares[keep], self.vehicles[keep]
+        )
 
 
-NO_WINDOWS = Windows(np.empty((0, 4), np.int32), np.empty(0, np.float32), np.empty(0, np.float32))
+NO_WINDOWS = Windows(
+    np.empty((0, 4), np.int32),
+    np.empty(0, np.float32),
+    np.empty(0, np.float32),
+    np.empty((0, 4), np.float32),
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ import yaml
 from conftest import Outcome, Run
 from red_cars import COLOUR, SETTINGS, red_finder
 from vdet.config.lanes import LaneSettings
-from vdet.config.schema import OutputSettings, SearchSettings, Settings, WindowSettings
+from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.geometry import Box
 from vdet.images import Image, read_image, write_image
 from vdet.lanes.camera import Camera
@@ -125,7 +125,7 @@ def red_settings(lanes: LaneSettings) -> Settings:
     changes = {
         "reference_height": HEIGHT,
         "features": COLOUR,
-        "search": SearchSettings(windows=(windows,)),
+        "search": SETTINGS.search.model_copy(update={"windows": (windows,)}),
         "lanes": lanes,
         "output": OutputSettings(crf=4),
     }

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from red_cars import CAR, COLOUR, HEIGHT, SETTINGS, WIDTH, red_finder, road
-from vdet.config.schema import FeatureSettings, SearchSettings, Settings, WindowSettings
+from red_cars import CAR, COLOUR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, red_finder, road
+from vdet.config.schema import FeatureSettings, Settings, WindowSettings
 from vdet.detection import Detection, detect_still
+from vdet.geometry import Box
 from vdet.images import Image, read_image
+from vdet.overlay.drawing import color_of
 from vdet.overlay.stages import LabelledBox, write_stages
 
 NAMES = ["1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png"]
@@ -16,8 +18,8 @@ SMALLER_SET = WindowSettings(size=24, overlap=0.5, top=100, bottom=160)
 OUTSIDE = WindowSettings(size=240, overlap=0.5, top=120, bottom=360)
 
 
-def detected(image: Image) -> Detection:
-    return detect_still(red_finder(), SETTINGS, image)
+def detected(image: Image, settings: Settings = SETTINGS) -> Detection:
+    return detect_still(red_finder(), settings, image)
 
 
 def written(
@@ -28,12 +30,13 @@ def written(
     features: FeatureSettings = COLOUR,
 ) -> dict[str, Image]:
     """Write the stages of a frame and read them again; name → picture."""
-    write_stages(folder, image, detected(image), boxes, settings=settings, features=features)
+    write_stages(folder, image, detected(image, settings), boxes, features=features)
     return {path.name: read_image(path) for path in sorted(folder.iterdir())}
 
 
 def with_windows(*sets: WindowSettings) -> Settings:
-    return SETTINGS.model_copy(update={"search": SearchSettings(windows=sets)})
+    search = SETTINGS.search.model_copy(update={"windows": sets})
+    return SETTINGS.model_copy(update={"search": search})
 
 
 @pytest.mark.parametrize("image", [road(CAR), road()], ids=["a car", "nothing found"])
@@ -104,6 +107,37 @@ def test_every_window_set_has_a_grid_of_its_own_colour(tmp_path: Path) -> None:
 def test_a_set_without_room_in_the_frame_is_passed_over(tmp_path: Path) -> None:
     pictures = written(tmp_path, road(CAR), [], with_windows(*SETTINGS.search.windows, OUTSIDE))
     assert pictures["2-windows.png"].shape == (HEIGHT, WIDTH, 3)
+
+
+def beyond(share: float) -> Settings:
+    """Search by windows that reach beyond the frame's sides."""
+    perspective = PERSPECTIVE.search.perspective.model_copy(update={"beyond": share})
+    search = PERSPECTIVE.search.model_copy(update={"perspective": perspective})
+    return PERSPECTIVE.model_copy(update={"search": search})
+
+
+@pytest.mark.parametrize("share", [0, 0.5, 1])
+@pytest.mark.parametrize("x", [-40, 20, WIDTH - 40])
+def test_windows_beyond_the_sides_are_drawn_as_far_as_they_are_seen(
+    tmp_path: Path, share: float, x: int
+) -> None:
+    image = road(CAR.moved_to(x, CAR.y).clipped(WIDTH, HEIGHT))
+    pictures = written(tmp_path, image, [], beyond(share))
+    assert list(pictures) == NAMES
+    for name in NAMES[1:]:
+        assert pictures[name].shape == image.shape
+    grid = pictures["2-windows.png"]
+    for number in (0, 1):
+        rows = (grid == color_of(number)).all(axis=2).any(axis=1)
+        assert rows.sum() > 6, "a row of points for each row of windows"
+
+
+def test_the_likeliest_window_is_shown_with_the_columns_that_it_repeats(tmp_path: Path) -> None:
+    edge = road(Box(0, 110, 8, 60))  # its window sees red where the frame has ended
+    likely = np.vsplit(written(tmp_path, edge, [], beyond(0.75))["1-patches.png"], 2)[0]
+    patch = likely[28:220, 4:196]
+    red = (patch[..., 2].astype(int) - patch[..., 0]) > 100
+    assert red.mean() > 0.85
 
 
 @pytest.mark.parametrize("space", ["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"])

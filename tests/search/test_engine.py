@@ -1,4 +1,5 @@
 import logging
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
     HogSettings,
+    PerspectiveSettings,
     SearchSettings,
     Settings,
     SpatialSettings,
@@ -16,9 +18,12 @@ from vdet.config.schema import (
 )
 from vdet.errors import ConfigError, ImageError
 from vdet.features import Layout
-from vdet.model import LinearModel
+from vdet.model import BoxRegression, LinearModel
 from vdet.search.engine import FrameSearch, lay_grids
-from vdet.windows import Boxes
+from vdet.search.perspective import lay_perspective
+from vdet.windows import Boxes, Windows
+
+Sides = tuple[float, float, float, float]
 
 COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
 SMALL = FeatureSettings(patch=16, hog=HogSettings(channels=(0,)))
@@ -35,17 +40,63 @@ def model_of(features: FeatureSettings) -> LinearModel:
     return LinearModel(features, weights.astype(np.float32), 0 * one, -one, 0 * one)
 
 
-def laid(width: int, height: int, settings: Settings = SEED) -> Boxes:
-    grids = lay_grids(settings, settings.features, width, height)
+def laid(width: int, height: int, settings: Settings = SEED, *, horizon: float = 0.5) -> Boxes:
+    grids = lay_grids(settings, settings.features, width, height, horizon=horizon)
     return np.concatenate([grid.boxes for grid in grids])
 
 
 def search_of(
     features: FeatureSettings, engine: Literal["auto", "dense", "patch"] = "auto"
 ) -> FrameSearch:
-    search = SearchSettings(engine=engine, windows=SETS)
-    settings = Settings(reference_height=120, features=features, search=search)
+    settings = Settings(reference_height=120, features=features, search=fixed(*SETS, engine=engine))
     return FrameSearch(model_of(features), settings, 160, 120)
+
+
+def fixed(
+    *sets: WindowSettings, engine: Literal["auto", "dense", "patch"] = "auto"
+) -> SearchSettings:
+    """Search by these sets and no others."""
+    none = PerspectiveSettings(sizes=())
+    return SearchSettings(engine=engine, windows=sets, perspective=none)
+
+
+PERSPECTIVE = Settings(
+    features=SMALL,
+    search=SearchSettings(
+        perspective=PerspectiveSettings(sizes=(0.1, 0.15, 0.2, 0.3), beyond=0.34)
+    ),
+)
+
+
+def by_perspective(alternate: int = 2) -> FrameSearch:
+    """Search by four sets that follow the perspective."""
+    search = PERSPECTIVE.search.model_copy(update={"alternate": alternate})
+    settings = PERSPECTIVE.model_copy(update={"search": search})
+    return FrameSearch(model_of(SMALL), settings, 160, 120, horizon=0.3)
+
+
+def with_sides(
+    sides: Sides,
+    engine: Literal["auto", "dense", "patch"] = "auto",
+    probability: float | None = None,
+) -> FrameSearch:
+    """Search with a regression that gives the same sides for all windows; half are detections."""
+    length = Layout.of(SMALL).hog_length
+    boxes = BoxRegression(np.zeros((4, length), np.float32), np.array(sides, np.float32))
+    search = fixed(*SETS, engine=engine).model_copy(
+        update={"probability": MEDIAN if probability is None else probability}
+    )
+    settings = Settings(reference_height=120, features=SMALL, search=search)
+    return FrameSearch(replace(model_of(SMALL), boxes=boxes), settings, 160, 120)
+
+
+MEDIAN = float(np.median(search_of(SMALL).search(FRAME).probabilities))
+
+
+def rows_of(windows: Windows) -> list[tuple[float, ...]]:
+    """Give what is known of each window, in the windows' order."""
+    columns = [windows.boxes, windows.probabilities[:, np.newaxis], windows.vehicles]
+    return [tuple(row) for row in np.hstack(columns).round(4).tolist()]
 
 
 def band(size: int, top: int, bottom: int) -> WindowSettings:
@@ -59,7 +110,25 @@ class TestLayingGrids:
     def test_all_default_sets_find_room_on_a_720p_frame(self) -> None:
         settings = Settings()
         grids = lay_grids(settings, settings.features, 1280, 720)
-        assert [grid.size for grid in grids] == [each.size for each in settings.search.windows]
+        shares = settings.search.perspective.sizes
+        assert [grid.size for grid in grids] == [round(1280 * share) for share in shares]
+
+    def test_sets_over_fixed_rows_come_before_those_of_the_perspective(self) -> None:
+        perspective = PerspectiveSettings(sizes=(0.1, 0.2))
+        both = Settings(
+            search=SearchSettings(windows=(band(64, 400, 500),), perspective=perspective)
+        )
+        grids = lay_grids(both, SMALL, 1280, 720, horizon=0.5)
+        assert [grid.size for grid in grids] == [64, 128, 256]
+        assert (
+            grids[0] == lay_grids(Settings(search=fixed(band(64, 400, 500))), SMALL, 1280, 720)[0]
+        )
+        assert grids[1:] == lay_perspective(perspective, SMALL, 1280, 720, horizon=0.5)
+
+    def test_a_horizon_moves_the_perspective_alone(self) -> None:
+        assert laid(1280, 720, SEED).tolist() == laid(1280, 720, SEED, horizon=0.4).tolist()
+        high, low = (laid(1280, 720, Settings(), horizon=horizon) for horizon in (0.4, 0.5))
+        assert (low[:, 1] - high[:, 1]).tolist() == [72] * len(high)
 
     @pytest.mark.parametrize(
         ("width", "height"), [(640, 360), (1920, 1080), (1279, 721), (853, 480)]
@@ -74,26 +143,26 @@ class TestLayingGrids:
     @pytest.mark.parametrize(
         ("width", "height"), [(1280, 720), (1277, 719), (1281, 721), (129, 720), (333, 77)]
     )
-    def test_all_windows_lie_inside_the_frame(
+    def test_all_windows_lie_inside_the_frame_but_for_what_is_asked_for(
         self, settings: Settings, width: int, height: int
     ) -> None:
         x, y, w, h = laid(width, height, settings).T
-        assert (x >= 0).all()
+        beyond = settings.search.perspective.beyond if settings.search.perspective.sizes else 0
+        assert (x >= -beyond * w).all()
         assert (y >= 0).all()
-        assert (x + w <= width).all()
+        assert (x + w <= width + beyond * w).all()
         assert (y + h <= height).all()
 
     def test_steps_are_counted_in_cells_of_the_features(self) -> None:
-        sets = SearchSettings(windows=(WindowSettings(size=64, step=1, top=0, bottom=64),))
-        settings = Settings(search=sets)
+        settings = Settings(search=fixed(WindowSettings(size=64, step=1, top=0, bottom=64)))
         for cell, step in ((4, 8), (8, 16)):
             features = FeatureSettings(patch=32, hog=HogSettings(cell=cell))
             (grid,) = lay_grids(settings, features, 1280, 720)
             assert grid.step == step
 
     def test_windows_below_the_frame_are_left_out(self) -> None:
-        sets = SearchSettings(windows=(band(64, 600, 900), band(64, 700, 800)))
-        (grid,) = lay_grids(Settings(search=sets), COLOUR, 640, 720)
+        settings = Settings(search=fixed(band(64, 600, 900), band(64, 700, 800)))
+        (grid,) = lay_grids(settings, COLOUR, 640, 720)
         assert {y for _, y, _, _ in grid.boxes.tolist()} == {600, 632}
 
     def test_a_set_that_does_not_fit_leaves_the_others(self) -> None:
@@ -141,6 +210,95 @@ class TestSearching:
         np.testing.assert_array_equal(frame, FRAME)
         np.testing.assert_array_equal(search.search(frame).probabilities, first.probabilities)
 
+    def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:
+        wide = np.pad(FRAME, ((0, 0), (24, 24), (0, 0)), mode="edge")
+        perspective = PERSPECTIVE.search.perspective.model_copy(update={"zoom": 160 / 208})
+        settings = PERSPECTIVE.model_copy(
+            update={"search": SearchSettings(perspective=perspective)}
+        )
+        found = FrameSearch(model_of(SMALL), settings, 208, 120, horizon=0.3).search(wide)
+        moved = (found.boxes - [24, 0, 0, 0]).tolist()
+        expected = dict(zip(map(tuple, moved), found.probabilities.tolist(), strict=True))
+        ours = by_perspective().search(FRAME)
+        assert ours.boxes[:, 0].min() == -12
+        for box, probability in zip(ours.boxes.tolist(), ours.probabilities.tolist(), strict=True):
+            assert expected[tuple(box)] == pytest.approx(probability, abs=1e-5)
+
+
+class TestTurns:
+    """In a video, `alternate` frames together are searched like a single picture."""
+
+    @pytest.mark.parametrize("alternate", [1, 2, 3, 4, 9])
+    def test_of_as_many_frames_are_together_the_whole_search(self, alternate: int) -> None:
+        search = by_perspective(alternate)
+        turns = min(alternate, 4)
+        found = [search.search(FRAME, turn) for turn in range(turns)]
+        sizes = [{int(size) for size in each.boxes[:, 2]} for each in found]
+        assert sum(len(each) for each in sizes) == len(set().union(*sizes)) == 4
+        assert all(sizes)
+        assert sorted(row for each in found for row in rows_of(each)) == sorted(
+            rows_of(search.search(FRAME))
+        )
+
+    def test_come_round_again(self) -> None:
+        search = by_perspective(3)
+        for turn in range(3):
+            assert rows_of(search.search(FRAME, turn)) == rows_of(search.search(FRAME, turn + 3))
+
+    def test_one_set_has_all_of_them(self) -> None:
+        settings = Settings(features=SMALL, search=fixed(SETS[0]), reference_height=120)
+        search = FrameSearch(model_of(SMALL), settings, 160, 120)
+        assert rows_of(search.search(FRAME, 0)) == rows_of(search.search(FRAME, 1))
+
+    def test_take_neighbouring_sizes_in_different_frames(self) -> None:
+        sizes = [
+            np.unique(by_perspective(2).search(FRAME, turn).boxes[:, 2]).tolist() for turn in (0, 1)
+        ]
+        assert sizes == [[16, 32], [24, 48]]
+
+
+class TestVehicles:
+    def test_are_the_windows_without_a_regression(self) -> None:
+        found = by_perspective().search(FRAME)
+        np.testing.assert_array_equal(found.vehicles, found.boxes)
+        assert found.vehicles.dtype == np.float32
+
+    @pytest.mark.parametrize("engine", ["dense", "patch"])
+    def test_are_where_the_regression_says_in_detections(
+        self, engine: Literal["dense", "patch"]
+    ) -> None:
+        # left, top, right, bottom from the middle, in windows: the same for all
+        found = with_sides((-0.25, 0, 0.5, 0.375), engine).search(FRAME)
+        hits = found.probabilities >= MEDIAN
+        assert 10 < hits.sum() < len(found) - 10
+        expected = [
+            [x + size / 2 - size / 4, y + size / 2, 0.75 * size, 0.375 * size]
+            for x, y, size, _ in found.boxes[hits].tolist()
+        ]
+        np.testing.assert_allclose(found.vehicles[hits], expected, rtol=1e-6)
+        np.testing.assert_array_equal(found.vehicles[~hits], found.boxes[~hits])
+
+    def test_may_reach_beyond_their_window(self) -> None:
+        found = with_sides((-1, -0.5, 1, 0.5)).search(FRAME)
+        hits = found.probabilities >= MEDIAN
+        expected = found.boxes[hits] * [1, 1, 2, 1] - found.boxes[hits][:, 2:3] * [0.5, 0, 0, 0]
+        np.testing.assert_allclose(found.vehicles[hits], expected)
+
+    @pytest.mark.parametrize("sides", [(0.3, 0.4, 0.1, 0.2), (0.2, 0.3, 0.2, 0.3)])
+    def test_have_a_size_whatever_the_regression_says(self, sides: Sides) -> None:
+        found = with_sides(sides).search(FRAME)
+        hits = found.probabilities >= MEDIAN
+        x, y, size, _ = found.boxes[hits].T
+        np.testing.assert_allclose(found.vehicles[hits][:, 2], 0.2 * size, rtol=1e-6)
+        np.testing.assert_allclose(found.vehicles[hits][:, 3], 0.2 * size, rtol=1e-6)
+        middle = found.vehicles[hits][:, :2] + found.vehicles[hits][:, 2:] / 2
+        np.testing.assert_allclose(middle[:, 0], x + size / 2 + 0.2 * size, rtol=1e-6)
+        np.testing.assert_allclose(middle[:, 1], y + size / 2 + 0.3 * size, rtol=1e-6)
+
+    def test_of_no_detection_at_all_are_the_windows(self) -> None:
+        found = with_sides((-1, -1, 1, 1), probability=1).search(FRAME)
+        np.testing.assert_array_equal(found.vehicles, found.boxes)
+
 
 class TestTheChoiceOfAnEngine:
     def test_auto_takes_the_dense_one_where_it_can(self) -> None:
@@ -176,6 +334,6 @@ def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int)
 
 
 def test_a_frame_that_ends_above_the_search_rows_is_refused() -> None:
-    settings = Settings(search=SearchSettings(windows=(band(64, 800, 900),)))
+    settings = Settings(search=fixed(band(64, 800, 900)))
     with pytest.raises(ImageError, match="no search window fits"):
         FrameSearch(model_of(COLOUR), settings, 1280, 720)

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from fractions import Fraction
 from types import ModuleType
 
@@ -37,7 +38,7 @@ def model_of(features: FeatureSettings, members: int = 2) -> LinearModel:
 )
 def test_every_window_is_cropped_resized_described_and_scored(features: FeatureSettings) -> None:
     model, extractor = model_of(features), FeatureExtractor(features)
-    found = PatchSearch(model, GRID).search(FramePyramid(FRAME))
+    found = PatchSearch(model, GRID).search(FramePyramid(FRAME)).probabilities
     assert len(found) == 28
     for (x, y, w, h), probability in zip(GRID.boxes.tolist(), found, strict=True):
         crop = to_patch(FRAME[y : y + h, x : x + w], features.patch)
@@ -46,7 +47,7 @@ def test_every_window_is_cropped_resized_described_and_scored(features: FeatureS
 
 
 def test_probabilities_differ_from_window_to_window() -> None:
-    found = PatchSearch(model_of(COLOUR), GRID).search(FramePyramid(FRAME))
+    found = PatchSearch(model_of(COLOUR), GRID).search(FramePyramid(FRAME)).probabilities
     assert found.shape == (28,)
     assert found.dtype == np.float32
     assert len(np.unique(found)) == 28
@@ -54,10 +55,10 @@ def test_probabilities_differ_from_window_to_window() -> None:
 
 def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing() -> None:
     engine, frame = PatchSearch(model_of(COLOUR), GRID), FRAME.copy()
-    first = engine.search(FramePyramid(frame))
+    first = engine.search(FramePyramid(frame)).probabilities
     engine.search(FramePyramid(255 - frame))
     np.testing.assert_array_equal(frame, FRAME)
-    np.testing.assert_array_equal(engine.search(FramePyramid(frame)), first)
+    np.testing.assert_array_equal(engine.search(FramePyramid(frame)).probabilities, first)
 
 
 @pytest.mark.parametrize(("engine", "module"), [(PatchSearch, patch), (LocatedSearch, located)])
@@ -67,13 +68,38 @@ def test_windows_scored_some_at_a_time_are_scored_alike(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     search = engine(model_of(FeatureSettings()), GRID)
-    together = search.search(FramePyramid(FRAME))
+    together = search.search(FramePyramid(FRAME)).probabilities
     monkeypatch.setattr(module, "BATCH", 3)
-    np.testing.assert_allclose(search.search(FramePyramid(FRAME)), together, atol=1e-6)
+    np.testing.assert_allclose(
+        search.search(FramePyramid(FRAME)).probabilities, together, atol=1e-6
+    )
 
 
 def test_what_lies_outside_a_window_does_not_matter() -> None:
     other = np.zeros_like(FRAME)
     other[0:64, 0:64] = FRAME[0:64, 0:64]
     engine = PatchSearch(model_of(SEED.features), ONE)
-    assert engine.search(FramePyramid(FRAME)) == engine.search(FramePyramid(other))
+    one, two = (engine.search(FramePyramid(image)).probabilities for image in (FRAME, other))
+    assert one == two
+
+
+def test_the_hog_of_chosen_windows_is_given_without_the_other_features() -> None:
+    features = FeatureSettings(patch=16)
+    model, extractor = model_of(features), FeatureExtractor(features)
+    numbers = np.array([27, 3, 3])
+    hogs = PatchSearch(model, GRID).search(FramePyramid(FRAME)).hogs(numbers)
+    assert hogs.shape == (3, extractor.layout.hog_length)
+    for (x, y, w, h), hog in zip(GRID.boxes[numbers].tolist(), hogs, strict=True):
+        vector = extractor.describe(to_patch(FRAME[y : y + h, x : x + w], 16))
+        np.testing.assert_array_equal(hog, vector[: len(hog)])
+
+
+def test_a_window_beyond_the_side_sees_the_outermost_columns_repeated() -> None:
+    features = FeatureSettings(patch=16)
+    model = model_of(features)
+    beyond = WindowGrid(32, Fraction(8), Fraction(-16), Fraction(8), columns=19, rows=2)
+    inside = replace(beyond, left=Fraction(0))
+    padded = np.pad(FRAME, ((0, 0), (16, 16), (0, 0)), mode="edge")
+    ours = PatchSearch(model, beyond).search(FramePyramid(FRAME, margin=16))
+    expected = PatchSearch(model, inside).search(FramePyramid(padded))
+    np.testing.assert_array_equal(ours.probabilities, expected.probabilities)

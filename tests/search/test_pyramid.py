@@ -57,9 +57,44 @@ def test_rows_that_nobody_asks_for_are_never_looked_at() -> None:
     np.testing.assert_array_equal(first, second)
 
 
-def test_the_frame_itself_is_there_whole_and_untouched() -> None:
+def test_the_frame_is_left_untouched() -> None:
     image = FRAME.copy()
-    frame = FramePyramid(image, 16, 80)
-    frame.cut(slice(16, 80), slice(0, 64), 8, 8)
-    assert frame.image is image
+    frame = FramePyramid(image, 16, 80, margin=16)
+    frame.cut(slice(16, 80), slice(-16, 48), 8, 8)
     np.testing.assert_array_equal(image, FRAME)
+
+
+@given(spans(97), spans(131), st.integers(0, 96))
+def test_a_crop_is_a_window_of_the_frame_at_full_size(
+    rows: slice, columns: slice, top: int
+) -> None:
+    frame = FramePyramid(FRAME, min(top, rows.start))
+    size = columns.stop - columns.start, rows.stop - rows.start
+    crop = frame.crop(columns.start, rows.start, *size)
+    np.testing.assert_array_equal(crop, FRAME[rows, columns])
+
+
+MARGIN = 48
+BEYOND = np.pad(FRAME, ((0, 0), (MARGIN, MARGIN), (0, 0)), mode="edge")
+
+
+@given(spans(97), spans(131 + 2 * MARGIN), st.integers(0, 96), st.integers(1, 40))
+def test_beyond_the_sides_the_outermost_columns_repeat(
+    rows: slice, columns: slice, top: int, side: int
+) -> None:
+    frame = FramePyramid(FRAME, min(top, rows.start), margin=MARGIN)
+    expected = BEYOND[rows, columns]
+    left, height = columns.start - MARGIN, rows.stop - rows.start
+    crop = frame.crop(left, rows.start, columns.stop - columns.start, height)
+    np.testing.assert_array_equal(crop, expected)
+    cut = frame.cut(rows, slice(left, columns.stop - MARGIN), side, side)
+    np.testing.assert_array_equal(cut, resize(expected, side, side))
+
+
+def test_inside_the_frame_a_margin_changes_nothing() -> None:
+    rows, columns = slice(8, 72), slice(16, 80)
+    plain, wide = FramePyramid(FRAME), FramePyramid(FRAME, margin=16)
+    for side in (8, 16, 20, 64):
+        np.testing.assert_array_equal(
+            wide.cut(rows, columns, side, side), plain.cut(rows, columns, side, side)
+        )

@@ -109,3 +109,32 @@ def test_an_svm_that_has_converged_is_not_worth_a_word(caplog: pytest.LogCapture
     with caplog.at_level(logging.WARNING, "vdet"):
         fit(*clouds(), COLOUR, training())
     assert caplog.text == ""
+
+
+def test_a_patch_and_its_views_are_calibrated_together() -> None:
+    """A view of a patch that was learnt from would be known: its score would be too good."""
+    rng = np.random.default_rng(0)
+    vehicle = np.arange(90) % 2 == 0
+    noise = rng.normal(size=(90, 24)).astype(np.float32)  # nothing to be learnt, only by heart
+    twice = np.concatenate([noise, noise])
+    origins = np.tile(np.arange(90), 2)
+    loose = training(ensemble=False, C=10.0)
+    honest = fit(twice, np.tile(vehicle, 2), COLOUR, loose, origins)
+    leaking = fit(twice, np.tile(vehicle, 2), COLOUR, loose)
+    np.testing.assert_allclose(honest.weights, leaking.weights, atol=1e-3)
+    assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
+
+
+def test_rows_that_are_their_own_origins_are_patches() -> None:
+    vectors, vehicle = clouds()
+    plain = fit(vectors, vehicle, COLOUR, training())
+    told = fit(vectors, vehicle, COLOUR, training(), np.arange(len(vehicle)))
+    np.testing.assert_array_equal(plain.weights, told.weights)
+
+
+def test_views_do_not_make_up_for_patches_that_are_missing() -> None:
+    vectors, _ = clouds(40)
+    vehicle = np.arange(40) % 20 == 0
+    origins = np.where(vehicle, 0, np.arange(40))
+    with pytest.raises(DataError, match="a class has 1 training patches"):
+        fit(vectors, vehicle, COLOUR, training(), origins)

@@ -1,7 +1,9 @@
 import logging
 import os
+import shutil
 import signal
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -11,21 +13,24 @@ import pytest
 
 import vdet
 from vdet.config.schema import (
+    BoxSettings,
     FeatureSettings,
     HistogramSettings,
     HogSettings,
     Settings,
     TrainingSettings,
+    ViewSettings,
 )
-from vdet.dataset import PatchFile, find_patches
+from vdet.dataset import PatchFile, find_boxed, find_patches
 from vdet.errors import DataError
-from vdet.features import FeatureExtractor
-from vdet.images import Image, write_image
+from vdet.features import FeatureExtractor, Layout
+from vdet.images import Image, read_image, write_image
 from vdet.model import load_model, save_model
 from vdet.training import train
 from vdet.training.extraction import MAX_NAMED, extract
 from vdet.training.fitting import fit
 from vdet.training.splits import hold_out
+from vdet.training.views import views_of
 
 SIZE = 16
 GROUPS = {
@@ -40,7 +45,7 @@ SETTINGS = Settings(
         hog=HogSettings(cell=4, channels=(0,)),
         histogram=HistogramSettings(bins=8),
     ),
-    training=TrainingSettings(C=0.1),
+    training=TrainingSettings(C=0.1, views=ViewSettings(mirror=True, cut=0.5, parts=0.5)),
 )
 
 
@@ -64,6 +69,25 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def mined(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Give the same set, with boxes: the bars of `vehicles/near`, and more in `boxes/`."""
+    folder = tmp_path_factory.mktemp("mined") / "set"
+    shutil.copytree(data, folder)
+    rng = np.random.default_rng(1)
+    (folder / "boxes" / "near").mkdir(parents=True)
+    rows = ["name,left,top,right,bottom"]
+    for name in [f"boxes/near/{i}.png" for i in range(40)]:
+        top = int(rng.integers(0, 8))
+        image = rng.integers(120, 200, (SIZE, SIZE, 3), dtype=np.uint8)
+        image[top : top + 8] = 30
+        write_image(folder / name, image)
+        rows.append(f"{name},,{top / SIZE - 0.5},,{(top + 8) / SIZE - 0.5}")
+    rows += [f"vehicles/near/{i}.png,-0.5,,0.5," for i in range(GROUPS["vehicles/near"])]
+    (folder / "boxes.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
 @pytest.fixture
 def files(data: Path) -> list[PatchFile]:
     return find_patches([data])
@@ -78,9 +102,18 @@ def with_broken(files: list[PatchFile], folder: Path, count: int) -> list[PatchF
     return [*files[:9], *broken, *files[9:]]
 
 
-def tolerant(share: float) -> Settings:
-    training = SETTINGS.training.model_copy(update={"max_broken": share})
+def but(**changes: object) -> Settings:
+    """Give the settings with some of `training` replaced."""
+    training = SETTINGS.training.model_copy(update=changes)
     return SETTINGS.model_copy(update={"training": training})
+
+
+NO_VIEWS = ViewSettings(mirror=False, cut=0, parts=0)
+LOOK = partial(views_of, settings=SETTINGS.training.views)
+
+
+def tolerant(share: float) -> Settings:
+    return but(max_broken=share)
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
@@ -107,11 +140,40 @@ def test_several_processes_give_the_same_as_one(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.training.extraction.CHUNK", 10)
-    one = extract(files, SETTINGS.features, max_broken=0, jobs=1)
-    two = extract(files, SETTINGS.features, max_broken=0, jobs=2)
+    one = extract(files, SETTINGS.features, max_broken=0, look=LOOK, jobs=1)
+    two = extract(files, SETTINGS.features, max_broken=0, look=LOOK, jobs=2)
     np.testing.assert_array_equal(one.vectors, two.vectors)
     np.testing.assert_array_equal(one.groups, two.groups)
     assert one.digest == two.digest
+    assert one.views is not None
+    assert two.views is not None
+    for name in ("vectors", "vehicle", "origins"):
+        np.testing.assert_array_equal(getattr(one.views, name), getattr(two.views, name))
+
+
+def test_views_are_described_with_the_row_of_their_patch(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.training.extraction.CHUNK", 10)
+    mirror = partial(views_of, settings=ViewSettings(mirror=True, cut=0, parts=0))
+    views = extract(files, SETTINGS.features, max_broken=0, look=mirror, jobs=1).views
+    assert views is not None
+    assert views.origins.tolist() == list(range(57))
+    assert views.vehicle.tolist() == [file.vehicle for file in files]
+    last = read_image(files[-1].source / files[-1].name)
+    expected = FeatureExtractor(SETTINGS.features).describe(np.ascontiguousarray(last[:, ::-1]))
+    np.testing.assert_array_equal(views.vectors[-1], expected)
+
+
+def test_a_patch_has_the_same_views_in_whatever_set_it_is(files: list[PatchFile]) -> None:
+    whole, one = (
+        extract(some, SETTINGS.features, max_broken=0, look=LOOK, seed=7, jobs=1).views
+        for some in (files, files[40:41])
+    )
+    assert whole is not None
+    assert one is not None
+    assert len(one.origins) >= 1
+    np.testing.assert_array_equal(whole.vectors[whole.origins == 40], one.vectors)
 
 
 def test_a_process_that_is_killed_is_an_error(
@@ -242,23 +304,48 @@ def test_the_tail_split_is_reported_by_group(files: list[PatchFile]) -> None:
 
 
 @pytest.mark.parametrize("name", ["random", "tail"])
-def test_the_patches_of_the_test_are_not_learnt_from(
+def test_without_views_the_model_is_fitted_to_the_patches_that_are_not_held_out(
     files: list[PatchFile], name: Literal["random", "tail"]
 ) -> None:
-    training = SETTINGS.training.model_copy(update={"split": name})
-    model, _ = train(files, SETTINGS.model_copy(update={"training": training}), jobs=1)
+    settings = but(split=name, views=NO_VIEWS)
+    model, report = train(files, settings, jobs=1)
     data = extract(files, SETTINGS.features, max_broken=0, jobs=1)
-    kept = ~hold_out(data.groups, name, training.test_fraction, training.seed)
-    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.features, training)
+    kept = ~hold_out(data.groups, name, settings.training.test_fraction, settings.training.seed)
+    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.features, settings.training)
     np.testing.assert_array_equal(model.weights, expected.weights)
+    assert [split.train_views for split in report.splits] == [0, 0]
+
+
+@pytest.mark.parametrize("name", ["random", "tail"])
+def test_neither_the_patches_of_the_test_nor_views_of_them_are_learnt_from(
+    mined: Path, tmp_path: Path, name: Literal["random", "tail"]
+) -> None:
+    """With other pictures in place of those held out, the very same model comes out."""
+    settings = but(split=name)
+    lists = find_patches([mined]), find_boxed([mined])
+    spoilt = tmp_path / "spoilt"
+    shutil.copytree(mined, spoilt)
+    for files in lists:
+        groups = np.array([file.group for file in files])
+        held = hold_out(groups, name, settings.training.test_fraction, settings.training.seed)
+        for row in np.flatnonzero(held):
+            write_image(spoilt / files[row].name, np.full((SIZE, SIZE, 3), row, np.uint8))
+    one, _ = train(lists[0], settings, boxed=lists[1], jobs=1)
+    files, boxed = find_patches([spoilt]), find_boxed([spoilt])
+    other, report = train(files, settings, boxed=boxed, jobs=1)
+    np.testing.assert_array_equal(one.weights, other.weights)
+    np.testing.assert_array_equal(one.slopes, other.slopes)
+    assert one.boxes is not None
+    assert other.boxes is not None
+    np.testing.assert_array_equal(one.boxes.weights, other.boxes.weights)
+    assert report.splits[0].train_views > report.splits[0].train_patches
 
 
 @pytest.mark.parametrize(("split", "order"), [("random", "random tail"), ("tail", "tail random")])
 def test_the_model_is_that_of_the_configured_split_which_comes_first(
     files: list[PatchFile], split: str, order: str
 ) -> None:
-    training = SETTINGS.training.model_copy(update={"split": split})
-    settings = SETTINGS.model_copy(update={"training": training})
+    settings = but(split=split)
     model, report = train(files, settings, jobs=1)
     assert [part.split for part in report.splits] == order.split()
     vectors = extract(files, settings.features, max_broken=0, jobs=1)
@@ -271,10 +358,9 @@ def test_the_model_is_that_of_the_configured_split_which_comes_first(
 def test_the_same_seed_gives_the_same_model_and_another_seed_another(
     files: list[PatchFile],
 ) -> None:
-    other = SETTINGS.model_copy(
-        update={"training": SETTINGS.training.model_copy(update={"seed": 1})}
+    one, same, different = (
+        train(files, each, jobs=1)[0] for each in (SETTINGS, SETTINGS, but(seed=1))
     )
-    one, same, different = (train(files, s, jobs=1)[0] for s in (SETTINGS, SETTINGS, other))
     for name in ("weights", "biases", "slopes", "offsets"):
         np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
     assert (one.weights != different.weights).any()
@@ -307,3 +393,80 @@ def test_groups_of_one_patch_each_leave_nothing_to_test_the_tail_on(
     lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]
     with pytest.raises(DataError, match="no folder has two patches"):
         train(lonely, SETTINGS, jobs=1)
+
+
+def test_without_boxes_a_model_finds_no_sides(files: list[PatchFile]) -> None:
+    model, report = train(files, SETTINGS, jobs=1)
+    assert model.boxes is None
+    assert report.boxed == 0
+    assert {split.boxes for split in report.splits} == {None}
+
+
+def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
+    settings = but(split="tail", boxes=BoxSettings(penalty=1e-3))
+    files, boxed = find_patches([mined]), find_boxed([mined])
+    model, report = train(files, settings, boxed=boxed, jobs=1)
+    assert model.boxes is not None
+    last = boxed[-1]
+    assert last.sides is not None
+    described = FeatureExtractor(SETTINGS.features).describe(read_image(mined / last.name))
+    hogs = described[: Layout.of(SETTINGS.features).hog_length]
+    found = model.boxes.sides(hogs[np.newaxis])[0]
+    np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
+    np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)
+    error = report.splits[0].boxes
+    assert error is not None
+    assert error.patches == 4 + 8
+    assert error.mean < 0.06
+    assert report.boxed == 60
+    assert report.groups["boxes/near"] == 40
+    assert report.vehicles == 32, "patches of boxes/ belong to neither class"
+    assert model.provenance["boxes_sha256"] != model.provenance["data_sha256"]
+
+
+def test_patches_of_boxes_are_not_learnt_from_as_vehicles(mined: Path) -> None:
+    files = find_patches([mined])
+    with_them, _ = train(files, SETTINGS, boxed=find_boxed([mined]), jobs=1)
+    without, _ = train(files, SETTINGS, jobs=1)
+    np.testing.assert_array_equal(with_them.weights, without.weights)
+
+
+@pytest.mark.parametrize("assumed", [0.0, 0.5])
+def test_vehicles_from_sets_without_boxes_are_taken_to_reach_from_left_to_right(
+    data: Path, mined: Path, tmp_path: Path, assumed: float
+) -> None:
+    """The mined vehicles are said to be narrow; those of the other set pull to its sides."""
+    narrow = tmp_path / "narrow"
+    shutil.copytree(mined, narrow)
+    table = narrow / "boxes.csv"
+    table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,,0.2,"))
+    sources = [narrow, data]
+    settings = but(boxes=BoxSettings(penalty=100, assumed=assumed))
+    files = find_patches(sources)
+    model, _ = train(files, settings, boxed=find_boxed(sources), jobs=1)
+    assert model.boxes is not None
+    vehicles = [file for file in files if file.vehicle]
+    described = extract(vehicles, SETTINGS.features, max_broken=0, jobs=1).vectors
+    hogs = described[:, : Layout.of(SETTINGS.features).hog_length]
+    left, _, right, _ = model.boxes.sides(hogs).mean(axis=0).tolist()
+    if assumed:
+        assert left < -0.25
+        assert right > 0.25
+    else:
+        assert (left, right) == pytest.approx((-0.2, 0.2), abs=0.02)
+
+
+def test_without_hog_no_sides_are_found(mined: Path) -> None:
+    colour = FeatureSettings(patch=SIZE, hog=HogSettings(channels=()))
+    settings = SETTINGS.model_copy(update={"features": colour})
+    files, boxed = find_patches([mined]), find_boxed([mined])
+    assert train(files, settings, boxed=boxed, jobs=1)[0].boxes is None
+
+
+def test_the_digest_tells_boxes_apart(mined: Path) -> None:
+    boxed = find_boxed([mined])
+    moved = [replace(boxed[0], sides=(None, 0.0, None, 0.1)), *boxed[1:]]
+    one, other = (
+        extract(some, SETTINGS.features, max_broken=0, jobs=1).digest for some in (boxed, moved)
+    )
+    assert one != other

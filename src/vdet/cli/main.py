@@ -16,6 +16,7 @@ from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
 from vdet.cli.eval import evaluate
 from vdet.cli.logs import set_up_logs
+from vdet.cli.mine import mine
 from vdet.cli.train import train
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
 
@@ -31,7 +32,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     context.obj = quiet
 
 
-for _command in (train, detect_image, detect_video, calibrate, evaluate, config, demo):
+for _command in (train, mine, detect_image, detect_video, calibrate, evaluate, config, demo):
     cli.add_command(_command)
 
 

@@ -1,10 +1,12 @@
-"""Where vehicles are looked for in a frame, and how hits become cars that are followed."""
+"""Where vehicles are looked for in a frame, and what the hits are summed to."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from vdet.config.section import FRAME_LENGTH, Fraction, Pixels, Section
+
+WindowShare = Annotated[float, Field(gt=0, le=1)]
 
 
 class WindowSettings(Section):
@@ -36,6 +38,41 @@ class WindowSettings(Section):
         return self
 
 
+class PerspectiveSettings(Section):
+    """Window sets whose rows follow from their size: vehicles stand on a flat road."""
+
+    sizes: tuple[WindowShare, ...] = Field(
+        (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25),
+        max_length=32,
+        description="sides of the windows, shares of the frame's width; [] for no sets",
+    )
+    zoom: float = Field(
+        1.0, ge=0.1, le=10, description="multiplies the sizes; above 1 for a longer lens"
+    )
+    horizon: Fraction = Field(
+        0.0,
+        description="row of the horizon, share of the frame's height; 0: it is where the lines of "
+        "the first frames meet",
+    )
+    highest: float = Field(
+        0.6,
+        ge=0,
+        le=10,
+        description="bottom of a set's highest windows below the horizon, in sides",
+    )
+    lowest: float = Field(1.1, ge=0, le=10, description="the same of its lowest windows")
+    beyond: Fraction = Field(
+        0.7, description="share of a window that may lie beyond the left and right of the frame"
+    )
+    step: int = Field(1, ge=1, le=64, description="distance to the next window, cells of the patch")
+
+    @model_validator(mode="after")
+    def _is_in_order(self) -> "PerspectiveSettings":
+        if self.lowest < self.highest:
+            raise ValueError("lowest must be at least highest")
+        return self
+
+
 class SearchSettings(Section):
     """Where vehicles are looked for in a frame."""
 
@@ -45,24 +82,41 @@ class SearchSettings(Section):
         "each strip described once for all its windows, many times faster; auto: dense where the "
         "features allow it",
     )
-    probability: Fraction = Field(0.5, description="a window is a detection from here on")
+    probability: Fraction = Field(0.3, description="a window is a detection from here on")
     windows: tuple[WindowSettings, ...] = Field(
-        (
-            WindowSettings(size=64, step=1, top=400, bottom=488),
-            WindowSettings(size=96, step=1, top=392, bottom=524),
-            WindowSettings(size=128, step=1, top=388, bottom=564),
-            WindowSettings(size=192, step=1, top=372, bottom=612),
-        ),
-        min_length=1,
-        max_length=32,
-        description="window sets",
+        (), max_length=32, description="window sets over fixed rows; [] for none"
     )
+    perspective: PerspectiveSettings = PerspectiveSettings()
+    alternate: int = Field(
+        2,
+        ge=1,
+        le=10,
+        description="frames of a video over which the sets are dealt out, each searched in one",
+    )
+
+    @model_validator(mode="after")
+    def _has_windows(self) -> "SearchSettings":
+        if not (self.windows or self.perspective.sizes):
+            raise ValueError("windows or perspective.sizes must be given")
+        return self
+
+
+class VoteSettings(Section):
+    """Boxes from the windows that voted: those that agree on a vehicle are averaged."""
+
+    agreement: Fraction = Field(
+        0.35, description="intersection over union from which on two votes agree"
+    )
+    inside: Fraction = Field(
+        0.7, description="a vehicle of which this share lies in a larger one is a part of it"
+    )
+    least: float = Field(0.03, ge=0, description="weight of the votes that a vehicle needs")
 
 
 class HeatSettings(Section):
     """Detections of consecutive frames summed into a heatmap, and its regions."""
 
-    frames: int = Field(4, ge=1, le=100, description="frames whose detections are summed")
+    frames: int = Field(2, ge=1, le=100, description="frames whose detections are summed")
     weight: Literal["none", "coverage"] = Field(
         "coverage",
         description="none: a window adds its probability; coverage: divided by the number of "
@@ -72,48 +126,10 @@ class HeatSettings(Section):
         4, description="the map has one value for this many pixels across and down"
     )
     blur: Pixels = Field(15, description="side of the Gaussian blur, pixels; 0 or 1 for none")
-    threshold: float = Field(0.5, ge=0, description="a region is where the heat is above this")
-
-
-class TrackerSettings(Section):
-    """How regions become cars (the original's rules; `tracking` explains each)."""
-
-    history: int = Field(
-        10, ge=1, le=1000, description="detections that a car's box is averaged over"
+    threshold: float = Field(0.05, ge=0, description="a region is where the heat is above this")
+    regions: Literal["outline", "votes"] = Field(
+        "votes",
+        description="outline: a region's box bounds the hot part; votes: the windows in it say how "
+        "many vehicles it is and where",
     )
-    min_region: Pixels = Field(50, description="regions narrower or lower than this are ignored")
-    near: Pixels = Field(50, description="a region within this distance of a car is close to it")
-    confident_peak: float = Field(
-        2.0, ge=0, description="a region with a higher peak is trusted sooner"
-    )
-    detections_needed: int = Field(10, ge=1, description="in a row, before a car is shown")
-    confident_detections_needed: int = Field(
-        3, ge=1, description="the same, after a confident peak"
-    )
-    wide: Pixels = Field(
-        200, description="a region wider than this is always good enough for its car"
-    )
-    good_fraction: Fraction = Field(2 / 3, description="so is one wider than this share of its car")
-    max_combined: Pixels = Field(
-        250, description="two regions of one car, combined, must be narrower"
-    )
-    combined_tolerance: Fraction = Field(
-        1 / 3, description="and differ in width from the car by no more than this share of it"
-    )
-    merge_overlap: Pixels = Field(
-        40, description="cars in one region that overlap by more, across and down, become one"
-    )
-    match_distance: Pixels = Field(50, description="a car is looked for this far from where it was")
-    match_method: Literal["ccoeff_normed", "ccorr_normed", "sqdiff_normed"] = Field(
-        "ccoeff_normed", description="score of the template match, as cv2.matchTemplate names it"
-    )
-    match_score: Fraction = Field(
-        0.5, description="a match must score this; 1 is perfect (sqdiff_normed is turned round)"
-    )
-    young: int = Field(
-        7, ge=0, description="a car with fewer detections is deleted at its first miss"
-    )
-    max_matches: int = Field(
-        12, ge=1, description="so is one whose last detections all were matches"
-    )
-    max_misses: int = Field(5, ge=1, description="so is one missed in this many frames in a row")
+    votes: VoteSettings = VoteSettings()

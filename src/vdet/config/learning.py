@@ -72,10 +72,41 @@ class CalibrationSettings(Section):
     )
 
 
+class ViewSettings(Section):
+    """What is learnt from a patch besides the patch itself; a held-out patch gives no views."""
+
+    mirror: bool = Field(True, description="its mirror image; the views below are of both")
+    cut: Fraction = Field(
+        0.15,
+        description="share of patches of which is added how the frame's left or right side, "
+        "repeated, would cut 15 to 50 % off",
+    )
+    parts: Fraction = Field(
+        0.05,
+        description="share of vehicle patches of which a crop, 40 to 60 % of a side, is added as a "
+        "non-vehicle",
+    )
+
+
+class BoxSettings(Section):
+    """Linear regression of the sides of a vehicle's box, where patches come with boxes."""
+
+    penalty: float = Field(
+        1.0, gt=0, le=1e6, description="ridge penalty of the scaled features' weights, a patch"
+    )
+    assumed: float = Field(
+        0.5,
+        ge=0,
+        le=100,
+        description="weight, against that of patches with boxes, of vehicle patches from sources "
+        "without: these are taken to be filled by their vehicle",
+    )
+
+
 class TrainingSettings(Section):
     """How `vdet train` fits the classifier."""
 
-    C: float = Field(1e-3, gt=0, le=1e6, description="penalty of the linear SVM; less is smoother")
+    C: float = Field(3e-5, gt=0, le=1e6, description="penalty of the linear SVM; less is smoother")
     test_fraction: float = Field(
         0.2, gt=0, lt=1, description="share of patches held out for the test"
     )
@@ -88,3 +119,27 @@ class TrainingSettings(Section):
     seed: int = Field(0, ge=0, le=2**32 - 1, description="of the split, the folds and the solver")
     max_broken: Fraction = Field(0.01, description="share of unreadable patches that is tolerated")
     calibration: CalibrationSettings = CalibrationSettings()
+    views: ViewSettings = ViewSettings()
+    boxes: BoxSettings = BoxSettings()
+
+
+class MiningSettings(Section):
+    """What `vdet mine` takes from each frame of labelled video."""
+
+    probability: Fraction = Field(
+        0.2, description="a window that shows no vehicle is a false alarm from here on"
+    )
+    per_vehicle: int = Field(
+        16,
+        ge=0,
+        le=10_000,
+        description="most windows that fit a vehicle, and most others around it",
+    )
+    false_alarms: int = Field(15, ge=0, le=10_000, description="most of these, a frame")
+    parts: int = Field(
+        5,
+        ge=0,
+        le=10_000,
+        description="most false alarms on a part of a vehicle, a frame; with many of them, fewer "
+        "vehicles are found whole",
+    )

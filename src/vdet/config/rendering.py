@@ -2,9 +2,10 @@
 
 import textwrap
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 import yaml
+from pydantic.fields import FieldInfo
 
 from vdet.config.schema import Section, Settings
 
@@ -31,18 +32,18 @@ def _section(section: Section, indent: str, *, comments: bool = True) -> Iterato
             yield from _comment(_first_line(type(value)), indent)
             yield f"{indent}{name}:"
             yield from _section(value, indent + "  ")
-        elif _is_list_of_sections(value):
-            yield from _comment(f"{field.description}: {_first_line(type(value[0]))}", indent)
-            yield f"{indent}{name}:"
-            yield from _items(value, indent + "  ")
+        elif item := _kind_of_items(field):
+            yield from _comment(f"{field.description}: {_first_line(item)}", indent)
+            yield f"{indent}{name}:" if value else f"{indent}{name}: []"
+            yield from _items(item, value, indent + "  ")
         else:
             if comments and field.description:
                 yield from _comment(field.description, indent)
             yield f"{indent}{name}: {_scalar(value)}"
 
 
-def _items(items: tuple[Section, ...], indent: str) -> Iterator[str]:
-    for name, field in type(items[0]).model_fields.items():
+def _items(kind: type[Section], items: tuple[Section, ...], indent: str) -> Iterator[str]:
+    for name, field in kind.model_fields.items():
         yield from _comment(f"{name}: {field.description}", indent)
     for item in items:
         first, *rest = _section(item, indent + "  ", comments=False)
@@ -50,8 +51,12 @@ def _items(items: tuple[Section, ...], indent: str) -> Iterator[str]:
         yield from rest
 
 
-def _is_list_of_sections(value: object) -> bool:
-    return isinstance(value, tuple) and bool(value) and isinstance(value[0], Section)
+def _kind_of_items(field: FieldInfo) -> type[Section] | None:
+    """Return what a list of sections holds; None for any other field."""
+    kinds = get_args(field.annotation)
+    if kinds and isinstance(kinds[0], type) and issubclass(kinds[0], Section):
+        return kinds[0]
+    return None
 
 
 def _first_line(section: type[Section]) -> str:

@@ -5,28 +5,34 @@ The defaults are `configs/default.yaml`, which is their printed form.
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from vdet.config.detecting import (
     HeatSettings,
+    PerspectiveSettings,
     SearchSettings,
-    TrackerSettings,
+    VoteSettings,
     WindowSettings,
 )
+from vdet.config.following import MotionSettings, TrackerSettings
 from vdet.config.lanes import LaneSettings
 from vdet.config.learning import (
+    BoxSettings,
     CalibrationSettings,
     ColorSpace,
     FeatureSettings,
     HistogramSettings,
     HogSettings,
+    MiningSettings,
     SpatialSettings,
     TrainingSettings,
+    ViewSettings,
 )
 from vdet.config.section import FRAME_LENGTH, Fraction, Section
 
 __all__ = [
     "FRAME_LENGTH",
+    "BoxSettings",
     "CalibrationSettings",
     "ColorSpace",
     "FeatureSettings",
@@ -35,13 +41,18 @@ __all__ = [
     "HogSettings",
     "InputSettings",
     "LaneSettings",
+    "MiningSettings",
+    "MotionSettings",
     "OutputSettings",
+    "PerspectiveSettings",
     "SearchSettings",
     "Section",
     "Settings",
     "SpatialSettings",
     "TrackerSettings",
     "TrainingSettings",
+    "ViewSettings",
+    "VoteSettings",
     "WindowSettings",
 ]
 
@@ -81,9 +92,16 @@ class Settings(Section):
     )
     features: FeatureSettings = FeatureSettings()
     training: TrainingSettings = TrainingSettings()
+    mining: MiningSettings = MiningSettings()
     search: SearchSettings = SearchSettings()
     heat: HeatSettings = HeatSettings()
     tracker: TrackerSettings = TrackerSettings()
     lanes: LaneSettings = LaneSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
+
+    @model_validator(mode="after")
+    def _heat_sees_every_set(self) -> "Settings":
+        if self.heat.frames < self.search.alternate:
+            raise ValueError("heat.frames must be at least search.alternate")
+        return self

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.labelled_video import Integers
+from vdet.overlaps import Floats
 
 
 def assign(scores: npt.NDArray[Any]) -> tuple[Integers, Integers]:

@@ -8,8 +8,8 @@ and the precision at 101 recalls 0, 0.01 … 1 is averaged.
 import numpy as np
 import numpy.typing as npt
 
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.comparison import ComparedFrame, Comparison
+from vdet.overlaps import Floats
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 

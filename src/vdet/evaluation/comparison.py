@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.labelled_video import Integers
+from vdet.overlaps import Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)

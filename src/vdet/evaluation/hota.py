@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.evaluation.assignment import assign, at_least
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.comparison import Comparison, joined
 from vdet.evaluation.labelled_video import Integers
 from vdet.evaluation.ratio import ratio
+from vdet.overlaps import Floats
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """The overlaps from which a pair counts, 0.05 … 0.95; the metrics are the mean over them."""

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.evaluation.assignment import assign, at_least
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.comparison import ComparedFrame, Comparison
 from vdet.evaluation.labelled_video import Integers
 from vdet.evaluation.preprocessing import MATCH_IOU
+from vdet.overlaps import Floats
 
 _NOBODY = -1
 _LOYALTY = 1000.0  # outweighs any sum of overlaps

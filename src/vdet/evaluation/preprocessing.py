@@ -13,9 +13,9 @@ import numpy as np
 
 from vdet.errors import TruthError
 from vdet.evaluation.assignment import assign, at_least
-from vdet.evaluation.boxes import coverage, iou_matrix
 from vdet.evaluation.comparison import ComparedFrame, Comparison, joined
 from vdet.evaluation.labelled_video import Flags, Integers, LabelledVideo
+from vdet.overlaps import coverage, iou_matrix
 
 MATCH_IOU = 0.5
 """From this overlap on a prediction finds a vehicle."""

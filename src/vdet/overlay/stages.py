@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.config.schema import FeatureSettings, Settings
+from vdet.config.schema import FeatureSettings
 from vdet.detection import Detection
 from vdet.files import check_output, make_folder
 from vdet.geometry import Box
@@ -13,7 +13,7 @@ from vdet.images import Image, write_image
 from vdet.lanes.road import Road
 from vdet.overlay.drawing import GREEN, WHITE, blend_heat, color_of, draw_box, draw_label
 from vdet.overlay.patches import patch_sheet
-from vdet.search.engine import lay_grids
+from vdet.search.pyramid import FramePyramid
 from vdet.windows import WindowGrid, Windows
 
 LAST_STAGE = "5-boxes"
@@ -33,7 +33,6 @@ def write_stages(
     detection: Detection,
     boxes: Sequence[LabelledBox],
     *,
-    settings: Settings,
     features: FeatureSettings,
 ) -> None:
     """Write `1-patches.png` … `5-boxes.png` into `folder`, which is made where it is missing.
@@ -47,10 +46,9 @@ def write_stages(
     features
         Those of the model.
     """
-    height, width = image.shape[:2]
     pictures = {
         "1-patches": patch_sheet(_examples(image, detection.windows), features),
-        "2-windows": _draw_window_sets(image, lay_grids(settings, features, width, height)),
+        "2-windows": _draw_window_sets(image, detection.grids),
         "3-hits": _draw_hits(image, detection.hits),
         "4-heat": _draw_heat(image, detection),
         LAST_STAGE: _draw_boxes(image, detection, boxes),
@@ -73,11 +71,11 @@ def _write(folder: Path, pictures: dict[str, Image]) -> None:
 def _examples(image: Image, windows: Windows) -> dict[str, Image]:
     """Return the likeliest and the unlikeliest window of the frame, with captions."""
     best, worst = int(windows.probabilities.argmax()), int(windows.probabilities.argmin())
+    frame = FramePyramid(image, margin=int(windows.boxes[:, 2].max()))
     examples = {}
     for name, i in (("car", best), ("not car", worst)):
-        x, y, width, height = windows.boxes[i].tolist()
         caption = f"{name}? p = {windows.probabilities[i]:.2f}"
-        examples[caption] = image[y : y + height, x : x + width]
+        examples[caption] = frame.crop(*windows.boxes[i].tolist())
     return examples
 
 
@@ -86,8 +84,9 @@ def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
     picture = (image * 0.6).astype(np.uint8)
     for number, grid in enumerate(grids):
         for x, y, width, height in grid.boxes.tolist():
-            picture[y, x : x + width] = color_of(number)
-            picture[y : y + height, x] = color_of(number)
+            picture[y, max(0, x) : x + width] = color_of(number)
+            if 0 <= x < picture.shape[1]:
+                picture[y : y + height, x] = color_of(number)
     for number, grid in enumerate(grids):
         across = number * grid.columns // len(grids)
         example = Box(*grid.boxes[across].tolist())

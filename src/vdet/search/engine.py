@@ -1,6 +1,7 @@
 """The search of one frame size: window sets laid over the frame, each scored by an engine."""
 
 import logging
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -11,14 +12,17 @@ from vdet.errors import ConfigError, ImageError
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.dense import dense_search, why_not_dense
+from vdet.search.horizon import USUAL
 from vdet.search.patch import PatchSearch
+from vdet.search.perspective import lay_perspective
 from vdet.search.pyramid import FramePyramid
-from vdet.windows import Floats, WindowGrid, Windows, lay_grid
+from vdet.search.scored import Scored
+from vdet.windows import Boxes, Floats, WindowGrid, Windows, lay_grid
 
 MAX_WINDOWS = 100_000
-"""In a frame; more take minutes. The shipped settings lay about 1,500 over a frame of 16:9."""
+"""In a frame; more take minutes. The shipped settings lay about 2,100 over a frame of 16:9."""
 
-_ROW_MULTIPLE = 16  # so that the pyramid's levels begin at whole pixels
+_MULTIPLE = 16  # of rows and columns, so that the pyramid's levels begin at whole pixels
 
 log = logging.getLogger("vdet")
 
@@ -26,8 +30,8 @@ log = logging.getLogger("vdet")
 class GridSearch(Protocol):
     """Scores the windows of one grid."""
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
 
 
 class FrameSearch:
@@ -37,6 +41,13 @@ class FrameSearch:
     ----------
     width, height
         Size of the frames, pixels.
+    horizon
+        Its row, share of the frames' height, for the sets that follow the perspective.
+
+    Attributes
+    ----------
+    grids
+        The window sets, laid over the frame.
 
     Raises
     ------
@@ -46,8 +57,18 @@ class FrameSearch:
         The dense engine is asked for, and the model's features cannot be computed densely.
     """
 
-    def __init__(self, model: LinearModel, settings: Settings, width: int, height: int) -> None:
-        grids = lay_grids(settings, model.features, width, height)
+    def __init__(
+        self,
+        model: LinearModel,
+        settings: Settings,
+        width: int,
+        height: int,
+        *,
+        horizon: float = USUAL,
+    ) -> None:
+        self.grids = grids = tuple(
+            lay_grids(settings, model.features, width, height, horizon=horizon)
+        )
         if not grids:
             raise ImageError(
                 f"no search window fits into a frame of {width}×{height} pixels; "
@@ -59,30 +80,90 @@ class FrameSearch:
                 f"more than {MAX_WINDOWS:,}; give search.windows larger steps, or fewer rows"
             )
         dense = _is_dense(settings.search, model.features)
+        turns = min(settings.search.alternate, len(grids))
+        self._turns = [_SetSearch(model, settings, grids[i::turns], dense) for i in range(turns)]
+        self._whole = _SetSearch(model, settings, grids, dense)
+
+    def search(self, image: Image, turn: int | None = None) -> Windows:
+        """Score windows of a frame, BGR uint8 `(H, W, 3)`; may be called from threads.
+
+        Parameters
+        ----------
+        turn
+            Number of a video's frame: only the sets whose turn it is are searched
+            (`search.alternate`). None for all of them.
+        """
+        sets = self._whole if turn is None else self._turns[turn % len(self._turns)]
+        return sets.search(image)
+
+
+class _SetSearch:
+    """Scores the windows of some sets."""
+
+    def __init__(
+        self, model: LinearModel, settings: Settings, grids: Sequence[WindowGrid], dense: bool
+    ) -> None:
         self._searches: list[GridSearch] = [
             dense_search(model, grid) if dense else PatchSearch(model, grid) for grid in grids
         ]
-        self._boxes = np.concatenate([grid.boxes for grid in grids])
-        top, bottom = self._boxes[:, 1].min(), (self._boxes[:, 1] + self._boxes[:, 3]).max()
-        self._rows = int(top) // _ROW_MULTIPLE * _ROW_MULTIPLE, int(bottom)
+        self._grid_boxes = [grid.boxes for grid in grids]
+        self._boxes = np.concatenate(self._grid_boxes)
         self._shares = np.repeat(
             np.array([grid.share for grid in grids], np.float32), [len(grid) for grid in grids]
         )
+        self._least = settings.search.probability
+        self._regression = model.boxes
+        top, bottom = self._boxes[:, 1].min(), (self._boxes[:, 1] + self._boxes[:, 3]).max()
+        self._rows = int(top) // _MULTIPLE * _MULTIPLE, int(bottom)
+        self._margin = -(int(self._boxes[:, 0].min()) // _MULTIPLE * _MULTIPLE)
 
     def search(self, image: Image) -> Windows:
-        """Score every window of a frame, BGR uint8 `(H, W, 3)`; may be called from threads."""
-        frame = FramePyramid(image, *self._rows)
-        probabilities = np.concatenate([search.search(frame) for search in self._searches])
-        return Windows(self._boxes, probabilities, self._shares)
+        frame = FramePyramid(image, *self._rows, margin=self._margin)
+        found = [search.search(frame) for search in self._searches]
+        vehicles = [self._vehicles(*each) for each in zip(found, self._grid_boxes, strict=True)]
+        probabilities = np.concatenate([scored.probabilities for scored in found])
+        return Windows(self._boxes, probabilities, self._shares, np.concatenate(vehicles))
+
+    def _vehicles(self, scored: Scored, boxes: Boxes) -> Floats:
+        """Return the windows themselves, detections replaced by the vehicles that they show."""
+        vehicles = boxes.astype(np.float32)
+        (hits,) = np.nonzero(scored.probabilities >= self._least)
+        if self._regression is not None and len(hits):
+            sides = self._regression.sides(scored.hogs(hits))
+            vehicles[hits] = _placed(vehicles[hits], sides)
+        return vehicles
+
+
+def _placed(windows: Floats, sides: Floats) -> Floats:
+    """Turn sides, relative to their windows, into boxes; a box has at least `_LEAST` of a window.
+
+    `windows` `(m, 4)` are x, y, width, height; `sides` `(m, 4)` left, top, right, bottom from the
+    window's centre in its sides.
+    """
+    size = windows[:, 2:]
+    middle = windows[:, :2] + size / 2
+    extent = np.maximum(sides[:, 2:] - sides[:, :2], _LEAST)
+    centre = middle + (sides[:, :2] + sides[:, 2:]) / 2 * size
+    return np.concatenate([centre - extent * size / 2, extent * size], axis=1, dtype=np.float32)
+
+
+_LEAST = 0.2
+"""Width and height of the smallest vehicle that a window can show, sides of the window."""
 
 
 def lay_grids(
-    settings: Settings, features: FeatureSettings, width: int, height: int
+    settings: Settings,
+    features: FeatureSettings,
+    width: int,
+    height: int,
+    *,
+    horizon: float = USUAL,
 ) -> list[WindowGrid]:
     """Lay the window sets over a frame; those of which no window fits are left out."""
     search = scale_lengths(settings.search, height / settings.reference_height)
     cells = features.patch // features.hog.cell
     grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
+    grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
     return [grid for grid in grids if len(grid)]
 
 

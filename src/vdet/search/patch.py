@@ -5,30 +5,36 @@ Slow and plain; faster engines are held to what it gives. Source: seed section 2
 
 import numpy as np
 
-from vdet.features import FeatureExtractor, to_patch
+from vdet.features import FeatureExtractor, Vectors, to_patch
 from vdet.model import LinearModel
 from vdet.search.pyramid import FramePyramid
-from vdet.windows import Boxes, Floats, WindowGrid
+from vdet.search.scored import Numbers, Scored
+from vdet.windows import WindowGrid
 
 BATCH = 1024
 """Windows described before they are scored: more would only take memory."""
 
 
 class PatchSearch:
-    """Scores the windows of one grid, all inside the frame."""
+    """Scores the windows of one grid."""
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
         self._boxes = grid.boxes
         self._extractor = FeatureExtractor(model.features)
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
-        batches = range(0, len(self._boxes), BATCH)
-        return np.concatenate([self._score(frame, self._boxes[i : i + BATCH]) for i in batches])
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
+        numbers = np.arange(len(self._boxes))
+        batches = (numbers[i : i + BATCH] for i in range(0, len(numbers), BATCH))
+        vectors = (self._describe(frame, some) for some in batches)
+        probabilities = [self._model.probabilities(some) for some in vectors]
+        length = self._extractor.layout.hog_length
+        return Scored(
+            np.concatenate(probabilities), lambda hits: self._describe(frame, hits)[:, :length]
+        )
 
-    def _score(self, frame: FramePyramid, boxes: Boxes) -> Floats:
+    def _describe(self, frame: FramePyramid, numbers: Numbers) -> Vectors:
         side = self._model.features.patch
-        crops = (frame.image[y : y + h, x : x + w] for x, y, w, h in boxes.tolist())
-        vectors = self._extractor.describe_all(to_patch(crop, side) for crop in crops)
-        return self._model.probabilities(vectors)
+        crops = (frame.crop(*box) for box in self._boxes[numbers].tolist())
+        return self._extractor.describe_all(to_patch(crop, side) for crop in crops)

@@ -1,5 +1,8 @@
 """A frame at full, half, quarter … size, so that each strip starts from what is near its scale."""
 
+import cv2
+import numpy as np
+
 from vdet.features import halve, resize
 from vdet.images import Image
 
@@ -13,21 +16,35 @@ class FramePyramid:
         BGR uint8 `(H, W, 3)`.
     top, bottom
         The rows that will be asked for.
+    margin
+        Columns that will be asked for beyond the left and right of the frame; they repeat its
+        outermost ones.
     """
 
-    def __init__(self, image: Image, top: int = 0, bottom: int | None = None) -> None:
-        self.image = image
-        self._top = top
-        self._levels = [image[top:bottom]]
+    def __init__(
+        self, image: Image, top: int = 0, bottom: int | None = None, margin: int = 0
+    ) -> None:
+        rows = image[top:bottom]
+        if margin:
+            rows = np.asarray(
+                cv2.copyMakeBorder(rows, 0, 0, margin, margin, cv2.BORDER_REPLICATE), np.uint8
+            )
+        self._origin = margin, -top
+        self._levels = [rows]
+
+    def crop(self, x: int, y: int, width: int, height: int) -> Image:
+        """Return a window of the frame at full size; full-frame pixels, x may be negative."""
+        left, top = x + self._origin[0], y + self._origin[1]
+        return self._levels[0][top : top + height, left : left + width]
 
     def cut(self, rows: slice, columns: slice, width: int, height: int) -> Image:
         """Return a part of the frame (full-frame pixels), resized to `width` × `height`.
 
         The pixels are those of `resize(image[rows, columns], width, height)`.
         """
-        top, bottom = rows.start - self._top, rows.stop - self._top
+        across, down = self._origin
+        sides = rows.start + down, rows.stop + down, columns.start + across, columns.stop + across
         level = 0
-        sides = (top, bottom, columns.start, columns.stop)
         while _halves_exactly(sides) and _is_twice(sides, width, height):
             sides = (sides[0] // 2, sides[1] // 2, sides[2] // 2, sides[3] // 2)
             level += 1

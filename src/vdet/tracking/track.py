@@ -15,10 +15,12 @@ class Track:
         1, 2, 3 … in the order in which the cars of a video are first shown; never used again for
         another car.
     box
-        Average of the car's last rectangles (`tracker.history` of them), rounded to whole pixels
-        of the full frame. It is not clipped; the rectangles that it averages lie in the frame.
+        Where it is, whole pixels of the full frame. Of the motion tracker: its estimate for this
+        frame, the part inside the frame. Of the original's rules: the average of the car's last
+        rectangles (`tracker.history` of them), which lie in the frame.
     from_match
-        Whether this frame's detection is a template match alone, without heat to back it.
+        Whether the frame has no region for the car: it is shown where its motion leads, or, by the
+        original's rules, where its image was found again.
     """
 
     id: int

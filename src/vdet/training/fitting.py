@@ -2,24 +2,26 @@
 
 import logging
 import warnings
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings, TrainingSettings
 from vdet.errors import DataError
 from vdet.features import Vectors
 from vdet.model import LinearModel
+from vdet.training.extraction import Flags, Rows
 
 log = logging.getLogger("vdet")
 
 
 def fit(
     vectors: Vectors,
-    vehicle: npt.NDArray[np.bool_],
+    vehicle: Flags,
     features: FeatureSettings,
     settings: TrainingSettings,
+    origins: Rows | None = None,
 ) -> LinearModel:
     """Fit StandardScaler → LinearSVC → CalibratedClassifierCV on raw feature vectors.
 
@@ -29,6 +31,9 @@ def fit(
         float32 of shape `(n, features)`.
     vehicle
         bool of shape `(n,)`.
+    origins
+        intp of shape `(n,)`: the row of the patch that each row is a view of, its own for a patch.
+        A patch and its views are in one fold of the calibration. None: all rows are patches.
 
     Raises
     ------
@@ -37,12 +42,13 @@ def fit(
     """
     from sklearn.calibration import CalibratedClassifierCV
     from sklearn.exceptions import ConvergenceWarning
-    from sklearn.model_selection import StratifiedKFold
     from sklearn.preprocessing import StandardScaler
     from sklearn.svm import LinearSVC
 
+    origins = np.arange(len(vehicle)) if origins is None else origins
     folds = settings.calibration.folds
-    fewest = min(np.count_nonzero(vehicle), np.count_nonzero(~vehicle))
+    (patches,) = np.nonzero(origins == np.arange(len(origins)))
+    fewest = min(np.count_nonzero(vehicle[patches]), np.count_nonzero(~vehicle[patches]))
     if fewest < folds:
         raise DataError(
             f"a class has {fewest} training patches, training.calibration.folds needs {folds}; "
@@ -54,7 +60,7 @@ def fit(
     calibrated = CalibratedClassifierCV(
         svm,
         method="sigmoid",
-        cv=StratifiedKFold(folds, shuffle=True, random_state=settings.seed),
+        cv=list(_folds(vehicle[patches], patches, origins, settings)),
         ensemble=settings.calibration.ensemble,
     )
     with warnings.catch_warnings(record=True) as caught:
@@ -63,6 +69,18 @@ def fit(
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
     return _to_model(calibrated.calibrated_classifiers_, scaler, features)
+
+
+def _folds(
+    vehicle: Flags, patches: Rows, origins: Rows, settings: TrainingSettings
+) -> Iterator[tuple[Rows, Rows]]:
+    """Give the rows to fit and to calibrate on; `vehicle` is of the rows that are `patches`."""
+    from sklearn.model_selection import StratifiedKFold
+
+    splitter = StratifiedKFold(settings.calibration.folds, shuffle=True, random_state=settings.seed)
+    for _, tested in splitter.split(patches, vehicle):
+        inside = np.isin(origins, patches[tested])
+        yield np.flatnonzero(~inside), np.flatnonzero(inside)
 
 
 def _to_model(members: list[Any], scaler: Any, features: FeatureSettings) -> LinearModel:

@@ -1,9 +1,11 @@
 """One training run, from labelled vectors to a model with its report."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +17,13 @@ from vdet.dataset import PatchFile, read_patches
 from vdet.errors import DataError
 from vdet.features import FeatureExtractor, to_patch
 from vdet.model import LinearModel
+from vdet.training.boxes import BoxPatches, describe_boxes, fit_split_boxes
 from vdet.training.extraction import LabelledVectors, extract
 from vdet.training.fitting import fit
+from vdet.training.lesson import lesson_of
 from vdet.training.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
 from vdet.training.splits import SplitName, hold_out
+from vdet.training.views import views_of
 
 _TIMED_PATCHES = 200
 
@@ -27,6 +32,7 @@ def train(
     files: Sequence[PatchFile],
     settings: Settings,
     *,
+    boxed: Sequence[PatchFile] = (),
     jobs: int = -1,
     scheduler: str | None = None,
     progress: Callable[[int], object] = lambda _: None,
@@ -35,6 +41,9 @@ def train(
 
     Parameters
     ----------
+    boxed
+        Patches of neither class that tell where a vehicle is. With them, or with `files` that
+        tell it, the model learns to find the sides of vehicles.
     jobs
         Processes, as joblib counts them: -1 for one a core.
     scheduler
@@ -55,18 +64,29 @@ def train(
         The cluster of `scheduler` cannot be used.
     """
     began = time.perf_counter()
-    broken = settings.training.max_broken
+    training = settings.training
     with on_cluster(scheduler) if scheduler else nullcontext():
-        data = extract(files, settings.features, max_broken=broken, jobs=jobs, progress=progress)
+        data = extract(
+            files,
+            settings.features,
+            max_broken=training.max_broken,
+            look=partial(views_of, settings=training.views),
+            seed=training.seed,
+            jobs=jobs,
+            progress=progress,
+        )
+        boxes = describe_boxes(files, boxed, settings, jobs=jobs, progress=progress)
     extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
-    names.sort(key=lambda name: name != settings.training.split)
-    fitted = [_fit_split(data, settings, name) for name in names]
+    names.sort(key=lambda name: name != training.split)
+    fitted = [_fit_split(data, boxes, settings, name) for name in names]
     model = fitted[0][0]
     report = TrainingReport(
         vehicles=int(np.count_nonzero(data.vehicle)),
         non_vehicles=int(np.count_nonzero(~data.vehicle)),
-        broken=data.broken,
+        boxed=sum(file.sides is not None for file in (*files, *boxed)),
+        broken=data.broken + (boxes.boxed.broken if boxes and boxes.boxed else 0),
+        groups=dict(Counter(file.group for file in (*files, *boxed))),
         features=data.vectors.shape[1],
         extract_seconds=round(extract_seconds, 3),
         milliseconds_per_prediction=_milliseconds_per_prediction(model, files),
@@ -75,32 +95,41 @@ def train(
     provenance = {
         "program": f"vdet {vdet.__version__}",
         "data_sha256": data.digest,
-        "training": settings.training.model_dump(mode="json"),
+        "training": training.model_dump(mode="json"),
         "report": asdict(report),
     }
+    if boxes and boxes.boxed:
+        provenance["boxes_sha256"] = boxes.boxed.digest
     return replace(model, provenance=provenance), report
 
 
 def _fit_split(
-    data: LabelledVectors, settings: Settings, name: SplitName
+    data: LabelledVectors, boxes: BoxPatches | None, settings: Settings, name: SplitName
 ) -> tuple[LinearModel, SplitReport]:
     training = settings.training
     held = hold_out(data.groups, name, training.test_fraction, training.seed)
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
-    model = fit(data.vectors[~held], data.vehicle[~held], settings.features, training)
+    lesson = lesson_of(data, ~held)
+    model = fit(lesson.vectors, lesson.vehicle, settings.features, training, lesson.origins)
+    regression, error = None, None
+    if boxes is not None:
+        regression, error = fit_split_boxes(data, held, boxes, name, settings)
     seconds = time.perf_counter() - began
     predicted = model.probabilities(data.vectors) >= 0.5
     right = predicted == data.vehicle
-    return model, SplitReport(
+    train_patches = int(np.count_nonzero(~held))
+    return replace(model, boxes=regression), SplitReport(
         split=name,
-        train_patches=int(np.count_nonzero(~held)),
+        train_patches=train_patches,
+        train_views=len(lesson.vehicle) - train_patches,
         test_patches=int(np.count_nonzero(held)),
         train_accuracy=float(right[~held].mean()),
         test_accuracy=float(right[held].mean()),
         confusion=Confusion.of(data.vehicle[held], predicted[held]),
         groups=_by_group(data.groups[held], right[held]),
+        boxes=error,
         fit_seconds=round(seconds, 3),
     )
 

@@ -11,10 +11,13 @@ from vdet.evaluation.clips.clip import detect, open_clip
 from vdet.evaluation.clips.evaluate import Variant, evaluate_clips
 from vdet.evaluation.clips.following import follow_under_all
 from vdet.following import follow
+from vdet.images import Image
 from vdet.model import LinearModel, load_model
+from vdet.search.engine import FrameSearch
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 from vdet.video import VideoReader
+from vdet.windows import Windows
 
 FRAMES = 10
 
@@ -43,6 +46,10 @@ def test_settings_side_by_side_give_what_each_gives_alone(
         settings("heat.threshold=0.3", "heat.frames=3"),
         settings("search.probability=0.8"),
         settings("tracker.history=2"),
+        settings("search.perspective.sizes=[0.25]", "search.alternate=2"),
+        settings("search.perspective={sizes: [0.25], horizon: 0.5}"),
+        settings("heat.regions=votes", "heat.votes.least=0.02"),
+        settings("tracker={method: motion, motion: {strong: 0.05}}"),
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
         frames = list(reader)
@@ -53,6 +60,23 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     ]
     assert [list(tracks) for tracks in zip(*alone, strict=True)] == [t for _, t in together]
     assert len({str(each) for each in alone}) > 1, "the settings should differ in what they find"
+
+
+def test_settings_that_search_alike_share_the_search(
+    clip_path: Path, model: LinearModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched: list[int | None] = []
+
+    def search(self: FrameSearch, image: Image, turn: int | None = None) -> Windows:
+        searched.append(turn)
+        return whole(self, image, turn)
+
+    whole = FrameSearch.search
+    monkeypatch.setattr(FrameSearch, "search", search)
+    variants = [settings(), settings("heat.threshold=1"), settings("search.probability=0.9")]
+    with VideoReader(clip_path, frames=3) as reader:
+        assert len(list(follow_under_all(reader, model, variants, 320, 180))) == 3
+    assert searched == [0, 0, 1, 1, 2, 2]
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(

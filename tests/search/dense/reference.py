@@ -1,19 +1,22 @@
 """What the dense engine is held to: the patch engine, with models fitted to generated patches."""
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings, HogSettings, WindowSettings
 from vdet.features import FeatureExtractor, to_patch
 from vdet.images import Image
-from vdet.model import LinearModel
+from vdet.model import BoxRegression, LinearModel
 from vdet.search.dense import dense_search
 from vdet.search.patch import PatchSearch
 from vdet.search.pyramid import FramePyramid
 from vdet.synthetic import background_patches, default_clip, render, vehicle_patches
 from vdet.windows import Floats, WindowGrid, lay_grid
+
+Exact = npt.NDArray[np.float64]
 
 SEED_FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
 _EACH = 120  # patches of a class
@@ -38,10 +41,15 @@ class Scores:
 
 def compare(model: LinearModel, grids: list[WindowGrid], image: Image) -> Scores:
     """Search a frame with both engines."""
-    frame = FramePyramid(image)
-    dense = [dense_search(model, grid).search(frame) for grid in grids]
-    patch = [PatchSearch(model, grid).search(frame) for grid in grids]
+    frame = pyramid(image, grids)
+    dense = [dense_search(model, grid).search(frame).probabilities for grid in grids]
+    patch = [PatchSearch(model, grid).search(frame).probabilities for grid in grids]
     return Scores(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
+
+
+def pyramid(image: Image, grids: list[WindowGrid]) -> FramePyramid:
+    """Give a frame with room for windows beyond its sides, whole pixels at all levels."""
+    return FramePyramid(image, margin=-16 * min(0, *(int(grid.left // 16) for grid in grids)))
 
 
 def log_odds(probabilities: Floats) -> Floats:
@@ -62,12 +70,39 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
     return LinearModel(features, weights, biases, slopes, np.zeros(members, np.float32))
 
 
-def _ridge(vectors: Floats, labels: Floats) -> tuple[Floats, float]:
+def with_boxes(model: LinearModel) -> LinearModel:
+    """Let a model know the vehicles' boxes too, learnt from crops of vehicle patches."""
+    rng = np.random.default_rng(2)
+    patches = _patches()[0][:_EACH] * 2
+    zooms = rng.uniform(0.6, 1, len(patches))
+    crops = [_crop(*each, rng) for each in zip(patches, zooms, strict=True)]
+    extractor = FeatureExtractor(model.features)
+    vectors = extractor.describe_all(to_patch(crop, model.features.patch) for crop, _ in crops)
+    hogs = vectors[:, : extractor.layout.hog_length].astype(np.float64)
+    targets = np.array([sides for _, sides in crops])
+    weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
+    biases = biases + targets.mean(axis=0)
+    boxes = BoxRegression(weights.T.astype(np.float32), biases.astype(np.float32))
+    return replace(model, boxes=boxes)
+
+
+def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, list[float]]:
+    """Cut a square out of a vehicle patch; and tell the patch's sides from the crop's middle."""
+    whole = len(patch)
+    side = round(zoom * whole)
+    x, y = rng.integers(0, whole - side + 1, 2).tolist()
+    sides = [(0 - x) / side, (0 - y) / side, (whole - x) / side, (whole - y) / side]
+    return patch[y : y + side, x : x + side], [each - 0.5 for each in sides]
+
+
+def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:
+    """Return weights `(n,)` or `(n, m)` and biases for targets `(k,)` or `(k, m)` of mean 0."""
     mean, deviation = vectors.mean(axis=0), vectors.std(axis=0) + 1e-3
     scaled = (vectors - mean) / deviation
-    kernel = scaled @ scaled.T / scaled.shape[1] + np.eye(len(labels))
-    weights = scaled.T @ np.linalg.solve(kernel, labels) / scaled.shape[1] / deviation
-    return weights, float(-mean @ weights)
+    kernel = scaled @ scaled.T / scaled.shape[1] + np.eye(len(targets))
+    weights = scaled.T @ np.linalg.solve(kernel, targets) / scaled.shape[1]
+    weights = (weights.T / deviation).T
+    return weights, -mean @ weights
 
 
 @functools.cache

@@ -37,7 +37,11 @@ def model_of(features: FeatureSettings) -> LinearModel:
 
 def settings(engine: str) -> Settings:
     search = SearchSettings.model_validate(
-        {"engine": engine, "windows": [WindowSettings(size=32, step=1, top=20, bottom=80)]}
+        {
+            "engine": engine,
+            "windows": [WindowSettings(size=32, step=1, top=20, bottom=80)],
+            "perspective": {"sizes": []},
+        }
     )
     return Settings(reference_height=90, search=search)
 
@@ -49,7 +53,7 @@ def searched(features: FeatureSettings, engine: str) -> np.ndarray:
 def by_patch(features: FeatureSettings) -> np.ndarray:
     model = model_of(features)
     (grid,) = lay_grids(settings("patch"), features, 160, 90)
-    return PatchSearch(model, grid).search(FramePyramid(FRAME))
+    return PatchSearch(model, grid).search(FramePyramid(FRAME)).probabilities
 
 
 @pytest.fixture(autouse=True)

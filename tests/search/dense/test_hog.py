@@ -4,7 +4,8 @@ import pytest
 
 from search.dense.reference import SEED_FEATURES
 from vdet.config.schema import FeatureSettings, HogSettings
-from vdet.search.dense.hog import channel_of, describe_blocks, window_sums
+from vdet.features import FeatureExtractor, convert
+from vdet.search.dense.hog import channel_of, describe_blocks, window_blocks, window_sums
 
 RNG = np.random.default_rng(0)
 STRIP = RNG.integers(0, 256, (96, 160, 3), dtype=np.uint8)
@@ -50,6 +51,31 @@ def test_channels_are_described_in_the_order_of_the_settings() -> None:
     settings = FeatureSettings(hog=HogSettings(cell=8, channels=(2, 0)))
     some = describe_blocks(STRIP, settings)
     np.testing.assert_array_equal(some, np.concatenate([every[..., 64:], every[..., :32]], axis=-1))
+
+
+@pytest.mark.parametrize(
+    "features",
+    [SEED_FEATURES, FeatureSettings(patch=64, hog=HogSettings(block=3, channels=(2, 0)))],
+    ids=["seed", "large blocks"],
+)
+def test_the_blocks_of_a_window_in_the_order_of_the_features(features: FeatureSettings) -> None:
+    patch = STRIP[:64, :64]
+    extractor = FeatureExtractor(features)
+    blocks = describe_blocks(convert(patch, features), features)
+    origin = np.zeros(1, np.intp)
+    (hog,) = window_blocks(blocks, origin, origin, features)
+    expected = extractor.describe(patch)[: extractor.layout.hog_length]
+    np.testing.assert_allclose(hog, expected, atol=1e-6)
+
+
+def test_windows_are_at_their_block_positions() -> None:
+    blocks = describe_blocks(STRIP, SEED_FEATURES)
+    columns, rows = np.array([0, 12, 5]), np.array([4, 0, 2])
+    windows = window_blocks(blocks, columns, rows, SEED_FEATURES)
+    for column, row, window in zip(columns, rows, windows, strict=True):
+        cut = blocks[column : column + 7, row : row + 7]
+        zero = np.zeros(1, np.intp)
+        np.testing.assert_array_equal(window, window_blocks(cut, zero, zero, SEED_FEATURES)[0])
 
 
 def test_a_channel_is_contiguous() -> None:

@@ -67,7 +67,7 @@ def test_a_texture_scores_highest_in_the_window_it_fills(
         x, y, w, h = grid.boxes[index].tolist()
         frame = np.full((2 * size + 6 * step, 2 * size + 8 * step, 3), 100, np.uint8)
         frame[y : y + h, x : x + w] = texture(size)
-        found = search.search(FramePyramid(frame))
+        found = search.search(FramePyramid(frame)).probabilities
         assert found.shape == (35,)
         assert found.dtype == np.float32
         assert int(found.argmax()) == index
@@ -83,8 +83,24 @@ def test_a_grid_may_be_a_window_a_row_or_a_column(
     frame = FramePyramid(np.asarray(texture(256), np.uint8))
     search = dense_search(model, grid)
     assert type(search) is kind
-    expected = PatchSearch(model, grid).search(frame)
-    np.testing.assert_allclose(search.search(frame), expected, atol=0.1)
+    expected = PatchSearch(model, grid).search(frame).probabilities
+    np.testing.assert_allclose(search.search(frame).probabilities, expected, atol=0.1)
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+def test_the_hog_of_each_window_is_what_it_was_scored_by(kind: type, size: int, step: int) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder(2)
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    found = search.search(FramePyramid(np.asarray(texture(400), np.uint8)))
+    numbers = np.random.default_rng(1).permutation(len(grid))
+    hogs = found.hogs(numbers)
+    assert hogs.shape == (len(grid), FeatureExtractor(FEATURES).layout.hog_length)
+    assert hogs.dtype == np.float32
+    scored = model.probabilities(hogs)  # there are no other features
+    np.testing.assert_allclose(scored, found.probabilities[numbers], atol=1e-5)
+    assert len(np.unique(scored.round(4))) > len(grid) / 2
 
 
 def test_a_search_remembers_nothing() -> None:
@@ -92,5 +108,10 @@ def test_a_search_remembers_nothing() -> None:
         grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
         search = dense_search(texture_finder(1), grid)
         first = search.search(FramePyramid(texture(256)))
+        kept = first.probabilities.copy()
+        hogs = first.hogs(np.arange(len(grid)))
         search.search(FramePyramid(255 - texture(256)))
-        np.testing.assert_array_equal(search.search(FramePyramid(texture(256))), first)
+        again = search.search(FramePyramid(texture(256)))
+        for found in (first, again):
+            np.testing.assert_array_equal(found.probabilities, kept)
+            np.testing.assert_array_equal(found.hogs(np.arange(len(grid))), hogs)

@@ -6,14 +6,13 @@ searched once for them, and only heat and tracker are run for each.
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from vdet.config.scaling import scale_lengths
-from vdet.config.schema import SearchSettings, Settings
+from vdet.config.schema import Settings
 from vdet.detection import Detector
-from vdet.following import follow
+from vdet.following import follow, seek_horizon
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.stream import quiet_libraries
-from vdet.tracking.cars import Cars
+from vdet.tracking.choice import tracker_of
 from vdet.tracking.track import Track
 from vdet.video import Frame
 from vdet.windows import Windows
@@ -43,31 +42,31 @@ def follow_under_all(
             for result in follow(frames, model, variants[0], width, height):
                 yield result.frame, [result.tracks]
         return
-    followers = [_Follower(model, settings, width, height) for settings in variants]
+    rest: Iterable[Frame] = frames
+    followers = []
+    for settings in variants:
+        rest, horizon = seek_horizon(rest, settings)
+        followers.append(_Follower(model, settings, width, height, horizon))
     searchers = {follower.search_key: follower for follower in followers}
     with quiet_libraries():
-        for frame in frames:
-            found = {key: searcher.search(frame.image) for key, searcher in searchers.items()}
+        for frame in rest:
+            found = {key: searcher.search(frame) for key, searcher in searchers.items()}
             tracks = [each.update(frame.image, found[each.search_key]) for each in followers]
             yield frame, tracks
-
-
-def _search_key(settings: Settings) -> tuple[int, SearchSettings]:
-    """Return what the search depends on; which windows count as detections is said after it."""
-    return settings.reference_height, settings.search.model_copy(update={"probability": 0.0})
 
 
 class _Follower:
     """Detector and tracker under one setting."""
 
-    def __init__(self, model: LinearModel, settings: Settings, width: int, height: int) -> None:
-        factor = height / settings.reference_height
-        self._detector = Detector(model, settings, width, height)
-        self._cars = Cars(scale_lengths(settings.tracker, factor))
-        self.search_key = _search_key(settings)
+    def __init__(
+        self, model: LinearModel, settings: Settings, width: int, height: int, horizon: float
+    ) -> None:
+        self._detector = Detector(model, settings, width, height, horizon=horizon)
+        self._track = tracker_of(settings, width, height)
+        self.search_key = settings.reference_height, settings.search
 
-    def search(self, image: Image) -> Windows:
-        return self._detector.search(image)
+    def search(self, frame: Frame) -> Windows:
+        return self._detector.search(frame.image, frame.index)
 
     def update(self, image: Image, windows: Windows) -> Tracks:
-        return tuple(self._cars.update(image, self._detector.accumulate(windows).regions))
+        return tuple(self._track(image, self._detector.accumulate(windows).regions))

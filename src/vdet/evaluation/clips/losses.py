@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.comparison import ComparedFrame, Comparison
 from vdet.evaluation.labelled_video import Integers
 from vdet.evaluation.matching import MatchedFrame
+from vdet.overlaps import Floats
 
 Kind = Literal["missed", "false alarm"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.patches.measures import MEASURES, Flags, measure
+from vdet.overlaps import Floats
 
 RESAMPLES = 1000
 """Draws of the bootstrap."""

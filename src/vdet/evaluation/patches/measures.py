@@ -7,7 +7,7 @@ a resample they are one draw of a bootstrap.
 import numpy as np
 import numpy.typing as npt
 
-from vdet.evaluation.boxes import Floats
+from vdet.overlaps import Floats
 
 Flags = npt.NDArray[np.bool_]
 

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from vdet.dataset import PatchFile
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.patches.bootstrap import intervals
 from vdet.evaluation.patches.measures import MEASURES, THRESHOLD, Flags, bins_of, measure
 from vdet.evaluation.patches.results import (
@@ -17,6 +16,7 @@ from vdet.evaluation.patches.results import (
     TrialReport,
 )
 from vdet.evaluation.patches.trials import Trial
+from vdet.overlaps import Floats
 from vdet.training.extraction import LabelledVectors
 from vdet.training.report import Confusion
 

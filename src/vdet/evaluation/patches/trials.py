@@ -9,10 +9,10 @@ import numpy as np
 
 from vdet.config.schema import Settings
 from vdet.errors import DataError
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.labelled_video import Integers
 from vdet.features import Vectors
 from vdet.model import LinearModel
+from vdet.overlaps import Floats
 from vdet.training.extraction import LabelledVectors
 from vdet.training.fitting import fit
 from vdet.training.splits import Held, hold_out

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 
 from vdet.config.schema import InputSettings
-from vdet.evaluation.boxes import Floats
 from vdet.evaluation.clips.evaluate import ClipResult
 from vdet.evaluation.clips.losses import Kind, Loss
 from vdet.evaluation.clips.text import frame_span, loss_name
 from vdet.evaluation.comparison import ComparedFrame
 from vdet.evaluation.report.page import Picture
 from vdet.images import Image
+from vdet.overlaps import Floats
 from vdet.overlay.drawing import Color
 from vdet.video import VideoReader
 

@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from vdet.features import Vectors
 from vdet.model import LinearModel
 from vdet.search.dense.histogram import table_sums
-from vdet.search.dense.hog import describe_blocks, window_sums
+from vdet.search.dense.hog import describe_blocks, window_blocks, window_sums
 from vdet.search.dense.strips import Strip
 from vdet.search.dense.weights import DenseWeights
 from vdet.search.pyramid import FramePyramid
-from vdet.windows import Floats, WindowGrid, every_nth
+from vdet.search.scored import Numbers, Scored
+from vdet.windows import WindowGrid, every_nth
 
 
 class AlignedSearch:
@@ -18,20 +20,29 @@ class AlignedSearch:
         self._model = model
         self._weights = DenseWeights.of(model)
         self._strip = Strip(grid, model.features)
+        self._columns = grid.columns
         cell = model.features.hog.cell
         self._cells = int(grid.step * model.features.patch / grid.size / cell)
         self._x = np.arange(grid.columns)[:, np.newaxis] * self._cells * cell
         self._y = np.arange(grid.rows)[np.newaxis] * self._cells * cell
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
         features = self._model.features
         strip = self._strip.cut(frame)
-        every_block = window_sums(describe_blocks(strip, features), self._weights.hog)
+        blocks = describe_blocks(strip, features)
+        every_block = window_sums(blocks, self._weights.hog)
         scores = every_block[:, :: self._cells, :: self._cells]
         scores = scores + table_sums(strip, self._weights.tables, features.patch, self._x, self._y)
         by_row = scores.transpose(2, 1, 0).reshape(-1, len(scores))
-        return self._model.probabilities_of_scores(by_row + self._model.biases)
+        probabilities = self._model.probabilities_of_scores(by_row + self._model.biases)
+        return Scored(probabilities, lambda numbers: self._hogs(blocks, numbers))
+
+    def _hogs(self, blocks: Vectors, numbers: Numbers) -> Vectors:
+        rows, columns = np.divmod(numbers, self._columns)
+        return window_blocks(
+            blocks, columns * self._cells, rows * self._cells, self._model.features
+        )
 
 
 class PhasedSearch:
@@ -46,10 +57,26 @@ class PhasedSearch:
             for across in range(min(every, grid.columns))
         }
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
         probabilities = np.zeros(self._shape, np.float32)
+        scored = {}
         for (down, across), part in self._parts.items():
+            scored[down, across] = found = part.search(frame)
             place = probabilities[down :: self._every, across :: self._every]
-            place[:] = part.search(frame).reshape(place.shape)
-        return probabilities.ravel()
+            place[:] = found.probabilities.reshape(place.shape)
+        return Scored(probabilities.ravel(), lambda numbers: self._hogs(scored, numbers))
+
+    def _hogs(self, scored: dict[tuple[int, int], Scored], numbers: Numbers) -> Vectors:
+        """Ask the part that each window belongs to."""
+        rows, columns = np.divmod(numbers, self._shape[1])
+        vectors: list[Vectors] = []
+        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
+            (down, j), (across, i) = self._part(row), self._part(column)
+            width = len(range(across, self._shape[1], self._every))
+            vectors.append(scored[down, across].hogs(np.array([j * width + i])))
+        return np.concatenate(vectors)
+
+    def _part(self, position: int) -> tuple[int, int]:
+        """Return the phase of a row or column, and its number within that."""
+        return position % self._every, position // self._every

@@ -5,12 +5,15 @@ window at a block position is a square of neighbouring blocks.
 """
 
 import numpy as np
+import numpy.typing as npt
 from numpy.lib.stride_tricks import as_strided
 
 from vdet.config.schema import FeatureSettings
 from vdet.features import Vectors, hog_descriptor
 from vdet.images import Image
 from vdet.windows import Floats
+
+Positions = npt.NDArray[np.intp]
 
 
 def describe_blocks(strip: Image, features: FeatureSettings) -> Vectors:
@@ -34,6 +37,31 @@ def describe_blocks(strip: Image, features: FeatureSettings) -> Vectors:
         for number in hog.channels
     ]
     return np.concatenate(blocks, axis=-1, dtype=np.float32)
+
+
+def window_blocks(
+    blocks: Vectors, columns: Positions, rows: Positions, features: FeatureSettings
+) -> Vectors:
+    """Return the HOG of chosen windows, as `FeatureExtractor` gives it.
+
+    Parameters
+    ----------
+    blocks
+        `(columns, rows, d)`, as from `describe_blocks`.
+    columns, rows
+        Block positions of the windows, `(m,)`.
+
+    Returns
+    -------
+    float32 `(m, h)`, channel by channel.
+    """
+    channels = len(features.hog.channels)
+    side = features.patch // features.hog.cell - features.hog.block + 1
+    steps = np.arange(side)
+    across = columns[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
+    down = rows[:, np.newaxis, np.newaxis] + steps
+    chosen = blocks[across, down].reshape(len(columns), side * side, channels, -1)
+    return np.reshape(chosen.transpose(0, 2, 1, 3), (len(columns), -1))
 
 
 def channel_of(strip: Image, number: int) -> Image:

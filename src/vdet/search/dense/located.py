@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-import numpy.typing as npt
 
-from vdet.features import Vectors, hog_descriptor
+from vdet.features import Layout, Vectors, hog_descriptor
 from vdet.images import Image
 from vdet.model import LinearModel
 from vdet.search.dense.histogram import table_sums
@@ -19,12 +18,11 @@ from vdet.search.dense.hog import channel_of
 from vdet.search.dense.strips import Strip
 from vdet.search.dense.weights import DenseWeights
 from vdet.search.pyramid import FramePyramid
+from vdet.search.scored import Numbers, Scored
 from vdet.windows import Floats, WindowGrid, every_nth
 
 BATCH = 8192
 """Windows described before they are scored: more would only take memory."""
-
-Indices = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +30,9 @@ class _Phase:
     """The windows on one strip: their numbers in the grid, and their places in the strip."""
 
     strip: Strip
-    numbers: Indices
-    x: Indices
-    y: Indices
+    numbers: Numbers
+    x: Numbers
+    y: Numbers
 
 
 class LocatedSearch:
@@ -48,24 +46,35 @@ class LocatedSearch:
         side = model.features.patch
         self._hog = hog_descriptor(model.features, (side, side))
 
-    def search(self, frame: FramePyramid) -> Floats:
-        """Return each window's probability, float32 `(n,)`."""
+    def search(self, frame: FramePyramid) -> Scored:
+        """Score each window."""
         probabilities = np.zeros(self._windows, np.float32)
+        strips: list[Image] = []
         for phase in self._phases:
             strip = phase.strip.cut(frame)
+            strips.append(strip)
             for i in range(0, len(phase.numbers), BATCH):
                 some = slice(i, i + BATCH)
                 scores = self._scores(strip, phase.x[some], phase.y[some])
                 probabilities[phase.numbers[some]] = self._model.probabilities_of_scores(scores)
-        return probabilities
+        return Scored(probabilities, lambda numbers: self._hogs(strips, numbers))
 
-    def _scores(self, strip: Image, x: Indices, y: Indices) -> Floats:
+    def _hogs(self, strips: list[Image], numbers: Numbers) -> Vectors:
+        """Describe some windows, each on its own strip."""
+        hogs = np.zeros((len(numbers), Layout.of(self._model.features).hog_length), np.float32)
+        for phase, strip in zip(self._phases, strips, strict=True):
+            asked, theirs = np.nonzero(numbers[:, np.newaxis] == phase.numbers)
+            if len(asked):
+                hogs[asked] = self._describe(strip, phase.x[theirs], phase.y[theirs])
+        return hogs
+
+    def _scores(self, strip: Image, x: Numbers, y: Numbers) -> Floats:
         vectors = self._describe(strip, x, y)
         scores = vectors @ self._model.weights[:, : vectors.shape[1]].T + self._model.biases
         side = self._model.features.patch
         return np.asarray(scores + table_sums(strip, self._tables, side, x, y).T, np.float32)
 
-    def _describe(self, strip: Image, x: Indices, y: Indices) -> Vectors:
+    def _describe(self, strip: Image, x: Numbers, y: Numbers) -> Vectors:
         """Return the HOG of each window, float32 `(n, features)`, channel by channel."""
         locations = list(zip(x.tolist(), y.tolist(), strict=True))
         described = [

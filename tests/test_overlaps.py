@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.evaluation.boxes import coverage, iou_matrix
 from vdet.geometry import Box
+from vdet.overlaps import coverage, iou_matrix
 
 SIDES = st.integers(1, 50)
 PLACES = st.integers(-50, 50)

@@ -1,0 +1,49 @@
+"""Which region belongs to which vehicle.
+
+Source: Kuhn, "The Hungarian Method for the Assignment Problem", 1955; the order of the rounds is
+the matching cascade of Wojke, Bewley and Paulus, "Simple Online and Realtime Tracking with a Deep
+Association Metric", 2017.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vdet.overlaps import Floats
+
+Pairs = dict[int, int]
+
+
+def pair(scores: Floats, rounds: Sequence[Sequence[int]]) -> Pairs:
+    """Pair rows with columns, each at most once.
+
+    Parameters
+    ----------
+    scores
+        Shape `(n, m)`: what a pair is worth; 0 where it must not be.
+    rounds
+        Rows: those of a later round may only have what the earlier ones left.
+
+    Returns
+    -------
+    The column of each paired row: in each round those pairs whose scores add up to most.
+    """
+    left = scores.copy()
+    pairs: Pairs = {}
+    for rows in rounds:
+        pairs |= {rows[row]: column for row, column in _assign(left[list(rows)])}
+        left[:, list(pairs.values())] = 0
+    return pairs
+
+
+def _assign(scores: Floats) -> list[tuple[int, int]]:
+    possible = scores > 0
+    if possible.sum(axis=0).max(initial=0) <= 1 and possible.sum(axis=1).max(initial=0) <= 1:
+        rows, columns = np.nonzero(possible)  # nothing to choose; scipy takes long to import
+    else:
+        from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
+
+        rows, columns = linear_sum_assignment(scores, maximize=True)
+        kept = possible[rows, columns]
+        rows, columns = rows[kept], columns[kept]
+    return list(zip(rows.tolist(), columns.tolist(), strict=True))

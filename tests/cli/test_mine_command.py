@@ -1,0 +1,178 @@
+"""`vdet mine`."""
+
+import re
+import zipfile
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from conftest import Run
+from vdet.dataset import find_boxed, find_patches, read_patches
+from vdet.evaluation.truth import read_truth
+from vdet.model import load_model
+from vdet.synthetic.clip import write_truth
+from vdet.synthetic.scene import Scene
+from vdet.video import VideoReader
+
+SETS = "{size: 80, step: 1, top: 380, bottom: 520}, {size: 160, step: 1, top: 360, bottom: 600}"
+WINDOWS = ("--set", "search.perspective.sizes=[]", "--set", f"search.windows=[{SETS}]")
+BELOW = "search.windows=[{size: 80, step: 1, top: 900, bottom: 990}]"
+NAME = re.compile(r"frame(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
+
+
+@pytest.fixture(scope="module")
+def truth_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("truth") / "gt.txt"
+    write_truth(path, replace(scene, frames=9))
+    return path
+
+
+@pytest.fixture
+def options(truth_path: Path, model_path: Path) -> tuple[str | Path, ...]:
+    # Of a model this small, whatever it finds likely is worth a look.
+    lenient = ("--set", "mining.probability=0.05")
+    return ("--truth", truth_path, "--model", model_path, *WINDOWS, *lenient)
+
+
+def test_mines_patches_that_train_learns_from(
+    run: Run, clip_path: Path, patches_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    target, model_path = tmp_path / "mined.zip", tmp_path / "m.npz"
+    result = run("mine", clip_path, "-o", target, *options)
+    assert result.code == 0, result.err
+    files = [*find_patches([target]), *find_boxed([target])]
+    counts = Counter(file.group for file in files)
+    assert set(counts) == {
+        "vehicles/mined_road",
+        "boxes/mined_road",
+        "non-vehicles/mined_road",
+        "non-vehicles/mined_road_parts",
+    }
+    assert result.out == (
+        f"{target}: {counts['vehicles/mined_road']} patches of vehicles, "
+        f"{counts['boxes/mined_road']} more for their boxes, "
+        f"{counts['non-vehicles/mined_road']} false alarms, "
+        f"{counts['non-vehicles/mined_road_parts']} more on parts of vehicles; from 3 frames\n"
+    )
+    quick = ("--jobs", "1", "--set", "features.hog.channels=[0]")
+    learnt = run("train", patches_path, target, "-o", model_path, *quick)
+    assert learnt.code == 0, learnt.err
+    for group, count in counts.items():
+        assert re.search(rf"{group} +{count} patches", learnt.out)
+    model = load_model(model_path)
+    assert model.boxes is not None
+    assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
+
+
+def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
+    run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    target = tmp_path / "mined.zip"
+    assert run("mine", clip_path, "-o", target, *options).code == 0
+    with VideoReader(clip_path) as reader:
+        frames = [frame.image for frame in reader]
+    truth = read_truth(truth_path)
+    seen = set()
+    for patch in read_patches([*find_patches([target]), *find_boxed([target])]):
+        match = NAME.fullmatch(patch.file.name.rpartition("/")[2])
+        assert match
+        number, x, y, side = map(int, match.groups())
+        seen.add(number)
+        crop = frames[number - 1][y : y + side, x : x + side]
+        assert patch.image is not None
+        assert patch.image.shape == (64, 64, 3)
+        expected = cv2.resize(crop, (64, 64), interpolation=cv2.INTER_AREA)
+        assert np.abs(patch.image.astype(int) - expected).mean() < 6
+        if patch.file.sides is not None:
+            here = truth.frame(number)
+            vehicles = here.boxes[~here.ignored]
+            corners = np.concatenate([vehicles[:, :2], vehicles[:, :2] + vehicles[:, 2:]], axis=1)
+            middle = np.array([x, y, x, y]) + side / 2
+            told = np.array(patch.file.sides, float) * side + middle
+            misses = np.nanmax(abs(corners - told), axis=1)
+            assert misses.min() < 0.05
+    assert seen == {1, 5, 9}
+
+
+def test_the_same_video_gives_the_same_bytes_whichever_other_frames_are_looked_at(
+    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    for name, chosen in (
+        ("a.zip", ()),
+        ("b.zip", ()),
+        ("c.zip", ("--from", "5", "--until", "8")),
+        ("d.zip", ("--every", "1", "--from", "5", "--until", "6")),
+    ):
+        result = run("mine", clip_path, "-o", tmp_path / name, *options, *chosen)
+        assert result.code == 0, result.err
+    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
+    whole, fifth, both = (_patches(tmp_path / f"{name}.zip") for name in "acd")
+    assert fifth == {name: data for name, data in whole.items() if "frame000005" in name}
+    assert {name: data for name, data in both.items() if "frame000005" in name} == fifth
+    assert any("frame000006" in name for name in both)
+
+
+def _patches(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist() if name != "boxes.csv"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("--until", "3", "--from", "4"), 2, "--until must not be before --from"),
+        (("--every", "0"), 2, "--every"),
+        (("--from", "10"), 1, "gt.txt: knows of the frames up to 9; mine some of these"),
+        (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
+        (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
+        (("--set", "mining.parts=-1"), 1, "mining.parts"),
+        (
+            ("--set", "mining={false_alarms: 0, parts: 0, per_vehicle: 0}"),
+            1,
+            "no window fits a vehicle",
+        ),
+        (("--set", BELOW), 1, "road.mp4: no search window fits into a frame of 320×180 pixels"),
+    ],
+)
+def test_what_cannot_be_leaves_nothing_behind(
+    run: Run,
+    clip_path: Path,
+    options: tuple[str, ...],
+    tmp_path: Path,
+    arguments: tuple[str, ...],
+    code: int,
+    words: str,
+) -> None:
+    named = [tmp_path / a if a.endswith((".npz", ".txt")) else a for a in arguments]
+    result = run("mine", clip_path, "-o", tmp_path / "mined.zip", *options, *named)
+    assert (result.code, result.out) == (code, "")
+    assert words in result.err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_earlier_archive_is_not_lost(
+    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    target = tmp_path / "mined.zip"
+    target.write_bytes(b"precious")
+    result = run("mine", clip_path, "-o", target, *options)
+    assert result.code == 1
+    assert "--overwrite" in result.err
+    assert target.read_bytes() == b"precious"
+    assert run("mine", clip_path, "-o", target, *options, "--overwrite").code == 0
+    assert len(find_patches([target])) > 10
+
+
+def test_truth_of_a_longer_video(
+    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    truth = tmp_path / "long.txt"
+    truth.write_text("40,1,10,10,50,50,1,3,1\n")
+    result = run("mine", clip_path, "-o", tmp_path / "mined.zip", *options, "--truth", truth)
+    assert result.code == 1
+    assert "long.txt:1: the frame is number 40 of a video of 30" in result.err
+    assert not (tmp_path / "mined.zip").exists()

@@ -1,0 +1,52 @@
+"""What the settings of search and heat refuse, in the words that a user reads."""
+
+import pytest
+
+from vdet.config.loading import load_settings
+from vdet.config.schema import HeatSettings, PerspectiveSettings, SearchSettings, Settings
+from vdet.errors import ConfigError
+
+WINDOWS = "search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
+
+
+@pytest.mark.parametrize(
+    ("assignment", "message"),
+    [
+        ("search.perspective.sizes=[]", "search: windows or perspective.sizes must be given"),
+        ("search.perspective.lowest=0.5", "search.perspective: lowest must be at least highest"),
+        ("search.alternate=3", "heat.frames must be at least search.alternate"),
+        ("heat.frames=1", "heat.frames must be at least search.alternate"),
+        ("search.alternate=0", "search.alternate: should be greater than or equal to 1"),
+        ("search.perspective.sizes=[0.1, 0]", "search.perspective.sizes[1]: should be greater"),
+        ("search.perspective.sizes=[1.5]", "search.perspective.sizes[0]: should be less than"),
+        ("search.perspective.horizon=360", "search.perspective.horizon: should be less than"),
+        ("search.perspective.beyond=-0.1", "search.perspective.beyond: should be greater"),
+        ("search.perspective.zoom=0", "search.perspective.zoom: should be greater"),
+        ("heat.regions=boxes", "heat.regions: should be 'outline' or 'votes'"),
+        ("heat.votes.agreement=2", "heat.votes.agreement: should be less than or equal to 1"),
+        ("heat.votes.least=-1", "heat.votes.least: should be greater than or equal to 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(assignment: str, message: str) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_settings(None, [assignment])
+    assert str(error.value).startswith(f"--set: {message}")
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_fixed_sets_may_stand_alone_and_beside_those_of_the_perspective() -> None:
+    both = load_settings(None, [WINDOWS]).settings.search
+    assert both.windows
+    assert both.perspective.sizes
+    alone = load_settings(None, [WINDOWS, "search.perspective.sizes=[]"]).settings.search
+    assert alone.windows == both.windows
+    assert alone.perspective.sizes == ()
+
+
+def test_a_heat_of_as_many_frames_as_the_sets_are_dealt_out_over_is_enough() -> None:
+    settings = Settings(search=SearchSettings(alternate=3), heat=HeatSettings(frames=3))
+    assert settings.heat.frames == settings.search.alternate
+
+
+def test_rows_may_be_those_of_one_row_of_windows() -> None:
+    assert PerspectiveSettings(highest=0.8, lowest=0.8).lowest == 0.8
