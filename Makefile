@@ -4,8 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DATA ?= $(or $(VDET_DATA),data)
+TRUTH ?= $(DATA)/project_video_0001-0880.txt
+PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
-.PHONY: demo test lint types tests bench soak data model clean
+.PHONY: demo test lint types tests bench soak folds data model clean
 
 demo: $(READY)  ## make a small data set and a road clip, train, detect, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
@@ -34,12 +36,18 @@ data:  ## fetch the data set (125 MB) into data/; data/README.md tells what it i
 			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
 	done
 
-model: $(READY)  ## train the shipped models anew from the data set in $(DATA)
-	for name in default seed; do \
-		$(BIN)/vdet train $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip -c configs/$$name.yaml \
-			-o src/vdet/models/$$name.npz --overwrite || exit 1; \
-		rm src/vdet/models/$$name.json; \
-	done
+model: $(READY)  ## train the shipped models anew: patches and video in $(DATA), truth in $(TRUTH)
+	mkdir -p build/model
+	$(BIN)/vdet train $(PATCHES) -o build/model/start.npz --overwrite
+	$(BIN)/vdet mine $(DATA)/project_video.mp4 --truth $(TRUTH) --model build/model/start.npz \
+		-o build/model/mined.zip --overwrite
+	$(BIN)/vdet train $(PATCHES) build/model/mined.zip -o build/model/default.npz --overwrite
+	$(BIN)/vdet train $(PATCHES) -c seed -o build/model/seed.npz --overwrite
+	cp build/model/default.npz build/model/seed.npz src/vdet/models/
+
+folds: $(READY)  ## the five-fold check of every threshold, on frames that the model has not seen
+	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \
+		$(PATCHES) build/model/mined.zip
 
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt

@@ -8,6 +8,15 @@ from vdet.config.loading import LoadedSettings, format_key, load_settings
 from vdet.config.schema import FeatureSettings, Settings, WindowSettings
 from vdet.errors import ConfigError
 
+WINDOWS = """\
+search:
+  windows:
+  - {size: 64, step: 1, top: 0, bottom: 100}
+  - {size: 96, step: 1, top: 0, bottom: 200}
+"""
+FIRST = WindowSettings(size=64, step=1, top=0, bottom=100)
+SECOND = WindowSettings(size=96, step=1, top=0, bottom=200)
+
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
@@ -50,34 +59,38 @@ def test_assignments_lie_over_the_file_and_later_ones_over_earlier_ones(path: Pa
 
 
 def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
-    window = "{size: 96, overlap: 0.5, top: 0, bottom: 200}"
-    windows = load(path, f"search: {{windows: [{window}]}}").settings.search.windows
-    assert [w.size for w in windows] == [96]
+    search = load(path, "search: {perspective: {sizes: [0.5]}}").settings.search
+    assert len(Settings().search.perspective.sizes) > 1
+    assert search.perspective.sizes == (0.5,)
+
+
+def test_a_list_in_an_assignment_replaces_the_whole_list_in_the_file(path: Path) -> None:
+    window = "{size: 32, step: 2, top: 0, bottom: 50}"
+    windows = load(path, WINDOWS, f"search.windows=[{window}]").settings.search.windows
+    assert windows == (WindowSettings(size=32, step=2, top=0, bottom=50),)
 
 
 def test_an_assignment_may_name_one_item_of_a_list() -> None:
-    windows = load_settings(None, ["search.windows.1.step=2"]).settings.search.windows
-    first, second, *others = Settings().search.windows
-    assert windows == (first, second.model_copy(update={"step": 2}), *others)
+    sizes = load_settings(None, ["search.perspective.sizes.1=0.07"]).settings
+    first, _, *others = Settings().search.perspective.sizes
+    assert sizes.search.perspective.sizes == (first, 0.07, *others)
 
 
-def test_an_assignment_may_give_overlap_in_place_of_step() -> None:
+def test_an_assignment_may_name_one_setting_of_an_item(path: Path) -> None:
+    windows = load(path, WINDOWS, "search.windows.1.step=2").settings.search.windows
+    assert windows == (FIRST, SECOND.model_copy(update={"step": 2}))
+
+
+def test_an_assignment_may_give_overlap_in_place_of_step(path: Path) -> None:
     assignments = ["search.windows.0.overlap=0.5", "search.windows.0.step=null"]
-    window = load_settings(None, assignments).settings.search.windows[0]
+    window = load(path, WINDOWS, *assignments).settings.search.windows[0]
     assert (window.overlap, window.step) == (0.5, None)
 
 
-def test_an_assignment_may_name_an_item_of_a_list_in_the_file(path: Path) -> None:
-    text = "search:\n  windows:\n  - {size: 96, overlap: 0.5, top: 0, bottom: 200}\n"
-    (window,) = load(path, text, "search.windows.0.size=100").settings.search.windows
-    assert (window.size, window.bottom) == (100, 200)
-
-
-def test_an_assignment_may_replace_a_whole_item() -> None:
+def test_an_assignment_may_replace_a_whole_item(path: Path) -> None:
     item = "{size: 64, step: 3, top: 0, bottom: 70}"
-    windows = load_settings(None, [f"search.windows.0={item}"]).settings.search.windows
-    replaced = WindowSettings(size=64, step=3, top=0, bottom=70)
-    assert windows == (replaced, *Settings().search.windows[1:])
+    windows = load(path, WINDOWS, f"search.windows.0={item}").settings.search.windows
+    assert windows == (WindowSettings(size=64, step=3, top=0, bottom=70), SECOND)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +150,10 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
             "features: {hog: {channels: []}, histogram: {bins: 0}}",
             "1:1: features: at least one of hog, histogram and spatial must be on",
         ),
-        ("search: {windows: []}", "1:10: search.windows: should have at least one item"),
+        (
+            "search: {windows: [], perspective: {sizes: []}}",
+            "1:1: search: windows or perspective.sizes must be given",
+        ),
         ("search: {windows: [5]}", "1:20: search.windows[0]: should be a section, key: value"),
         ("search: {windows: 5}", "1:10: search.windows: should be a list"),
         (
@@ -183,12 +199,12 @@ def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
     [
         ("heat.frames=x", "heat.frames: should be a valid integer"),
         ("heat.frames.0=5", "heat.frames: should be a valid integer"),
-        ("search.windows.0.sise=3", "search.windows[0].sise: is no setting; did you mean size?"),
-        ("search.windows.32.size=3", "search.windows: should be a list, or in --set the number of"),
-        ("search.windows.-1.size=3", "search.windows: should be a list, or in --set the number of"),
-        ("search.windows.x.size=3", "search.windows: should be a list, or in --set the number of"),
-        ("search.windows.0.0=3", "search.windows[0][0]: is no setting; known here: size, "),
-        ("tracker.0=3", "tracker[0]: is no setting; known here: history, "),
+        ("search.perspective.sizes.6=0.3", "search.perspective.sizes: should be a list, or in"),
+        ("search.perspective.sizes.-1=0.3", "search.perspective.sizes: should be a list, or in"),
+        ("search.perspective.sizes.x=0.3", "search.perspective.sizes: should be a list, or in"),
+        ("search.perspective.sizes.0=3", "search.perspective.sizes[0]: should be less than or equ"),
+        ("search.windows.0.size=64", "search.windows: should be a list, or in --set the number of"),
+        ("tracker.0=3", "tracker[0]: is no setting; known here: method, history, "),
         ("0=3", "[0]: is no setting; known here: reference_height, "),
         ("9" * 5000 + "=3", "9999"),
         ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: should be a valid integer"),
@@ -201,8 +217,22 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, me
     assert line.startswith(f"--set: {message}")
 
 
+@pytest.mark.parametrize(
+    ("assignment", "message"),
+    [
+        ("search.windows.1.sise=3", "search.windows[1].sise: is no setting; did you mean size?"),
+        ("search.windows.0.0=3", "search.windows[0][0]: is no setting; known here: size, "),
+    ],
+)
+def test_so_is_one_in_an_assignment_to_an_item_of_the_file(
+    path: Path, assignment: str, message: str
+) -> None:
+    (line,) = refusal(path, WINDOWS, assignment)
+    assert line.startswith(f"--set: {message}")
+
+
 def test_a_value_that_an_assignment_mends_is_no_error(path: Path) -> None:
-    assert load(path, "heat: {frames: 0}", "heat.frames=1").settings.heat.frames == 1
+    assert load(path, "heat: {frames: 0}", "heat.frames=3").settings.heat.frames == 3
 
 
 @pytest.mark.parametrize("value", ["[" * 200 + "]" * 200, "9" * 300, "x" * 5000])

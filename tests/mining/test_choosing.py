@@ -48,7 +48,7 @@ def kinds(choices: list[Choice]) -> dict[Box, str]:
 
 
 def test_windows_become_patches_of_their_kind() -> None:
-    fits, shows, part, false = about(450), about(470), about(450, 50), about(100)
+    fits, shows, part, false = about(450), about(470), about(450, 36), about(100)
     choices = chosen(windows(fits, shows, part, false), truth(CAR))
     assert kinds(choices) == {
         fits: "vehicle",
@@ -63,7 +63,7 @@ def test_windows_become_patches_of_their_kind() -> None:
 
 
 def test_what_the_model_does_not_take_for_a_vehicle_is_no_false_alarm() -> None:
-    fits, shows, part, false, sure = about(450), about(470), about(450, 50), about(100), about(200)
+    fits, shows, part, false, sure = about(450), about(470), about(450, 36), about(100), about(200)
     found = windows(fits, shows, part, false, sure)
     found.probabilities[:] = [0, 0, 0.19, 0.19, 0.21]
     choices = chosen(found, truth(CAR))
@@ -89,13 +89,13 @@ def test_a_window_on_a_part_of_a_vehicle_is_none_where_another_is_whole() -> Non
 
 
 def test_a_part_in_an_ignore_region_is_not_taken() -> None:
-    part = about(500)
+    part = about(465, 36)
     assert kinds(chosen(windows(part), truth(CAR))) == {part: "part"}
-    assert chosen(windows(part), truth(CAR, ignored=(Box(460, 280, 90, 90),))) == []
+    assert chosen(windows(part), truth(CAR, ignored=(Box(455, 280, 90, 90),))) == []
 
 
 def many() -> Windows:
-    return windows(*(about(x, side) for x in range(60, 940, 5) for side in (80, 100, 120)))
+    return windows(*(about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120)))
 
 
 def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:

@@ -125,6 +125,17 @@ def test_a_patch_and_its_views_are_calibrated_together() -> None:
     assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
 
 
+def test_views_have_no_say_in_the_calibration() -> None:
+    """Half of the patches are vehicles and no view is: the probabilities are of the patches."""
+    vectors, vehicle = clouds(400)
+    views = vectors[~vehicle]
+    rows = np.concatenate([vectors, views])
+    labels = np.concatenate([vehicle, np.zeros(len(views), bool)])
+    origins = np.concatenate([np.arange(400), np.flatnonzero(~vehicle)])
+    model = fit(rows, labels, COLOUR, training(ensemble=False), origins)
+    assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
+
+
 def test_rows_that_are_their_own_origins_are_patches() -> None:
     vectors, vehicle = clouds()
     plain = fit(vectors, vehicle, COLOUR, training())

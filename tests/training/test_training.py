@@ -432,28 +432,28 @@ def test_patches_of_boxes_are_not_learnt_from_as_vehicles(mined: Path) -> None:
 
 
 @pytest.mark.parametrize("assumed", [0.0, 0.5])
-def test_vehicles_from_sets_without_boxes_are_taken_to_reach_from_left_to_right(
+def test_vehicles_from_sets_without_boxes_are_taken_to_fill_their_patch(
     data: Path, mined: Path, tmp_path: Path, assumed: float
 ) -> None:
-    """The mined vehicles are said to be narrow; those of the other set pull to its sides."""
-    narrow = tmp_path / "narrow"
-    shutil.copytree(mined, narrow)
-    table = narrow / "boxes.csv"
-    table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,,0.2,"))
-    sources = [narrow, data]
+    """The mined vehicles are said to be small; those of the other set pull to all four sides."""
+    small = tmp_path / "small"
+    shutil.copytree(mined, small)
+    table = small / "boxes.csv"
+    table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,-0.1,0.2,0.1"))
     settings = but(boxes=BoxSettings(penalty=100, assumed=assumed))
-    files = find_patches(sources)
-    model, _ = train(files, settings, boxed=find_boxed(sources), jobs=1)
+    files = find_patches([small, data])
+    model, _ = train(files, settings, jobs=1)
     assert model.boxes is not None
     vehicles = [file for file in files if file.vehicle]
     described = extract(vehicles, SETTINGS.features, max_broken=0, jobs=1).vectors
     hogs = described[:, : Layout.of(SETTINGS.features).hog_length]
-    left, _, right, _ = model.boxes.sides(hogs).mean(axis=0).tolist()
+    left, top, right, bottom = model.boxes.sides(hogs).mean(axis=0).tolist()
     if assumed:
-        assert left < -0.25
-        assert right > 0.25
+        assert max(left, -right) < -0.25
+        assert max(top, -bottom) < -0.15
     else:
         assert (left, right) == pytest.approx((-0.2, 0.2), abs=0.02)
+        assert (top, bottom) == pytest.approx((-0.1, 0.1), abs=0.02)
 
 
 def test_without_hog_no_sides_are_found(mined: Path) -> None:

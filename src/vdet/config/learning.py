@@ -137,7 +137,7 @@ class MiningSettings(Section):
     )
     false_alarms: int = Field(15, ge=0, le=10_000, description="most of these, a frame")
     parts: int = Field(
-        5,
+        10,
         ge=0,
         le=10_000,
         description="most false alarms on a part of a vehicle, a frame; with many of them, fewer "

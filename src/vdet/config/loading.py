@@ -50,7 +50,7 @@ def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> 
     try:
         settings = Settings.model_validate(values)
     except ValidationError as error:
-        details = [detail for detail in error.errors() if _is_true(detail)]
+        details = error.errors()
     if errors or details:
         described = (_describe(detail, places) for detail in details)
         raise mistakes(itertools.chain(errors, described), len(errors) + len(details))
@@ -79,11 +79,6 @@ def _overlay(below: Any, above: Any) -> Any:
     ):
         return [_overlay(item, above[i]) if i in above else item for i, item in enumerate(below)]
     return above
-
-
-def _is_true(detail: ErrorDetails) -> bool:
-    """Tell a list that is too short from one that pydantic left the faulty items out of."""
-    return not (detail["type"] == "too_short" and detail["input"])
 
 
 def _describe(detail: ErrorDetails, places: dict[Key, str]) -> str:
@@ -123,8 +118,6 @@ def _expected(detail: ErrorDetails) -> str:
             return "is missing"
         case "value_error":
             return str(detail["ctx"]["error"])
-        case "too_short":
-            return "should have at least one item"
     message = _EXPECTED.get(detail["type"]) or detail["msg"].removeprefix("Input ")
     return f"{message} (got {reprlib.repr(detail['input'])})"
 

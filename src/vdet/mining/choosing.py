@@ -60,7 +60,7 @@ def choose(
     for number, placing in enumerate(placings):
         own = owners == number
         others = np.delete(covered, number, axis=1)
-        parts |= suspicious & own & placing.part & (others <= _MOST_COVERED).all(axis=1)
+        parts |= suspicious & placing.part & (others <= _MOST_COVERED).all(axis=1)
         for row in _some(placing.fits & own, settings.per_vehicle, rng):
             yield Choice("vehicle", _box(boxes[row]), _sides(placing.sides[row]))
         for row in _some(placing.shows & own, settings.per_vehicle, rng):

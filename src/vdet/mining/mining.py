@@ -15,6 +15,7 @@ from vdet.features import to_patch
 from vdet.following import seek_horizon
 from vdet.mining.archive import PatchArchive, patch_archive
 from vdet.mining.choosing import Choice, Kind, choose
+from vdet.mining.placing import cut_sides
 from vdet.model import LinearModel
 from vdet.search.engine import FrameSearch
 from vdet.search.pyramid import FramePyramid
@@ -36,8 +37,8 @@ _FOLDERS: dict[Kind, str] = {
 class MiningJob:
     """What to mine, and the zip file to make of it.
 
-    Every n-th frame is looked at, from the `first` (counted from 1) to the `last`; None: to the
-    last that the truth knows of.
+    Every n-th frame is looked at, and every one that cuts a vehicle off, from the `first` (counted
+    from 1) to the `last`; None: to the last that the truth knows of.
     """
 
     video: Path
@@ -103,9 +104,11 @@ def mine(
         search = _search(job, model, settings, reader.info, horizon)
         for frame in frames:
             number = frame.index + 1
-            if number >= job.first and (number - job.first) % job.every == 0:
+            labelled = truth.frame(number)
+            regular = (number - job.first) % job.every == 0
+            if number >= job.first and (regular or _comes_in(labelled, reader.info.width)):
                 looked += 1
-                choices = _choices(search.search(frame.image), truth.frame(number), frame, settings)
+                choices = _choices(search.search(frame.image), labelled, frame, settings)
                 _add(archive, frame, choices, job.video.stem)
                 counts.update(choice.kind for choice in choices)
             advance(1)
@@ -125,6 +128,11 @@ def _search(
         return FrameSearch(model, settings, info.width, info.height, horizon=horizon)
     except ImageError as error:
         raise VideoError(f"{job.video}: {error}") from error
+
+
+def _comes_in(truth: LabelledVideo, width: int) -> bool:
+    """Tell whether the frame's side cuts a vehicle off: that is seldom, and hard to learn."""
+    return any(cut_sides(box, width).any() for box in truth.boxes[~truth.ignored])
 
 
 def _choices(

@@ -23,8 +23,9 @@ class Placing:
     `sides` is float64 `(n, 4)`: left, top, right, bottom of the vehicle, NaN where the frame cuts
     it off. `distances` `(n,)` is how far its middle is from the window's, the larger of across and
     down. The flags `(n,)`: a window that `fits` is a picture of the vehicle, one that `shows` it
-    has it too small, too large or beside the middle, one with a `part` shows no whole vehicle; all
-    these and others are `near` it.
+    has it too small, too large or beside the middle; one on a `part` lies in the vehicle, which is
+    far too large for it, and is no picture of a vehicle though it may show one. Those that fit or
+    show it, and others, are `near` it.
     """
 
     sides: Floats
@@ -58,18 +59,23 @@ def place(windows: Floats, vehicle: Floats, frame_width: int) -> Placing:
         vehicle[3] / size,
         coverage(windows, vehicle[np.newaxis])[:, 0],
     )
-    edge = _EDGE * frame_width
-    cut = np.array([corners[0] <= edge, corners[2] >= frame_width - edge])
+    cut = cut_sides(vehicle, frame_width)
     if cut.all():
-        fits = shows = part = np.zeros(len(windows), np.bool_)
+        fits = shows = np.zeros(len(windows), np.bool_)
     elif cut.any():
         fits, shows = _of_cut(look, sides[:, 2] if cut[0] else -sides[:, 0])
-        part = np.zeros(len(windows), np.bool_)
     else:
-        fits, shows, part = _of_whole(look)
+        fits, shows = _of_whole(look)
     sides[:, [0, 2]] = np.where(cut, np.nan, sides[:, [0, 2]])
     near = look.near | fits | shows
-    return Placing(sides, np.maximum(look.across, look.down), fits, shows & ~fits, part, near)
+    distances = np.maximum(look.across, look.down)
+    return Placing(sides, distances, fits, shows & ~fits, look.part & ~fits, near)
+
+
+def cut_sides(vehicle: Floats, frame_width: int) -> Flags:
+    """Tell whether the frame's left and right cut a vehicle's box `(4,)` off, bool `(2,)`."""
+    edge = _EDGE * frame_width
+    return np.array([vehicle[0] <= edge, vehicle[0] + vehicle[2] >= frame_width - edge])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,18 +93,22 @@ class _Look:
     covered: Floats
 
     @property
+    def part(self) -> Flags:
+        """Whether the window lies in the vehicle, which is far too large for it."""
+        return (self.covered > 0.5) & ((self.width > 2.5) | (self.height > 1.3))
+
+    @property
     def near(self) -> Flags:
         """Whether the window has to do with the vehicle at all."""
         close = (self.across < 0.75) & (self.down < 0.4) & (self.covered > 0.12)
         return close & (self.width > 0.4) & (self.width < 3)
 
 
-def _of_whole(look: _Look) -> tuple[Flags, Flags, Flags]:
+def _of_whole(look: _Look) -> tuple[Flags, Flags]:
     width, across, down = look.width, look.across, look.down
     fits = (width > 0.72) & (width < 1.3) & (across < 0.16) & (down < 0.16)
     shows = (width > 0.62) & (width < 2.5) & (across < 0.45) & (down < 0.25)
-    part = look.near & (width > 2.5)
-    return fits, shows, part
+    return fits, shows
 
 
 def _of_cut(look: _Look, visible: Floats) -> tuple[Flags, Flags]:

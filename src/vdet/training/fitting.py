@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings, TrainingSettings
 from vdet.errors import DataError
@@ -33,7 +34,8 @@ def fit(
         bool of shape `(n,)`.
     origins
         intp of shape `(n,)`: the row of the patch that each row is a view of, its own for a patch.
-        A patch and its views are in one fold of the calibration. None: all rows are patches.
+        The sigmoid is fitted on the patches alone, each scored by an SVM that has seen neither it
+        nor a view of it. None: all rows are patches.
 
     Raises
     ------
@@ -43,7 +45,6 @@ def fit(
     from sklearn.calibration import CalibratedClassifierCV
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.preprocessing import StandardScaler
-    from sklearn.svm import LinearSVC
 
     origins = np.arange(len(vehicle)) if origins is None else origins
     folds = settings.calibration.folds
@@ -56,19 +57,38 @@ def fit(
         )
     scaler = StandardScaler()
     scaled = scaler.fit_transform(vectors)
-    svm = LinearSVC(C=settings.C, max_iter=settings.max_iterations, random_state=settings.seed)
     calibrated = CalibratedClassifierCV(
-        svm,
+        _unweighted_svm(settings),
         method="sigmoid",
         cv=list(_folds(vehicle[patches], patches, origins, settings)),
         ensemble=settings.calibration.ensemble,
     )
     with warnings.catch_warnings(record=True) as caught:
+        warnings.filterwarnings("ignore", "Since .* does not appear to accept sample_weight")
         warnings.simplefilter("always", ConvergenceWarning)
-        calibrated.fit(scaled, vehicle)
+        calibrated.fit(scaled, vehicle, _weights(patches, len(vehicle)))
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
     return _to_model(calibrated.calibrated_classifiers_, scaler, features)
+
+
+def _unweighted_svm(settings: TrainingSettings) -> Any:
+    """Return an SVM that knows of no weights: these are then those of the calibration alone."""
+    from sklearn.svm import LinearSVC
+
+    class Svm(LinearSVC):  # type: ignore[misc]  # scikit-learn has no types
+        def fit(self, x: Vectors, y: Flags) -> "Svm":
+            super().fit(x, y)
+            return self
+
+    return Svm(C=settings.C, max_iter=settings.max_iterations, random_state=settings.seed)
+
+
+def _weights(patches: Rows, count: int) -> npt.NDArray[np.float64]:
+    """Weigh the rows for the sigmoid: the patches 1, their views 0."""
+    weights = np.zeros(count)
+    weights[patches] = 1
+    return weights
 
 
 def _folds(

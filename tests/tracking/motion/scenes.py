@@ -9,8 +9,9 @@ from vdet.tracking.motion import MotionTracker
 from vdet.tracking.track import Track
 
 WIDTH, HEIGHT = 1280, 720
-CLEAR, WEAK = 1.5, 0.5
-"""Peaks of a vehicle that is seen clearly, and of one that is hardly seen."""
+_STRONG = MotionSettings().strong
+CLEAR, WEAK, GLIMMER = 1.5 * _STRONG, 0.5 * _STRONG, 0.1 * _STRONG
+"""Peaks of a vehicle that is seen clearly, of one that is hardly seen, and of next to nothing."""
 
 
 def region(box: Box, peak: float = CLEAR) -> Region:

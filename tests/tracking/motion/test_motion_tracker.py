@@ -4,6 +4,7 @@ import pytest
 
 from tracking.motion.scenes import (
     CLEAR,
+    GLIMMER,
     HEIGHT,
     WEAK,
     WIDTH,
@@ -123,14 +124,14 @@ def test_in_the_end_it_is_forgotten() -> None:
 
 
 def test_glimmers_do_not_lead_a_lost_vehicle_away() -> None:
-    glimmers = [region(place, 0.1) for place in moving(CAR, dx=6, frames=15)]
+    glimmers = [region(place, GLIMMER) for place in moving(CAR, dx=6, frames=15)]
     missed: list[list[Box]] = [[]] * (DEFAULTS.carried + 1)
     shown = follow([*[[CAR]] * 20, *missed, *[[glimmer] for glimmer in glimmers], *[[CAR]] * 5])
     assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
 
 
 def test_a_vehicle_of_which_only_glimmers_are_left_is_not_shown_for_ever() -> None:
-    shown = follow([*[[CAR]] * 200, *[[region(CAR, 0.1)]] * 100])
+    shown = follow([*[[CAR]] * 200, *[[region(CAR, GLIMMER)]] * 100])
     assert len(shown[205]) == 1
     assert shown[-1] == []
 

@@ -12,6 +12,7 @@ from vdet.evaluation.patches.summing_up import sum_up
 from vdet.evaluation.patches.trials import SplitName, Trial, holdouts, model_trial, run_trial
 from vdet.model import LinearModel
 from vdet.training.extraction import LabelledVectors, extract
+from vdet.training.views import Look, views_of
 
 Advance = Callable[[int], object]
 Progress = Callable[[int | None], Advance]
@@ -46,7 +47,8 @@ def evaluate_splits(
     DataError
         Too many patches are unreadable, or too few are there for a split.
     """
-    data = _extract(files, settings, settings.features, jobs, progress(len(files)))
+    look = partial(views_of, settings=settings.training.views)
+    data = _extract(files, settings, settings.features, jobs, progress(len(files)), look=look)
     plans = [(split, holdouts(data, settings, split)) for split in splits]
     advance = progress(sum(len(parts) for _, parts in plans))
     trials = [run_trial(split, data, settings, parts, advance) for split, parts in plans]
@@ -72,9 +74,18 @@ def _extract(
     features: FeatureSettings,
     jobs: int,
     advance: Advance,
+    *,
+    look: Look | None = None,
 ) -> LabelledVectors:
-    broken = settings.training.max_broken
-    return extract(files, features, max_broken=broken, jobs=jobs, progress=advance)
+    return extract(
+        files,
+        features,
+        max_broken=settings.training.max_broken,
+        look=look,
+        seed=settings.training.seed,
+        jobs=jobs,
+        progress=advance,
+    )
 
 
 def _origin(model: LinearModel, data: LabelledVectors) -> str:

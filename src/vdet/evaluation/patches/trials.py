@@ -15,6 +15,7 @@ from vdet.model import LinearModel
 from vdet.overlaps import Floats
 from vdet.training.extraction import LabelledVectors
 from vdet.training.fitting import fit
+from vdet.training.lesson import lesson_of
 from vdet.training.splits import Held, hold_out
 
 log = logging.getLogger("vdet")
@@ -79,7 +80,10 @@ def run_trial(
     """Fit once for each part, on everything else, and predict that part. Raises `DataError`."""
     rows, probabilities = [], []
     for held in parts:
-        model = fit(data.vectors[~held], data.vehicle[~held], settings.features, settings.training)
+        lesson = lesson_of(data, ~held)
+        model = fit(
+            lesson.vectors, lesson.vehicle, settings.features, settings.training, lesson.origins
+        )
         rows.append(np.flatnonzero(held))
         probabilities.append(_probabilities(model, data.vectors[held]))
         progress(1)

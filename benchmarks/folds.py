@@ -1,0 +1,206 @@
+"""The five-fold check of `make folds`: thresholds on frames that the model has not seen.
+
+The labelled frames are cut into five blocks; the vehicles and false alarms mined from a block are
+kept from the model that searches it. Every threshold is then chosen on four blocks and scored on
+the fifth.
+"""
+
+import argparse
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import joblib
+import numpy as np
+import numpy.typing as npt
+
+from vdet.config.loading import load_settings
+from vdet.config.schema import Settings
+from vdet.dataset import PatchFile, find_boxed, find_patches
+from vdet.detection import Detector, horizon_of
+from vdet.evaluation.labelled_video import LabelledVideo
+from vdet.evaluation.rows import Row, in_memory
+from vdet.evaluation.scores import score
+from vdet.evaluation.truth import read_truth
+from vdet.features import Layout
+from vdet.images import Image
+from vdet.model import BoxRegression, LinearModel
+from vdet.stream import quiet_libraries
+from vdet.tracking.choice import Follow, tracker_of
+from vdet.training.boxes import BoxPatches, describe_boxes
+from vdet.training.extraction import LabelledVectors, extract
+from vdet.training.fitting import fit
+from vdet.training.lesson import lesson_of
+from vdet.training.regression import fit_boxes
+from vdet.training.views import views_of
+from vdet.video import VideoReader
+from vdet.windows import Windows
+
+BLOCKS = 5
+LEAST = 0.2  # probability of the windows that are kept for the sweeps
+SETTINGS = (
+    f"search.probability={LEAST}",
+    "training.calibration.folds=2",
+    "training.views.mirror=false",  # half the memory and a third of the time of the shipped model
+)
+SWEEPS = {
+    "search.probability": (0.2, 0.3, 0.4, 0.5),
+    "heat.votes.least": (0.01, 0.03, 0.06),
+    "heat.votes.agreement": (0.25, 0.35, 0.45),
+    "tracker.motion.strong": (0.1, 0.15, 0.2, 0.3, 0.4),
+    "tracker.motion.leak": (0.1, 0.2, 0.3),
+    "tracker.motion.needed": (1.5, 2.5, 4.0),
+}
+
+Numbers = npt.NDArray[np.intp]
+
+
+def main() -> None:
+    """Train five times, search once, sweep, print a table a threshold."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.folds", description=main.__doc__)
+    parser.add_argument("video", type=Path)
+    parser.add_argument("truth", type=Path)
+    parser.add_argument("patches", type=Path, nargs="+", help="the sets, the mined one among them")
+    options = parser.parse_args()
+    truth = read_truth(options.truth)
+    settings = load_settings(None, SETTINGS).settings
+    models = _models(options.patches, truth.last_frame, settings)
+    with quiet_libraries():
+        searched, size = _search(options.video, truth.last_frame, models, settings)
+        for key, values in SWEEPS.items():
+            print(
+                "\n".join(_sweep(key, values, searched, models[0], size=size, truth=truth)),
+                flush=True,
+            )
+
+
+def _block_of(frames: Numbers, last: int) -> Numbers:
+    """Return the block of each frame, counted from 1; -1 for patches of no frame (0)."""
+    return np.where(frames > 0, (frames - 1) * BLOCKS // last, -1)
+
+
+def _frames_of(files: Sequence[PatchFile]) -> Numbers:
+    found = (re.search(r"/mined_.*/frame(\d+)_", f"/{file.name}") for file in files)
+    return np.array([int(match[1]) if match else 0 for match in found], np.intp)
+
+
+def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
+    files, boxed = find_patches(sources), find_boxed(sources)
+    training = settings.training
+    data = extract(
+        files,
+        settings.features,
+        max_broken=0,
+        look=partial(views_of, settings=training.views),
+        seed=training.seed,
+    )
+    boxes = describe_boxes(files, boxed, settings, jobs=-1, progress=lambda _: None)
+    assert boxes is not None
+    blocks = _block_of(_frames_of(files), last), _block_of(_frames_of(boxed), last)
+
+    def without(block: int) -> LinearModel:
+        kept, kept_boxed = (each != block for each in blocks)
+        lesson = lesson_of(data, kept)
+        model = fit(lesson.vectors, lesson.vehicle, settings.features, training, lesson.origins)
+        return replace(model, boxes=_boxes(data, kept, boxes, kept_boxed, settings))
+
+    at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
+    return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))
+
+
+def _boxes(
+    data: LabelledVectors,
+    kept: npt.NDArray[np.bool_],
+    boxes: BoxPatches,
+    kept_boxed: npt.NDArray[np.bool_],
+    settings: Settings,
+) -> BoxRegression:
+    assert boxes.boxed is not None
+    assert boxes.filled is not None
+    told = [lesson_of(data, kept), lesson_of(boxes.boxed, kept_boxed)]
+    filled = lesson_of(boxes.filled, np.ones(len(boxes.filled.vectors), bool))
+    sides = np.concatenate([each.sides for each in (*told, filled)])
+    vectors = np.concatenate([each.vectors for each in (*told, filled)])
+    known = np.isfinite(sides).any(axis=1)
+    weights = np.ones(len(sides), np.float32)
+    count = np.count_nonzero(known[: -len(filled.sides)])
+    weights[-len(filled.sides) :] = settings.training.boxes.assumed * count / len(filled.sides)
+    hogs = vectors[known, : Layout.of(settings.features).hog_length]
+    return fit_boxes(hogs, sides[known], settings.training.boxes.penalty, weights[known])
+
+
+def _search(
+    video: Path, last: int, models: Sequence[LinearModel], settings: Settings
+) -> tuple[list[Windows], tuple[int, int]]:
+    """Return the likely windows of each frame, searched by the model that has not seen it."""
+    found = []
+    with VideoReader(video, frames=last) as reader:
+        size = reader.info.width, reader.info.height
+        frames = list(_first_ones(video))
+        horizon = horizon_of(settings, frames)
+        detectors = [Detector(model, settings, *size, horizon=horizon) for model in models]
+        for frame in reader:
+            block = int(_block_of(np.array([frame.index + 1]), last)[0])
+            windows = detectors[block].search(frame.image, frame.index)
+            found.append(windows.detected(LEAST))
+    return found, size
+
+
+def _first_ones(video: Path) -> Iterator[Image]:
+    with VideoReader(video, frames=5) as reader:
+        for frame in reader:
+            yield frame.image
+
+
+def _sweep(
+    key: str,
+    values: Sequence[float],
+    searched: Sequence[Windows],
+    model: LinearModel,
+    *,
+    size: tuple[int, int],
+    truth: LabelledVideo,
+) -> Iterator[str]:
+    """Give the lines of a table: the F1 of each value, whole and block by block."""
+    variants = [load_settings(None, [f"{key}={value}"]).settings for value in values]
+    found = [
+        _tracks(Detector(model, each, *size), tracker_of(each, *size), searched)
+        for each in variants
+    ]
+    by_block = np.array([_f1_by_block(each, truth) for each in found])
+    yield f"\n{key}: F1, id switches, false tracks; F1 of the blocks"
+    for value, each, blocks in zip(values, found, by_block, strict=True):
+        whole = score(each, truth)
+        numbers = "  ".join(f"{f1:.3f}" for f1 in blocks)
+        yield (
+            f"  {value:6}  {whole.f1:.3f} {whole.id_switches:2} {whole.false_tracks:2}   {numbers}"
+        )
+    chosen = [int((by_block.sum(axis=1) - by_block[:, block]).argmax()) for block in range(BLOCKS)]
+    held = np.mean([by_block[value, block] for block, value in enumerate(chosen)])
+    picks = ", ".join(f"{values[value]}" for value in chosen)
+    yield f"  chosen without each block: {picks}; F1 on the one left out {held:.3f}"
+
+
+def _tracks(detector: Detector, track: Follow, searched: Sequence[Windows]) -> LabelledVideo:
+    blank = np.zeros((1, 1, 3), np.uint8)
+    rows = []
+    for number, windows in enumerate(searched, start=1):
+        for each in track(blank, detector.accumulate(windows).regions):
+            box = each.box
+            rows.append(Row(0, number, each.id, box.x, box.y, box.width, box.height))
+    return in_memory(rows, frame_count=len(searched), rate=25.0)
+
+
+def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:
+    last = truth.last_frame
+    parts = [
+        [each.where(_block_of(each.frames, last) == block) for each in (found, truth)]
+        for block in range(BLOCKS)
+    ]
+    return [score(prediction, part).f1 for prediction, part in parts]
+
+
+if __name__ == "__main__":
+    main()
