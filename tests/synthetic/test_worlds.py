@@ -1,10 +1,14 @@
+from dataclasses import replace
+from itertools import pairwise
+
 import pytest
 
 from vdet.geometry import Box
+from vdet.synthetic.camera import Camera
 from vdet.synthetic.clip import counts
-from vdet.synthetic.scene import Scene
+from vdet.synthetic.scene import Light, Scene
 from vdet.synthetic.truth import TrueBox, truth
-from vdet.synthetic.worlds import default_clip
+from vdet.synthetic.worlds import LANE_WIDTH, default_clip, traffic
 
 
 def history(scene: Scene, number: int) -> list[tuple[int, TrueBox]]:
@@ -63,6 +67,52 @@ def test_vehicles_in_full_view_have_the_sizes_that_window_sets_are_made_for(scen
 def test_the_same_seed_gives_the_same_scene() -> None:
     assert default_clip(5) == default_clip(5)
     assert default_clip(5) != default_clip(6)
+
+
+CAMERAS = (Camera.dashboard(1280, 720), Camera(1242, 375, 721, 172.5, 1.65))
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("lane", [0, 1, 2])
+def test_traffic_is_near_and_far_in_every_lane(camera: Camera, lane: int) -> None:
+    scene = traffic(camera, lane=lane, lanes=3, frames=30, seed=1)
+    lanes: dict[int, list[float]] = {0: [], 1: [], 2: []}
+    for vehicle in scene.vehicles:
+        ahead, lateral = vehicle.position(0.0) or (0.0, 0.0)
+        lanes[round(lateral / LANE_WIDTH) + lane].append(ahead)
+    assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4, 5, 6]
+    assert all(8 < near < 20 < far < 40 for near, far in lanes.values())
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize(("lane", "hidden"), [(0, {2, 6}), (1, {4}), (2, {2, 6})])
+def test_all_traffic_counts_but_what_nearer_vehicles_hide(
+    camera: Camera, lane: int, hidden: set[int]
+) -> None:
+    scene = traffic(camera, lane=lane, lanes=3, frames=30, seed=1)
+    for index in (0, 15, 29):
+        boxes = truth(scene, index)
+        assert {box.id for box in boxes} == {1, 2, 3, 4, 5, 6}
+        assert {box.id for box in boxes if not counts(box, camera.height)} == hidden
+
+
+def test_traffic_drives_steadily_to_the_last_frame() -> None:
+    scene = traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
+    for vehicle in scene.vehicles:
+        places = [vehicle.position(scene.time(index)) or (0.0, 0.0) for index in (0, 14, 28)]
+        steps = [after[0] - before[0] for before, after in pairwise(places)]
+        assert steps[0] == pytest.approx(steps[1])
+        assert 0.5 < steps[0] < 2.5
+        assert len({lateral for _, lateral in places}) == 1
+
+
+def test_traffic_takes_the_light_that_it_is_given() -> None:
+    dusk = Light(gain=0.5)
+    given = traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1, light=dusk)
+    drawn = traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
+    assert given == replace(drawn, light=dusk)
+    assert drawn.light != dusk
+    assert drawn != traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=2)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from vdet.synthetic.clip import counts, frames, write_clip, write_truth
 from vdet.synthetic.patches import background_patches, vehicle_patches, write_patches
 from vdet.synthetic.render import Renderer, render
 from vdet.synthetic.truth import TrueBox, truth
-from vdet.synthetic.worlds import default_clip, empty_road
+from vdet.synthetic.worlds import default_clip, empty_road, traffic
 
 __all__ = [
     "Renderer",
@@ -19,6 +19,7 @@ __all__ = [
     "empty_road",
     "frames",
     "render",
+    "traffic",
     "truth",
     "vehicle_patches",
     "write_clip",

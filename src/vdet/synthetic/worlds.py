@@ -1,4 +1,4 @@
-"""Scenes from a seed: empty roads of every kind, and the clip of the demo."""
+"""Scenes from a seed: empty roads of every kind, traffic on them, and the clip of the demo."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -72,6 +72,31 @@ def default_clip(seed: int, *, width: int = 960, height: int = 540) -> Scene:
         for number, path in enumerate(paths, start=1)
     )
     return replace(scene, vehicles=vehicles, rate=Fraction(25), frames=250)
+
+
+def traffic(
+    camera: Camera, *, lane: int, lanes: int, frames: int, seed: int, light: Light | None = None
+) -> Scene:
+    """Return a clip at 25 frames a second with a near and a far vehicle in every lane.
+
+    All drive steadily, a little faster than the camera, which is in lane `lane`, counted from 0 at
+    the left, of `lanes`. Ids count from 1 at the left, near before far. Without `light` it is drawn
+    from the seed, as the rest is.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
+    rate = Fraction(25)
+    end = float(frames / rate)
+    paths = [
+        (Waypoint(0.0, ahead, lateral), Waypoint(end, ahead + gained, lateral))
+        for lateral in ((number - lane) * LANE_WIDTH for number in range(lanes))
+        for ahead, gained in ((9 + 1.2 * abs(lateral), 2 * end), (24 + abs(lateral), 3 * end))
+    ]
+    vehicles = tuple(
+        Vehicle(number, path, random_paint(rng), random_body(rng))
+        for number, path in enumerate(paths, start=1)
+    )
+    return replace(scene, light=light or scene.light, vehicles=vehicles, rate=rate, frames=frames)
 
 
 def empty_road(
