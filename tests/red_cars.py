@@ -33,6 +33,7 @@ SETTINGS = Settings(
     reference_height=HEIGHT,
     features=COLOUR,
     search=SearchSettings(
+        probability=0.5,
         windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),),
         perspective=PerspectiveSettings(sizes=()),
         alternate=1,
@@ -53,8 +54,8 @@ def by_perspective(horizon: float) -> Settings:
     )
     return Settings(
         features=COLOUR,
-        search=SearchSettings(perspective=perspective),
-        heat=HeatSettings(votes=VoteSettings(least=0.2)),
+        search=SearchSettings(probability=0.5, perspective=perspective),
+        heat=HeatSettings(votes=VoteSettings(least=0.25)),
         tracker=TrackerSettings(motion=MotionSettings(strong=0.25)),
     )
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, red_finder, road
-from vdet.config.schema import Settings, TrackerSettings
+from vdet.config.schema import MotionSettings, Settings
 from vdet.detection import Detection, Detector, detect_still, horizon_of, still_boxes
 from vdet.errors import ImageError
 from vdet.geometry import Box
@@ -45,7 +45,7 @@ def test_the_heat_of_a_car_that_has_gone_is_forgotten() -> None:
 
 def test_hits_are_the_windows_of_at_least_the_probability() -> None:
     (detection,) = watch(road(CAR))
-    expected = detection.windows.probabilities >= 0.5
+    expected = detection.windows.probabilities >= SETTINGS.search.probability
     assert 0 < expected.sum() < len(detection.windows)
     np.testing.assert_array_equal(detection.hits.boxes, detection.windows.boxes[expected])
 
@@ -166,20 +166,35 @@ def test_lengths_scale_with_the_frame() -> None:
     assert large.box.iou(doubled) > 0.9
 
 
-def test_regions_too_small_for_the_tracker_are_no_boxes() -> None:
-    detection = detect_still(MODEL, SETTINGS, road(CAR))
-    (region,) = detection.regions
-    width, height = region.box.width, region.box.height
-    assert still_boxes(detection, SETTINGS, 320, 240) == [(region.box, region.peak)]
-    for least, boxes in ((min(width, height), 1), (min(width, height) + 1, 0)):
-        settings = SETTINGS.model_copy(update={"tracker": TrackerSettings(min_region=least)})
-        assert len(still_boxes(detection, settings, 320, 240)) == boxes
+class TestBoxesOfAStill:
+    """Regions that the tracker would show, were this a video."""
 
+    def test_by_the_rules_a_region_is_large_enough_both_ways(self) -> None:
+        detection = detect_still(MODEL, SETTINGS, road(CAR))
+        (region,) = detection.regions
+        least = min(region.box.width, region.box.height)
+        enough, too_much = (but(SETTINGS, "tracker", min_region=n) for n in (least, least + 1))
+        assert still_boxes(detection, enough, WIDTH, HEIGHT) == [(region.box, region.peak)]
+        assert still_boxes(detection, too_much, WIDTH, HEIGHT) == []
 
-def test_the_least_size_of_a_region_scales_with_the_frame() -> None:
-    detection = detect_still(MODEL, SETTINGS, road(CAR))
-    assert len(still_boxes(detection, SETTINGS, 320, 240)) == 1
-    assert still_boxes(detection, SETTINGS, 3200, 2400) == []
+    def test_by_motion_a_region_is_wide_enough_and_clearly_seen(self) -> None:
+        detection = detect_still(MODEL, PERSPECTIVE, road(CAR))
+        (region,) = detection.regions
+        share, peak = region.box.width / WIDTH, region.peak
+        for smallest, strong, boxes in (
+            (share, peak, [(region.box, peak)]),
+            (share + 1 / WIDTH, peak, []),
+            (share, peak + 0.01, []),
+        ):
+            motion = MotionSettings(smallest=smallest, strong=strong)
+            settings = but(PERSPECTIVE, "tracker", motion=motion)
+            assert still_boxes(detection, settings, WIDTH, HEIGHT) == boxes
+
+    @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["rules", "motion"])
+    def test_the_least_size_of_a_region_scales_with_the_frame(self, settings: Settings) -> None:
+        detection = detect_still(MODEL, settings, road(CAR))
+        assert len(still_boxes(detection, settings, WIDTH, HEIGHT)) == 1
+        assert still_boxes(detection, settings, 10 * WIDTH, 10 * HEIGHT) == []
 
 
 @pytest.mark.parametrize("shape", [(240, 20, 3), (1, 1, 3), (2, 2, 3)])

@@ -1,5 +1,6 @@
 """What bad input gets: one line that says what to do, exit code 1, and nothing half-written."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from conftest import Run
+from quick import only_windows
 from vdet.model import load_model, save_model
 
 
@@ -78,7 +80,7 @@ def test_a_video_cut_off_in_the_middle_gives_what_is_left(
     data = clip_path.read_bytes()
     source = tmp_path / "cut.mp4"
     source.write_bytes(data[: len(data) * 2 // 3])
-    few = ("--set", "search.windows=[{size: 160, overlap: 0.5, top: 380, bottom: 600}]")
+    few = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
     result = run("detect-video", source, out, "--model", model_path, *few)
     assert result.code == 0, result.err
     assert "ends early: " in result.err
@@ -116,8 +118,8 @@ def _other_features(model: Path, target: Path) -> None:
 
 def _other_version(model: Path, target: Path) -> None:
     arrays = dict(np.load(model))
-    header = arrays["header"].tobytes().replace(b'"version": 1', b'"version": 9')
-    arrays["header"] = np.frombuffer(header, np.uint8)
+    header = json.loads(arrays["header"].tobytes()) | {"version": 9}
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     np.savez(target, **arrays)
 
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
+from quick import only_windows
 from vdet import demo
 from vdet.synthetic import default_clip
 from vdet.synthetic.scene import Scene
 
-FEW_WINDOWS = ("--set", "search.windows=[{size: 128, overlap: 0.7, top: 370, bottom: 600}]")
+FEW_WINDOWS = only_windows("size: 128, overlap: 0.7, top: 370, bottom: 600")
 FRAMES = 12
 
 

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from conftest import Run
+from quick import QUICK_OPTIONS, only_windows
 from vdet.images import read_image, write_image
 from vdet.synthetic import render, truth
 from vdet.synthetic.scene import Scene
 
-FEW_WINDOWS = ("--set", "search.windows=[{size: 160, overlap: 0.7, top: 380, bottom: 600}]")
+FEW_WINDOWS = only_windows("size: 160, overlap: 0.7, top: 380, bottom: 600")
 
 
 @pytest.fixture
@@ -25,7 +26,7 @@ def picture(scene: Scene, tmp_path: Path) -> Path:
 
 def test_draws_boxes_into_one_picture(run: Run, picture: Path, model_path: Path) -> None:
     out = picture.parent.parent / "found.png"
-    result = run("detect-image", picture, "-o", out, "--model", model_path)
+    result = run("detect-image", picture, "-o", out, "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     before, after = read_image(picture), read_image(out)
     assert after.shape == before.shape
@@ -33,7 +34,7 @@ def test_draws_boxes_into_one_picture(run: Run, picture: Path, model_path: Path)
 
 
 def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Scene) -> None:
-    result = run("detect-image", picture, "--json", "-", "--model", model_path)
+    result = run("detect-image", picture, "--json", "-", "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     (item,) = json.loads(result.out)
     assert (item["image"], item["width"], item["height"]) == (str(picture), 320, 180)
@@ -170,8 +171,9 @@ def test_boxes_lie_in_the_picture_whatever_its_size(
 ) -> None:
     path = tmp_path / "odd.png"
     write_image(path, render(scene, 10)[:179, :318])
-    loose = ("--set", "heat.threshold=0.01", "--set", "search.probability=0.05")
-    result = run("detect-image", path, "--json", "-", "--model", model_path, *loose)
+    loose = ("heat.threshold=0.01", "search.probability=0.05", "tracker.motion.strong=0.01")
+    options = [word for assignment in loose for word in ("--set", assignment)]
+    result = run("detect-image", path, "--json", "-", "--model", model_path, *options)
     (item,) = json.loads(result.out)
     assert item["boxes"]
     assert all(box["x"] + box["width"] <= 318 for box in item["boxes"])

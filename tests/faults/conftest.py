@@ -34,6 +34,6 @@ def long_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def clips(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of two clips that take a second or two, and a short one."""
     folder = tmp_path_factory.mktemp("clips")
-    for name, frames in (("a", 60), ("b", 60), ("short", 5)):
+    for name, frames in (("a", 300), ("b", 300), ("short", 5)):
         write_drive(folder / f"{name}.mp4", frames)
     return folder

@@ -14,6 +14,7 @@ from running import names, write_drive
 from vdet.batch.task import process_file
 from vdet.pipeline import VideoJob
 from vdet.tracking.cars import Cars
+from vdet.tracking.motion import MotionTracker
 from vdet.video import Frame
 from vdet.video.encoder import Encoder
 
@@ -84,7 +85,8 @@ def test_a_tracker_that_raises(
     def update(*_: object) -> None:
         raise ZeroDivisionError("no\nscale")
 
-    monkeypatch.setattr(Cars, "update", update)
+    for tracker in (Cars, MotionTracker):
+        monkeypatch.setattr(tracker, "update", update)
     record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error

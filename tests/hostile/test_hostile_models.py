@@ -20,7 +20,7 @@ from hostile.trials import broken_promises, files_in, try_all
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
 from vdet.errors import ModelError
 from vdet.features import Layout
-from vdet.model import load_model
+from vdet.model import FORMAT_VERSION, load_model
 
 FEATURES = FeatureSettings(
     patch=16,
@@ -28,10 +28,11 @@ FEATURES = FeatureSettings(
     histogram=HistogramSettings(bins=8),
 )
 LENGTH = Layout.of(FEATURES).length
+HOG_LENGTH = Layout.of(FEATURES).hog_length
 HEADER = json.dumps(
     {
         "format": "vdet model",
-        "version": 1,
+        "version": FORMAT_VERSION,
         "features": FEATURES.model_dump(mode="json"),
         "provenance": {"data_sha256": "0" * 64, "accuracy": 0.5},
     }
@@ -80,12 +81,15 @@ def members(header: str | bytes = HEADER) -> dict[str, bytes]:
     """Give the parts of a model that is whole."""
     text = header if isinstance(header, bytes) else header.encode()
     ones = np.ones(1, np.float32)
+    rng = np.random.default_rng(0)
     return {
         "header": npy(np.frombuffer(text, np.uint8)),
-        "weights": npy(np.random.default_rng(0).normal(size=(1, LENGTH)).astype(np.float32)),
+        "weights": npy(rng.normal(size=(1, LENGTH)).astype(np.float32)),
         "biases": npy(ones),
         "slopes": npy(-ones),
         "offsets": npy(ones),
+        "box_weights": npy(rng.normal(0, 0.1, (4, HOG_LENGTH)).astype(np.float32)),
+        "box_biases": npy(np.array([-0.4, -0.3, 0.4, 0.3], np.float32)),
     }
 
 
@@ -98,7 +102,7 @@ def zipped(parts: dict[str, bytes]) -> bytes:
 
 
 def bad_models() -> Iterator[bytes]:
-    """Give 500 models with a fault: in the file, in a part of it, in a number."""
+    """Give 500 models with a fault: in the file, in a part of it, in a number, or a part less."""
     yield from mutated(zipped(members()), seed=1, count=100)
     for header in mutated(HEADER.encode(), seed=2, count=80, tokens=TOKENS):
         yield zipped(members(header))
@@ -110,11 +114,13 @@ def bad_models() -> Iterator[bytes]:
             yield zipped(whole | {name: part})
     rng = np.random.default_rng(4)
     names = list(whole)
-    for _ in range(70):
+    for name in names:
+        yield zipped({other: part for other, part in whole.items() if other != name})
+    for _ in range(50):
         name, kind = rng.choice(names), str(rng.choice(KINDS))
         data = npy_header(kind, SHAPES[rng.integers(len(SHAPES))]) + bytes(4 * LENGTH)
         yield zipped(whole | {name: data})
-    for _ in range(70):
+    for _ in range(43):
         name = rng.choice(names[1:])
         array = np.load(io.BytesIO(whole[name])).copy()
         array.flat[rng.integers(array.size)] = rng.choice(VALUES)
@@ -159,7 +165,7 @@ def bombs() -> dict[str, tuple[bytes, str]]:
         "patch": 256,
         "hog": {"orientations": 32, "cell": 2, "block": 8, "channels": [0, 1, 2]},
     }
-    asking = json.dumps({"format": "vdet model", "version": 1, "features": many})
+    asking = json.dumps({"format": "vdet model", "version": FORMAT_VERSION, "features": many})
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("header.npy", bytes(300_000_000))
@@ -213,7 +219,7 @@ def test_a_file_without_an_end_is_no_model() -> None:
 
 
 @pytest.mark.parametrize("value", [1.1e9, -3e38])
-@pytest.mark.parametrize("part", ["weights", "biases", "slopes", "offsets"])
+@pytest.mark.parametrize("part", [name for name in members() if name != "header"])
 def test_values_that_could_overflow_are_refused(tmp_path: Path, part: str, value: float) -> None:
     array = np.load(io.BytesIO(members()[part])).copy()
     array.flat[0] = value
@@ -223,7 +229,7 @@ def test_values_that_could_overflow_are_refused(tmp_path: Path, part: str, value
         load_model(path)
 
 
-def test_the_largest_values_that_are_read_give_probabilities(tmp_path: Path) -> None:
+def test_the_largest_values_that_are_read_give_probabilities_and_sides(tmp_path: Path) -> None:
     most = {
         name: npy(np.sign(np.load(io.BytesIO(data))) * np.float32(1e9))
         for name, data in members().items()
@@ -233,4 +239,7 @@ def test_the_largest_values_that_are_read_give_probabilities(tmp_path: Path) -> 
     path.write_bytes(zipped(members() | most))
     vectors = np.full((3, LENGTH), 65_536, np.float32)
     with warnings.catch_warnings(action="error"):
-        assert np.isfinite(load_model(path).probabilities(vectors)).all()
+        model = load_model(path)
+        assert model.boxes is not None
+        assert np.isfinite(model.probabilities(vectors)).all()
+        assert np.isfinite(model.boxes.sides(vectors[:, :HOG_LENGTH])).all()

@@ -10,6 +10,7 @@ import pytest
 
 from hostile.mutations import mutated
 from hostile.trials import broken_promises, files_in, try_all
+from quick import only_windows
 from vdet.errors import ImageError
 from vdet.images import read_image
 
@@ -28,7 +29,7 @@ FORMATS: dict[str, tuple[str, list[int]]] = {
 }
 MUTATIONS = 30  # of each
 SECONDS = 20.0
-FEW_WINDOWS = ("--set", "search.windows=[{size: 160, overlap: 0.5, top: 380, bottom: 600}]")
+FEW_WINDOWS = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
 
 
 def encoded(suffix: str, picture: cv2.typing.MatLike, options: list[int] | None = None) -> bytes:
@@ -119,10 +120,13 @@ def test_formats_that_are_not_named_are_not_read(tmp_path: Path, suffix: str) ->
 def test_a_panorama_with_a_million_windows_is_refused(tmp_path: Path) -> None:
     path, out = tmp_path / "wide.png", tmp_path / "out.png"
     path.write_bytes(black(32_000, 24))
-    (trial,) = try_all([["detect-image", path, "-o", out]], seconds=SECONDS)
-    assert trial.code == 1
-    assert "search windows would be laid over a frame of 32000×24 pixels" in trial.err
-    assert broken_promises([trial]) == []
+    fine = only_windows("size: 120, step: 1, top: 0, bottom: 720")
+    run: list[str | Path] = ["detect-image", path, "-o", out]
+    by_default, finely = try_all([run, [*run, *fine]], seconds=SECONDS)
+    assert [by_default.code, finely.code] == [1, 1]
+    assert "no search window fits into a frame of 32000×24 pixels" in by_default.err
+    assert "search windows would be laid over a frame of 32000×24 pixels" in finely.err
+    assert broken_promises([by_default, finely]) == []
 
 
 def test_a_damaged_jpeg_that_can_be_read_is_warned_of(

@@ -10,6 +10,7 @@ import pytest
 
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
+from quick import only_windows
 from vdet.config.document import MAX_BYTES, MAX_MISTAKES
 from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
@@ -27,8 +28,11 @@ search:
     step: 2
     top: 300
     bottom: 700
+  perspective: {sizes: [0.25, 0.5], horizon: 0.45, lowest: 1.1, beyond: 0.7, step: 2}
+  alternate: 2
 heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
 tracker:
+  motion: {smallest: 0.03, strong: 0.2, needed: 2.5, carried: 8}
   history: 10
   min_region: 50
   match_method: ccoeff_normed
@@ -95,14 +99,14 @@ def test_500_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Pat
     settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=200)
     cameras = mutated(CAMERA.encode(), seed=3, count=50, tokens=TOKENS)
     cameras += with_other_words(CAMERA, NUMBERS, seed=4, count=100)
-    few = ("--set", "search.windows=[{size: 160, overlap: 0.5, top: 380, bottom: 600}]")
-    runs = []
+    few = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
+    runs: list[list[str | Path]] = []
     for number, data in enumerate(settings + cameras):
         path = inside / f"{number}.yaml"
         path.write_bytes(data)
+        runs.append(["detect-image", picture, "-o", out / f"{number}.png"])
         of_settings = number < len(settings)
-        options = ("-c", path) if of_settings else ("--lanes", "--camera", path, *few)
-        runs.append(["detect-image", picture, "-o", out / f"{number}.png", *options])
+        runs[-1] += ["-c", path] if of_settings else ["--lanes", "--camera", path, *few]
     assert len(runs) == 500
     before = files_in(inside)
     trials = try_all(runs, seconds=SECONDS)

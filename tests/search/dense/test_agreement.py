@@ -75,6 +75,9 @@ STEPS = {AlignedSearch: 12, PhasedSearch: 18, LocatedSearch: 19}
 HORIZON = 0.57
 """Of the drawn road."""
 
+PROBABILITY = 0.5
+"""Of a detection; only these are asked where their vehicle is."""
+
 FEW = 0.92
 """Decisions of so small a grid that one or two near 0.5 are a few percent."""
 
@@ -169,7 +172,8 @@ def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image])
 
 def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -> Windows:
     """Search a frame by one set of windows, that of the grid."""
-    settings = Settings(search=SearchSettings.model_validate({"engine": engine}))
+    search = SearchSettings.model_validate({"engine": engine, "probability": PROBABILITY})
+    settings = Settings(search=search)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("vdet.search.engine.lay_grids", lambda *_, **__: [grid])
         height, width = image.shape[:2]
@@ -194,7 +198,7 @@ def _vehicles_by_both(model: LinearModel, kind: type) -> tuple[Windows, Windows]
     grid = WindowGrid(96, Fraction(step), left, Fraction(8), columns, rows=5)
     assert type(dense_search(model, grid)) is kind
     dense, patch = (_vehicles(model, grid, cars(), engine) for engine in ("dense", "patch"))
-    hits = [found.probabilities >= 0.5 for found in (dense, patch)]
+    hits = [found.probabilities >= PROBABILITY for found in (dense, patch)]
     assert (hits[0] & hits[1]).sum() > 5
     same = hits[0] == hits[1]
     assert same.mean() > FEW
@@ -213,7 +217,7 @@ def _only(windows: Windows, keep: np.ndarray) -> Windows:
 @pytest.mark.parametrize("kind", STEPS)
 def test_they_agree_on_the_vehicles_that_windows_show(kind: type) -> None:
     dense, patch = _vehicles_by_both(with_boxes(fitted(FeatureSettings())), kind)
-    hits = patch.probabilities >= 0.5
+    hits = patch.probabilities >= PROBABILITY
     assert (patch.vehicles[hits] != patch.boxes[hits]).any(axis=1).all()
     pair = (found.vehicles.astype(np.float64) for found in (dense, patch))
     assert np.diag(iou_matrix(*pair)).min() > 0.9
