@@ -41,9 +41,12 @@ class TestSizes:
         (grid,) = laid(sizes=(0.1,), zoom=zoom, horizon=0.3)
         assert grid.size == size
 
-    def test_do_not_depend_on_the_height(self) -> None:
-        small, large = ([grid.size for grid in laid(1280, height)] for height in (600, 1000))
+    def test_do_not_depend_on_the_height_of_a_frame_of_16_by_9_or_higher(self) -> None:
+        small, large = ([grid.size for grid in laid(1280, height)] for height in (720, 1000))
         assert small == large
+
+    def test_of_a_wider_frame_are_those_of_one_of_16_by_9_and_its_height(self) -> None:
+        assert [grid.size for grid in laid(2560, 720)] == [grid.size for grid in laid(1280, 720)]
 
     @given(st.floats(0.02, 0.4), st.sampled_from([320, 640, 854, 960, 1242, 1280, 1920]))
     def test_are_rounded_by_no_more_than_a_cell(self, share: float, width: int) -> None:
@@ -152,7 +155,7 @@ class TestHalving:
     [
         (1280, 720, [64, 80, 112, 160, 224, 320]),
         (960, 540, [48, 64, 80, 128, 160, 256]),
-        (1242, 375, [64, 80, 112, 160, 224]),
+        (1242, 375, [32, 40, 56, 80, 112, 160]),
         (1920, 1080, [96, 128, 160, 256, 320, 512]),
         (96, 64, [8, 16, 24]),
     ],

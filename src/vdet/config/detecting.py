@@ -44,7 +44,8 @@ class PerspectiveSettings(Section):
     sizes: tuple[WindowShare, ...] = Field(
         (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25),
         max_length=32,
-        description="sides of the windows, shares of the frame's width; [] for no sets",
+        description="sides of the windows, shares of the frame's width (of 16/9 of its height, "
+        "where it is wider than that); [] for no sets",
     )
     zoom: float = Field(
         1.0, ge=0.1, le=10, description="multiplies the sizes; above 1 for a longer lens"

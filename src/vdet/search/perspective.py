@@ -11,6 +11,9 @@ from fractions import Fraction
 from vdet.config.schema import FeatureSettings, PerspectiveSettings
 from vdet.windows import WindowGrid
 
+_WIDEST = 16 / 9
+"""Of a wider frame, this share of its height counts as its width: it shows more to the sides."""
+
 
 def lay_perspective(
     settings: PerspectiveSettings,
@@ -38,7 +41,7 @@ def lay_perspective(
     cells = features.patch // features.hog.cell
     grids: list[WindowGrid] = []
     for share in settings.sizes:
-        side = share * settings.zoom * width
+        side = share * settings.zoom * min(width, _WIDEST * height)
         halvings = max(0, math.floor(math.log2(max(side, 1) / features.patch)))
         unit = cells << halvings
         size = unit * max(1, round(side / unit))
