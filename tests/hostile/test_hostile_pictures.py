@@ -122,11 +122,11 @@ def test_a_panorama_with_a_million_windows_is_refused(tmp_path: Path) -> None:
     path.write_bytes(black(32_000, 24))
     fine = only_windows("size: 120, step: 1, top: 0, bottom: 720")
     run: list[str | Path] = ["detect-image", path, "-o", out]
-    by_default, finely = try_all([run, [*run, *fine]], seconds=SECONDS)
-    assert [by_default.code, finely.code] == [1, 1]
-    assert "no search window fits into a frame of 32000×24 pixels" in by_default.err
-    assert "search windows would be laid over a frame of 32000×24 pixels" in finely.err
-    assert broken_promises([by_default, finely]) == []
+    trials = try_all([run, [*run, *fine]], seconds=SECONDS)
+    assert [trial.code for trial in trials] == [1, 1]
+    for trial in trials:
+        assert "search windows would be laid over a frame of 32000×24 pixels" in trial.err
+    assert broken_promises(trials) == []
 
 
 def test_a_damaged_jpeg_that_can_be_read_is_warned_of(
