@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.geometry import Box
-from vdet.overlaps import coverage, iou_matrix
+from vdet.overlaps import coverage, iou_matrix, visible
 
 SIDES = st.integers(1, 50)
 PLACES = st.integers(-50, 50)
@@ -57,3 +57,14 @@ def test_coverage_is_never_less_than_iou(
     a: tuple[int, int, int, int], b: tuple[int, int, int, int]
 ) -> None:
     assert coverage(boxes(a), boxes(b)).item() >= iou_matrix(boxes(a), boxes(b)).item()
+
+
+@given(x=st.floats(-200, 1100), y=st.floats(-200, 600), w=st.floats(1, 300), h=st.floats(1, 300))
+def test_the_visible_part_lies_in_the_frame_and_in_the_box(
+    x: float, y: float, w: float, h: float
+) -> None:
+    ((left, top, width, height),) = visible(boxes((x, y, w, h)), (900, 500))
+    assert 0 <= left <= left + width <= 900
+    assert 0 <= top <= top + height <= 500
+    assert width <= w + 1e-9
+    assert height <= h + 1e-9

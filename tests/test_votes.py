@@ -167,10 +167,27 @@ class TestCollecting:
             shares = np.asarray(values / 4, np.float32)
             return Windows(np.zeros((count, 4), np.int32), values, shares, vehicles)
 
-        votes = Votes.of([windows(2, 0), windows(0, 0), windows(1, 50)])
+        votes = Votes.of([windows(2, 0), windows(0, 0), windows(1, 50)], (100, 100))
         assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 10, 20], [50, 0, 10, 20]]
         assert votes.weights.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
         assert votes.boxes.dtype == votes.weights.dtype == np.float64
+
+    def test_a_vehicle_is_voted_for_as_far_as_the_frame_shows_it(self) -> None:
+        vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
+        ones = np.ones(4, np.float32)
+        windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
+        votes = Votes.of([windows], (100, 100))
+        assert votes.boxes.tolist() == [[90, 10, 10, 20], [0, 0, 5, 5], [60, 95, 20, 5]]
+        assert len(votes.weights) == 3
+
+    def test_votes_for_a_cut_off_vehicle_agree_whatever_they_guess_of_its_rest(self) -> None:
+        votes = np.array([[60, 40, width, 30] for width in (45, 60, 90, 120)], np.float32)
+        quarters = np.full(4, 0.25, np.float32)
+        windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
+        regions = [Region(Box(60, 40, 40, 30), (80, 55), 1)]
+        (vehicle,) = split_regions(regions, Votes.of([windows], (100, 100)), VoteSettings())
+        assert vehicle.box == Box(60, 40, 40, 30)
+        assert vehicle.peak == pytest.approx(0.25)
 
     def test_of_too_many_the_heaviest_are_heard_in_their_order(self) -> None:
         rng = np.random.default_rng(0)

@@ -1,4 +1,4 @@
-"""Overlap of many boxes with many, each `x, y, width, height` in pixels, float64."""
+"""Overlap of many boxes with many; each is `x, y, width, height` in pixels, float64."""
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,13 @@ def coverage(predicted: Floats, regions: Floats) -> Floats:
     float64 of shape `(n, m)`.
     """
     return _intersection(predicted, regions) / _area(predicted)[:, np.newaxis]
+
+
+def visible(boxes: Floats, size: tuple[int, int]) -> Floats:
+    """Return the parts of boxes `(n, 4)` that lie in a frame of `size`; sides may be 0."""
+    near = np.clip(boxes[:, :2], 0, size)
+    far = np.clip(boxes[:, :2] + boxes[:, 2:], 0, size)
+    return np.concatenate([near, far - near], axis=1)
 
 
 def _intersection(a: Floats, b: Floats) -> Floats:

@@ -14,7 +14,7 @@ import numpy as np
 from vdet.config.schema import VoteSettings
 from vdet.geometry import Box
 from vdet.heatmap import Region
-from vdet.overlaps import Floats, coverage, iou_matrix
+from vdet.overlaps import Floats, coverage, iou_matrix, visible
 from vdet.windows import Windows
 
 MOST_VOTES = 400
@@ -29,13 +29,17 @@ class Votes:
     weights: Floats
 
     @staticmethod
-    def of(detections: Sequence[Windows]) -> "Votes":
-        """Collect the votes of some frames' detections, each its probability times its share."""
-        boxes = [each.vehicles for each in detections]
+    def of(detections: Sequence[Windows], size: tuple[int, int]) -> "Votes":
+        """Collect the votes of some frames' detections, each its probability times its share.
+
+        What lies outside the frame of `size`, width and height in pixels, is cut off: how far a
+        vehicle reaches there, windows can only guess, and need not agree on.
+        """
+        boxes = np.concatenate([each.vehicles for each in detections], dtype=np.float64)
         weights = [each.probabilities * each.shares for each in detections]
-        return Votes(
-            np.concatenate(boxes, dtype=np.float64), np.concatenate(weights, dtype=np.float64)
-        )
+        inside = visible(boxes, size)
+        seen = (inside[:, 2:] >= 1).all(axis=1)
+        return Votes(inside[seen], np.concatenate(weights, dtype=np.float64)[seen])
 
     def within(self, box: Box) -> "Votes":
         """Return those whose centre lies in `box`; the weightiest where they are too many."""

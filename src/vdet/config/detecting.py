@@ -42,7 +42,7 @@ class PerspectiveSettings(Section):
     """Window sets whose rows follow from their size: vehicles stand on a flat road."""
 
     sizes: tuple[WindowShare, ...] = Field(
-        (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25),
+        (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3),
         max_length=32,
         description="sides of the windows, shares of the frame's width (of 16/9 of its height, "
         "where it is wider than that); [] for no sets",

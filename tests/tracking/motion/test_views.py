@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vdet.overlaps import Floats
 from vdet.tracking.motion.state import MotionState, measurement_of
-from vdet.tracking.motion.views import view, visible
+from vdet.tracking.motion.views import view
 
 SIZE = (1000, 500)
 
@@ -69,14 +67,3 @@ def test_a_growing_vehicle_that_is_cut_off_stops_growing() -> None:
 def test_a_view_cut_off_on_both_sides_is_measured_as_it_is() -> None:
     box = np.array([0.0, 200.0, 1000.0, 250.0])
     assert (view(expecting(0, 200, 900, 250), box, SIZE).seen == 1).all()
-
-
-@given(x=st.floats(-200, 1100), y=st.floats(-200, 600), w=st.floats(1, 300), h=st.floats(1, 300))
-def test_the_visible_part_lies_in_the_frame_and_in_the_box(
-    x: float, y: float, w: float, h: float
-) -> None:
-    ((left, top, width, height),) = visible(np.array([[x, y, w, h]]), SIZE)
-    assert 0 <= left <= left + width <= SIZE[0]
-    assert 0 <= top <= top + height <= SIZE[1]
-    assert width <= w + 1e-9
-    assert height <= h + 1e-9

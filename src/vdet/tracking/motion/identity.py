@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from vdet.config.schema import MotionSettings
+from vdet.overlaps import visible
 from vdet.tracking.motion.overlapping import is_part, is_same
 from vdet.tracking.motion.vehicle import Vehicle
-from vdet.tracking.motion.views import visible
 
 _REACH = 1.5
 """How far from its expected place a lost vehicle may turn up, in sizes of the vehicle."""

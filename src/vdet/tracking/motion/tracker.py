@@ -8,7 +8,7 @@ import numpy as np
 from vdet.config.schema import MotionSettings
 from vdet.geometry import Box
 from vdet.heatmap import Region
-from vdet.overlaps import Floats, iou_matrix
+from vdet.overlaps import Floats, iou_matrix, visible
 from vdet.tracking.motion.identity import take_over_ids, without_duplicates
 from vdet.tracking.motion.overlapping import (
     are_hidden,
@@ -18,7 +18,6 @@ from vdet.tracking.motion.overlapping import (
 )
 from vdet.tracking.motion.pairing import pair
 from vdet.tracking.motion.vehicle import Sighting, Vehicle
-from vdet.tracking.motion.views import visible
 from vdet.tracking.track import Track
 
 Found = dict[int, Sighting]

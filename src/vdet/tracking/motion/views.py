@@ -57,10 +57,3 @@ def view(state: MotionState, box: Floats, size: tuple[int, int]) -> View:
         measured[axis] = (first if cut_behind else last) + outward * length / 2
         seen[axis + 2] = 0
     return View(MotionState(mean, covariance), measured, seen)
-
-
-def visible(boxes: Floats, size: tuple[int, int]) -> Floats:
-    """Return the parts of boxes `(n, 4)` that lie in a frame of `size`; sides may be 0."""
-    near = np.clip(boxes[:, :2], 0, size)
-    far = np.clip(boxes[:, :2] + boxes[:, 2:], 0, size)
-    return np.concatenate([near, far - near], axis=1)
