@@ -22,8 +22,9 @@ EVERYWHERE = Box(-1000, -1000, 5000, 5000)
 
 
 def votes_of(*votes: Vote) -> Votes:
+    """Make votes that weigh the same for whether and where."""
     table = np.array(votes, np.float64).reshape(-1, 5)
-    return Votes(table[:, :4], table[:, 4])
+    return Votes(table[:, :4], table[:, 4], table[:, 4])
 
 
 def around(box: Box, weight: float = 0.1, seed: int = 0, count: int = 12) -> list[Vote]:
@@ -105,6 +106,23 @@ class TestWeights:
         assert len(split(around(LEFT, 0.02, count=20))) == 1
         assert split(around(LEFT, 0.02, count=1)) == []
 
+    def test_whether_and_where_are_weighed_apart(self) -> None:
+        off = LEFT.moved_to(120, 100)
+        table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
+        votes = Votes(table, whether=np.array([0.2, 0.6]), where=np.array([1e4, 1.0]))
+        (vehicle,) = split_regions([Region(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        assert vehicle.box == LEFT
+        assert vehicle.peak == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
+
+    def test_a_lone_sure_vote_keeps_no_vehicle_from_being_found(self) -> None:
+        lone = exactly(LEFT.moved_to(300, 100), 0)[:4]
+        table = np.array([lone, *[exactly(LEFT, 0)[:4]] * 3], np.float64)
+        votes = Votes(
+            table, whether=np.array([0.01, 0.1, 0.1, 0.1]), where=np.array([9, 1, 1, 1.0])
+        )
+        (vehicle,) = split_regions([Region(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        assert vehicle.box == LEFT
+
     def test_votes_without_weight_are_none(self) -> None:
         assert split([exactly(LEFT, 0)], least=0) == []
 
@@ -158,6 +176,11 @@ class TestRegions:
         assert split_regions([], votes_of(*around(LEFT)), VoteSettings()) == []
 
 
+def collected(*windows: Windows, **settings: float) -> Votes:
+    """Collect the votes in a frame of 100 × 100 pixels."""
+    return Votes.of(windows, (100, 100), VoteSettings.model_validate(settings))
+
+
 class TestCollecting:
     def test_each_detection_of_each_frame_votes_by_probability_times_share(self) -> None:
         def windows(count: int, x: int) -> Windows:
@@ -167,35 +190,46 @@ class TestCollecting:
             shares = np.asarray(values / 4, np.float32)
             return Windows(np.zeros((count, 4), np.int32), values, shares, vehicles)
 
-        votes = Votes.of([windows(2, 0), windows(0, 0), windows(1, 50)], (100, 100))
+        votes = collected(windows(2, 0), windows(0, 0), windows(1, 50))
         assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 10, 20], [50, 0, 10, 20]]
-        assert votes.weights.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
-        assert votes.boxes.dtype == votes.weights.dtype == np.float64
+        assert votes.whether.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
+        assert votes.boxes.dtype == votes.whether.dtype == votes.where.dtype == np.float64
+
+    def test_where_a_vehicle_is_the_surest_know_best(self) -> None:
+        box = np.tile(np.array([10, 10, 20, 20], np.float32), (3, 1))
+        sure, ones = np.array([0.5, 0.9, 1], np.float32), np.ones(3, np.float32)
+        windows = Windows(np.zeros((3, 4), np.int32), sure, ones, box)
+        where = collected(windows, sharpness=2).where
+        assert where[0] == pytest.approx(np.log(2) ** 2)
+        assert where[1] == pytest.approx(np.log(10) ** 2, rel=1e-5)
+        assert np.isfinite(where[2])
+        assert where[2] > 10 * where[1]
+        assert collected(windows, sharpness=0).where.tolist() == [1, 1, 1]
 
     def test_a_vehicle_is_voted_for_as_far_as_the_frame_shows_it(self) -> None:
         vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
         ones = np.ones(4, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
-        votes = Votes.of([windows], (100, 100))
+        votes = collected(windows)
         assert votes.boxes.tolist() == [[90, 10, 10, 20], [0, 0, 5, 5], [60, 95, 20, 5]]
-        assert len(votes.weights) == 3
+        assert len(votes.whether) == len(votes.where) == 3
 
     def test_votes_for_a_cut_off_vehicle_agree_whatever_they_guess_of_its_rest(self) -> None:
         votes = np.array([[60, 40, width, 30] for width in (45, 60, 90, 120)], np.float32)
         quarters = np.full(4, 0.25, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
         regions = [Region(Box(60, 40, 40, 30), (80, 55), 1)]
-        (vehicle,) = split_regions(regions, Votes.of([windows], (100, 100)), VoteSettings())
+        (vehicle,) = split_regions(regions, collected(windows), VoteSettings())
         assert vehicle.box == Box(60, 40, 40, 30)
         assert vehicle.peak == pytest.approx(0.25)
 
-    def test_of_too_many_the_heaviest_are_heard_in_their_order(self) -> None:
+    def test_of_too_many_the_surest_are_heard_in_their_order(self) -> None:
         rng = np.random.default_rng(0)
         weights = rng.permutation(MOST_VOTES + 100) / 1000
         votes = votes_of(*((i, 0, 10, 10, weight) for i, weight in enumerate(weights.tolist())))
         heard = votes.within(EVERYWHERE)
-        assert len(heard.weights) == MOST_VOTES
-        assert heard.weights.min() == 0.1
+        assert len(heard.where) == MOST_VOTES
+        assert heard.where.min() == 0.1
         assert (np.diff(heard.boxes[:, 0]) > 0).all()
 
     def test_too_many_votes_of_a_vehicle_are_one_vehicle(self) -> None:

@@ -1,3 +1,5 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -5,7 +7,7 @@ from hypothesis import strategies as st
 
 from seed import SEED
 from vdet.config.schema import WindowSettings
-from vdet.windows import Boxes, Windows, every_nth, lay_grid
+from vdet.windows import Boxes, WindowGrid, Windows, every_nth, lay_grid
 
 LARGE, SMALL = SEED.search.windows
 ROWS = 2000  # of a frame that no band here reaches the end of
@@ -162,6 +164,15 @@ def test_the_share_of_a_window_is_one_over_the_windows_that_cover_a_pixel() -> N
             covered[y : y + h, x : x + w] += 1
         assert covered[160, 160] == 16
         assert grid.share == 1 / 16
+
+
+def test_windows_of_few_rows_share_with_fewer() -> None:
+    grid = WindowGrid(64, Fraction(16), Fraction(0), Fraction(100), columns=17, rows=2)
+    covered = np.zeros((320, 320))
+    for x, y, w, h in grid.boxes.tolist():
+        covered[y : y + h, x : x + w] += 1
+    assert covered.max() == 8
+    assert grid.share == 1 / 8
 
 
 def test_windows_without_overlap_share_with_none() -> None:

@@ -78,7 +78,8 @@ class Detector:
         self._recent.append(hits)
         regions = find_regions(heat, self._heat.threshold)
         if self._heat.regions == "votes":
-            regions = split_regions(regions, Votes.of(self._recent, self._size), self._heat.votes)
+            votes = Votes.of(self._recent, self._size, self._heat.votes)
+            regions = split_regions(regions, votes, self._heat.votes)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         visible = tuple(region for region in inside if region.box.area)
         return Detection(windows, hits, heat, visible, self._search.grids)

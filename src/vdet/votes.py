@@ -1,9 +1,11 @@
 """Hot regions split into vehicles by the votes of the windows in them.
 
-A detection votes with its probability for the box of the vehicle that it shows. The box that most
-votes agree with is a vehicle; these are averaged and used up, and the rest vote again: greedy
-non-maximum suppression that averages instead of picking one, as Viola & Jones, "Robust Real-Time
-Face Detection", 2004, section 5.6, merge detections.
+A detection votes for the box of the vehicle that it shows, and its vote weighs twice. Whether there
+is a vehicle: by its probability, which soon comes near to 1. Where it is: by how far the window is
+from being none, which is most where it fits the vehicle best. The box that most votes agree with
+is a vehicle; these are averaged and used up, and the rest vote again: greedy non-maximum
+suppression that averages instead of picking one, as Viola & Jones, "Robust Real-Time Face
+Detection", 2004, section 5.6, merge detections.
 """
 
 from collections.abc import Sequence
@@ -18,37 +20,57 @@ from vdet.overlaps import Floats, coverage, iou_matrix, visible
 from vdet.windows import Windows
 
 MOST_VOTES = 400
-"""In a region; of more, the likeliest are heard. Keeps the square of their number small."""
+"""In a region; of more, the surest are heard. Keeps the square of their number small."""
+
+
+_SUREST = 1 - 2**-24
+"""Probabilities above it are taken for it; in float32 they may be 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Votes:
-    """Boxes voted for, float64 `(n, 4)` of x, y, width, height, and weights, float64 `(n,)`."""
+    """Boxes voted for, float64 `(n, 4)` of x, y, width, height, and the weights of the votes.
+
+    `whether`, float64 `(n,)`, is the weight for there being a vehicle; `where`, `(n,)`, above 0,
+    for the place of its box.
+    """
 
     boxes: Floats
-    weights: Floats
+    whether: Floats
+    where: Floats
 
     @staticmethod
-    def of(detections: Sequence[Windows], size: tuple[int, int]) -> "Votes":
-        """Collect the votes of some frames' detections, each its probability times its share.
+    def of(detections: Sequence[Windows], size: tuple[int, int], settings: VoteSettings) -> "Votes":
+        """Collect the votes of some frames' detections.
 
         What lies outside the frame of `size`, width and height in pixels, is cut off: how far a
         vehicle reaches there, windows can only guess, and need not agree on.
         """
         boxes = np.concatenate([each.vehicles for each in detections], dtype=np.float64)
-        weights = [each.probabilities * each.shares for each in detections]
+        shares = np.concatenate([each.shares for each in detections], dtype=np.float64)
+        sure = np.concatenate([each.probabilities for each in detections], dtype=np.float64)
+        where = (-np.log1p(-np.clip(sure, 1 - _SUREST, _SUREST))) ** settings.sharpness
         inside = visible(boxes, size)
         seen = (inside[:, 2:] >= 1).all(axis=1)
-        return Votes(inside[seen], np.concatenate(weights, dtype=np.float64)[seen])
+        return Votes(inside[seen], (sure * shares)[seen], where[seen])
 
     def within(self, box: Box) -> "Votes":
-        """Return those whose centre lies in `box`; the weightiest where they are too many."""
+        """Return those whose centre lies in `box`; the surest where they are too many."""
         x, y = (self.boxes[:, :2] + self.boxes[:, 2:] / 2).T
         inside = (box.x <= x) & (x < box.right) & (box.y <= y) & (y < box.bottom)
         (numbers,) = np.nonzero(inside)
-        heaviest = np.argsort(-self.weights[numbers], kind="stable")[:MOST_VOTES]
-        numbers = np.sort(numbers[heaviest])
-        return Votes(self.boxes[numbers], self.weights[numbers])
+        surest = np.argsort(-self.where[numbers], kind="stable")[:MOST_VOTES]
+        numbers = np.sort(numbers[surest])
+        return Votes(self.boxes[numbers], self.whether[numbers], self.where[numbers])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Vehicle:
+    """A box, `(4,)`, the agreement on it, and the evidence for it."""
+
+    box: Floats
+    agreed: float
+    evidence: float
 
 
 def split_regions(regions: Sequence[Region], votes: Votes, settings: VoteSettings) -> list[Region]:
@@ -60,22 +82,22 @@ def split_regions(regions: Sequence[Region], votes: Votes, settings: VoteSetting
 
 def _vehicles(votes: Votes, settings: VoteSettings) -> list[Region]:
     overlaps = iou_matrix(votes.boxes, votes.boxes)
-    left = votes.weights.copy()
-    found: list[tuple[Floats, float]] = []
-    while len(left):
-        agreed = np.where(left > 0, overlaps @ left, 0)
+    whether, where = votes.whether.copy(), votes.where.copy()
+    found: list[_Vehicle] = []
+    while where.any():
+        agreed = np.where(where > 0, overlaps @ where, 0)
         mode = int(agreed.argmax())
-        if agreed[mode] < settings.least or agreed[mode] <= 0:
-            break
-        box = _average(votes.boxes, left, overlaps[mode], settings.agreement)
+        box = _average(votes.boxes, where, overlaps[mode], settings.agreement)
         around = iou_matrix(box[np.newaxis], votes.boxes)[0]
-        box = _average(votes.boxes, left, around, settings.agreement)
-        found.append((box, float(agreed[mode])))
+        box = _average(votes.boxes, where, around, settings.agreement)
+        vehicle = _Vehicle(box, float(agreed[mode]), float(overlaps[mode] @ whether))
         used = np.maximum(around, overlaps[mode]) > settings.agreement
-        inside = coverage(votes.boxes, box[np.newaxis])[:, 0] > settings.inside
-        left[used | inside] = 0
-        left[mode] = 0  # no vote is heard twice, even where agreement is 1
-    return [_region(*each) for each in found if not _is_part(each, found, settings.inside)]
+        used[mode] = True  # no vote is heard twice, even where agreement is 1
+        if vehicle.evidence >= settings.least:
+            found.append(vehicle)
+            used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > settings.inside
+        whether[used] = where[used] = 0
+    return [_region(each) for each in found if not _is_part(each, found, settings.inside)]
 
 
 def _average(boxes: Floats, weights: Floats, overlaps: Floats, agreement: float) -> Floats:
@@ -87,21 +109,20 @@ def _average(boxes: Floats, weights: Floats, overlaps: Floats, agreement: float)
     return np.asarray(shares @ boxes / total)
 
 
-def _is_part(
-    vehicle: tuple[Floats, float], others: Sequence[tuple[Floats, float]], inside: float
-) -> bool:
-    """Tell whether a larger vehicle of some weight holds this one."""
-    box, weight = vehicle
+def _is_part(vehicle: _Vehicle, others: Sequence[_Vehicle], inside: float) -> bool:
+    """Tell whether a larger vehicle, agreed on about as well, holds this one."""
+    box = vehicle.box
     return any(
-        other[2] * other[3] > box[2] * box[3]
-        and coverage(box[np.newaxis], other[np.newaxis])[0, 0] > inside
-        and other_weight > weight / 2
-        for other, other_weight in others
+        other.box[2] * other.box[3] > box[2] * box[3]
+        and coverage(box[np.newaxis], other.box[np.newaxis])[0, 0] > inside
+        and other.agreed > vehicle.agreed / 2
+        for other in others
     )
 
 
-def _region(box: Floats, weight: float) -> Region:
+def _region(vehicle: _Vehicle) -> Region:
+    box = vehicle.box
     x1, y1 = np.floor(box[:2] + 0.5).astype(int).tolist()
     x2, y2 = np.floor(box[:2] + box[2:] + 0.5).astype(int).tolist()
     x, y = (box[:2] + box[2:] / 2).tolist()
-    return Region(Box(x1, y1, x2 - x1, y2 - y1), (x, y), weight)
+    return Region(Box(x1, y1, x2 - x1, y2 - y1), (x, y), vehicle.evidence)

@@ -84,8 +84,9 @@ class WindowGrid:
 
     @property
     def share(self) -> float:
-        """One over the number of windows that cover a pixel, (step / size)²; at most 1."""
-        return min(1.0, float((self.step / self.size) ** 2))
+        """One over the number of windows that cover a pixel in the middle of the set."""
+        along = max(1.0, float(self.size / self.step))
+        return 1 / (min(self.columns, along) * min(self.rows, along))
 
 
 def lay_grid(

@@ -199,7 +199,7 @@ def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
     [
         ("heat.frames=x", "heat.frames: should be a valid integer"),
         ("heat.frames.0=5", "heat.frames: should be a valid integer"),
-        ("search.perspective.sizes.6=0.3", "search.perspective.sizes: should be a list, or in"),
+        ("search.perspective.sizes.7=0.3", "search.perspective.sizes: should be a list, or in"),
         ("search.perspective.sizes.-1=0.3", "search.perspective.sizes: should be a list, or in"),
         ("search.perspective.sizes.x=0.3", "search.perspective.sizes: should be a list, or in"),
         ("search.perspective.sizes.0=3", "search.perspective.sizes[0]: should be less than or equ"),

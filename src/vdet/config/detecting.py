@@ -111,7 +111,14 @@ class VoteSettings(Section):
     inside: Fraction = Field(
         0.7, description="a vehicle of which this share lies in a larger one is a part of it"
     )
-    least: float = Field(0.03, ge=0, description="weight of the votes that a vehicle needs")
+    least: float = Field(0.08, ge=0, description="weight of the votes that a vehicle needs")
+    sharpness: float = Field(
+        4.0,
+        ge=0,
+        le=16,
+        description="how much more the windows count that fit a vehicle best, where its box is "
+        "averaged: power of -log(1 - probability)",
+    )
 
 
 class HeatSettings(Section):

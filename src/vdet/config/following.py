@@ -17,7 +17,7 @@ class MotionSettings(Section):
         0.028, description="narrower vehicles are not shown, share of the frame's width"
     )
     strong: Positive = Field(
-        0.3, description="evidence (a region's peak) of a vehicle that is seen clearly"
+        0.6, description="evidence (a region's peak) of a vehicle that is seen clearly"
     )
     leak: Fraction = Field(
         0.2, description="evidence that every vehicle loses in a frame, share of strong"

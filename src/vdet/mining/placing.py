@@ -107,7 +107,7 @@ class _Look:
 def _of_whole(look: _Look) -> tuple[Flags, Flags]:
     width, across, down = look.width, look.across, look.down
     fits = (width > 0.72) & (width < 1.3) & (across < 0.16) & (down < 0.16)
-    shows = (width > 0.62) & (width < 2.5) & (across < 0.45) & (down < 0.25)
+    shows = (width > 0.4) & (width < 2.5) & (across < 0.45) & (down < 0.25)
     return fits, shows
 
 

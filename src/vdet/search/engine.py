@@ -20,7 +20,7 @@ from vdet.search.scored import Scored
 from vdet.windows import Boxes, Floats, WindowGrid, Windows, lay_grid
 
 MAX_WINDOWS = 100_000
-"""In a frame; more take minutes. The shipped settings lay about 2,100 over a frame of 16:9."""
+"""In a frame; more take minutes. The shipped settings lay about 2,700 over a frame of 16:9."""
 
 _MULTIPLE = 16  # of rows and columns, so that the pyramid's levels begin at whole pixels
 
