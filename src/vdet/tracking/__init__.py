@@ -1,4 +1,7 @@
-"""Regions of the heatmap become cars, followed from frame to frame by `cars.Cars`.
+"""Regions of the heatmap become vehicles, followed from frame to frame.
+
+There are two trackers, and `choice` gives the one that `tracker.method` names: that of `motion`,
+which its docstring explains, and the original's rules, by which `cars.Cars` follows cars.
 
 The rules, as the code and the tests number them, with the original's constants (`tracker` in the
 settings has them all). Source: seed section 3, "Video pipeline".
