@@ -181,12 +181,12 @@ class TestBoxesOfAStill:
         detection = detect_still(MODEL, PERSPECTIVE, road(CAR))
         (region,) = detection.regions
         share, peak = region.box.width / WIDTH, region.peak
-        for smallest, strong, boxes in (
-            (share, peak, [(region.box, peak)]),
-            (share + 1 / WIDTH, peak, []),
-            (share, peak + 0.01, []),
+        for smallest, still, boxes in (
+            (share, 0.5, [(region.box, peak)]),
+            (share + 1 / WIDTH, 0.5, []),
+            (share, 0.51, []),
         ):
-            motion = MotionSettings(smallest=smallest, strong=strong)
+            motion = MotionSettings(smallest=smallest, strong=2 * peak, still=still)
             settings = but(PERSPECTIVE, "tracker", motion=motion)
             assert still_boxes(detection, settings, WIDTH, HEIGHT) == boxes
 

@@ -152,3 +152,23 @@ def test_both_cars_are_followed_through_the_video(
                     followed[car].add(track["id"])
     assert all(len(ids) == 1 for ids in followed.values()), followed
     assert followed["white"].isdisjoint(followed["black"])
+
+
+def test_the_default_finds_vehicles_once_and_tightly(run: Run, real_data: Path) -> None:
+    """Hold what the README says of the labelled frames, from which the model has learnt, too."""
+    name = "project_video_0001-0880.txt"
+    places = [real_data / name, real_data.parent / "labels" / name]
+    truth = next((place for place in places if place.exists()), None)
+    if truth is None:
+        pytest.skip("the truth of the video is not here; data/README.md tells what it is")
+    video = real_data / "project_video.mp4"
+    result = run("eval", "video", video, "--truth", truth, "--json", "-")
+    assert result.code == 0, result.err
+    scores = json.loads(result.out)["total"]
+    assert scores["f1"] >= 0.95
+    assert scores["mean_iou"] >= 0.85
+    assert scores["idf1"] >= 0.95
+    assert scores["id_switches"] == scores["false_tracks"] == 0
+    delays = [each["found"] - each["appears"] for each in scores["first_detections"]]
+    assert len(delays) == 2
+    assert max(delays) <= 30

@@ -119,7 +119,7 @@ def still_boxes(
     """Return box and peak of the regions of a picture that the tracker would take for vehicles.
 
     By the rules these are the large enough ones (`min_region`); by motion those that are large
-    enough (`motion.smallest`) and seen clearly (`motion.strong`).
+    enough (`motion.smallest`) and seen clearly enough for one look (`motion.still`).
     """
     regions = ((region.box, region.peak) for region in detection.regions)
     if settings.tracker.method == "rules":
@@ -129,5 +129,5 @@ def still_boxes(
     return [
         (box, peak)
         for box, peak in regions
-        if box.width >= motion.smallest * width and peak >= motion.strong
+        if box.width >= motion.smallest * width and peak >= motion.still * motion.strong
     ]

@@ -19,6 +19,9 @@ class MotionSettings(Section):
     strong: Positive = Field(
         0.6, description="evidence (a region's peak) of a vehicle that is seen clearly"
     )
+    still: Fraction = Field(
+        0.7, description="a single picture shows vehicles of at least this share of strong"
+    )
     leak: Fraction = Field(
         0.2, description="evidence that every vehicle loses in a frame, share of strong"
     )
