@@ -32,12 +32,13 @@ def search_times(
 
 
 def _search(config: Config, engine: str, images: Sequence[Image]) -> Subject:
+    """Search as in a video, where not every frame is searched for every size."""
     height, width = images[0].shape[:2]
     search = FrameSearch(config.model, config.with_engine(engine), width, height)
 
     def run() -> None:
-        for image in images:
-            search.search(image)
+        for turn, image in enumerate(images):
+            search.search(image, turn)
 
     return run
 

@@ -7,7 +7,6 @@ from vdet.config.schema import Settings
 from vdet.heatmap import Region
 from vdet.images import Image
 from vdet.tracking.cars import Cars
-from vdet.tracking.motion import MotionTracker
 from vdet.tracking.track import Track
 
 Follow = Callable[[Image, Sequence[Region]], list[Track]]
@@ -18,5 +17,7 @@ def tracker_of(settings: Settings, width: int, height: int) -> Follow:
     """Return the tracker that `tracker.method` names, new, for frames of `width` × `height`."""
     if settings.tracker.method == "rules":
         return Cars(scale_lengths(settings.tracker, height / settings.reference_height)).update
+    from vdet.tracking.motion import MotionTracker  # scipy takes long to import
+
     tracker = MotionTracker(settings.tracker.motion, width, height)
     return lambda _, regions: tracker.update(regions)

@@ -7,7 +7,7 @@ Association Metric", 2017.
 
 from collections.abc import Sequence
 
-import numpy as np
+from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from vdet.overlaps import Floats
 
@@ -37,13 +37,6 @@ def pair(scores: Floats, rounds: Sequence[Sequence[int]]) -> Pairs:
 
 
 def _assign(scores: Floats) -> list[tuple[int, int]]:
-    possible = scores > 0
-    if possible.sum(axis=0).max(initial=0) <= 1 and possible.sum(axis=1).max(initial=0) <= 1:
-        rows, columns = np.nonzero(possible)  # nothing to choose; scipy takes long to import
-    else:
-        from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
-
-        rows, columns = linear_sum_assignment(scores, maximize=True)
-        kept = possible[rows, columns]
-        rows, columns = rows[kept], columns[kept]
-    return list(zip(rows.tolist(), columns.tolist(), strict=True))
+    rows, columns = linear_sum_assignment(scores, maximize=True)
+    kept = scores[rows, columns] > 0
+    return list(zip(rows[kept].tolist(), columns[kept].tolist(), strict=True))
