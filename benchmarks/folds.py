@@ -50,7 +50,7 @@ SWEEPS = {
     "heat.votes.least": (0.04, 0.08, 0.12),
     "heat.votes.sharpness": (2.0, 3.0, 4.0, 6.0),
     "heat.votes.agreement": (0.25, 0.35, 0.45),
-    "tracker.motion.strong": (0.3, 0.45, 0.6, 0.75, 0.9),
+    "tracker.motion.strong": (0.3, 0.5, 0.6, 0.7, 0.8),
     "tracker.motion.leak": (0.1, 0.2, 0.3),
     "tracker.motion.needed": (1.5, 2.5, 4.0),
 }

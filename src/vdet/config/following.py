@@ -17,10 +17,10 @@ class MotionSettings(Section):
         0.028, description="narrower vehicles are not shown, share of the frame's width"
     )
     strong: Positive = Field(
-        0.75, description="evidence (a region's peak) of a vehicle that is seen clearly"
+        0.7, description="evidence (a region's peak) of a vehicle that is seen clearly"
     )
     still: Fraction = Field(
-        0.55, description="a single picture shows vehicles of at least this share of strong"
+        0.6, description="a single picture shows vehicles of at least this share of strong"
     )
     leak: Fraction = Field(
         0.2, description="evidence that every vehicle loses in a frame, share of strong"
