@@ -77,8 +77,10 @@ def test_nothing_is_taken_from_ignore_regions() -> None:
         assert kinds(chosen(windows(each), truth(ignored=(region,)))) == expected
 
 
-def test_a_window_with_a_vehicle_too_small_in_it_is_neither() -> None:
-    assert chosen(windows(about(450, 190)), truth(CAR)) == []
+def test_a_window_far_too_large_for_its_vehicle_is_a_false_alarm() -> None:
+    large, too_large = about(450, 190), about(450, 260)
+    assert kinds(chosen(windows(large), truth(CAR))) == {large: "box"}
+    assert kinds(chosen(windows(too_large), truth(CAR))) == {too_large: "false alarm"}
 
 
 def test_a_window_on_a_part_of_a_vehicle_is_none_where_another_is_whole() -> None:

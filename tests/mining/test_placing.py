@@ -51,7 +51,9 @@ def test_sides_are_measured_from_the_middle_of_the_window_in_its_sides() -> None
         (100, "fits"),
         (135, "fits"),
         (150, "shows"),
-        (170, "-"),
+        (170, "shows"),
+        (245, "shows"),
+        (255, "-"),
     ],
 )
 def test_a_window_fits_a_vehicle_about_as_wide_as_itself(side: float, expected: str) -> None:
