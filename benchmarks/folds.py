@@ -19,21 +19,19 @@ import numpy.typing as npt
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.dataset import PatchFile, find_boxed, find_patches
-from vdet.detection import Detector, horizon_of
+from vdet.detection import Detector
 from vdet.evaluation.labelled_video import LabelledVideo
 from vdet.evaluation.rows import Row, in_memory
 from vdet.evaluation.scores import score
 from vdet.evaluation.truth import read_truth
-from vdet.features import Layout
-from vdet.images import Image
-from vdet.model import BoxRegression, LinearModel
+from vdet.following import seek_horizon
+from vdet.model import LinearModel
 from vdet.stream import quiet_libraries
 from vdet.tracking.choice import Follow, tracker_of
-from vdet.training.boxes import BoxPatches, describe_boxes
-from vdet.training.extraction import LabelledVectors, extract
+from vdet.training.boxes import describe_boxes, learn_boxes
+from vdet.training.extraction import extract
 from vdet.training.fitting import fit
 from vdet.training.lesson import lesson_of
-from vdet.training.regression import fit_boxes
 from vdet.training.views import views_of
 from vdet.video import VideoReader
 from vdet.windows import Windows
@@ -99,37 +97,21 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
     )
     boxes = describe_boxes(files, boxed, settings, jobs=-1, progress=lambda _: None)
     assert boxes is not None
+    boxed_data = boxes.boxed
+    assert boxed_data is not None
+    assert boxes.filled is not None
+    filled = lesson_of(boxes.filled, np.ones(len(boxes.filled.vectors), bool))
     blocks = _block_of(_frames_of(files), last), _block_of(_frames_of(boxed), last)
 
     def without(block: int) -> LinearModel:
         kept, kept_boxed = (each != block for each in blocks)
         lesson = lesson_of(data, kept)
         model = fit(lesson.vectors, lesson.vehicle, settings.features, training, lesson.origins)
-        return replace(model, boxes=_boxes(data, kept, boxes, kept_boxed, settings))
+        told = [lesson, lesson_of(boxed_data, kept_boxed)]
+        return replace(model, boxes=learn_boxes(told, filled, settings))
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))
-
-
-def _boxes(
-    data: LabelledVectors,
-    kept: npt.NDArray[np.bool_],
-    boxes: BoxPatches,
-    kept_boxed: npt.NDArray[np.bool_],
-    settings: Settings,
-) -> BoxRegression:
-    assert boxes.boxed is not None
-    assert boxes.filled is not None
-    told = [lesson_of(data, kept), lesson_of(boxes.boxed, kept_boxed)]
-    filled = lesson_of(boxes.filled, np.ones(len(boxes.filled.vectors), bool))
-    sides = np.concatenate([each.sides for each in (*told, filled)])
-    vectors = np.concatenate([each.vectors for each in (*told, filled)])
-    known = np.isfinite(sides).any(axis=1)
-    weights = np.ones(len(sides), np.float32)
-    count = np.count_nonzero(known[: -len(filled.sides)])
-    weights[-len(filled.sides) :] = settings.training.boxes.assumed * count / len(filled.sides)
-    hogs = vectors[known, : Layout.of(settings.features).hog_length]
-    return fit_boxes(hogs, sides[known], settings.training.boxes.penalty, weights[known])
 
 
 def _search(
@@ -139,20 +121,13 @@ def _search(
     found = []
     with VideoReader(video, frames=last) as reader:
         size = reader.info.width, reader.info.height
-        frames = list(_first_ones(video))
-        horizon = horizon_of(settings, frames)
+        frames, horizon = seek_horizon(reader, settings)
         detectors = [Detector(model, settings, *size, horizon=horizon) for model in models]
-        for frame in reader:
+        for frame in frames:
             block = int(_block_of(np.array([frame.index + 1]), last)[0])
             windows = detectors[block].search(frame.image, frame.index)
             found.append(windows.detected(LEAST))
     return found, size
-
-
-def _first_ones(video: Path) -> Iterator[Image]:
-    with VideoReader(video, frames=5) as reader:
-        for frame in reader:
-            yield frame.image
 
 
 def _sweep(

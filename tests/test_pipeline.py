@@ -86,23 +86,17 @@ class TestFollow:
         assert min(overlaps) > 0.3
         assert np.mean(overlaps) > 0.5
 
-    def test_follows_a_car_by_one_id(self) -> None:
-        results = list(follow(drive(20), red_finder(), SETTINGS, WIDTH, HEIGHT))
+    @pytest.mark.parametrize(
+        ("settings", "least"), [(SETTINGS, 0.3), (PERSPECTIVE, 0.5)], ids=["original", "default"]
+    )
+    def test_follows_a_car_by_one_id(self, settings: Settings, least: float) -> None:
+        results = list(follow(drive(20), red_finder(), settings, WIDTH, HEIGHT))
         shown = [result for result in results if result.tracks]
         assert len(shown) > 15
         for result in shown:
             (track,) = result.tracks
             assert track.id == 1
-            assert track.box.iou(car_at(result.frame.index)) > 0.3
-
-    def test_follows_it_by_the_perspective_votes_and_motion_too(self) -> None:
-        results = list(follow(drive(20), red_finder(), PERSPECTIVE, WIDTH, HEIGHT))
-        shown = [result for result in results if result.tracks]
-        assert len(shown) > 15
-        for result in shown:
-            (track,) = result.tracks
-            assert track.id == 1
-            assert track.box.iou(car_at(result.frame.index)) > 0.5
+            assert track.box.iou(car_at(result.frame.index)) > least
 
     def test_searches_each_frame_at_the_sets_whose_turn_it_is(self) -> None:
         for result in follow(drive(5), red_finder(), PERSPECTIVE, WIDTH, HEIGHT, threads=2):

@@ -1,6 +1,7 @@
 """Damaged and wicked files of boxes, truth and tracks, through `vdet eval tracks`."""
 
 import json
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 
@@ -156,15 +157,21 @@ WICKED = {
 }
 
 
-@pytest.mark.parametrize("name", WICKED)
-def test_wicked_truth_is_refused_by_name(tmp_path: Path, name: str) -> None:
-    file, text, words = WICKED[name]
-    path = tmp_path / file
+def refused_by_name(
+    read: Callable[[Path], object], folder: Path, file: str, text: str, words: str
+) -> None:
+    """Hold that `read` refuses a file of that text, and says why in one line that can be shown."""
+    path = folder / file
     path.write_text(text, encoding="utf-8")
     with pytest.raises(TruthError, match=words) as error:
-        read_truth(path)
+        read(path)
     assert str(error.value).isprintable()
     assert len(str(error.value)) < 1000
+
+
+@pytest.mark.parametrize("name", WICKED)
+def test_wicked_truth_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    refused_by_name(read_truth, tmp_path, *WICKED[name])
 
 
 WICKED_TRACKS = {
@@ -178,13 +185,7 @@ WICKED_TRACKS = {
 
 @pytest.mark.parametrize("name", WICKED_TRACKS)
 def test_wicked_tracks_are_refused_by_name(tmp_path: Path, name: str) -> None:
-    file, text, words = WICKED_TRACKS[name]
-    path = tmp_path / file
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(TruthError, match=words) as error:
-        read_predictions(path)
-    assert str(error.value).isprintable()
-    assert len(str(error.value)) < 1000
+    refused_by_name(read_predictions, tmp_path, *WICKED_TRACKS[name])
 
 
 def test_a_file_without_an_end_is_not_read_to_its_end() -> None:

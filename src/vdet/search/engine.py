@@ -79,10 +79,13 @@ class FrameSearch:
                 f"{count:,} search windows would be laid over a frame of {width}×{height} pixels, "
                 f"more than {MAX_WINDOWS:,}; give search.windows larger steps, or fewer rows"
             )
-        dense = _is_dense(settings.search, model.features)
+        grid_search = dense_search if _is_dense(settings.search, model.features) else PatchSearch
+        searches = [grid_search(model, grid) for grid in grids]
         turns = min(settings.search.alternate, len(grids))
-        self._turns = [_SetSearch(model, settings, grids[i::turns], dense) for i in range(turns)]
-        self._whole = _SetSearch(model, settings, grids, dense)
+        self._turns = [
+            _SetSearch(model, settings, grids[i::turns], searches[i::turns]) for i in range(turns)
+        ]
+        self._whole = _SetSearch(model, settings, grids, searches)
 
     def search(self, image: Image, turn: int | None = None) -> Windows:
         """Score windows of a frame, BGR uint8 `(H, W, 3)`; may be called from threads.
@@ -101,11 +104,13 @@ class _SetSearch:
     """Scores the windows of some sets."""
 
     def __init__(
-        self, model: LinearModel, settings: Settings, grids: Sequence[WindowGrid], dense: bool
+        self,
+        model: LinearModel,
+        settings: Settings,
+        grids: Sequence[WindowGrid],
+        searches: Sequence[GridSearch],
     ) -> None:
-        self._searches: list[GridSearch] = [
-            dense_search(model, grid) if dense else PatchSearch(model, grid) for grid in grids
-        ]
+        self._searches = searches
         self._grid_boxes = [grid.boxes for grid in grids]
         self._boxes = np.concatenate(self._grid_boxes)
         self._shares = np.repeat(

@@ -84,18 +84,30 @@ def fit_split_boxes(
     parts = [(data, held)]
     if boxes.boxed is not None:
         parts.append((boxes.boxed, _held(boxes.boxed, name, training)))
-    learnt = [_Told.of(lesson_of(each, ~out), length) for each, out in parts]
-    tried = _Told.joined([_Told.of(_patches(each, out), length) for each, out in parts])
-    known = sum(len(told.sides) for told in learnt)
-    if not known:
-        return None, None
+    filled = None
     if boxes.filled is not None:
         filled = lesson_of(boxes.filled, ~_held(boxes.filled, name, training))
-        weight = training.boxes.assumed * known / len(filled.sides)
+    regression = learn_boxes([lesson_of(each, ~out) for each, out in parts], filled, settings)
+    if regression is None:
+        return None, None
+    tried = _Told.joined([_Told.of(_patches(each, out), length) for each, out in parts])
+    return regression, _error(regression, tried)
+
+
+def learn_boxes(
+    lessons: Sequence[Lesson], filled: Lesson | None, settings: Settings
+) -> BoxRegression | None:
+    """Fit on lessons that tell sides, and, for less, on `filled`; None where no side is told."""
+    length = Layout.of(settings.features).hog_length
+    learnt = [_Told.of(lesson, length) for lesson in lessons]
+    known = sum(len(told.sides) for told in learnt)
+    if not known:
+        return None
+    if filled is not None:
+        weight = settings.training.boxes.assumed * known / len(filled.sides)
         learnt.append(_Told.of(filled, length, weight))
     told = _Told.joined(learnt)
-    regression = fit_boxes(told.hogs, told.sides, training.boxes.penalty, told.weights)
-    return regression, _error(regression, tried)
+    return fit_boxes(told.hogs, told.sides, settings.training.boxes.penalty, told.weights)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ searched once for them, and only heat and tracker are run for each.
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from vdet.config.schema import Settings
+from vdet.config.schema import SearchSettings, Settings
 from vdet.detection import Detector
 from vdet.following import follow, seek_horizon
 from vdet.images import Image
@@ -29,7 +29,7 @@ def follow_under_all(
 ) -> Iterator[tuple[Frame, list[Tracks]]]:
     """Give each frame with the tracks shown in it under each of the settings.
 
-    What is given for one setting does not depend on the others, and is what `vdet.pipeline.follow`
+    What is given for one setting does not depend on the others, and is what `vdet.following.follow`
     gives for it.
 
     Raises
@@ -43,16 +43,28 @@ def follow_under_all(
                 yield result.frame, [result.tracks]
         return
     rest: Iterable[Frame] = frames
-    followers = []
+    horizons: dict[_SearchKey, float] = {}
     for settings in variants:
-        rest, horizon = seek_horizon(rest, settings)
-        followers.append(_Follower(model, settings, width, height, horizon))
+        if (key := _search_key(settings)) not in horizons:
+            rest, horizons[key] = seek_horizon(rest, settings)
+    followers = [
+        _Follower(model, settings, width, height, horizons[_search_key(settings)])
+        for settings in variants
+    ]
     searchers = {follower.search_key: follower for follower in followers}
     with quiet_libraries():
         for frame in rest:
             found = {key: searcher.search(frame) for key, searcher in searchers.items()}
             tracks = [each.update(frame.image, found[each.search_key]) for each in followers]
             yield frame, tracks
+
+
+_SearchKey = tuple[int, SearchSettings]
+
+
+def _search_key(settings: Settings) -> _SearchKey:
+    """Return what settings that search alike have in common."""
+    return settings.reference_height, settings.search
 
 
 class _Follower:
@@ -63,7 +75,7 @@ class _Follower:
     ) -> None:
         self._detector = Detector(model, settings, width, height, horizon=horizon)
         self._track = tracker_of(settings, width, height)
-        self.search_key = settings.reference_height, settings.search
+        self.search_key = _search_key(settings)
 
     def search(self, frame: Frame) -> Windows:
         return self._detector.search(frame.image, frame.index)
