@@ -55,6 +55,8 @@ ODD: dict[str, tuple[str, dict[str, Any]]] = {
     "10 bits": ("mp4", {"pix_fmt": "yuv420p10le"}),
     "4:2:2": ("mp4", {"pix_fmt": "yuv422p"}),
     "full range": ("mp4", {"full_range": True}),
+    "BT.601": ("mp4", {"matrix": 5}),
+    "BT.601, full range": ("mp4", {"matrix": 5, "full_range": True}),
     "BT.709": ("mp4", {"matrix": 1}),
     "BT.709, full range": ("mp4", {"matrix": 1, "full_range": True}),
     "RGB": ("mkv", {"codec": "ffv1", "pix_fmt": "bgr0"}),
