@@ -113,7 +113,8 @@ def _find_in(source: Path) -> list[PatchFile]:
     else:
         raise DataError(f"{source}: no such folder or zip file")
     boxes = _read_table(source) if TABLE in names else {}
-    files = [file for name in names if (file := _patch_file(source, name, boxes))]
+    top = source.resolve().name
+    files = [file for name in names if (file := _patch_file(source, top, name, boxes))]
     if not files:
         raise DataError(
             f"{source}: no pictures in vehicles/<group>/ or non-vehicles/<group>/; "
@@ -154,15 +155,15 @@ def _sides(values: Sequence[str]) -> Sides:
     return left, top, right, bottom
 
 
-def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
-    """Return the patch that a file name stands for; None for what is no patch."""
+def _patch_file(source: Path, top: str, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
+    """Return the patch that a file name stands for, in a source named `top`; None if it is none."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
     if hidden or path.suffix.lower() not in SUFFIXES:
         return None
     sides = boxes.get(name)
     known = CLASSES | ({BOXED: True} if sides else {})
-    folders = [source.resolve().name, *path.parts[:-1]]
+    folders = [top, *path.parts[:-1]]
     for depth in range(len(folders) - 1, -1, -1):
         if folders[depth] in known:
             group = escaped("/".join(folders[depth:]))
