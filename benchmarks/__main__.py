@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.material import config, frames, video
 from benchmarks.runs import peak_memory, run_times, seconds_of_video
 from benchmarks.searches import search_times, times_per_megapixel
-from vdet.stream import quiet_libraries
+from vdet.pipeline.threads import quiet_libraries
 
 
 @dataclass(frozen=True)

@@ -18,23 +18,23 @@ import numpy.typing as npt
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.dataset import PatchFile, find_boxed, find_patches
-from vdet.detection import Detector
-from vdet.evaluation.labelled_video import LabelledVideo
-from vdet.evaluation.rows import Row, in_memory
-from vdet.evaluation.scores import score
-from vdet.evaluation.truth import read_truth
-from vdet.following import seek_horizon
-from vdet.model import LinearModel
-from vdet.stream import quiet_libraries
-from vdet.tracking.choice import Follow, tracker_of
-from vdet.training.boxes import describe_boxes, learn_boxes
-from vdet.training.extraction import extract
-from vdet.training.fitting import fit
-from vdet.training.lesson import lesson_of
-from vdet.training.views import views_of
-from vdet.video import VideoReader
-from vdet.windows import Windows
+from vdet.detect.svm.detector import Detector
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.windows import Windows
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.scores import score
+from vdet.evaluate.truth import read_truth
+from vdet.learn.augmentation import views_of
+from vdet.learn.boxes import describe_boxes, learn_boxes
+from vdet.learn.dataset import PatchFile, find_boxed, find_patches
+from vdet.learn.extraction import extract
+from vdet.learn.fitting import fit
+from vdet.learn.training_set import lesson_of
+from vdet.media import VideoReader
+from vdet.pipeline.following import seek_horizon
+from vdet.pipeline.threads import quiet_libraries
+from vdet.track.factory import Follow, tracker_of
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps

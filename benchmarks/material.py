@@ -6,11 +6,11 @@ from pathlib import Path
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.images import Image
-from vdet.model import LinearModel, load_model
+from vdet.detect.svm.model import LinearModel, load_model
+from vdet.media import VideoReader
+from vdet.media.images import Image
 from vdet.resources import find_config, shipped_model
 from vdet.synthetic import default_clip, write_clip
-from vdet.video import VideoReader
 
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from benchmarks.material import Config
 from benchmarks.rounds import Subject, measure
-from vdet.images import Image
-from vdet.search.engine import FrameSearch
+from vdet.detect.svm.search import FrameSearch
+from vdet.media.images import Image
 
 HEIGHTS = (360, 720, 1080, 2160)
 DECODED = 60

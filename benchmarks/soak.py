@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.looping import loop_video
 from benchmarks.material import config, video
-from vdet.pipeline import VideoJob, process_video
+from vdet.pipeline.run import VideoJob, process_video
 
 FRAMES = 20_000
 FEWEST = 1000

@@ -10,11 +10,11 @@ from hypothesis import settings
 
 from vdet.cli import main
 from vdet.config.schema import Settings, TrainingSettings, ViewSettings
-from vdet.dataset import find_patches
-from vdet.model import save_model
+from vdet.detect.svm.model import save_model
+from vdet.learn.dataset import find_patches
+from vdet.learn.training import train
 from vdet.synthetic import default_clip, write_clip, write_patches
 from vdet.synthetic.scene import Scene
-from vdet.training import train
 
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.
 settings.register_profile("vdet", derandomize=True, deadline=None)

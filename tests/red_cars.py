@@ -18,10 +18,10 @@ from vdet.config.schema import (
     VoteSettings,
     WindowSettings,
 )
+from vdet.detect.svm.model import LinearModel
 from vdet.geometry import Box
-from vdet.images import Image
-from vdet.model import LinearModel
-from vdet.video import Frame
+from vdet.media import Frame
+from vdet.media.images import Image
 
 WIDTH, HEIGHT = 320, 240
 CAR = Box(96, 120, 64, 48)

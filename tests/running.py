@@ -18,7 +18,7 @@ import pytest
 from conftest import Outcome
 from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
-from vdet.video import Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 
 SOON = 60.0  # seconds; a limit for what comes at once, on a very busy machine
 

@@ -16,11 +16,9 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 250
 
 ROOMS = (
-    "__main__", "cli", "demo", "batch", "mining", "evaluation", "pipeline", "following", "stills",
-    "annotation", "overlay", "frame_result", "stream", "trackfile", "training", "detection",
-    "tracking", "votes", "heatmap", "search", "lanes", "resources", "model", "features", "windows",
-    "dataset", "synthetic", "video", "images", "files", "temporaries", "cluster", "workers",
-    "overlaps", "geometry", "config", "untrusted", "hushed", "errors", "__init__",
+    "__main__", "cli", "demo", "batch", "learn", "evaluate", "pipeline", "lanes", "resources",
+    "track", "detect", "synthetic", "draw", "media", "config", "cluster", "workers", "archives",
+    "files", "geometry", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

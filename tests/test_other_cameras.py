@@ -13,22 +13,21 @@ import numpy as np
 import pytest
 
 from vdet.config.schema import Settings
-from vdet.evaluation.comparison import Comparison
-from vdet.evaluation.labelled_video import LabelledVideo
-from vdet.evaluation.matching import match
-from vdet.evaluation.preprocessing import compare
-from vdet.evaluation.rows import Row, in_memory
-from vdet.evaluation.scores import score, score_comparison
-from vdet.following import follow, seek_horizon
-from vdet.geometry import Box
-from vdet.model import LinearModel, load_model
-from vdet.overlaps import Floats
+from vdet.detect.svm.model import LinearModel, load_model
+from vdet.evaluate.comparison import Comparison
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.matching import match
+from vdet.evaluate.preprocessing import compare
+from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.scores import score, score_comparison
+from vdet.geometry import Box, Float64Array
+from vdet.media import Frame
+from vdet.pipeline.following import follow, seek_horizon
+from vdet.pipeline.threads import quiet_libraries
 from vdet.resources import shipped_model
-from vdet.stream import quiet_libraries
 from vdet.synthetic import counts, frames, traffic, truth
 from vdet.synthetic.camera import Camera
 from vdet.synthetic.scene import Light, Scene
-from vdet.video import Frame
 
 DEFAULT = Settings()
 FRAMES = 30
@@ -107,7 +106,7 @@ def mirror_images(clip: Iterable[Frame]) -> Iterator[Frame]:
         yield replace(frame, image=np.ascontiguousarray(frame.image[:, ::-1]))
 
 
-def on_vehicles(comparison: Comparison) -> dict[tuple[int, int], Floats]:
+def on_vehicles(comparison: Comparison) -> dict[tuple[int, int], Float64Array]:
     """Give the left, top, right and bottom shown of each vehicle found, by frame and vehicle."""
     return {
         (pairs.frame.number, vehicle): np.concatenate([box[:2], box[:2] + box[2:]])

@@ -15,15 +15,15 @@ import pytest
 from conftest import Run
 from seed import SEED
 from vdet.config.schema import Settings
-from vdet.dataset import find_patches, read_patches
-from vdet.detection import detect_still, still_boxes
-from vdet.features import FeatureExtractor, to_patch
+from vdet.detect.svm.detector import detect_still, still_boxes
+from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.model import LinearModel, load_model
 from vdet.geometry import Box
-from vdet.images import Image, read_image
-from vdet.model import LinearModel, load_model
+from vdet.learn.dataset import find_patches, read_patches
+from vdet.learn.splits import hold_out
+from vdet.media import VideoReader
+from vdet.media.images import Image, read_image
 from vdet.resources import shipped_model
-from vdet.training.splits import hold_out
-from vdet.video import VideoReader
 
 pytestmark = pytest.mark.realdata
 

@@ -4,8 +4,8 @@ import pytest
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import FeatureSettings, Settings
+from vdet.detect.svm.model import load_model
 from vdet.errors import ConfigError, ModelError
-from vdet.model import load_model
 from vdet.resources import find_config, shipped_model
 
 

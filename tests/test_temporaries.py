@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from vdet.files import replacing
-from vdet.temporaries import remove_forsaken, temporary_beside
+from vdet.files import remove_stale, replacing, temporary_beside
 
 LEAVE_ONE = """
 import os, sys
 from pathlib import Path
-from vdet.temporaries import temporary_beside
+from vdet.files import temporary_beside
 
 with temporary_beside(Path(sys.argv[1])):
     os._exit(1)
@@ -29,13 +28,13 @@ def leave_one(path: Path) -> Path:
 
 def test_what_an_ended_process_left_is_removed(tmp_path: Path) -> None:
     left = leave_one(tmp_path / "out.mp4")
-    remove_forsaken(tmp_path)
+    remove_stale(tmp_path)
     assert not left.exists()
 
 
 def test_what_is_in_use_is_kept(tmp_path: Path) -> None:
     with temporary_beside(tmp_path / "out.mp4") as temporary:
-        remove_forsaken(tmp_path)
+        remove_stale(tmp_path)
         assert temporary.exists()
         with replacing(tmp_path / "out.mp4"), replacing(tmp_path / "other.txt"):
             assert temporary.exists()
@@ -53,19 +52,19 @@ def test_writing_anything_in_a_folder_cleans_it(tmp_path: Path) -> None:
 )
 def test_files_of_others_are_never_removed(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
-    remove_forsaken(tmp_path)
+    remove_stale(tmp_path)
     assert (tmp_path / name).exists()
 
 
 def test_a_link_of_such_a_name_is_not_followed(tmp_path: Path) -> None:
     (tmp_path / "precious").touch()
     (tmp_path / ".a.vdet-1a2b3c4d.mp4").symlink_to("precious")
-    remove_forsaken(tmp_path)
+    remove_stale(tmp_path)
     assert (tmp_path / "precious").exists()
 
 
 def test_a_folder_that_is_not_there_needs_no_cleaning(tmp_path: Path) -> None:
-    remove_forsaken(tmp_path / "none")
+    remove_stale(tmp_path / "none")
 
 
 @pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
@@ -84,7 +83,7 @@ def test_where_files_have_no_locks_nothing_is_forsaken(
 
     monkeypatch.setattr("fcntl.flock", refuse)
     with temporary_beside(tmp_path / "a.mp4") as temporary:
-        remove_forsaken(tmp_path)
+        remove_stale(tmp_path)
         assert temporary.exists()
     assert list(tmp_path.iterdir()) == []
 

@@ -11,15 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import ConfigError
-from vdet.untrusted import (
-    ArchiveError,
-    list_members,
-    open_archive,
-    printable,
-    read_member,
-    read_whole,
-)
+from vdet.files import printable, read_whole
 
 
 def read(path: Path, most: int) -> bytes:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vdet.geometry import Box
-from vdet.images import Image
+from vdet.media.images import Image
 
 
 def textured_road(width: int, height: int, *boxes: Box | None) -> Image:

@@ -5,17 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
-from vdet.dataset import find_patches
-from vdet.evaluation.predictions import read_predictions
-from vdet.evaluation.scores import Scores, score
-from vdet.evaluation.truth import read_truth
+from vdet.detect.svm.model import save_model
+from vdet.evaluate.predictions import read_predictions
+from vdet.evaluate.scores import Scores, score
+from vdet.evaluate.truth import read_truth
 from vdet.files import check_output, make_folder
-from vdet.model import save_model
-from vdet.pipeline import VideoJob, process_video
+from vdet.learn.dataset import find_patches
+from vdet.learn.report import TrainingReport
+from vdet.learn.training import train
+from vdet.pipeline.run import VideoJob, process_video
 from vdet.synthetic.clip import write_clip, write_truth
 from vdet.synthetic.patches import write_patches
 from vdet.synthetic.worlds import default_clip
-from vdet.training import TrainingReport, train
 
 PATCHES = 1200
 """Of each class."""

@@ -1,7 +1,17 @@
-"""Rectangles in an image: x to the right, y down, whole pixels, the far sides exclusive."""
+"""Rectangles in an image: x to the right, y down, the far sides exclusive.
+
+`Box` is one rectangle of whole pixels. The functions take many boxes as float64 arrays of
+`x, y, width, height` in pixels.
+"""
 
 import math
 from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Float32Array = npt.NDArray[np.float32]
+Float64Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +82,53 @@ class Box:
         dx = max(self.x - other.right, other.x - self.right, 0)
         dy = max(self.y - other.bottom, other.y - self.bottom, 0)
         return math.hypot(dx, dy)
+
+
+def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
+    """Return intersection over union, 0 to 1, of every box of `a` with every box of `b`.
+
+    Parameters
+    ----------
+    a, b
+        Shapes `(n, 4)` and `(m, 4)`, each box with an area.
+
+    Returns
+    -------
+    float64 of shape `(n, m)`; boxes that only touch have 0.
+    """
+    common = _intersection(a, b)
+    return common / (_area(a)[:, np.newaxis] + _area(b)[np.newaxis, :] - common)
+
+
+def coverage(predicted: Float64Array, regions: Float64Array) -> Float64Array:
+    """Return the share, 0 to 1, of every predicted box's own area that lies in every region.
+
+    Parameters
+    ----------
+    predicted, regions
+        Shapes `(n, 4)` and `(m, 4)`, each predicted box with an area.
+
+    Returns
+    -------
+    float64 of shape `(n, m)`.
+    """
+    return _intersection(predicted, regions) / _area(predicted)[:, np.newaxis]
+
+
+def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
+    """Return the parts of boxes `(n, 4)` that lie in a frame of `size`; sides may be 0."""
+    near = np.clip(boxes[:, :2], 0, size)
+    far = np.clip(boxes[:, :2] + boxes[:, 2:], 0, size)
+    return np.concatenate([near, far - near], axis=1)
+
+
+def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
+    first, second = a[:, np.newaxis, :], b[np.newaxis, :, :]
+    near = np.maximum(first[..., :2], second[..., :2])
+    far = np.minimum(first[..., :2] + first[..., 2:], second[..., :2] + second[..., 2:])
+    sides = np.maximum(far - near, 0)
+    return np.asarray(sides[..., 0] * sides[..., 1])
+
+
+def _area(boxes: Float64Array) -> Float64Array:
+    return np.asarray(boxes[:, 2] * boxes[:, 3])

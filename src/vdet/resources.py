@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from vdet.config.schema import FeatureSettings
+from vdet.detect.svm.model import load_model
 from vdet.errors import ConfigError, ModelError
-from vdet.model import load_model
 
 _PACKAGE = Path(__file__).parent
 # In a wheel the configs lie in the package; in a work tree beside `src`.

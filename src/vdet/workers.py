@@ -18,7 +18,7 @@ _LONGEST = 5.0  # seconds that an end in order may take
 
 
 @contextmanager
-def deaf_to_ctrl_c() -> Iterator[None]:
+def ignore_sigint() -> Iterator[None]:
     """Start processes that Ctrl-C in a terminal does not reach: their parent ends them."""
     if threading.current_thread() is not threading.main_thread():
         yield

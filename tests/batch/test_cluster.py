@@ -14,8 +14,8 @@ import pytest
 from conftest import Run
 from running import frames_of, names, start, unfinished, until, write_drive
 from vdet.cluster import on_cluster
+from vdet.detect.svm.model import load_model
 from vdet.errors import ClusterError
-from vdet.model import load_model
 from vdet.synthetic import write_patches
 
 pytest.importorskip("distributed")

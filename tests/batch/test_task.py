@@ -10,7 +10,7 @@ from red_cars import HEIGHT, SETTINGS, WIDTH, red_finder
 from running import names, write_drive
 from vdet.batch.manifest import Record
 from vdet.batch.task import process_file, record_of_killed
-from vdet.pipeline import VideoJob, process_video
+from vdet.pipeline.run import VideoJob, process_video
 
 
 @pytest.fixture

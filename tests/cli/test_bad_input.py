@@ -11,7 +11,7 @@ import pytest
 
 from conftest import Run
 from quick import only_windows
-from vdet.model import load_model, save_model
+from vdet.detect.svm.model import load_model, save_model
 
 
 def _failure(run: Run, source: Path, out: Path, *options: str | Path) -> str:

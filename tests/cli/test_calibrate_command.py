@@ -7,9 +7,9 @@ import pytest
 
 from conftest import Run
 from lanes.chessboards import photographs
-from vdet.images import read_image, write_image
 from vdet.lanes.camera import Camera
 from vdet.lanes.camera_file import load_camera
+from vdet.media.images import read_image, write_image
 
 
 @pytest.fixture(scope="session")

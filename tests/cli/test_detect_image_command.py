@@ -9,7 +9,7 @@ import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
-from vdet.images import read_image, write_image
+from vdet.media.images import read_image, write_image
 from vdet.synthetic import render, truth
 from vdet.synthetic.scene import Scene
 

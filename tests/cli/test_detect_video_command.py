@@ -9,8 +9,8 @@ import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS
-from vdet.images import read_image
-from vdet.video import VideoReader
+from vdet.media import VideoReader
+from vdet.media.images import read_image
 
 
 def _times(path: Path) -> list[Fraction]:

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from vdet.dataset import find_boxed, find_patches, read_patches
-from vdet.evaluation.truth import read_truth
-from vdet.model import load_model
+from vdet.detect.svm.model import load_model
+from vdet.evaluate.truth import read_truth
+from vdet.learn.dataset import find_boxed, find_patches, read_patches
+from vdet.media import VideoReader
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
-from vdet.video import VideoReader
 
 SETS = ", ".join(
     f"{{size: {size}, step: 1, top: {top}, bottom: {bottom}}}"

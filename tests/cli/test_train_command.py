@@ -5,7 +5,7 @@ import zipfile
 from pathlib import Path
 
 from conftest import Run
-from vdet.model import load_model
+from vdet.detect.svm.model import load_model
 
 QUICK = ("--jobs", "1")
 

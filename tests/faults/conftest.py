@@ -1,6 +1,7 @@
 """Clips that take a while, and the program as a process that nothing is left of."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,47 @@ def launch() -> Iterator[Start]:
     yield launch_it
     for running in started:
         running.stop()
+
+
+HOLDS = """
+import os, time
+from pathlib import Path
+from vdet.media.reader import VideoReader
+
+frames = VideoReader.__iter__
+
+def held(reader):
+    for frame in frames(reader):
+        while frame.index == 100 and not Path(os.environ["VDET_TEST_GATE"]).exists():
+            time.sleep(0.02)
+        yield frame
+
+VideoReader.__iter__ = held
+"""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Holds every video at its hundredth frame until it is opened, however slow the machine."""
+
+    path: Path
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """What a program is started with to be held."""
+        return {"PYTHONPATH": str(self.path.parent), "VDET_TEST_GATE": str(self.path)}
+
+    def open(self) -> None:
+        """Let all videos go on."""
+        self.path.touch()
+
+
+@pytest.fixture
+def gate(tmp_path_factory: pytest.TempPathFactory) -> Gate:
+    """A gate that is closed."""
+    folder = tmp_path_factory.mktemp("gate")
+    (folder / "sitecustomize.py").write_text(HOLDS)
+    return Gate(folder / "open")
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ import os
 import signal
 from pathlib import Path
 
-from faults.conftest import Start
+from faults.conftest import Gate, Start
 from running import frames_of, names, unfinished, until
 
 KILL = signal.SIGKILL
@@ -17,10 +17,10 @@ def records_of(folder: Path) -> dict[str, dict[str, object]]:
 
 
 def test_after_a_kill_the_next_run_needs_no_cleaning_up(
-    launch: Start, long_clip: Path, tmp_path: Path
+    launch: Start, gate: Gate, long_clip: Path, tmp_path: Path
 ) -> None:
     arguments = ("detect-video", long_clip, tmp_path / "out.mp4", "--tracks", tmp_path / "out.csv")
-    running = launch(*arguments)
+    running = launch(*arguments, environment=gate.environment)
     until(lambda: bool(unfinished(tmp_path)))
     running.send(KILL)
     assert running.finish().code == -KILL
@@ -31,10 +31,10 @@ def test_after_a_kill_the_next_run_needs_no_cleaning_up(
 
 
 def test_when_a_batch_is_killed_its_workers_end_and_clean_up(
-    launch: Start, clips: Path, tmp_path: Path
+    launch: Start, gate: Gate, clips: Path, tmp_path: Path
 ) -> None:
     arguments = ("detect-video", clips, "-d", tmp_path / "out", "--jobs", "2", "--skip-existing")
-    running = launch(*arguments)
+    running = launch(*arguments, environment=gate.environment)
     until(lambda: len(unfinished(tmp_path)) == 2)
     running.send(KILL)
     until(running.is_alone)
@@ -46,11 +46,13 @@ def test_when_a_batch_is_killed_its_workers_end_and_clean_up(
 
 
 def test_when_a_worker_is_killed_its_file_is_done_again(
-    launch: Start, clips: Path, tmp_path: Path
+    launch: Start, gate: Gate, clips: Path, tmp_path: Path
 ) -> None:
-    running = launch("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    arguments = ("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    running = launch(*arguments, environment=gate.environment)
     until(lambda: len(unfinished(tmp_path)) == 2)
     os.kill(running.workers()[0], KILL)
+    gate.open()
     result = running.finish()
     assert result.code == 0, result.err
     assert names(tmp_path) == ["a.mp4", "b.mp4", "manifest.jsonl", "short.mp4"]

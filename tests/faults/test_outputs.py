@@ -12,11 +12,11 @@ from faults.conftest import Start
 from red_cars import SETTINGS, red_finder
 from running import names, write_drive
 from vdet.batch.task import process_file
-from vdet.pipeline import VideoJob
-from vdet.tracking.cars import Cars
-from vdet.tracking.motion import MotionTracker
-from vdet.video import Frame
-from vdet.video.encoder import Encoder
+from vdet.media import Frame
+from vdet.media.encoder import Encoder
+from vdet.pipeline.run import VideoJob
+from vdet.track.motion import MotionTracker
+from vdet.track.rules.tracker import Cars
 
 LIMIT = 5_000  # bytes: the short clip is smaller, the others are not
 CAP_DAC_OVERRIDE = 1

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from faults.conftest import Start
+from faults.conftest import Gate, Start
 from running import names, unfinished, until
 
 HALF_LOADED = """
@@ -24,9 +24,12 @@ sys.meta_path.insert(0, Slow)
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_in_the_middle_of_a_video(
-    launch: Start, long_clip: Path, tmp_path: Path, number: signal.Signals
+    launch: Start, gate: Gate, long_clip: Path, tmp_path: Path, number: signal.Signals
 ) -> None:
-    running = launch("detect-video", long_clip, tmp_path / "o.mp4", "--tracks", tmp_path / "o.csv")
+    running = launch(
+        *("detect-video", long_clip, tmp_path / "o.mp4", "--tracks", tmp_path / "o.csv"),
+        environment=gate.environment,
+    )
     until(lambda: bool(unfinished(tmp_path)))
     running.send(number)
     result = running.finish()
@@ -36,9 +39,10 @@ def test_in_the_middle_of_a_video(
 
 @pytest.mark.parametrize(("number", "to_all"), [(signal.SIGINT, True), (signal.SIGTERM, False)])
 def test_in_the_middle_of_a_batch(
-    launch: Start, clips: Path, tmp_path: Path, number: signal.Signals, to_all: bool
+    launch: Start, gate: Gate, clips: Path, tmp_path: Path, number: signal.Signals, to_all: bool
 ) -> None:
-    running = launch("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    arguments = ("detect-video", clips, "-d", tmp_path, "--jobs", "2")
+    running = launch(*arguments, environment=gate.environment)
     until(lambda: len(unfinished(tmp_path)) == 2)
     running.send(number, to_all=to_all)
     result = running.finish()
@@ -59,14 +63,16 @@ def test_while_the_program_is_loaded(launch: Start, tmp_path: Path, number: sign
 
 
 def test_what_nohup_lets_the_program_ignore_is_ignored(
-    launch: Start, clips: Path, tmp_path: Path
+    launch: Start, gate: Gate, clips: Path, tmp_path: Path
 ) -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    arguments = ("detect-video", clips / "a.mp4", tmp_path / "out.mp4")
     try:
-        running = launch("detect-video", clips / "a.mp4", tmp_path / "out.mp4")
+        running = launch(*arguments, environment=gate.environment)
     finally:
         signal.signal(signal.SIGHUP, before)
     until(lambda: bool(unfinished(tmp_path)))
     running.send(signal.SIGHUP)
+    gate.open()
     assert running.finish().code == 0
     assert names(tmp_path) == ["out.mp4"]

@@ -18,9 +18,9 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.detect.svm.features import Layout
+from vdet.detect.svm.model import FORMAT_VERSION, load_model
 from vdet.errors import ModelError
-from vdet.features import Layout
-from vdet.model import FORMAT_VERSION, load_model
 
 FEATURES = FeatureSettings(
     patch=16,

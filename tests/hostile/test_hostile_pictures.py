@@ -12,7 +12,7 @@ from hostile.mutations import mutated
 from hostile.trials import broken_promises, files_in, try_all
 from quick import only_windows
 from vdet.errors import ImageError
-from vdet.images import read_image
+from vdet.media.images import read_image
 
 PICTURE = cv2.resize(np.random.default_rng(0).integers(0, 256, (6, 8, 3), dtype=np.uint8), (64, 48))
 FORMATS: dict[str, tuple[str, list[int]]] = {

@@ -10,11 +10,11 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.errors import TruthError
-from vdet.evaluation import rows
-from vdet.evaluation.predictions import read_predictions
-from vdet.evaluation.preprocessing import MAX_IDS, MAX_IN_FRAME, compare
-from vdet.evaluation.truth import read_truth
-from vdet.evaluation.truth.cvat import MAX_DEPTH
+from vdet.evaluate import rows
+from vdet.evaluate.predictions import read_predictions
+from vdet.evaluate.preprocessing import MAX_IDS, MAX_IN_FRAME, compare
+from vdet.evaluate.truth import read_truth
+from vdet.evaluate.truth.cvat import MAX_DEPTH
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
 GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)

@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
-from vdet.images import Image
 from vdet.lanes.camera import Camera
+from vdet.media.images import Image
 
 PATTERN = (9, 6)
 _TEXELS = 40  # a square of the board

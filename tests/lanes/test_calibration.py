@@ -8,10 +8,10 @@ import pytest
 
 from lanes.chessboards import PATTERN, photographs
 from vdet.errors import ImageError
-from vdet.images import Image, write_image
 from vdet.lanes import calibration as calibration_module
 from vdet.lanes.calibration import Calibration, calibrate, find_corners
 from vdet.lanes.camera import Camera
+from vdet.media.images import Image, write_image
 
 
 @pytest.fixture(scope="module")

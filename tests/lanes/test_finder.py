@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import Image
 from vdet.lanes.finder import LaneFinder
 from vdet.lanes.lane import Lane, Polyline
+from vdet.media.images import Image
 from vdet.synthetic.camera import Camera
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Light, Line, Scene, Shadow

@@ -16,17 +16,17 @@ from conftest import Outcome, Run
 from red_cars import COLOUR, SETTINGS, red_finder
 from vdet.config.lanes import LaneSettings
 from vdet.config.schema import OutputSettings, Settings, WindowSettings
+from vdet.detect.svm.model import save_model
+from vdet.draw.boxes import color_of
 from vdet.geometry import Box
-from vdet.images import Image, read_image, write_image
 from vdet.lanes.camera import Camera
 from vdet.lanes.camera_file import save_camera
 from vdet.lanes.undistortion import Undistorter
-from vdet.model import save_model
-from vdet.overlay.drawing import color_of
+from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.media.images import Image, read_image, write_image
 from vdet.synthetic.camera import Camera as RoadCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
-from vdet.video import Frame, VideoInfo, VideoReader, VideoWriter
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
 LENS = Camera(WIDTH, HEIGHT, (480, 480), (320, 240), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import Image
 from vdet.lanes.drawing import draw_lane, lane_pictures, lane_text
 from vdet.lanes.finder import LaneFinder
 from vdet.lanes.lane import Lane
+from vdet.media.images import Image
 
 LANE = Lane(
     curvature=-1 / 800,

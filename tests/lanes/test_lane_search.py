@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import Image
-from vdet.lanes.curves import Curves, Floats
+from vdet.geometry import Float64Array
+from vdet.lanes.curves import Curves
 from vdet.lanes.search import find_base, paint_along, slide_windows
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
 SETTINGS = LaneSettings()
 
@@ -17,7 +18,7 @@ def view() -> View:
     return View(SETTINGS.view, 1280, 720)
 
 
-def drawn(view: View, *lines: Floats, rows: slice = slice(None)) -> Image:
+def drawn(view: View, *lines: Float64Array, rows: slice = slice(None)) -> Image:
     """Draw lines, given by x at each row, five columns wide."""
     mask = np.zeros((len(view.distances), len(view.laterals)), np.uint8)
     for line in lines:
@@ -27,7 +28,7 @@ def drawn(view: View, *lines: Floats, rows: slice = slice(None)) -> Image:
     return mask
 
 
-def constant(view: View, *laterals: float) -> list[Floats]:
+def constant(view: View, *laterals: float) -> list[Float64Array]:
     return [np.full(len(view.distances), lateral) for lateral in laterals]
 
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import MaskSettings
-from vdet.images import Image
 from vdet.lanes.mask import lane_mask
+from vdet.media.images import Image
 
 ACROSS = 30.0
 WHITE, YELLOW = (215, 215, 215), (60, 180, 225)

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import read_image
 from vdet.lanes.calibration import Calibration, calibrate
 from vdet.lanes.finder import LaneFinder
 from vdet.lanes.lane import Lane
 from vdet.lanes.undistortion import Undistorter
-from vdet.video import VideoReader
+from vdet.media import VideoReader
+from vdet.media.images import read_image
 
 pytestmark = pytest.mark.realdata
 

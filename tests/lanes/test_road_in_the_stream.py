@@ -8,11 +8,11 @@ import pytest
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, drive, red_finder
 from vdet.config.lanes import LaneSettings
-from vdet.following import follow
-from vdet.images import Image
 from vdet.lanes.camera import Camera
 from vdet.lanes.road import LaneRequest, RoadWatch
 from vdet.lanes.undistortion import Undistorter
+from vdet.media.images import Image
+from vdet.pipeline.following import follow
 
 LENS = Camera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 COUNT = 40

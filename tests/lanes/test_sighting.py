@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import Image
 from vdet.lanes.curves import Curves
 from vdet.lanes.sighting import sight_anew, sight_around
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
 SETTINGS = LaneSettings()
 VIEW = View(SETTINGS.view, 1280, 720)

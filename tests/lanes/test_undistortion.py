@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from vdet.errors import ConfigError
 from vdet.geometry import Box
-from vdet.images import Image
 from vdet.lanes.camera import Camera
 from vdet.lanes.undistortion import Undistorter
+from vdet.media.images import Image
 
 CAMERA = Camera(640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5)
 

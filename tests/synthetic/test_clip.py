@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from vdet.errors import OutputError
+from vdet.media import VideoReader
 from vdet.synthetic.clip import frames, write_clip, write_truth
 from vdet.synthetic.scene import Scene, Vehicle
 from vdet.synthetic.truth import truth
-from vdet.video import VideoReader
 
 MakeScene = Callable[..., Scene]
 Parked = Callable[[int, float, float], Vehicle]

@@ -5,11 +5,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from vdet.dataset import find_patches
 from vdet.errors import OutputError
+from vdet.learn.dataset import find_patches
 from vdet.synthetic.patches import background_patches, vehicle_patches, write_patches
 
-Floats = npt.NDArray[np.float64]
+Float64Array = npt.NDArray[np.float64]
 
 
 def test_patches_are_64_pixels_bgr() -> None:
@@ -81,7 +81,7 @@ def test_vehicles_can_be_told_from_background() -> None:
     assert right.mean() > 0.85
 
 
-def _described(seed: int) -> tuple[Floats, Floats]:
+def _described(seed: int) -> tuple[Float64Array, Float64Array]:
     rng = np.random.default_rng(seed)
     patches = np.concatenate([vehicle_patches(80, rng), background_patches(80, rng)])
     hog = cv2.HOGDescriptor((64, 64), (16, 16), (8, 8), (8, 8), 8)

@@ -7,8 +7,8 @@ from pathlib import Path
 from vdet.batch.inputs import Source, find_sources
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
-from vdet.pipeline import VideoJob
-from vdet.video.writer import SUFFIXES
+from vdet.media.writer import SUFFIXES
+from vdet.pipeline.run import VideoJob
 
 MANIFEST = "manifest.jsonl"
 

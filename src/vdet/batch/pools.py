@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Protocol, TypeVar
 
 from vdet.cluster import on_cluster
-from vdet.workers import deaf_to_ctrl_c, end_with, work
+from vdet.workers import end_with, ignore_sigint, work
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -47,7 +47,7 @@ class Processes:
             initargs=(os.getpid(),),
         )
         with parallel:
-            with deaf_to_ctrl_c():
+            with ignore_sigint():
                 results = parallel(joblib.delayed(partial(work, function))(item) for item in items)
             yield from _ended_with_us(results)
 

@@ -11,10 +11,9 @@ from vdet.batch.plan import Plan
 from vdet.batch.pools import Pool
 from vdet.batch.task import process_file, record_of_killed
 from vdet.config.schema import Settings
-from vdet.files import make_folder
-from vdet.model import LinearModel
-from vdet.pipeline import VideoJob
-from vdet.temporaries import remove_forsaken
+from vdet.detect.svm.model import LinearModel
+from vdet.files import make_folder, remove_stale
+from vdet.pipeline.run import VideoJob
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -50,7 +49,7 @@ def run_batch(
                 yield job, record
     finally:
         for folder in {output.parent for job in plan.jobs for output in job.outputs}:
-            remove_forsaken(folder)
+            remove_stale(folder)
 
 
 def each_once(

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
+from vdet.detect.svm.model import LinearModel
 from vdet.errors import in_one_line
 from vdet.files import make_folder
-from vdet.model import LinearModel
-from vdet.pipeline import Summary, VideoJob, process_video
+from vdet.pipeline.run import Summary, VideoJob, process_video
 
 
 def process_file(job: VideoJob, *, model: LinearModel, settings: Settings, threads: int) -> Record:

@@ -18,10 +18,10 @@ from vdet.batch.run import run_batch
 from vdet.cli.options import PathOf, scheduler_option
 from vdet.cli.progress import files_bar, tell
 from vdet.config.schema import Settings
+from vdet.detect.svm.model import LinearModel
 from vdet.errors import SOME_FAILED, VdetError
-from vdet.model import LinearModel
-from vdet.pipeline import VideoJob
-from vdet.trackfile import SUFFIXES
+from vdet.pipeline.run import VideoJob
+from vdet.pipeline.sinks.tracks import SUFFIXES
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -17,7 +17,7 @@ from vdet.cli.options import (
 )
 from vdet.errors import ImageError
 from vdet.files import check_output, write_json
-from vdet.stills import StillResult, find_images, list_results, plan, process_still
+from vdet.pipeline.stills import StillResult, find_images, list_results, plan, process_still
 
 log = logging.getLogger("vdet")
 

@@ -19,7 +19,7 @@ from vdet.cli.options import (
     settings_options,
 )
 from vdet.cli.progress import progress_bar
-from vdet.pipeline import VideoJob, check_job, process_video
+from vdet.pipeline.run import VideoJob, check_job, process_video
 
 
 @click.command()

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import click
 
 from vdet.cli.options import PathOf, overwrite_option
-from vdet.evaluation.output import write_page
+from vdet.evaluate.output import write_page
 from vdet.files import write_json
 
 F = TypeVar("F", bound=Callable[..., Any])

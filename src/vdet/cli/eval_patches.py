@@ -7,9 +7,9 @@ import click
 from vdet.cli.eval_options import give_results, results_options
 from vdet.cli.options import PathOf, read_settings, settings_options
 from vdet.cli.progress import progress_bar
-from vdet.dataset import find_patches
-from vdet.evaluation.output import check_outputs
-from vdet.model import load_model
+from vdet.detect.svm.model import load_model
+from vdet.evaluate.output import check_outputs
+from vdet.learn.dataset import find_patches
 
 
 @click.command()
@@ -46,9 +46,9 @@ def patches(
     overwrite: bool,
 ) -> None:
     """Measure the classifier on DATA: folders or zip files of labelled patches."""
-    from vdet.evaluation.patches import SPLITS, evaluate_model, evaluate_splits
-    from vdet.evaluation.patches.text import lines, plain
-    from vdet.evaluation.report.patch_page import patch_page
+    from vdet.learn.patch_eval import SPLITS, evaluate_model, evaluate_splits
+    from vdet.learn.patch_eval.page import patch_page
+    from vdet.learn.patch_eval.text import lines, plain
 
     if model_path is not None and splits:
         raise click.UsageError("--split trains afresh; leave it out, or --model")

@@ -6,7 +6,7 @@ import click
 
 from vdet.cli.eval_options import give_results, results_options
 from vdet.cli.options import PathOf
-from vdet.evaluation.output import check_outputs
+from vdet.evaluate.output import check_outputs
 
 
 @click.command()
@@ -35,9 +35,9 @@ def tracks(
 
     TRUTH is a MOTChallenge gt.txt, KITTI tracking labels or CVAT for video 1.1.
     """
-    from vdet.evaluation.clips.evaluate import judge_files
-    from vdet.evaluation.clips.text import plain_clip, run_lines
-    from vdet.evaluation.report.video_page import video_page
+    from vdet.evaluate.clips.evaluate import judge_files
+    from vdet.evaluate.clips.text import plain_clip, run_lines
+    from vdet.evaluate.report.video_page import video_page
 
     check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
     run = judge_files(prediction, truth, until=until, rate=rate)

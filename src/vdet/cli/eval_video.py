@@ -7,7 +7,7 @@ import click
 from vdet.cli.eval_options import give_results, results_options
 from vdet.cli.options import PathOf, model_option, read_model, read_settings, settings_options
 from vdet.cli.progress import progress_bar
-from vdet.evaluation.output import check_outputs
+from vdet.evaluate.output import check_outputs
 from vdet.resources import shipped_model
 
 
@@ -54,11 +54,11 @@ def video(
     overwrite: bool,
 ) -> None:
     """Find and follow vehicles in each IN, and compare them with the truth."""
-    from vdet.evaluation.clips.clip import open_clip
-    from vdet.evaluation.clips.evaluate import Variant, evaluate_clips
-    from vdet.evaluation.clips.sweep import grid
-    from vdet.evaluation.clips.text import plain, run_lines
-    from vdet.evaluation.report.video_page import video_page
+    from vdet.evaluate.clips.clip import open_clip
+    from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
+    from vdet.evaluate.clips.sweep import grid
+    from vdet.evaluate.clips.text import plain, run_lines
+    from vdet.evaluate.report.video_page import video_page
 
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")

@@ -68,8 +68,8 @@ def mine(
     Vehicles come with their boxes. A false alarm is a window that the model takes for a vehicle
     where there is none, or only a part of one; nothing is taken from ignore regions.
     """
-    from vdet.mining import MiningJob
-    from vdet.mining import mine as mine_patches
+    from vdet.learn.mining import MiningJob
+    from vdet.learn.mining import mine as mine_patches
 
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")

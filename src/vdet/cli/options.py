@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 import click
 
 from vdet.config.loading import LoadedSettings, load_settings
+from vdet.detect.svm.model import LinearModel, load_model
 from vdet.lanes.camera_file import load_camera
 from vdet.lanes.road import LaneRequest
-from vdet.model import LinearModel, load_model
 from vdet.resources import find_config, shipped_model
 
 _TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)

@@ -12,10 +12,10 @@ from vdet.cli.options import (
     settings_options,
 )
 from vdet.cli.progress import progress_bar
-from vdet.dataset import find_boxed, find_patches
+from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.files import check_output
-from vdet.model import save_model
+from vdet.learn.dataset import find_boxed, find_patches
 
 
 @click.command()
@@ -43,7 +43,7 @@ def train(
     folders tells where in a patch the vehicle is, as in those of vdet mine, the model learns to
     find its sides. The report is printed, and written beside the model as JSON.
     """
-    from vdet.training import train as fit_model
+    from vdet.learn.training import train as fit_model
 
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")

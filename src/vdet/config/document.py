@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from vdet.errors import ConfigError
-from vdet.untrusted import printable, read_whole
+from vdet.files import printable, read_whole
 
 MAX_BYTES = 100_000
 """Ten times what all settings with all their comments take."""

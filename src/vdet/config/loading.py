@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 from vdet.config.document import Document, Key, mistakes, parse_assignment, read_document
 from vdet.config.schema import FeatureSettings, Settings
 from vdet.errors import ConfigError
-from vdet.untrusted import printable
+from vdet.files import printable
 
 
 @dataclass(frozen=True, slots=True)

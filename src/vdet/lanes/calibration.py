@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.errors import ImageError
-from vdet.images import Image, read_image
 from vdet.lanes.camera import Camera
+from vdet.media.images import Image, read_image
 
 MIN_VIEWS = 5
 SIZE_TOLERANCE = 2

@@ -14,9 +14,8 @@ look like z, and all widths there like seen(z) times as large.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from vdet.geometry import Float64Array
 
 _LEAST_SEEN = 0.3  # no pitch of a car that is on its wheels makes less of a width
 
@@ -44,14 +43,14 @@ class Curves:
         """Whether the camera is between the lines."""
         return self.left < 0 < self.right
 
-    def at(self, z: Floats) -> tuple[Floats, Floats]:
+    def at(self, z: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Return x of the left and of the right line at distances `(n,)`, as the camera sees it."""
         seen = seen_width(z, self.pitch)
         common = self.heading * z + self.bend * z**2 / seen
         return self.left * seen + common, self.right * seen + common
 
 
-def seen_width(z: Floats, pitch: float) -> Floats:
+def seen_width(z: Float64Array, pitch: float) -> Float64Array:
     """Return as how many metres a metre across is seen at distances `(n,)`."""
     return np.maximum(1 - pitch * z, _LEAST_SEEN)
 
@@ -60,8 +59,8 @@ def seen_width(z: Floats, pitch: float) -> Floats:
 class Paint:
     """Rows of paint that may belong to one line: distances and lateral places, metres, `(n,)`."""
 
-    z: Floats
-    x: Floats
+    z: Float64Array
+    x: Float64Array
 
 
 NONE = Paint(np.empty(0), np.empty(0))

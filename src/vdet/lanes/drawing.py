@@ -3,10 +3,10 @@
 import cv2
 import numpy as np
 
-from vdet.images import Image
 from vdet.lanes.finder import Glance
 from vdet.lanes.lane import Lane, Polyline
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
 Color = tuple[int, int, int]
 

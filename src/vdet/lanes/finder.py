@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import Image
 from vdet.lanes.lane import Lane
 from vdet.lanes.mask import lane_mask
 from vdet.lanes.sighting import sight_anew, sight_around
 from vdet.lanes.track import Track, follow, start
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
 _POINTS = 24  # of a polyline
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.lanes.curves import Curves, Floats, Paint, seen_width
+from vdet.geometry import Float64Array
+from vdet.lanes.curves import Curves, Paint, seen_width
 
 _PITCH = 4  # its place among the five numbers, in the order of `Curves`
 
@@ -24,8 +25,8 @@ _ANY_WEIGHT = 1e-3  # keeps the equations solvable
 class Evidence:
     """Normal equations of a fit, `(5, 5)` and `(5,)`."""
 
-    matrix: Floats
-    vector: Floats
+    matrix: Float64Array
+    vector: Float64Array
 
     def with_earlier(self, earlier: "Evidence", memory: float) -> "Evidence":
         """Return this evidence with `memory` × what an earlier one says of all but the pitch.
@@ -60,7 +61,7 @@ def solve(evidence: Evidence, width: float) -> Curves:
     return Curves(*np.linalg.solve(evidence.matrix + known, vector).tolist())
 
 
-def _rows(paint: Paint, side: tuple[int, int], place: float, guess: Curves) -> Floats:
+def _rows(paint: Paint, side: tuple[int, int], place: float, guess: Curves) -> Float64Array:
     """Return the coefficients of the five numbers at each row of a line's paint, `(n, 5)`."""
     rows = np.empty((len(paint.z), 5))
     rows[:, 0] = paint.z**2 / seen_width(paint.z, guess.pitch)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from vdet.config.lanes import MaskSettings
-from vdet.images import Image
+from vdet.media.images import Image
 
 
 def lane_mask(above: Image, settings: MaskSettings, across: float) -> Image:

@@ -8,9 +8,9 @@ import numpy as np
 
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder
-from vdet.images import read_image, write_image
 from vdet.lanes.calibration import Calibration, Pattern
 from vdet.lanes.undistortion import Undistorter
+from vdet.media.images import read_image, write_image
 
 
 def check_previews(folder: Path, photos: Sequence[Path], *, overwrite: bool) -> None:

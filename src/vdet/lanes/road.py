@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 from vdet.config.lanes import LaneSettings
 from vdet.geometry import Box
-from vdet.images import Image
 from vdet.lanes.camera import Camera
 from vdet.lanes.drawing import lane_pictures
 from vdet.lanes.finder import Glance, LaneFinder
 from vdet.lanes.lane import Lane
 from vdet.lanes.undistortion import Undistorter
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
 
 @dataclass(frozen=True, slots=True)

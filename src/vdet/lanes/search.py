@@ -4,15 +4,16 @@ import cv2
 import numpy as np
 
 from vdet.config.lanes import LaneSettings
-from vdet.images import Image
-from vdet.lanes.curves import Floats, Paint
+from vdet.geometry import Float64Array
+from vdet.lanes.curves import Paint
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
-Guide = tuple[Floats, Floats]
+Guide = tuple[Float64Array, Float64Array]
 """x of the left and of the right line at each row of the view, metres."""
 
 
-def paint_along(mask: Image, view: View, x: Floats, margin: float) -> Paint:
+def paint_along(mask: Image, view: View, x: Float64Array, margin: float) -> Paint:
     """Return the paint within `margin` metres of `x` `(rows,)`: the middle of it in each row."""
     half = max(1, round(margin * view.across))
     around = np.arange(-half, half + 1)
@@ -46,7 +47,7 @@ def find_base(mask: Image, view: View, settings: LaneSettings) -> tuple[float, f
     return base
 
 
-def _histogram(mask: Image, view: View, settings: LaneSettings) -> Floats:
+def _histogram(mask: Image, view: View, settings: LaneSettings) -> Float64Array:
     """Return how many of the nearest rows have paint in each column, smoothed."""
     near = view.distances < view.distances[-1] + settings.search.base
     counts = np.count_nonzero(mask[near], axis=0).astype(np.float64)
@@ -76,7 +77,7 @@ def slide_windows(
     return guide[0], guide[1]
 
 
-def _shift(part: Image, view: View, places: Floats, margin: float) -> float:
+def _shift(part: Image, view: View, places: Float64Array, margin: float) -> float:
     """Return how far the paint in both windows is to the right of their middles, metres."""
     offsets = view.laterals - places[:, None]
     counts = np.count_nonzero(part, axis=0) * (np.abs(offsets) <= margin)

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.config.lanes import LaneCheckSettings, LaneSettings
-from vdet.images import Image
-from vdet.lanes.curves import NONE, Curves, Floats, Paint
+from vdet.geometry import Float64Array
+from vdet.lanes.curves import NONE, Curves, Paint
 from vdet.lanes.fit import Evidence, gather, solve
 from vdet.lanes.search import Guide, find_base, paint_along, slide_windows
 from vdet.lanes.view import View
+from vdet.media.images import Image
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ def _is_plausible(curves: Curves, settings: LaneSettings) -> bool:
     )
 
 
-def _is_seen(paint: Paint, view: View, x: Floats, check: LaneCheckSettings) -> bool:
+def _is_seen(paint: Paint, view: View, x: Float64Array, check: LaneCheckSettings) -> bool:
     """Tell whether there is paint enough of a line, and in line with x `(rows,)`, its curve."""
     if len(paint.z) < check.marking * view.along:
         return False

@@ -5,8 +5,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.geometry import Box
-from vdet.images import Image
 from vdet.lanes.camera import Camera
+from vdet.media.images import Image
 
 _OUTLINE_POINTS = 16  # on each side of a box
 

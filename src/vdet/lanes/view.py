@@ -6,12 +6,10 @@ vanishing point is x = 0 at any distance, if the camera looks along the road and
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from vdet.config.lanes import ViewSettings
-from vdet.images import Image
-
-Floats = npt.NDArray[np.float64]
+from vdet.geometry import Float64Array
+from vdet.media.images import Image
 
 
 class View:
@@ -35,26 +33,26 @@ class View:
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         return np.asarray(cv2.warpPerspective(image, self._warp, size, flags=flags), np.uint8)
 
-    def to_frame(self, x: Floats, z: Floats) -> Floats:
+    def to_frame(self, x: Float64Array, z: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` in the undistorted frame of points of the ground, metres."""
         return _transform(self._to_frame, np.asarray(np.column_stack([x, z]), np.float64))
 
-    def to_above(self, pixels: Floats) -> Floats:
+    def to_above(self, pixels: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the undistorted frame are seen from above, `(n, 2)`."""
         return _transform(np.asarray(np.linalg.inv(self._warp), np.float64), pixels)
 
     @property
-    def outline(self) -> Floats:
+    def outline(self) -> Float64Array:
         """The corners, in the undistorted frame, of what is seen from above, pixels `(4, 2)`."""
         right, bottom = len(self.laterals) - 0.5, len(self.distances) - 0.5
         corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]]
         return _transform(self._warp, np.array(corners))
 
-    def columns(self, x: Floats) -> Floats:
+    def columns(self, x: Float64Array) -> Float64Array:
         """Return the columns, seen from above, of lateral positions in metres."""
         return np.asarray((x - self.laterals[0]) * self.across)
 
-    def _to_ground_matrix(self) -> Floats:
+    def _to_ground_matrix(self) -> Float64Array:
         """Return the matrix that takes `(column, row, 1)` from above to `(x, z, 1)`."""
         return np.array(
             [
@@ -65,7 +63,7 @@ class View:
         )
 
 
-def _transform(matrix: Floats, points: Floats) -> Floats:
+def _transform(matrix: Float64Array, points: Float64Array) -> Float64Array:
     """Apply a homography to points `(n, 2)`."""
     moved = points @ matrix[:, :2].T + matrix[:, 2]
     return np.asarray(moved[:, :2] / moved[:, 2:])
@@ -82,7 +80,7 @@ def _widths(settings: ViewSettings) -> tuple[float, float]:
     return far, settings.bottom_right - settings.bottom_left
 
 
-def _ground_to_frame(settings: ViewSettings, width: int, height: int) -> Floats:
+def _ground_to_frame(settings: ViewSettings, width: int, height: int) -> Float64Array:
     """Return the homography `(3, 3)` from `(x, z, 1)`, metres, to undistorted pixels."""
     far, near = _widths(settings)
     slope = (settings.top_left - settings.bottom_left) / (near - far)

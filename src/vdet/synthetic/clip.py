@@ -6,10 +6,10 @@ from pathlib import Path
 
 from vdet.config.schema import OutputSettings
 from vdet.files import replacing
+from vdet.media import Frame, VideoInfo, VideoWriter
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import TrueBox, truth
-from vdet.video import Frame, VideoInfo, VideoWriter
 
 SMALLEST = (40, 24)
 """Width and height in pixels of a 720-row frame from which on a vehicle counts."""

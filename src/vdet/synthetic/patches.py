@@ -15,7 +15,7 @@ import numpy as np
 
 from vdet.errors import OutputError
 from vdet.geometry import Box
-from vdet.images import Image, write_image
+from vdet.media.images import Image, write_image
 from vdet.synthetic.truth import TrueBox
 from vdet.synthetic.views import views
 

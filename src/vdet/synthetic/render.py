@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.images import Image
+from vdet.media.images import Image
 from vdet.synthetic.roadside import Roadside
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.sky import paint_sky

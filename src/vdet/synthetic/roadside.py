@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.images import Image
+from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, Camera, Points, along
 from vdet.synthetic.painting import fill, shaded
 from vdet.synthetic.scene import PERIOD, Color, RoadsideObject, Scene, Wall

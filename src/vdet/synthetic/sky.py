@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.images import Image
+from vdet.media.images import Image
 from vdet.synthetic.camera import Camera
 from vdet.synthetic.scene import Scene
 

@@ -6,12 +6,11 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.images import Image
+from vdet.geometry import Float32Array
+from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, Points, along
 from vdet.synthetic.painting import fill, mixed
 from vdet.synthetic.scene import PERIOD, Line, Road, Scene, Shadow
-
-Floats = npt.NDArray[np.float32]
 
 _TEXEL = 0.1  # metres a pixel of the finest texture
 _HALF_WIDTH = 30.0  # metres of texture to either side of the camera
@@ -66,7 +65,7 @@ class Ground:
         ]
         return np.asarray(np.concatenate(parts), dtype=np.uint8)
 
-    def _map(self, level: int, rows: slice) -> tuple[int, Floats, Floats]:
+    def _map(self, level: int, rows: slice) -> tuple[int, Float32Array, Float32Array]:
         """Return a level of the texture, and where in it rows of the screen lie at station 0."""
         x = (self._lateral[rows] + np.float32(_HALF_WIDTH)) / np.float32(_texel(level))
         y = np.empty_like(x)
@@ -115,14 +114,14 @@ def brightness(scene: Scene, station: float) -> float:
     return light
 
 
-def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Floats:
+def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Float32Array:
     """Return smooth noise, mean 0 and deviation about 1, `(rows, columns)`."""
     shape = (max(1, rows // grain), max(1, columns // grain))
     noise = rng.standard_normal(shape, dtype=np.float32)
     return np.asarray(cv2.resize(noise, (columns, rows), interpolation=cv2.INTER_CUBIC))
 
 
-def _cast(gain: npt.NDArray[np.float64], shadow: Shadow, patches: Floats) -> None:
+def _cast(gain: npt.NDArray[np.float64], shadow: Shadow, patches: Float32Array) -> None:
     """Darken the texture where a shadow lies."""
     start, end = (int(s / _TEXEL) for s in (shadow.station, shadow.station + shadow.length))
     dark = patches[start:end] > 0 if shadow.dappled else np.True_
@@ -139,7 +138,7 @@ def _pyramid(finest: Image) -> list[Image]:
     return levels
 
 
-def _colors(road: Road, lateral: Floats, pixel: Floats) -> Floats:
+def _colors(road: Road, lateral: Float32Array, pixel: Float32Array) -> Float32Array:
     """Return the colour at each lateral position; `pixel` is a pixel's width in metres."""
     inside = np.minimum(lateral - road.left, road.right - lateral) / pixel + 0.5
     paved = np.clip(inside, 0, 1)[..., None]

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from vdet.geometry import Box
-from vdet.images import Image
+from vdet.media.images import Image
 from vdet.synthetic.camera import Camera, Points
 from vdet.synthetic.painting import fill_mask
 from vdet.synthetic.scene import Scene

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from vdet.images import Image
+from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, Camera, Points, beyond_near
 from vdet.synthetic.car import facets, footprint
 from vdet.synthetic.painting import fill, shaded

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.geometry import Box
-from vdet.images import Image
+from vdet.media.images import Image
 from vdet.synthetic.camera import Camera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import PERIOD, Scene, Vehicle, Waypoint

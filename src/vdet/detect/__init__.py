@@ -1,0 +1,1 @@
+"""Vehicles in one frame: the detectors, each behind one protocol."""

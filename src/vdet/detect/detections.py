@@ -1,0 +1,147 @@
+"""What a detector finds in one frame, column by column."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vdet.geometry import Box, Float32Array
+
+if TYPE_CHECKING:
+    import supervision
+
+ClassIds = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Detections:
+    """The vehicles that a detector sees in a frame: `n` rows, unchangeable.
+
+    Attributes
+    ----------
+    boxes
+        float32 `(n, 4)`: x1, y1, x2, y2 in pixels of the frame; x to the right, y down, `x2` and
+        `y2` are the far sides, exclusive.
+    scores
+        float32 `(n,)`, 0 to 1: the share of boxes with such a score that are vehicles.
+    classes
+        int32 `(n,)`, indices into `names`; None where the detector does not tell classes.
+    names
+        Names of the classes.
+    centroids
+        float32 `(n, 2)`: x, y of the centre of mass; the middle of the box where none is given.
+    strengths
+        float32 `(n,)`: how strong the evidence is, in the detector's own unit; the score where
+        none is given.
+    trace
+        What the detector keeps for its stage pictures; nobody else looks at it.
+
+    Raises
+    ------
+    ValueError
+        A column has another shape, a value is not finite, a box has no area, a score is not in
+        0 to 1.
+    """
+
+    boxes: Float32Array
+    scores: Float32Array
+    classes: ClassIds | None
+    names: tuple[str, ...]
+    centroids: Float32Array
+    strengths: Float32Array
+    trace: Any = field(repr=False)
+
+    def __init__(
+        self,
+        boxes: npt.ArrayLike,
+        scores: npt.ArrayLike,
+        *,
+        classes: npt.ArrayLike | None = None,
+        names: Sequence[str] = (),
+        centroids: npt.ArrayLike | None = None,
+        strengths: npt.ArrayLike | None = None,
+        trace: Any = None,
+    ) -> None:
+        corners = _column(boxes, np.float32, (-1, 4), "boxes")
+        count = len(corners)
+        chances = _column(scores, np.float32, (count,), "scores")
+        if ((corners[:, 2:] - corners[:, :2]) <= 0).any():
+            raise ValueError("boxes: a box has no area; give x1 < x2 and y1 < y2")
+        if ((chances < 0) | (chances > 1)).any():
+            raise ValueError("scores: a score is not in 0 to 1")
+        middles = (corners[:, :2] + corners[:, 2:]) / 2 if centroids is None else centroids
+        kinds = None if classes is None else _column(classes, np.int32, (count,), "classes")
+        if kinds is not None and ((kinds < 0) | (kinds >= len(names))).any():
+            raise ValueError("classes: an index that `names` does not have")
+        columns = {
+            "boxes": corners,
+            "scores": chances,
+            "classes": kinds,
+            "names": tuple(names),
+            "centroids": _column(middles, np.float32, (count, 2), "centroids"),
+            "strengths": _column(
+                chances if strengths is None else strengths, np.float32, (count,), "strengths"
+            ),
+            "trace": trace,
+        }
+        for name, column in columns.items():
+            object.__setattr__(self, name, column)
+
+    def __len__(self) -> int:
+        return len(self.boxes)
+
+    def __getitem__(self, rows: slice | Sequence[int] | npt.NDArray[Any]) -> "Detections":
+        """Return only these rows, in this order; `trace` stays."""
+        chosen = rows if isinstance(rows, slice) else np.asarray(rows)
+        return Detections(
+            self.boxes[chosen],
+            self.scores[chosen],
+            classes=None if self.classes is None else self.classes[chosen],
+            names=self.names,
+            centroids=self.centroids[chosen],
+            strengths=self.strengths[chosen],
+            trace=self.trace,
+        )
+
+    @property
+    def rounded(self) -> list[Box]:
+        """The boxes to the nearest whole pixel, halves up."""
+        return [
+            Box(x1, y1, x2 - x1, y2 - y1)
+            for x1, y1, x2, y2 in np.floor(self.boxes + 0.5).astype(int).tolist()
+        ]
+
+    def to_supervision(self) -> "supervision.Detections":
+        """Return the same as `supervision.Detections`. Needs the package supervision."""
+        import supervision
+
+        return supervision.Detections(
+            xyxy=self.boxes.copy(),
+            confidence=self.scores.copy(),
+            class_id=None if self.classes is None else self.classes.astype(int),
+            data={}
+            if self.classes is None
+            else {"class_name": np.array([self.names[i] for i in self.classes.tolist()])},
+        )
+
+
+def _column(
+    values: npt.ArrayLike, kind: type[np.generic], shape: tuple[int, ...], name: str
+) -> npt.NDArray[Any]:
+    """Return a copy that nobody can change; -1 in `shape` stands for any length."""
+    column = np.array(values, kind)
+    if column.size == 0 and shape[0] <= 0:
+        column = column.reshape(0, *shape[1:])
+    if column.ndim != len(shape) or any(
+        wanted not in (-1, length) for wanted, length in zip(shape, column.shape, strict=True)
+    ):
+        raise ValueError(f"{name}: of shape {column.shape}, expected {shape}")
+    if not np.isfinite(column).all():
+        raise ValueError(f"{name}: a value is not a finite number")
+    column.flags.writeable = False
+    return column
+
+
+NO_DETECTIONS = Detections(np.empty((0, 4)), np.empty(0))

@@ -1,0 +1,147 @@
+"""A patch → its feature vector: HOG and colour histogram of each channel, and the shrunk patch.
+
+Sources: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 2005; seed
+section 1.
+"""
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vdet.config.schema import FeatureSettings
+from vdet.media.images import Image
+
+Vectors = npt.NDArray[np.float32]
+
+_CONVERSIONS = {
+    "YCrCb": cv2.COLOR_BGR2YCrCb,
+    "HSV": cv2.COLOR_BGR2HSV,
+    "LUV": cv2.COLOR_BGR2LUV,
+    "HLS": cv2.COLOR_BGR2HLS,
+    "YUV": cv2.COLOR_BGR2YUV,
+    "RGB": cv2.COLOR_BGR2RGB,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the parts of a feature vector lie; HOG has one part a described channel."""
+
+    hog: tuple[slice, ...]
+    histogram: slice
+    spatial: slice
+
+    @staticmethod
+    def of(settings: FeatureSettings) -> "Layout":
+        """Return the layout of the vectors that these settings give."""
+        hog = settings.hog
+        blocks = settings.patch // hog.cell - hog.block + 1
+        length = blocks**2 * hog.block**2 * hog.orientations
+        starts = [i * length for i in range(len(hog.channels) + 1)]
+        histogram = slice(starts[-1], starts[-1] + 3 * settings.histogram.bins)
+        spatial = slice(histogram.stop, histogram.stop + 3 * settings.spatial.size**2)
+        return Layout(
+            tuple(itertools.starmap(slice, itertools.pairwise(starts))), histogram, spatial
+        )
+
+    @property
+    def hog_length(self) -> int:
+        """HOG features of a patch, which come first; 4,704 for the seed's settings."""
+        return int(self.histogram.start)
+
+    @property
+    def length(self) -> int:
+        """Features of a patch; 4,800 for the seed's settings."""
+        return int(self.spatial.stop)
+
+
+class FeatureExtractor:
+    """Describes patches by the settings; holds OpenCV's descriptor, nothing that changes.
+
+    A vector's parts, in order: HOG channel by channel (each as `cv2.HOGDescriptor.compute` gives
+    it: block column by column, then down, then cell, then orientation), colour histogram channel
+    by channel, spatial bins.
+    """
+
+    def __init__(self, settings: FeatureSettings) -> None:
+        self.settings = settings
+        self.layout = Layout.of(settings)
+        self._hog = hog_descriptor(settings, (settings.patch, settings.patch))
+
+    def describe(self, patch: Image) -> Vectors:
+        """Describe one patch.
+
+        Parameters
+        ----------
+        patch
+            BGR uint8 of shape `(patch, patch, 3)`.
+
+        Returns
+        -------
+        float32 of shape `(layout.length,)`: HOG 0 to 1, histogram in pixels, spatial bins 0 to 255.
+        """
+        channels = np.ascontiguousarray(convert(patch, self.settings).transpose(2, 0, 1))
+        parts: list[npt.ArrayLike] = []
+        parts += [self._hog.compute(channels[i]) for i in self.settings.hog.channels]
+        if self.settings.histogram.bins:
+            parts += [histogram(channel, self.settings.histogram.bins) for channel in channels]
+        if side := self.settings.spatial.size:
+            parts += [cv2.resize(c, (side, side), interpolation=cv2.INTER_AREA) for c in channels]
+        return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
+
+    def describe_all(self, patches: Iterable[Image]) -> Vectors:
+        """Describe patches one by one; float32 of shape `(n, layout.length)`."""
+        vectors = [self.describe(patch) for patch in patches]
+        return np.stack(vectors) if vectors else np.empty((0, self.layout.length), np.float32)
+
+
+def convert(image: Image, settings: FeatureSettings) -> Image:
+    """Convert BGR to the settings' colour space; uint8 of the same shape `(H, W, 3)`."""
+    return np.asarray(cv2.cvtColor(image, _CONVERSIONS[settings.color_space]), np.uint8)
+
+
+def hog_descriptor(settings: FeatureSettings, window: tuple[int, int]) -> cv2.HOGDescriptor:
+    """Return OpenCV's descriptor for a window of `(width, height)` pixels, blocks a cell apart."""
+    hog = settings.hog
+    block = hog.block * hog.cell
+    cell = (hog.cell, hog.cell)
+    return cv2.HOGDescriptor(window, (block, block), cell, cell, hog.orientations)
+
+
+def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:
+    """Count the pixels of one channel in `bins` equal bins over 0 … 255; shape `(bins,)`."""
+    return np.bincount(channel.ravel() // (256 // bins), minlength=bins)
+
+
+def to_patch(image: Image, side: int) -> Image:
+    """Resize a crop (BGR uint8) to a square patch of `side` pixels."""
+    return resize(image, side, side)
+
+
+def resize(image: Image, width: int, height: int) -> Image:
+    """Resize an image without skipping pixels.
+
+    It is halved (each pixel the mean of four) as long as it is twice too large and both sides are
+    even, then brought to size bilinearly, or by area where it is still twice too large.
+    """
+    while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width and _is_even(image):
+        image = halve(image)
+    if image.shape[:2] == (height, width):
+        return image
+    shrinks = image.shape[0] >= 2 * height or image.shape[1] >= 2 * width
+    method = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(image, (width, height), interpolation=method), np.uint8)
+
+
+def halve(image: Image) -> Image:
+    """Return an image of even sides at half its size, each pixel the mean of four."""
+    half = (image.shape[1] // 2, image.shape[0] // 2)
+    return np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _is_even(image: Image) -> bool:
+    return not any(side % 2 for side in image.shape[:2])

@@ -1,0 +1,102 @@
+"""The horizon of a camera over a road: the row where the lines of the road meet.
+
+Lane lines, barriers, kerbs and roofs run along the road, so their pictures meet in its vanishing
+point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vdet.media.images import Image
+
+USUAL = 0.58
+"""Where a dashboard camera has it, share of the height: taken where no lines tell."""
+
+_TALLEST = 4  # picture that can show a road, height in widths
+_WIDTH = 640  # of the picture in which segments are looked for, pixels
+_SHORTEST = 0.02  # segment, share of the width
+_SLOPES = (12.0, 75.0)  # degrees from the horizontal: flatter is traffic, steeper stands upright
+_MISSES = 0.05  # sine of the angle by which a segment may miss the point it votes for
+_FEWEST = 8  # segments on each side
+_ROWS = np.arange(0.30, 0.75, 0.01)
+_COLUMNS = np.arange(0.25, 0.76, 0.02)
+
+Values = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Segments:
+    """Line segments: middle `(n, 2)`, normal `(n, 2)` and length `(n,)`, in widths of the frame."""
+
+    middles: Values
+    normals: Values
+    lengths: Values
+
+
+def find_horizon(images: Iterable[Image]) -> float:
+    """Return the horizon's row, share of the frame's height.
+
+    Parameters
+    ----------
+    images
+        Frames of one camera, BGR uint8 `(H, W, 3)`, all of one size.
+
+    Returns
+    -------
+    0.30 to 0.74 in steps of 0.01, `USUAL` where too few lines run along the road.
+    """
+    images = list(images)
+    if not images:
+        return USUAL
+    height, width = images[0].shape[:2]
+    if height > _TALLEST * width:
+        return USUAL
+    segments = np.concatenate([_segments(image) for image in images])
+    directions = segments[:, 2:] - segments[:, :2]
+    falling = directions[:, 0] * directions[:, 1] > 0
+    sides = [_oriented(segments[side]) for side in (falling, ~falling)]
+    if min(len(side.lengths) for side in sides) < _FEWEST:
+        return USUAL
+    left, right = (_votes(side, height / width) for side in sides)
+    both = np.minimum(left, right)  # a point needs lines from both sides
+    if not both.any():
+        return USUAL
+    votes = both + 0.2 * (left + right)
+    row, _ = np.unravel_index(int(votes.argmax()), votes.shape)
+    return round(float(_ROWS[row]), 2)
+
+
+def _segments(image: Image) -> Values:
+    """Return the ends of the usable segments, `(n, 4)`, in widths of the frame."""
+    height, width = image.shape[:2]
+    small = (_WIDTH, max(1, round(height * _WIDTH / width)))
+    grey = cv2.cvtColor(cv2.resize(image, small, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
+    lines = cv2.createLineSegmentDetector().detect(grey)[0]
+    ends = np.zeros((0, 4)) if lines is None else np.asarray(lines, np.float64).reshape(-1, 4)
+    ends = ends / _WIDTH
+    across, down = abs(ends[:, 2] - ends[:, 0]), abs(ends[:, 3] - ends[:, 1])
+    slopes = np.degrees(np.arctan2(down, across))
+    usable = (np.hypot(across, down) > _SHORTEST) & (slopes > _SLOPES[0]) & (slopes < _SLOPES[1])
+    return np.asarray(ends[usable])
+
+
+def _oriented(ends: Values) -> _Segments:
+    directions = ends[:, 2:] - ends[:, :2]
+    lengths = np.hypot(directions[:, 0], directions[:, 1])
+    normals = np.stack([-directions[:, 1], directions[:, 0]], axis=1) / lengths[:, np.newaxis]
+    return _Segments((ends[:, :2] + ends[:, 2:]) / 2, normals, lengths)
+
+
+def _votes(segments: _Segments, aspect: float) -> Values:
+    """Sum the votes for each point, `(rows, columns)`; a segment votes for points above it."""
+    x, y = np.meshgrid(_COLUMNS, _ROWS * aspect)
+    dx = x[..., np.newaxis] - segments.middles[:, 0]
+    dy = y[..., np.newaxis] - segments.middles[:, 1]
+    away = abs(dx * segments.normals[:, 0] + dy * segments.normals[:, 1])
+    sines = away / (np.hypot(dx, dy) + 1e-9)
+    votes = segments.lengths * np.maximum(0, 1 - (sines / _MISSES) ** 2) * (dy < 0)
+    return np.asarray(votes.sum(axis=-1))

@@ -1,0 +1,153 @@
+"""Labelled videos × settings → scores."""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vdet.config.schema import Settings
+from vdet.detect.svm.model import LinearModel
+from vdet.evaluate.clips.clip import Clip, Progress, detect
+from vdet.evaluate.clips.losses import Loss, losses
+from vdet.evaluate.clips.timeline import Timeline, timelines
+from vdet.evaluate.comparison import Comparison
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.matching import match
+from vdet.evaluate.pooling import pool
+from vdet.evaluate.predictions import read_predictions
+from vdet.evaluate.preprocessing import compare
+from vdet.evaluate.scores import Scores, score_comparison
+from vdet.evaluate.truth import read_truth
+
+log = logging.getLogger("vdet")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClipResult:
+    """One video under one setting.
+
+    `name` is what tables call it; `video` is the file, None where only its tracks are known.
+    """
+
+    name: str
+    video: Path | None
+    comparison: Comparison
+    scores: Scores
+    losses: tuple[Loss, ...]
+    timelines: tuple[Timeline, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunResult:
+    """All videos under one setting, and their total.
+
+    `assignments` are what sets this one apart, as `--set` takes them.
+    """
+
+    assignments: tuple[str, ...]
+    clips: tuple[ClipResult, ...]
+    total: Scores
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """Settings, and the assignments that set them apart from the others."""
+
+    assignments: tuple[str, ...]
+    settings: Settings
+
+
+def evaluate_clips(
+    clips: Sequence[Clip],
+    model: LinearModel,
+    variants: Sequence[Variant],
+    progress: Progress = lambda _: lambda _: None,
+) -> list[RunResult]:
+    """Run detection on every clip, once for all settings, and score each.
+
+    Parameters
+    ----------
+    progress
+        As `detect` takes it, called for each clip.
+
+    Raises
+    ------
+    VideoError, TruthError
+        As `detect`.
+    """
+    settings = [variant.settings for variant in variants]
+    found = [detect(clip, model, settings, progress) for clip in clips]
+    results = []
+    for number, variant in enumerate(variants):
+        of_clips = [
+            _judge_clip(clip, each[number]) for clip, each in zip(clips, found, strict=True)
+        ]
+        results.append(RunResult(variant.assignments, tuple(of_clips), total(of_clips)))
+    return results
+
+
+def judge(
+    name: str,
+    prediction: LabelledVideo,
+    truth: LabelledVideo,
+    *,
+    video: Path | None = None,
+    rate: float | None = None,
+) -> ClipResult:
+    """Score the predictions for a video, and say where they fail; arguments as `compare`'s."""
+    comparison = compare(prediction, truth, rate=rate)
+    matched = match(comparison)
+    return ClipResult(
+        name,
+        video,
+        comparison,
+        score_comparison(comparison),
+        tuple(losses(comparison, matched)),
+        tuple(timelines(comparison, matched)),
+    )
+
+
+def _judge_clip(clip: Clip, found: LabelledVideo) -> ClipResult:
+    truth = clip.truth.until(found.last_frame)
+    return judge(str(clip.video), found, truth, video=clip.video)
+
+
+def judge_files(
+    prediction: Path, truth: Path, *, until: int | None = None, rate: float | None = None
+) -> RunResult:
+    """Score a file of tracks against a file of truth.
+
+    Parameters
+    ----------
+    until
+        Number of the last frame to look at, from 1; without it, predictions beyond the last true
+        frame are false alarms (a warning tells so).
+    rate
+        As `compare` takes it.
+
+    Raises
+    ------
+    TruthError
+        A file cannot be used.
+    """
+    found, true = read_predictions(prediction), read_truth(truth)
+    if until is not None:
+        found, true = found.until(until), true.until(until)
+    elif len(found) and found.frames[-1] > true.last_frame:
+        log.warning(
+            "%s: has boxes up to frame %d, the truth ends with frame %d; what is beyond counts as "
+            "false alarms unless --until %d",
+            *(prediction, found.frames[-1], true.last_frame, true.last_frame),
+        )
+    result = judge(str(prediction), found, true, rate=rate)
+    return RunResult((), (result,), result.scores)
+
+
+def total(clips: Sequence[ClipResult]) -> Scores:
+    """Return the scores of all clips taken as one."""
+    return score_comparison(pool([clip.comparison for clip in clips]))
+
+
+def best(runs: Sequence[RunResult]) -> RunResult:
+    """Return the run with the highest F1; of equals the first."""
+    return max(runs, key=lambda run: run.total.f1)

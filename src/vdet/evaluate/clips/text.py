@@ -1,0 +1,140 @@
+"""Scores of videos as lines of text, and as plain JSON values."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
+from vdet.evaluate.clips.losses import Loss
+from vdet.evaluate.scores import Scores
+from vdet.evaluate.table import ABSENT, share, table
+
+LARGEST = 10
+"""Losses of a video that are listed."""
+
+HEADINGS = (
+    *("precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
+    *("MOTA", "IDF1", "HOTA", "switches", "false tracks"),
+)
+
+
+def key_figures(scores: Scores) -> list[str]:
+    """Return the texts under `HEADINGS`."""
+    found = (scores.precision, scores.recall, scores.f1, scores.ap50, scores.ap50_95)
+    followed = (scores.mean_iou, scores.mota, scores.idf1, scores.hota)
+    ratios = [share(value) for value in (*found, *followed)]
+    return [*ratios, str(scores.id_switches), str(scores.false_tracks)]
+
+
+def run_lines(runs: Sequence[RunResult]) -> Iterator[str]:
+    """Give runs as lines: one in full, several (a sweep) a row each."""
+    if len(runs) > 1:
+        yield from sweep_lines(runs)
+        return
+    (run,) = runs
+    yield from table(("video", *HEADINGS), list(clip_rows(run)))
+    yield ""
+    yield from detail_lines(run.total)
+    for clip in run.clips:
+        yield from loss_lines(clip)
+
+
+def clip_rows(run: RunResult) -> Iterator[list[str]]:
+    """Give a row of text for each video, and one for the total of several."""
+    for clip in run.clips:
+        yield [clip.name, *key_figures(clip.scores)]
+    if len(run.clips) > 1:
+        yield ["total", *key_figures(run.total)]
+
+
+def sweep_lines(runs: Sequence[RunResult]) -> Iterator[str]:
+    """Give a row for each setting, and the best by F1."""
+    yield from table(("setting", *HEADINGS), sweep_rows(runs))
+    top = best(runs)
+    yield ""
+    yield f"best F1: {setting_name(top)} ({share(top.total.f1)})"
+
+
+def sweep_rows(runs: Iterable[RunResult]) -> list[list[str]]:
+    """Return a row of text for the total of each run."""
+    return [[setting_name(run), *key_figures(run.total)] for run in runs]
+
+
+def setting_name(run: RunResult) -> str:
+    """Name a run by what sets it apart."""
+    return " ".join(run.assignments)
+
+
+def detail_lines(scores: Scores) -> list[str]:
+    """Return everything that the key figures leave out."""
+    delay = ABSENT if scores.mean_delay is None else f"{scores.mean_delay:.1f} frames"
+    rate = scores.false_tracks_per_minute
+    per_minute = "" if rate is None else f" ({rate:.1f} a minute)"
+    boxes = (
+        f"boxes: {scores.vehicle_boxes} true ones (vehicles: {scores.vehicles}); "
+        f"{scores.matches} found, {scores.misses} missed, {scores.false_positives} false alarms"
+    )
+    tracks = (
+        f"tracks: {scores.tracks}, of which {scores.false_tracks} false{per_minute}; "
+        f"{scores.id_switches} id switches, {scores.fragmentations} fragmentations"
+    )
+    vehicles = (
+        f"vehicles: {scores.mostly_tracked} mostly tracked, {scores.partly_tracked} partly, "
+        f"{scores.mostly_lost} mostly lost, {scores.never_found} never found; "
+        f"mean time to the first detection {delay}"
+    )
+    further = (
+        f"also: MOTP {share(scores.motp)}, IDP {share(scores.idp)}, IDR {share(scores.idr)}, "
+        f"DetA {share(scores.deta)}, AssA {share(scores.assa)}"
+    )
+    return [boxes, tracks, vehicles, further]
+
+
+def loss_lines(clip: ClipResult) -> Iterator[str]:
+    """Give the largest losses of a video as a table; nothing where there is none."""
+    if clip.losses:
+        yield ""
+        yield f"largest of {len(clip.losses)} losses in {clip.name}"
+        headings = ("what", "frames", "boxes", "best IoU")
+        yield from table(headings, [loss_row(loss) for loss in clip.losses[:LARGEST]])
+
+
+def loss_row(loss: Loss) -> list[str]:
+    """Return a loss as a row of text: what, frames, boxes, best IoU."""
+    return [loss_name(loss), frame_span(loss), str(loss.boxes), share(loss.overlap, 2)]
+
+
+def frame_span(loss: Loss) -> str:
+    """Write the frames of a loss."""
+    return f"{loss.first}–{loss.last}" if loss.boxes > 1 else str(loss.first)
+
+
+def loss_name(loss: Loss) -> str:
+    """Say what was lost."""
+    return f"vehicle {loss.id} missed" if loss.kind == "missed" else f"false alarm, track {loss.id}"
+
+
+def plain(runs: Sequence[RunResult]) -> dict[str, Any]:
+    """Return runs as values that JSON knows.
+
+    One run has `total` and `videos`; several have these each, with their `settings`, in `sweep`.
+    """
+    if len(runs) == 1:
+        return _plain_run(runs[0])
+    return {
+        "sweep": [
+            {"settings": dict(text.split("=", 1) for text in run.assignments), **_plain_run(run)}
+            for run in runs
+        ]
+    }
+
+
+def _plain_run(run: RunResult) -> dict[str, Any]:
+    videos = [{"video": clip.name, **plain_clip(clip)} for clip in run.clips]
+    return {"total": asdict(run.total), "videos": videos}
+
+
+def plain_clip(clip: ClipResult) -> dict[str, Any]:
+    """Return the scores of a video and its losses as values that JSON knows."""
+    lost = [{**asdict(loss), "boxes": loss.boxes} for loss in clip.losses]
+    return {**asdict(clip.scores), "losses": lost}

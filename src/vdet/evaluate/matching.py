@@ -1,0 +1,67 @@
+"""Which prediction found which vehicle, frame by frame."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdet.evaluate.assignment import assign, at_least
+from vdet.evaluate.comparison import ComparedFrame, Comparison
+from vdet.evaluate.labelled_video import Integers
+from vdet.evaluate.preprocessing import MATCH_IOU
+from vdet.geometry import Float64Array
+
+_NOBODY = -1
+_LOYALTY = 1000.0  # outweighs any sum of overlaps
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MatchedFrame:
+    """A frame's pairs: row `vehicle_rows[i]` of its vehicles, row `track_rows[i]` of its tracks."""
+
+    frame: ComparedFrame
+    vehicle_rows: Integers
+    track_rows: Integers
+
+    def __len__(self) -> int:
+        return len(self.vehicle_rows)
+
+    @property
+    def vehicles(self) -> Integers:
+        """The vehicles that were found, int64: as in `ComparedFrame.vehicles`."""
+        return self.frame.vehicles[self.vehicle_rows]
+
+    @property
+    def tracks(self) -> Integers:
+        """The track that found each of `vehicles`, int64."""
+        return self.frame.tracks[self.track_rows]
+
+    @property
+    def iou(self) -> Float64Array:
+        """The overlap of each pair, float64."""
+        return self.frame.iou[self.vehicle_rows, self.track_rows]
+
+
+def match(comparison: Comparison) -> list[MatchedFrame]:
+    """Pair vehicles with predictions in every frame, at IoU 0.5 and above.
+
+    A pair of the frame before stays together where it still overlaps enough; the others are paired
+    so that the sum of IoU is largest. As in TrackEval, a frame without vehicles or without
+    predictions does not count as the frame before.
+    Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
+    MOT Metrics", 2008.
+    """
+    partners = np.full(len(comparison.vehicle_ids), _NOBODY)
+    matched = []
+    for frame in comparison.frames:
+        pairs = _match_frame(frame, partners)
+        matched.append(pairs)
+        if frame.iou.size:
+            partners[:] = _NOBODY
+            partners[pairs.vehicles] = pairs.tracks
+    return matched
+
+
+def _match_frame(frame: ComparedFrame, partners: Integers) -> MatchedFrame:
+    together = partners[frame.vehicles][:, np.newaxis] == frame.tracks[np.newaxis, :]
+    wishes = np.where(at_least(frame.iou, MATCH_IOU), frame.iou + _LOYALTY * together, 0)
+    return MatchedFrame(frame, *assign(wishes))

@@ -1,0 +1,1 @@
+"""Patches to learn from, training, mining of hard negatives, and tests of the classifier."""

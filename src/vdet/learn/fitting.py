@@ -1,0 +1,118 @@
+"""Scale, fit, calibrate: scikit-learn's estimators → a `LinearModel` that needs none of them."""
+
+import logging
+import warnings
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vdet.config.schema import FeatureSettings, TrainingSettings
+from vdet.detect.svm.features import Vectors
+from vdet.detect.svm.model import LinearModel
+from vdet.errors import DataError
+from vdet.learn.extraction import Flags, Rows
+
+log = logging.getLogger("vdet")
+
+
+def fit(
+    vectors: Vectors,
+    vehicle: Flags,
+    features: FeatureSettings,
+    settings: TrainingSettings,
+    origins: Rows | None = None,
+) -> LinearModel:
+    """Fit StandardScaler → LinearSVC → CalibratedClassifierCV on raw feature vectors.
+
+    Parameters
+    ----------
+    vectors
+        float32 of shape `(n, features)`.
+    vehicle
+        bool of shape `(n,)`.
+    origins
+        intp of shape `(n,)`: the row of the patch that each row is a view of, its own for a patch.
+        The sigmoid is fitted on the patches alone, each scored by an SVM that has seen neither it
+        nor a view of it. None: all rows are patches.
+
+    Raises
+    ------
+    DataError
+        A class has fewer patches than there are calibration folds.
+    """
+    from sklearn.calibration import CalibratedClassifierCV
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.preprocessing import StandardScaler
+
+    origins = np.arange(len(vehicle)) if origins is None else origins
+    folds = settings.calibration.folds
+    (patches,) = np.nonzero(origins == np.arange(len(origins)))
+    fewest = min(np.count_nonzero(vehicle[patches]), np.count_nonzero(~vehicle[patches]))
+    if fewest < folds:
+        raise DataError(
+            f"a class has {fewest} training patches, training.calibration.folds needs {folds}; "
+            "give more patches"
+        )
+    scaler = StandardScaler()
+    scaled = scaler.fit_transform(vectors)
+    calibrated = CalibratedClassifierCV(
+        _unweighted_svm(settings),
+        method="sigmoid",
+        cv=list(_folds(vehicle[patches], patches, origins, settings)),
+        ensemble=settings.calibration.ensemble,
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.filterwarnings("ignore", "Since .* does not appear to accept sample_weight")
+        warnings.simplefilter("always", ConvergenceWarning)
+        calibrated.fit(scaled, vehicle, _weights(patches, len(vehicle)))
+    if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
+        log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
+    return _to_model(calibrated.calibrated_classifiers_, scaler, features)
+
+
+def _unweighted_svm(settings: TrainingSettings) -> Any:
+    """Return an SVM that knows of no weights: these are then those of the calibration alone."""
+    from sklearn.svm import LinearSVC
+
+    class Svm(LinearSVC):  # type: ignore[misc]  # scikit-learn has no types
+        def fit(self, x: Vectors, y: Flags) -> "Svm":
+            super().fit(x, y)
+            return self
+
+    return Svm(C=settings.C, max_iter=settings.max_iterations, random_state=settings.seed)
+
+
+def _weights(patches: Rows, count: int) -> npt.NDArray[np.float64]:
+    """Weigh the rows for the sigmoid: the patches 1, their views 0."""
+    weights = np.zeros(count)
+    weights[patches] = 1
+    return weights
+
+
+def _folds(
+    vehicle: Flags, patches: Rows, origins: Rows, settings: TrainingSettings
+) -> Iterator[tuple[Rows, Rows]]:
+    """Give the rows to fit and to calibrate on; `vehicle` is of the rows that are `patches`."""
+    from sklearn.model_selection import StratifiedKFold
+
+    splitter = StratifiedKFold(settings.calibration.folds, shuffle=True, random_state=settings.seed)
+    for _, tested in splitter.split(patches, vehicle):
+        inside = np.isin(origins, patches[tested])
+        yield np.flatnonzero(~inside), np.flatnonzero(inside)
+
+
+def _to_model(members: list[Any], scaler: Any, features: FeatureSettings) -> LinearModel:
+    """Fold the scaler into the weights: w·(x - μ)/σ + b = (w/σ)·x + (b - (w/σ)·μ)."""
+    weights = np.concatenate([member.estimator.coef_ for member in members]) / scaler.scale_
+    biases = np.concatenate([member.estimator.intercept_ for member in members])
+    biases = biases - weights @ scaler.mean_
+    sigmoids = [member.calibrators[0] for member in members]
+    return LinearModel(
+        features,
+        weights.astype(np.float32),
+        biases.astype(np.float32),
+        np.array([sigmoid.a_ for sigmoid in sigmoids], np.float32),
+        np.array([sigmoid.b_ for sigmoid in sigmoids], np.float32),
+    )

@@ -1,0 +1,154 @@
+"""Through a labelled video, frame by frame, to a zip file of patches."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.schema import Settings
+from vdet.detect.svm.features import to_patch
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.windows import Windows
+from vdet.errors import DataError, ImageError, TruthError, VideoError
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.truth import read_truth
+from vdet.learn.mining.archive import PatchArchive, patch_archive
+from vdet.learn.mining.choosing import Choice, Kind, choose
+from vdet.learn.mining.placing import cut_sides
+from vdet.media import Frame, VideoInfo, VideoReader
+from vdet.pipeline.following import seek_horizon
+
+PATCH = 64
+"""Side of the patches, pixels, as in the Udacity set."""
+
+_FOLDERS: dict[Kind, str] = {
+    "vehicle": "vehicles/mined_{}",
+    "box": "boxes/mined_{}",
+    "false alarm": "non-vehicles/mined_{}",
+    "part": "non-vehicles/mined_{}_parts",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MiningJob:
+    """What to mine, and the zip file to make of it.
+
+    Every n-th frame is looked at, and every one that cuts a vehicle off, from the `first` (counted
+    from 1) to the `last`; None: to the last that the truth knows of.
+    """
+
+    video: Path
+    truth: Path
+    output: Path
+    every: int = 4
+    first: int = 1
+    last: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mined:
+    """How many frames were looked at, and how many patches of each kind they gave."""
+
+    frames: int
+    vehicles: int
+    boxes: int
+    false_alarms: int
+    parts: int
+
+
+def mine(
+    job: MiningJob,
+    model: LinearModel,
+    settings: Settings,
+    *,
+    progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
+) -> Mined:
+    """Search the labelled frames, and write what is to be learnt from them.
+
+    Patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
+    `non-vehicles/`, those of parts in `non-vehicles/mined_video_parts/`; frame and window are in
+    their names.
+
+    Parameters
+    ----------
+    progress
+        Called with the number of frames to read; what it returns is called with the number of
+        frames read since the last call.
+
+    Raises
+    ------
+    TruthError
+        The truth cannot be used, or knows nothing of these frames.
+    VideoError
+        The video cannot be read or searched.
+    DataError
+        There is nothing to learn from these frames.
+    OutputError
+        The zip file cannot be written.
+    """
+    truth = read_truth(job.truth)
+    last = min(job.last or truth.last_frame, truth.last_frame)
+    if last < job.first:
+        raise TruthError(
+            f"{job.truth}: knows of the frames up to {truth.last_frame}; mine some of these"
+        )
+    looked, number = 0, 0
+    counts: Counter[Kind] = Counter()
+    with VideoReader(job.video, frames=last) as reader, patch_archive(job.output) as archive:
+        advance = progress(last)
+        frames, horizon = seek_horizon(reader, settings)
+        search = _search(job, model, settings, reader.info, horizon)
+        for frame in frames:
+            number = frame.index + 1
+            labelled = truth.frame(number)
+            regular = (number - job.first) % job.every == 0
+            if number >= job.first and (regular or _comes_in(labelled, reader.info.width)):
+                looked += 1
+                choices = _choices(search.search(frame.image), labelled, frame, settings)
+                _add(archive, frame, choices, job.video.stem)
+                counts.update(choice.kind for choice in choices)
+            advance(1)
+        if number < last:
+            read_truth(job.truth, frame_count=number)  # refuses it, and names the line
+        if not counts:
+            raise DataError(
+                f"{job.video}: no window fits a vehicle or is a false alarm; try others"
+            )
+    return Mined(looked, counts["vehicle"], counts["box"], counts["false alarm"], counts["part"])
+
+
+def _search(
+    job: MiningJob, model: LinearModel, settings: Settings, info: VideoInfo, horizon: float
+) -> FrameSearch:
+    try:
+        return FrameSearch(model, settings, info.width, info.height, horizon=horizon)
+    except ImageError as error:
+        raise VideoError(f"{job.video}: {error}") from error
+
+
+def _comes_in(truth: LabelledVideo, width: int) -> bool:
+    """Tell whether the frame's side cuts a vehicle off: that is seldom, and hard to learn."""
+    return any(cut_sides(box, width).any() for box in truth.boxes[~truth.ignored])
+
+
+def _choices(
+    windows: Windows, truth: LabelledVideo, frame: Frame, settings: Settings
+) -> list[Choice]:
+    """Choose by chance that depends on the frame alone, whichever others are looked at."""
+    rng = np.random.default_rng((settings.training.seed, frame.index))
+    return list(choose(windows, truth, frame.image.shape[1], settings.mining, rng))
+
+
+def _add(archive: PatchArchive, frame: Frame, choices: Sequence[Choice], stem: str) -> None:
+    width = frame.image.shape[1]
+    beyond = max((max(-each.box.x, each.box.right - width) for each in choices), default=0)
+    pixels = FramePyramid(frame.image, margin=max(0, beyond))
+    for choice in choices:
+        box = choice.box
+        place = f"frame{frame.index + 1:06}_x{box.x:04}_y{box.y:04}_s{box.width:04}"
+        patch = to_patch(pixels.crop(box.x, box.y, box.width, box.height), PATCH)
+        archive.add(f"{_FOLDERS[choice.kind].format(stem)}/{place}.png", patch, choice.sides)

@@ -1,0 +1,157 @@
+"""One training run, from labelled vectors to a model with its report."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, replace
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+import vdet
+from vdet.cluster import on_cluster
+from vdet.config.schema import Settings
+from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.model import LinearModel
+from vdet.errors import DataError
+from vdet.learn.augmentation import views_of
+from vdet.learn.boxes import BoxPatches, describe_boxes, fit_split_boxes
+from vdet.learn.dataset import PatchFile, read_patches
+from vdet.learn.extraction import LabelledVectors, extract
+from vdet.learn.fitting import fit
+from vdet.learn.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
+from vdet.learn.splits import SplitName, hold_out
+from vdet.learn.training_set import lesson_of
+
+_TIMED_PATCHES = 200
+
+
+def train(
+    files: Sequence[PatchFile],
+    settings: Settings,
+    *,
+    boxed: Sequence[PatchFile] = (),
+    jobs: int = -1,
+    scheduler: str | None = None,
+    progress: Callable[[int], object] = lambda _: None,
+) -> tuple[LinearModel, TrainingReport]:
+    """Describe the patches, fit on the configured split, and on the other one for comparison.
+
+    Parameters
+    ----------
+    boxed
+        Patches of neither class that tell where a vehicle is. With them, or with `files` that
+        tell it, the model learns to find the sides of vehicles.
+    jobs
+        Processes, as joblib counts them: -1 for one a core.
+    scheduler
+        Address of a Dask scheduler whose workers describe the patches instead.
+    progress
+        Called with the number of patches described since the last call.
+
+    Returns
+    -------
+    The model fitted on the training part of `training.split`, with its provenance; the report on
+    both splits, this one first.
+
+    Raises
+    ------
+    DataError
+        Too many patches are unreadable, or too few are left to learn from; or a process was killed.
+    ClusterError
+        The cluster of `scheduler` cannot be used.
+    """
+    began = time.perf_counter()
+    training = settings.training
+    with on_cluster(scheduler) if scheduler else nullcontext():
+        data = extract(
+            files,
+            settings.features,
+            max_broken=training.max_broken,
+            look=partial(views_of, settings=training.views),
+            seed=training.seed,
+            jobs=jobs,
+            progress=progress,
+        )
+        boxes = describe_boxes(files, boxed, settings, jobs=jobs, progress=progress)
+    extract_seconds = time.perf_counter() - began
+    names: list[SplitName] = ["random", "tail"]
+    names.sort(key=lambda name: name != training.split)
+    fitted = [_fit_split(data, boxes, settings, name) for name in names]
+    model = fitted[0][0]
+    report = TrainingReport(
+        vehicles=int(np.count_nonzero(data.vehicle)),
+        non_vehicles=int(np.count_nonzero(~data.vehicle)),
+        boxed=sum(file.sides is not None for file in (*files, *boxed)),
+        broken=data.broken + (boxes.boxed.broken if boxes and boxes.boxed else 0),
+        groups=dict(Counter(file.group for file in (*files, *boxed))),
+        features=data.vectors.shape[1],
+        extract_seconds=round(extract_seconds, 3),
+        milliseconds_per_prediction=_milliseconds_per_prediction(model, files),
+        splits=tuple(split for _, split in fitted),
+    )
+    provenance = {
+        "program": f"vdet {vdet.__version__}",
+        "data_sha256": data.digest,
+        "training": training.model_dump(mode="json"),
+        "report": asdict(report),
+    }
+    if boxes and boxes.boxed:
+        provenance["boxes_sha256"] = boxes.boxed.digest
+    return replace(model, provenance=provenance), report
+
+
+def _fit_split(
+    data: LabelledVectors, boxes: BoxPatches | None, settings: Settings, name: SplitName
+) -> tuple[LinearModel, SplitReport]:
+    training = settings.training
+    held = hold_out(data.groups, name, training.test_fraction, training.seed)
+    if not held.any():
+        raise DataError("no folder has two patches, of which one could be held out; give more")
+    began = time.perf_counter()
+    lesson = lesson_of(data, ~held)
+    model = fit(lesson.vectors, lesson.vehicle, settings.features, training, lesson.origins)
+    regression, error = None, None
+    if boxes is not None:
+        regression, error = fit_split_boxes(data, held, boxes, name, settings)
+    seconds = time.perf_counter() - began
+    predicted = model.probabilities(data.vectors) >= 0.5
+    right = predicted == data.vehicle
+    train_patches = int(np.count_nonzero(~held))
+    return replace(model, boxes=regression), SplitReport(
+        split=name,
+        train_patches=train_patches,
+        train_views=len(lesson.vehicle) - train_patches,
+        test_patches=int(np.count_nonzero(held)),
+        train_accuracy=float(right[~held].mean()),
+        test_accuracy=float(right[held].mean()),
+        confusion=Confusion.of(data.vehicle[held], predicted[held]),
+        groups=_by_group(data.groups[held], right[held]),
+        boxes=error,
+        fit_seconds=round(seconds, 3),
+    )
+
+
+def _by_group(
+    groups: npt.NDArray[np.str_], right: npt.NDArray[np.bool_]
+) -> tuple[GroupAccuracy, ...]:
+    return tuple(
+        GroupAccuracy(str(name), int((groups == name).sum()), float(right[groups == name].mean()))
+        for name in np.unique(groups)
+    )
+
+
+def _milliseconds_per_prediction(model: LinearModel, files: Sequence[PatchFile]) -> float:
+    """Describe and score some patches one by one; return the median time."""
+    extractor = FeatureExtractor(model.features)
+    some = files[:: max(1, len(files) // _TIMED_PATCHES)]
+    times = []
+    for patch in read_patches(some):
+        if patch.image is not None:
+            image = to_patch(patch.image, model.features.patch)
+            began = time.perf_counter()
+            model.probabilities(extractor.describe(image)[np.newaxis])
+            times.append(time.perf_counter() - began)
+    return round(1000 * float(np.median(times)), 4)

@@ -1,0 +1,95 @@
+"""Open a video file, and take its packets out in spite of damage."""
+
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import av
+from av.container import InputContainer
+from av.packet import Packet
+from av.stream import Stream
+
+from vdet.errors import VideoError
+from vdet.media.claims import check_claims
+from vdet.media.numbered import find_sequence
+
+MAX_PIXELS = 8192 * 4608
+"""Of a frame; 8K video in both its widths has less. A damaged header may claim a thousandfold."""
+
+MAX_SIDE = 16_384
+"""Pixels; H.264 cannot be written larger."""
+
+_MAX_FAILURES = 100  # in a row; a file that gives nothing but errors must end, too
+
+# Formats that hold pictures themselves. Left out are those that name other files or addresses to be
+# opened (playlists and such), and text that would be drawn as a picture.
+_FORMATS = (
+    "apng", "asf", "av1", "avi", "cavsvideo", "dhav", "dirac", "dv", "flv", "gif", "gxf", "h261",
+    "h263", "h264", "hevc", "ivf", "kux", "live_flv", "m4v", "matroska", "mjpeg", "mjpeg_2000",
+    "mov", "mpeg", "mpegts", "mpegtsraw", "mpegvideo", "mpjpeg", "mxf", "nut", "obu", "ogg", "rm",
+    "vc1", "vvc", "wtv", "yuv4mpegpipe",
+)  # fmt: skip
+
+
+def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
+    """Open a video file, or numbered pictures (`img_%04d.png`), for reading.
+
+    Parameters
+    ----------
+    frame_rate
+        Of numbered pictures, per second.
+
+    Raises
+    ------
+    VideoError
+        There is no such file, it cannot be read, or it is not a video; a picture is missing.
+    """
+    if path.is_dir():
+        raise VideoError(f"{path}: is a folder; give the name of a video file")
+    # An absolute name cannot be taken for a protocol ("a:b.mp4").
+    name, kind, options = str(path.absolute()), None, {"format_whitelist": ",".join(_FORMATS)}
+    if sequence := find_sequence(path):
+        name, kind = sequence.pattern, "image2"
+        rate = Fraction(str(frame_rate))
+        options = {
+            "framerate": f"{rate.numerator}/{rate.denominator}",
+            "start_number": str(sequence.first),
+            "start_number_range": "1",
+        }
+    else:
+        check_claims(path)
+    try:
+        options["max_pixels"] = str(MAX_PIXELS)  # already where the decoder looks into the file
+        return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
+    except av.FileNotFoundError as error:
+        raise VideoError(f"{path}: there is no such file; check the name") from error
+    except av.PermissionError as error:
+        raise VideoError(f"{path}: may not be read; check its permissions") from error
+    except av.FFmpegError as error:
+        raise VideoError(
+            f"{path}: is not a video, or one that was cut off while it was recorded "
+            f"({error.strerror}); give a file that plays"
+        ) from error
+
+
+def packets(
+    container: InputContainer, *streams: Stream, on_error: Callable[[], None]
+) -> "Iterator[Packet[Stream]]":
+    """Yield the packets of `streams` in file order; skip what cannot be read.
+
+    `on_error` is called at each place where something had to be skipped.
+    """
+    failures = 0
+    while failures < _MAX_FAILURES:
+        try:
+            for packet in container.demux(list(streams)):
+                failures = 0
+                if packet.size:  # an empty one would tell the decoder that all is over
+                    yield packet
+            return
+        except IndexError:  # PyAV's, at the end, over a stream that appeared while it was reading
+            return
+        except av.FFmpegError:
+            failures += 1
+            if failures == 1:
+                on_error()

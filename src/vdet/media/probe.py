@@ -1,0 +1,111 @@
+"""What a video file says of itself."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+from av.container import InputContainer
+from av.stream import Disposition
+from av.video.stream import VideoStream
+
+from vdet.errors import VideoError
+from vdet.media.demux import MAX_PIXELS, MAX_SIDE
+from vdet.media.frame import ColorTags, VideoInfo
+from vdet.media.pixels import quarter_turns
+
+_USUAL_RATE = Fraction(25)
+_LARGEST_TERM = 1_000_000  # of a rate; the encoder's own are 32-bit integers
+
+
+def picture_stream(container: InputContainer, path: Path) -> VideoStream:
+    """Return the first stream of moving pictures: a cover or a thumbnail is none.
+
+    Raises
+    ------
+    VideoError
+        There is none, or no decoder for it.
+    """
+    stills = Disposition.attached_pic | Disposition.timed_thumbnails
+    for stream in container.streams.video:
+        if not stream.disposition & stills:
+            if stream.codec_context is None:
+                raise VideoError(f"{path}: its codec is not known here; convert it to H.264 first")
+            return stream
+    raise VideoError(f"{path}: has no moving pictures; give a video file")
+
+
+def check_size(path: Path, width: int, height: int) -> None:
+    """Refuse frames that are too large, before there is memory for any. Raises `VideoError`."""
+    if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
+        raise VideoError(
+            f"{path}: frames of {width}×{height} pixels are too large ({MAX_PIXELS // 10**6} "
+            f"million pixels and sides of {MAX_SIDE} at most); scale it down first"
+        )
+
+
+def describe(
+    path: Path, container: InputContainer, stream: VideoStream, first: av.VideoFrame
+) -> VideoInfo:
+    """Gather what is known once the `first` picture of `stream` has been decoded."""
+    time_base = _time_base(stream)
+    rate = _first_sensible(stream.average_rate, stream.guessed_rate)
+    start = (first.pts or 0) * time_base
+    duration = stated_duration(stream, start) or _longest(container)
+    rotation = quarter_turns(first)
+    width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
+    if rotation in (90, 270):
+        width, height, aspect = height, width, 1 / aspect
+    return VideoInfo(
+        path=path,
+        width=width,
+        height=height,
+        rate=rate,
+        time_base=time_base,
+        start=start,
+        frames=stream.frames or (round(duration * rate) if duration else None),
+        duration=duration,
+        rotation=rotation,
+        pixel_aspect=aspect,
+        color=ColorTags(first.color_primaries, first.color_trc, first.colorspace),
+        has_sound=bool(container.streams.audio),
+    )
+
+
+def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
+    """Return the seconds of picture that the file declares; None where it declares none.
+
+    Matroska declares, in a tag, when the stream ends; `start` is the time of its first frame.
+    """
+    if stream.duration and stream.time_base:
+        return stream.duration * stream.time_base
+    try:
+        hours, minutes, seconds = stream.metadata["DURATION"].split(":")
+        end = Fraction(hours) * 3600 + Fraction(minutes) * 60 + Fraction(seconds)
+    except (KeyError, ValueError, ZeroDivisionError):
+        return None
+    return end - start if end > start else None
+
+
+def _longest(container: InputContainer) -> Fraction | None:
+    """Return the seconds of the longest stream: the picture's own may be shorter."""
+    return Fraction(container.duration, av.time_base) if container.duration else None
+
+
+def period_of(stream: VideoStream) -> Fraction:
+    """Return the usual time from one picture to the next, in units of the time base.
+
+    It is not the average where pictures were left out.
+    """
+    rate = _first_sensible(stream.guessed_rate, stream.average_rate)
+    return 1 / (rate * _time_base(stream))
+
+
+def _time_base(stream: VideoStream) -> Fraction:
+    return stream.time_base or Fraction(1, 90_000)
+
+
+def _first_sensible(*rates: Fraction | None) -> Fraction:
+    for rate in rates:
+        if rate and (near := rate.limit_denominator(_LARGEST_TERM)) > 0:
+            return near
+    return _USUAL_RATE

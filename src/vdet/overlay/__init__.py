@@ -1,1 +1,0 @@
-"""Drawing on frames: boxes, ids, heat, and pictures of every stage."""

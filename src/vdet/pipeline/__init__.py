@@ -1,0 +1,1 @@
+"""The loop frame → detector → tracker → sinks."""

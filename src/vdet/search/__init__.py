@@ -1,1 +1,0 @@
-"""A frame's windows and the probability that each shows a vehicle."""

@@ -1,0 +1,1 @@
+"""Detections of consecutive frames become tracks: the trackers, each behind one protocol."""

@@ -1,0 +1,76 @@
+"""Boxes that overlap: a vehicle before another one, two parts of one, or two seen as one.
+
+On a flat road what is nearer stands lower in the picture. So of two vehicles that overlap the one
+with the lower bottom hides the other, and two boxes that overlap and stand level are of one
+vehicle: two would be in the same place.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from vdet.geometry import Float64Array, coverage, iou_matrix
+
+_LEVEL = 0.15
+"""Bottoms that differ by less than this share of the lesser height are level."""
+
+_LEVEL_OVERLAP = 0.3
+"""Share of the smaller of two level boxes that lies in the other, where they are one vehicle."""
+
+_ALIKE = 0.5
+"""Intersection over union from which on two boxes are of one vehicle, level or not."""
+
+
+def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float) -> list[bool]:
+    """Tell of each box whether another one covers more than `share` of it and is not farther.
+
+    Parameters
+    ----------
+    boxes
+        Shape `(n, 4)`: x, y, width, height in pixels, each with an area.
+    present
+        Shape `(n,)`: those that can hide others.
+    """
+    bottoms = boxes[:, 1] + boxes[:, 3]
+    farther = bottoms < (bottoms - _LEVEL * boxes[:, 3])[:, np.newaxis]
+    hiding = (coverage(boxes, boxes) > share) & present & ~farther
+    np.fill_diagonal(hiding, val=False)
+    return [bool(row.any()) for row in hiding]
+
+
+def is_same(box: Float64Array, others: Float64Array) -> bool:
+    """Tell whether `box`, `(4,)`, shows the same vehicle as one of `others`, `(n, 4)`."""
+    one = box[np.newaxis]
+    bottoms = others[:, 1] + others[:, 3]
+    height = np.minimum(box[3], others[:, 3])
+    level = np.abs(bottoms - box[1] - box[3]) < _LEVEL * height
+    overlap = np.maximum(coverage(one, others)[0], coverage(others, one)[:, 0])
+    alike = iou_matrix(one, others)[0] > _ALIKE
+    return bool((alike | (level & (overlap > _LEVEL_OVERLAP))).any())
+
+
+def is_part(box: Float64Array, others: Float64Array, share: float) -> bool:
+    """Tell whether more than `share` of `box`, `(4,)`, lies in one of `others`, `(n, 4)`."""
+    return bool((coverage(box[np.newaxis], others) > share).any())
+
+
+def around(boxes: Float64Array) -> Float64Array:
+    """Return the smallest box, `(4,)`, that covers all of `boxes`, `(n, 4)`."""
+    near = boxes[:, :2].min(axis=0)
+    return np.concatenate([near, (boxes[:, :2] + boxes[:, 2:]).max(axis=0) - near])
+
+
+def shows_both(found: Float64Array, expected: Float64Array, share: float) -> bool:
+    """Tell whether the region `found`, `(4,)`, shows both vehicles `expected`, `(2, 4)`, as one.
+
+    So it is where more than `share` of the second lies in it and it fits the box around both
+    better than the first one alone.
+    """
+    region = found[np.newaxis]
+    alone, together = iou_matrix(region, np.stack([expected[0], around(expected)]))[0]
+    return is_part(expected[1], region, share) and bool(together > alone)
+
+
+def stretched(box: Float64Array, before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return `box` moved and scaled as `before` was to become `after`; all of shape `(4,)`."""
+    scale = after[2:] / before[2:]
+    return np.concatenate([after[:2] + (box[:2] - before[:2]) * scale, box[2:] * scale])

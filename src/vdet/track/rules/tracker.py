@@ -1,0 +1,102 @@
+"""The tracker: which cars there are, frame after frame.
+
+Source: seed section 3, "Video pipeline". Where it can be read in two ways (`association` has the
+choices for the regions), this is the choice:
+
+* A car counts as shown before if it ever was, not only in the frame before.
+* "In a row" is up to this frame: a car that is missed once is counted from the start again.
+* The car that absorbs another one is detected by region in this frame, and the other's average
+  centroid lies in its average rectangle. It keeps its id, or takes the other's if it has none yet.
+* The searched image is the latest one, around the latest rectangle.
+* A car found by match for the last time allowed is deleted in that frame, and not shown in it.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from itertools import count
+
+from vdet.config.schema import TrackerSettings
+from vdet.detect.svm.heat import Region
+from vdet.track.rules.association import Association
+from vdet.track.rules.car import Car
+from vdet.track.rules.regions import large_enough
+from vdet.track.rules.template import Image
+from vdet.track.track import Track
+
+
+class Cars:
+    """The cars of one video; make a new one for every video, ids start at 1 in each.
+
+    Parameters
+    ----------
+    settings
+        Lengths already scaled to the frame.
+    """
+
+    def __init__(self, settings: TrackerSettings) -> None:
+        self._settings = settings
+        self._cars: list[Car] = []
+        self._ids = count(1)
+
+    def update(self, image: Image, regions: Sequence[Region]) -> list[Track]:
+        """Follow the cars into the next frame.
+
+        Parameters
+        ----------
+        image
+            The frame, BGR uint8 `(H, W, 3)`; every frame of a video has the same size.
+        regions
+            Its hot regions, in full-frame pixels.
+
+        Returns
+        -------
+        The cars shown in this frame, by id.
+        """
+        height, width = image.shape[:2]
+        regions = large_enough(regions, width, height, self._settings)
+        association = Association(self._cars, regions, image, self._settings)
+        self._cars = association.cars
+        placed = association.places
+        for car, place in placed.items():
+            car.see(place.box, place.centroid, image)
+        for car in [car for car in self._cars if car not in placed]:
+            if not self._absorb(car, placed):
+                self._search(car, image)
+        self._cars = [car for car in self._cars if not self._is_over(car)]
+        return self._tracks()
+
+    def _absorb(self, car: Car, others: Iterable[Car]) -> bool:
+        """Rule 12: a shown car gives way to the one that is now where it was."""
+        there = [other for other in others if other.box.contains(car.centroid)]
+        if car.id is None or not there:
+            return False
+        heir = min(there, key=lambda other: math.dist(other.centroid, car.centroid))
+        heir.vouch(self._settings.detections_needed)
+        if heir.id is None:
+            heir.id = car.id
+        self._cars.remove(car)
+        return True
+
+    def _search(self, car: Car, image: Image) -> None:
+        """Rule 13: a shown car is looked for by its image."""
+        box = None if car.id is None else car.find_in(image, self._settings)
+        if box is None:
+            car.miss()
+        else:
+            car.see_match(box, image)
+
+    def _is_over(self, car: Car) -> bool:
+        """Rules 15, 16 and 17: the reasons to delete a car."""
+        young_and_missed = not car.detected and car.detections < self._settings.young
+        only_matched = car.matches >= self._settings.max_matches
+        gone = car.misses >= self._settings.max_misses
+        return young_and_missed or only_matched or gone
+
+    def _tracks(self) -> list[Track]:
+        """Rule 14; a car gets its id when it is first shown."""
+        tracks = []
+        for car in self._cars:
+            if car.is_shown:
+                car.id = next(self._ids) if car.id is None else car.id
+                tracks.append(Track(car.id, car.box, from_match=car.matches > 0))
+        return sorted(tracks, key=lambda track: track.id)

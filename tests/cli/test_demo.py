@@ -1,0 +1,124 @@
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import pytest
+
+from quick import QUICK
+from vdet import demo
+from vdet.config.loading import load_settings
+from vdet.config.schema import Settings
+from vdet.demo import DemoFiles, DemoResult, check_demo, run_demo
+from vdet.detect.svm.model import load_model
+from vdet.errors import OutputError
+from vdet.evaluate.predictions import read_predictions
+from vdet.evaluate.truth import read_truth
+from vdet.media import VideoReader
+from vdet.synthetic import default_clip
+from vdet.synthetic.scene import Scene
+
+PATCHES = 400
+FRAMES = 30
+
+
+def short_clip(seed: int) -> Scene:
+    return replace(default_clip(seed, width=320, height=180), frames=FRAMES)
+
+
+@dataclass(frozen=True)
+class Demo:
+    files: DemoFiles
+    result: DemoResult
+    said: list[str]
+    totals: list[int | None]
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
+    """A demo with few patches and a short clip."""
+    files = DemoFiles(tmp_path_factory.mktemp("demo") / "new" / "demo")
+    said: list[str] = []
+    totals: list[int | None] = []
+
+    def progress(total: int | None) -> Callable[[int], object]:
+        totals.append(total)
+        return lambda _: None
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(demo, "PATCHES", PATCHES)
+        patch.setattr(demo, "default_clip", short_clip)
+        settings = load_settings(None, QUICK).settings
+        result = run_demo(files, settings, say=said.append, progress=progress)
+    return Demo(files, result, said, totals)
+
+
+def test_every_file_it_names_is_there(done: Demo) -> None:
+    files = done.files
+    for path in (files.clip, files.truth, files.model, files.report, files.result, files.tracks):
+        assert path.stat().st_size > 0
+    assert len(list(files.stages.glob("*.png"))) == 5
+    assert len(list(files.patches.rglob("*.png"))) == 2 * PATCHES
+
+
+def test_nothing_else_is_left(done: Demo) -> None:
+    names = {path.name for path in done.files.folder.iterdir()}
+    assert names == {
+        "patches", "road.mp4", "truth.txt", "model.npz", "model.json", "found.mp4", "found.jsonl",
+        "stages",
+    }  # fmt: skip
+
+
+def test_the_whole_clip_is_searched(done: Demo) -> None:
+    assert done.result.frames == FRAMES
+    assert done.result.seconds > 0
+    for path in (done.files.clip, done.files.result):
+        with VideoReader(path) as reader:
+            assert sum(1 for _ in reader) == FRAMES
+
+
+def test_vehicles_are_found(done: Demo) -> None:
+    scores = done.result.scores
+    shares = (scores.precision, scores.recall, scores.f1, scores.idf1)
+    assert all(0 <= share <= 1 for share in shares)
+    assert scores.recall > 0.5
+    assert scores.precision > 0.35
+
+
+def test_the_model_has_learnt_the_patches(done: Demo) -> None:
+    assert {split.split for split in done.result.training.splits} == {"random", "tail"}
+    for split in done.result.training.splits:
+        assert 0.85 < split.test_accuracy <= 1
+    assert load_model(done.files.model).features == Settings().features
+
+
+def test_tracks_and_truth_can_be_scored_again(done: Demo) -> None:
+    assert read_predictions(done.files.tracks)
+    assert read_truth(done.files.truth)
+
+
+def test_each_step_is_told(done: Demo) -> None:
+    assert [line[:3] for line in done.said] == ["1/4", "2/4", "3/4", "4/4"]
+    assert f"{2 * PATCHES} patches" in done.said[0]
+    assert done.totals == [2 * PATCHES, FRAMES]
+
+
+@pytest.mark.parametrize(
+    "name", ["road.mp4", "truth.txt", "model.npz", "model.json", "found.mp4", "found.jsonl"]
+)
+def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    with pytest.raises(OutputError, match=f"{name}: is there already; give --overwrite"):
+        check_demo(DemoFiles(tmp_path), overwrite=False)
+    check_demo(DemoFiles(tmp_path), overwrite=True)
+
+
+def test_a_new_or_an_empty_folder_will_do(tmp_path: Path) -> None:
+    check_demo(DemoFiles(tmp_path), overwrite=False)
+    check_demo(DemoFiles(tmp_path / "new" / "demo"), overwrite=False)
+    assert (tmp_path / "new" / "demo").is_dir()
+
+
+def test_a_file_is_no_folder_for_a_demo(tmp_path: Path) -> None:
+    (tmp_path / "demo").touch()
+    with pytest.raises(OutputError, match="cannot be made a folder"):
+        check_demo(DemoFiles(tmp_path / "demo"), overwrite=False)

@@ -1,0 +1,13 @@
+"""The searches run as in the pipeline: a thread each, the libraries kept from starting more."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from vdet.pipeline.threads import quiet_libraries
+
+
+@pytest.fixture(scope="module", autouse=True)
+def one_thread() -> Iterator[None]:
+    with quiet_libraries():
+        yield

@@ -1,0 +1,117 @@
+"""Each window's score stands at its place: a texture drawn into one window is found there."""
+
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.detect.svm.dense import dense_search
+from vdet.detect.svm.dense.aligned import AlignedSearch, PhasedSearch
+from vdet.detect.svm.dense.located import LocatedSearch
+from vdet.detect.svm.features import FeatureExtractor
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.patch_search import PatchSearch
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.windows import WindowGrid
+from vdet.media.images import Image
+
+FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=0))
+GRIDS = [
+    (AlignedSearch, 64, 8),
+    (AlignedSearch, 64, 16),
+    (AlignedSearch, 64, 24),
+    (AlignedSearch, 128, 16),
+    (PhasedSearch, 64, 12),
+    (PhasedSearch, 128, 24),
+    (PhasedSearch, 48, 9),
+    (LocatedSearch, 64, 7),
+    (LocatedSearch, 128, 25),
+    (LocatedSearch, 96, 19),
+    (LocatedSearch, 48, 7),
+    (LocatedSearch, 80, 13),
+]
+
+
+def texture(side: int) -> Image:
+    coarse = np.random.default_rng(3).integers(0, 256, (8, 8, 3), dtype=np.uint8)
+    return np.asarray(cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def texture_finder(members: int) -> LinearModel:
+    """Return a model that is surest of the texture."""
+    vector = FeatureExtractor(FEATURES).describe(texture(64))
+    weights = np.tile(vector / np.linalg.norm(vector) ** 2, (members, 1))
+    return LinearModel(
+        FEATURES,
+        weights,
+        biases=np.full(members, -0.7, np.float32),
+        slopes=np.full(members, -8, np.float32),
+        offsets=np.linspace(-1, 1, members, dtype=np.float32)
+        if members > 1
+        else np.zeros(1, np.float32),
+    )
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+@pytest.mark.parametrize("members", [1, 2])
+def test_a_texture_scores_highest_in_the_window_it_fills(
+    kind: type, size: int, step: int, members: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder(members)
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    for index in (0, 6, 9, 17, 28, 34):
+        x, y, w, h = grid.boxes[index].tolist()
+        frame = np.full((2 * size + 6 * step, 2 * size + 8 * step, 3), 100, np.uint8)
+        frame[y : y + h, x : x + w] = texture(size)
+        found = search.search(FramePyramid(frame)).probabilities
+        assert found.shape == (35,)
+        assert found.dtype == np.float32
+        assert int(found.argmax()) == index
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (1, 4), (5, 1), (2, 2)])
+def test_a_grid_may_be_a_window_a_row_or_a_column(
+    kind: type, size: int, step: int, columns: int, rows: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(3), columns, rows)
+    model = texture_finder(1)
+    frame = FramePyramid(np.asarray(texture(256), np.uint8))
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    expected = PatchSearch(model, grid).search(frame).probabilities
+    np.testing.assert_allclose(search.search(frame).probabilities, expected, atol=0.1)
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+def test_the_hog_of_each_window_is_what_it_was_scored_by(kind: type, size: int, step: int) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder(2)
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    found = search.search(FramePyramid(np.asarray(texture(400), np.uint8)))
+    numbers = np.random.default_rng(1).permutation(len(grid))
+    hogs = found.hogs(numbers)
+    assert hogs.shape == (len(grid), FeatureExtractor(FEATURES).layout.hog_length)
+    assert hogs.dtype == np.float32
+    scored = model.probabilities(hogs)  # there are no other features
+    np.testing.assert_allclose(scored, found.probabilities[numbers], atol=1e-5)
+    assert len(np.unique(scored.round(4))) > len(grid) / 2
+
+
+def test_a_search_remembers_nothing() -> None:
+    for _, size, step in GRIDS:
+        grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
+        search = dense_search(texture_finder(1), grid)
+        first = search.search(FramePyramid(texture(256)))
+        kept = first.probabilities.copy()
+        hogs = first.hogs(np.arange(len(grid)))
+        search.search(FramePyramid(255 - texture(256)))
+        again = search.search(FramePyramid(texture(256)))
+        for found in (first, again):
+            np.testing.assert_array_equal(found.probabilities, kept)
+            np.testing.assert_array_equal(found.hogs(np.arange(len(grid))), hogs)

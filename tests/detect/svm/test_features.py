@@ -1,0 +1,203 @@
+from typing import get_args
+
+import cv2
+import numpy as np
+import pytest
+
+from seed import SEED
+from vdet.config.schema import (
+    ColorSpace,
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    SpatialSettings,
+)
+from vdet.detect.svm.features import (
+    FeatureExtractor,
+    Layout,
+    convert,
+    halve,
+    histogram,
+    resize,
+    to_patch,
+)
+
+PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+FEATURES = SEED.features
+NO_HOG = HogSettings(channels=())
+NO_HISTOGRAM = HistogramSettings(bins=0)
+
+
+def seed_but(**changes: object) -> FeatureSettings:
+    """Give the seed's features with some sections or values replaced."""
+    return FEATURES.model_copy(update=changes)
+
+
+def test_a_vector_of_the_seed_settings_has_4800_features() -> None:
+    extractor = FeatureExtractor(FEATURES)
+    assert extractor.layout == Layout.of(FEATURES)
+    assert extractor.layout.length == 3 * 1568 + 96 == 4800
+    assert extractor.describe(PATCH).shape == (4800,)
+    assert extractor.describe(PATCH).dtype == np.float32
+
+
+def test_the_layout_names_the_parts_of_a_vector() -> None:
+    layout = Layout.of(seed_but(spatial=SpatialSettings(size=8)))
+    assert layout.hog == (slice(0, 1568), slice(1568, 3136), slice(3136, 4704))
+    assert layout.histogram == slice(4704, 4800)
+    assert layout.spatial == slice(4800, 4992)
+    assert layout.length == 4992
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        FeatureSettings(),
+        FEATURES,
+        seed_but(patch=48, hog=HogSettings(cell=6, block=3, orientations=9, channels=(1,))),
+        seed_but(hog=NO_HOG, histogram=NO_HISTOGRAM, spatial=SpatialSettings(size=4)),
+    ],
+    ids=["default", "seed", "other HOG", "spatial only"],
+)
+def test_a_vector_is_as_long_as_its_layout(settings: FeatureSettings) -> None:
+    extractor = FeatureExtractor(settings)
+    patch = to_patch(PATCH, settings.patch)
+    assert extractor.describe(patch).shape == (extractor.layout.length,)
+
+
+def test_the_hog_part_is_what_opencv_gives_for_each_channel_of_ycrcb() -> None:
+    descriptor = cv2.HOGDescriptor((64, 64), (16, 16), (8, 8), (8, 8), 8)
+    channels = cv2.split(cv2.cvtColor(PATCH, cv2.COLOR_BGR2YCrCb))
+    expected = np.concatenate([np.ravel(descriptor.compute(channel)) for channel in channels])
+    np.testing.assert_array_equal(FeatureExtractor(FEATURES).describe(PATCH)[:4704], expected)
+
+
+def test_the_histogram_part_is_what_numpy_gives_for_each_channel_of_ycrcb() -> None:
+    channels = cv2.split(cv2.cvtColor(PATCH, cv2.COLOR_BGR2YCrCb))
+    expected = np.concatenate([np.histogram(c, 32, range=(0, 256))[0] for c in channels])
+    np.testing.assert_array_equal(FeatureExtractor(FEATURES).describe(PATCH)[4704:], expected)
+
+
+@pytest.mark.parametrize("bins", [8, 16, 32, 64, 128, 256])
+def test_a_histogram_counts_every_value_once(bins: int) -> None:
+    channel = np.repeat(np.arange(256, dtype=np.uint8), 2).reshape(16, 32)
+    assert histogram(channel, bins).tolist() == [2 * 256 // bins] * bins
+
+
+def test_a_histogram_of_one_colour_has_all_its_bins() -> None:
+    assert histogram(np.full((4, 4), 255, np.uint8), 32).tolist() == [0] * 31 + [16]
+
+
+@pytest.mark.parametrize("space", get_args(ColorSpace))
+def test_every_colour_space_is_that_of_opencv(space: ColorSpace) -> None:
+    settings = seed_but(color_space=space, hog=NO_HOG, spatial=SpatialSettings(size=64))
+    converted = cv2.cvtColor(PATCH, getattr(cv2, f"COLOR_BGR2{space}"))
+    np.testing.assert_array_equal(convert(PATCH, settings), converted)
+    spatial = FeatureExtractor(settings).describe(PATCH)[96:]
+    np.testing.assert_array_equal(spatial.reshape(3, 64, 64), converted.transpose(2, 0, 1))
+
+
+def test_a_red_patch_is_red_in_rgb() -> None:
+    red = np.zeros((64, 64, 3), np.uint8)
+    red[..., 2] = 200
+    settings = seed_but(color_space="RGB", hog=NO_HOG, histogram=HistogramSettings(bins=8))
+    vector = FeatureExtractor(settings).describe(red).reshape(3, 8)
+    assert vector.argmax(axis=1).tolist() == [6, 0, 0]
+
+
+@pytest.mark.parametrize("channels", [(0,), (2, 0), (1, 2)])
+def test_hog_may_be_of_some_channels_in_any_order(channels: tuple[int, ...]) -> None:
+    some = FEATURES.hog.model_copy(update={"channels": channels})
+    extractor = FeatureExtractor(seed_but(hog=some, histogram=NO_HISTOGRAM))
+    everything = FeatureExtractor(FEATURES).describe(PATCH)[:4704].reshape(3, 1568)
+    assert extractor.layout.length == 1568 * len(channels)
+    np.testing.assert_array_equal(
+        extractor.describe(PATCH).reshape(-1, 1568), everything[list(channels)]
+    )
+
+
+def test_without_hog_only_the_histogram_is_left() -> None:
+    extractor = FeatureExtractor(seed_but(hog=NO_HOG))
+    assert extractor.layout.hog == ()
+    assert extractor.layout.histogram == slice(0, 96)
+    assert extractor.layout.length == 96
+    assert extractor.describe(PATCH).sum() == 3 * 64 * 64
+
+
+@pytest.mark.parametrize("patch", [17, 20, 100])
+def test_without_hog_a_patch_need_not_be_a_multiple_of_the_cell(patch: int) -> None:
+    settings = FeatureSettings(patch=patch, hog=NO_HOG)
+    assert FeatureExtractor(settings).describe(to_patch(PATCH, patch)).sum() == 3 * patch**2
+
+
+def test_spatial_features_are_the_shrunk_channels() -> None:
+    settings = seed_but(
+        hog=NO_HOG, histogram=NO_HISTOGRAM, spatial=SpatialSettings(size=16), color_space="RGB"
+    )
+    extractor = FeatureExtractor(settings)
+    assert extractor.layout.length == 768
+    means = PATCH[..., ::-1].reshape(16, 4, 16, 4, 3).mean(axis=(1, 3)).transpose(2, 0, 1)
+    np.testing.assert_allclose(extractor.describe(PATCH).reshape(3, 16, 16), means, atol=0.5)
+
+
+def test_spatial_features_come_last() -> None:
+    settings = seed_but(spatial=SpatialSettings(size=8))
+    vector = FeatureExtractor(settings).describe(PATCH)
+    np.testing.assert_array_equal(vector[:4800], FeatureExtractor(FEATURES).describe(PATCH))
+    assert len(vector) == 4800 + 192
+
+
+def test_describe_all_stacks_the_vectors_of_the_patches() -> None:
+    extractor = FeatureExtractor(FEATURES)
+    patches = [PATCH, PATCH[::-1].copy(), PATCH[:, ::-1].copy()]
+    vectors = extractor.describe_all(patches)
+    assert vectors.dtype == np.float32
+    np.testing.assert_array_equal(vectors, [extractor.describe(patch) for patch in patches])
+
+
+def test_describe_all_of_nothing_has_no_rows() -> None:
+    vectors = FeatureExtractor(FEATURES).describe_all([])
+    assert vectors.shape == (0, 4800)
+    assert vectors.dtype == np.float32
+
+
+def test_a_patch_of_the_right_size_is_taken_as_it_is() -> None:
+    np.testing.assert_array_equal(to_patch(PATCH, 64), PATCH)
+
+
+@pytest.mark.parametrize("side", [33, 48, 63, 65, 100, 128])
+def test_less_than_half_or_larger_is_resized_bilinearly(side: int) -> None:
+    expected = cv2.resize(PATCH, (side, side), interpolation=cv2.INTER_LINEAR)
+    np.testing.assert_array_equal(to_patch(PATCH, side), expected)
+
+
+def test_twice_too_large_is_halved_each_pixel_the_mean_of_four() -> None:
+    means = PATCH.reshape(32, 2, 32, 2, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(halve(PATCH), means, atol=0.5)
+    np.testing.assert_array_equal(to_patch(PATCH, 32), halve(PATCH))
+    np.testing.assert_array_equal(to_patch(PATCH, 16), halve(halve(PATCH)))
+
+
+def test_what_is_left_after_halving_is_resized_bilinearly() -> None:
+    expected = cv2.resize(halve(PATCH), (24, 24), interpolation=cv2.INTER_LINEAR)
+    np.testing.assert_array_equal(to_patch(PATCH, 24), expected)
+
+
+@pytest.mark.parametrize(("height", "width"), [(64, 63), (63, 64), (61, 61)])
+def test_twice_too_large_with_an_odd_side_is_averaged_by_area(height: int, width: int) -> None:
+    crop = PATCH[:height, :width]
+    expected = cv2.resize(crop, (16, 16), interpolation=cv2.INTER_AREA)
+    np.testing.assert_array_equal(to_patch(crop, 16), expected)
+
+
+def test_no_pixel_is_skipped_however_small_the_patch() -> None:
+    for size in (64, 60, 50, 37):
+        crop = np.zeros((size, size, 3), np.uint8)
+        crop[:, ::2] = 200  # stripes of a pixel are an even grey from afar
+        assert np.abs(to_patch(crop, 8).astype(int) - 100).max() <= 20
+
+
+def test_width_and_height_may_differ() -> None:
+    assert resize(PATCH, 30, 20).shape == (20, 30, 3)
+    assert resize(PATCH[:10, :50], 64, 64).shape == (64, 64, 3)
+    np.testing.assert_array_equal(resize(PATCH, 32, 32), to_patch(PATCH, 32))

@@ -1,0 +1,308 @@
+from dataclasses import replace
+from typing import Literal
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.config.schema import HeatSettings, WindowSettings
+from vdet.detect.svm.heat import Heat, HeatMap, Values, find_regions
+from vdet.detect.svm.windows import Windows, lay_grid
+from vdet.geometry import Box
+
+
+def found(*windows: tuple[int, int, int, int, float], share: float = 1) -> Windows:
+    boxes = np.array([window[:4] for window in windows], np.int32).reshape(-1, 4)
+    probabilities = np.array([window[4] for window in windows], np.float32)
+    shares = np.full(len(windows), share, np.float32)
+    return Windows(boxes, probabilities, shares, boxes.astype(np.float32))
+
+
+def parts(windows: Windows) -> list[np.ndarray]:
+    return [windows.boxes, windows.probabilities, windows.shares, windows.vehicles]
+
+
+def heat_map(
+    frames: int = 2,
+    blur: int = 0,
+    weight: Literal["none", "coverage"] = "none",
+    shrink: Literal[1, 2, 4, 8] = 1,
+) -> HeatMap:
+    """Make the map of a frame of 100 × 60 pixels."""
+    settings = HeatSettings(frames=frames, blur=blur, weight=weight, shrink=shrink)
+    return HeatMap(100, 60, settings)
+
+
+def values_of(heat: HeatMap, windows: Windows) -> Values:
+    return heat.update(windows).values
+
+
+def drawn(*boxes: tuple[int, int, int, int, float], shrink: int = 1) -> Heat:
+    """Draw a map of 100 × 60 values."""
+    values = np.zeros((60, 100), np.float32)
+    for x, y, width, height, value in boxes:
+        values[y : y + height, x : x + width] = value
+    return Heat(values, shrink)
+
+
+def test_heat_is_the_sum_of_the_probabilities_of_the_windows_over_a_pixel() -> None:
+    heat = values_of(heat_map(), found((10, 10, 20, 20, 0.5), (20, 20, 20, 20, 0.75)))
+    assert heat.shape == (60, 100)
+    assert heat.dtype == np.float32
+    assert heat[10, 10] == 0.5
+    assert heat[25, 25] == 1.25
+    assert heat[39, 39] == 0.75
+    assert heat[40, 39] == heat[39, 40] == heat[9, 10] == 0
+    assert heat.sum() == 400 * 0.5 + 400 * 0.75
+
+
+def test_heat_is_summed_over_the_last_frames_and_the_oldest_is_forgotten() -> None:
+    heat = heat_map(frames=3)
+    peaks = [heat.update(found((0, 0, 5, 5, p))).peak for p in (0.5, 0.25, 1, 0.125)]
+    assert peaks == [0.5, 0.75, 1.75, 1.375]
+
+
+def test_frames_without_detections_cool_the_map_down() -> None:
+    heat = heat_map(frames=2)
+    heat.update(found((0, 0, 5, 5, 1)))
+    assert heat.update(found()).peak == 1
+    assert heat.update(found()).peak == 0
+
+
+def test_a_returned_map_does_not_change_with_later_frames() -> None:
+    heat = heat_map()
+    first = heat.update(found((0, 0, 5, 5, 1)))
+    heat.update(found((0, 0, 5, 5, 1)))
+    assert first.peak == 1
+
+
+def test_blur_spreads_heat_and_conserves_it() -> None:
+    window = found((40, 20, 20, 20, 1))
+    sharp, blurred = values_of(heat_map(), window), values_of(heat_map(blur=15), window)
+    assert blurred.sum() == pytest.approx(sharp.sum(), rel=1e-5)
+    assert 0 < blurred[30, 35] < 1
+    np.testing.assert_allclose(blurred, cv2.GaussianBlur(sharp, (15, 15), 0), atol=1e-6)
+
+
+def test_blur_is_of_the_sum_not_of_what_is_kept() -> None:
+    heat = heat_map(frames=2, blur=9)
+    heat.update(found((40, 20, 20, 20, 1)))
+    twice = values_of(heat, found((40, 20, 20, 20, 1)))
+    once = values_of(heat_map(blur=9), found((40, 20, 20, 20, 1)))
+    np.testing.assert_allclose(twice, 2 * once, atol=1e-6)
+
+
+def test_an_even_blur_is_rounded_up_to_the_next_odd_one() -> None:
+    window = found((40, 20, 20, 20, 1))
+    np.testing.assert_array_equal(
+        values_of(heat_map(blur=14), window), values_of(heat_map(blur=15), window)
+    )
+
+
+@pytest.mark.parametrize("blur", [0, 1])
+def test_a_blur_of_a_pixel_or_none_changes_nothing(blur: int) -> None:
+    assert values_of(heat_map(blur=blur), found((0, 0, 9, 9, 1))).sum() == 81
+
+
+@pytest.mark.parametrize(
+    ("window", "pixels"),
+    [
+        ((-5, -5, 10, 10), 25),
+        ((95, 55, 10, 10), 25),
+        ((-20, 0, 10, 10), 0),
+        ((0, -20, 10, 10), 0),
+        ((100, 0, 10, 10), 0),
+    ],
+)
+def test_of_a_window_partly_outside_the_frame_only_the_inside_is_heated(
+    window: tuple[int, int, int, int], pixels: int
+) -> None:
+    assert values_of(heat_map(), found((*window, 1))).sum() == pixels
+
+
+def test_the_peak_is_the_highest_value_and_of_no_values_zero() -> None:
+    assert drawn((3, 4, 1, 1, 2.5), (9, 9, 5, 5, 1)).peak == 2.5
+    assert Heat(np.zeros((0, 0), np.float32)).peak == 0
+
+
+def test_by_coverage_a_window_adds_its_share_of_its_probability() -> None:
+    quarters = found((10, 10, 20, 20, 0.5), (20, 20, 20, 20, 1), share=0.25)
+    values = values_of(heat_map(weight="coverage"), quarters)
+    assert values[10, 10] == 0.125
+    assert values[25, 25] == 0.375
+    assert values[39, 39] == 0.25
+
+
+def test_without_weight_shares_do_not_matter() -> None:
+    window = (10, 10, 20, 20, 0.5)
+    np.testing.assert_array_equal(
+        values_of(heat_map(), found(window, share=0.25)), values_of(heat_map(), found(window))
+    )
+
+
+@pytest.mark.parametrize("overlap", [0, 0.5, 0.75])
+def test_by_coverage_heat_does_not_depend_on_overlap(overlap: float) -> None:
+    settings = WindowSettings(size=20, overlap=overlap, top=0, bottom=60)
+    grid = lay_grid(settings, 100, 60)
+    shares = np.full(len(grid), grid.share, np.float32)
+    ones, boxes = np.ones(len(grid), np.float32), grid.boxes
+    windows = Windows(boxes, ones, shares, boxes.astype(np.float32))
+    assert values_of(heat_map(weight="coverage"), windows)[30, 50] == pytest.approx(1)
+
+
+def test_by_coverage_sets_that_agree_add_up() -> None:
+    heat = heat_map(weight="coverage")
+    large, small = found((0, 0, 40, 40, 1), share=0.25), found((20, 20, 20, 20, 1), share=0.0625)
+    both = Windows(*(np.concatenate(pair) for pair in zip(parts(large), parts(small), strict=True)))
+    assert values_of(heat, both)[30, 30] == 0.3125
+
+
+def test_a_window_heats_the_vehicle_that_it_shows_not_itself() -> None:
+    window = found((10, 10, 20, 20, 0.5))
+    shown = replace(window, vehicles=np.array([[14, 12, 30, 10]], np.float32))
+    expected = values_of(heat_map(), found((14, 12, 30, 10, 0.5)))
+    np.testing.assert_array_equal(values_of(heat_map(), shown), expected)
+
+
+@pytest.mark.parametrize(("x", "first"), [(9.4, 9), (9.6, 10), (-0.4, 0)])
+def test_sides_of_a_vehicle_between_pixels_go_to_the_nearest(x: float, first: int) -> None:
+    window = found((10, 10, 20, 20, 1))
+    shown = replace(window, vehicles=np.array([[x, 5, 20, 10]], np.float32))
+    (columns,) = np.nonzero(values_of(heat_map(), shown)[7])
+    assert columns.tolist() == list(range(first, first + 20))
+
+
+@pytest.mark.parametrize("shrink", [2, 4, 8])
+class TestShrunk:
+    def test_a_value_stands_for_n_by_n_pixels(self, shrink: Literal[2, 4, 8]) -> None:
+        heat = heat_map(shrink=shrink).update(found((16, 8, 32, 24, 0.5)))
+        assert heat.shrink == shrink
+        expected = np.zeros((60, 100), np.float32)
+        expected[8:32, 16:48] = 0.5
+        np.testing.assert_array_equal(heat.values, expected[::shrink, ::shrink])
+
+    def test_the_map_covers_a_frame_of_any_size(self, shrink: Literal[2, 4, 8]) -> None:
+        for width, height in ((100, 60), (97, 57), (1, 1)):
+            heat = HeatMap(width, height, HeatSettings(shrink=shrink)).update(found())
+            rows, columns = heat.values.shape
+            assert height <= rows * shrink < height + shrink
+            assert width <= columns * shrink < width + shrink
+
+    def test_sides_go_to_the_nearest_value(self, shrink: Literal[2, 4, 8]) -> None:
+        near = shrink // 2 - 1  # pixels beyond a multiple of n: not yet the next one
+        moved = found((8 + near, 8 + near, 24, 24, 1))
+        np.testing.assert_array_equal(
+            values_of(heat_map(shrink=shrink), moved),
+            values_of(heat_map(shrink=shrink), found((8, 8, 24, 24, 1))),
+        )
+        farther = found((8 + shrink // 2, 8, 24, 24, 1))
+        np.testing.assert_array_equal(
+            values_of(heat_map(shrink=shrink), farther),
+            values_of(heat_map(shrink=shrink), found((8 + shrink, 8, 24, 24, 1))),
+        )
+
+    def test_a_window_partly_outside_heats_the_inside(self, shrink: Literal[2, 4, 8]) -> None:
+        values = values_of(heat_map(shrink=shrink), found((-8, -8, 24, 16, 1), (88, 48, 24, 24, 1)))
+        rows, columns = values.shape
+        expected = np.zeros_like(values)
+        expected[: 8 // shrink, : 16 // shrink] = 1
+        expected[48 // shrink : rows, 88 // shrink : columns] = 1
+        np.testing.assert_array_equal(values, expected)
+
+    def test_blur_is_as_wide_in_the_frame(self, shrink: Literal[2, 4, 8]) -> None:
+        window = found((32, 16, 16, 16, 1))
+        sharp = values_of(heat_map(shrink=shrink), window)
+        blurred = values_of(heat_map(shrink=shrink, blur=24), window)
+        side = {2: 13, 4: 7, 8: 3}[shrink]  # 24 / n, made odd
+        np.testing.assert_allclose(blurred, cv2.GaussianBlur(sharp, (side, side), 0), atol=1e-6)
+        assert (blurred != sharp).any()
+
+    def test_regions_are_in_pixels_of_the_frame(self, shrink: int) -> None:
+        (region,) = find_regions(drawn((5, 3, 4, 2, 2), shrink=shrink), 1)
+        assert region.box == Box(5 * shrink, 3 * shrink, 4 * shrink, 2 * shrink)
+        # the middles of the outermost values' pixels are at equal distance from it
+        left, right = (5 + 0.5) * shrink - 0.5, (8 + 0.5) * shrink - 0.5
+        top, bottom = (3 + 0.5) * shrink - 0.5, (4 + 0.5) * shrink - 0.5
+        assert region.centroid == pytest.approx(((left + right) / 2, (top + bottom) / 2))
+        assert region.peak == 2
+
+    def test_a_single_value_is_a_region_with_its_middle(self, shrink: int) -> None:
+        (region,) = find_regions(drawn((5, 3, 1, 1, 2), shrink=shrink), 1)
+        assert region.box == Box(5 * shrink, 3 * shrink, shrink, shrink)
+        assert region.centroid == region.box.center
+
+    def test_a_window_comes_back_as_a_region(self, shrink: Literal[2, 4, 8]) -> None:
+        heat = heat_map(shrink=shrink).update(found((16, 8, 32, 24, 2)))
+        (region,) = find_regions(heat, 1)
+        assert region.box == Box(16, 8, 32, 24)
+        assert region.centroid == pytest.approx((31.5, 19.5))
+
+
+def test_a_drawn_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
+    heat = drawn((20, 10, 31, 21, 2))
+    heat.values[15, 30] = 5
+    (region,) = find_regions(heat, 1.4)
+    assert region.box == Box(20, 10, 31, 21)
+    assert region.centroid == pytest.approx((35, 20))
+    assert region.peak == 5
+
+
+def test_each_region_has_its_own_peak() -> None:
+    regions = find_regions(drawn((50, 5, 10, 10, 2), (5, 30, 10, 10, 3)), 1)
+    assert [(region.box, region.peak) for region in regions] == [
+        (Box(50, 5, 10, 10), 2.0),
+        (Box(5, 30, 10, 10), 3.0),
+    ]
+
+
+def test_regions_come_topmost_first_and_then_leftmost() -> None:
+    heat = drawn((60, 5, 4, 4, 2), (5, 5, 4, 4, 2), (30, 40, 4, 4, 2), (2, 20, 4, 4, 2))
+    corners = [(region.box.x, region.box.y) for region in find_regions(heat, 1)]
+    assert corners == [(5, 5), (60, 5), (2, 20), (30, 40)]
+
+
+def test_heat_equal_to_the_threshold_is_not_hot() -> None:
+    heat = drawn((10, 10, 10, 10, 1.5))
+    assert find_regions(heat, 1.5) == []
+    assert len(find_regions(heat, 1.4999)) == 1
+
+
+def test_a_cold_map_has_no_regions() -> None:
+    assert find_regions(drawn(), 0) == []
+
+
+def test_a_hole_does_not_split_a_region() -> None:
+    (region,) = find_regions(drawn((20, 10, 30, 30, 2), (30, 20, 10, 10, 0)), 1)
+    assert region.box == Box(20, 10, 30, 30)
+    assert region.centroid == pytest.approx((34.5, 24.5))
+    assert region.peak == 2
+
+
+def test_what_lies_in_the_box_but_not_in_the_region_does_not_count_for_its_peak() -> None:
+    # an L around a hotter spot that does not touch it
+    heat = drawn((10, 10, 5, 40, 2), (10, 45, 40, 5, 2), (30, 15, 5, 5, 9))
+    peaks = {region.box: region.peak for region in find_regions(heat, 1)}
+    assert peaks == {Box(10, 10, 40, 40): 2.0, Box(30, 15, 5, 5): 9.0}
+
+
+def test_a_single_pixel_is_a_region_with_its_middle() -> None:
+    (region,) = find_regions(drawn((7, 9, 1, 1, 3)), 1)
+    assert region.box == Box(7, 9, 1, 1)
+    assert region.centroid == (7.5, 9.5)
+    assert region.peak == 3
+
+
+def test_a_line_is_a_region_with_the_middle_of_its_box() -> None:
+    (region,) = find_regions(drawn((10, 9, 20, 1, 3)), 1)
+    assert region.box == Box(10, 9, 20, 1)
+    assert region.centroid == (20, 9.5)
+
+
+def test_pixels_that_touch_at_a_corner_are_connected() -> None:
+    (region,) = find_regions(drawn((10, 10, 5, 5, 2), (15, 15, 5, 5, 2)), 1)
+    assert region.box == Box(10, 10, 10, 10)
+
+
+def test_a_region_at_the_border_of_the_frame_is_whole() -> None:
+    (region,) = find_regions(drawn((0, 0, 100, 60, 2)), 1)
+    assert region.box == Box(0, 0, 100, 60)

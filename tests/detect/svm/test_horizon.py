@@ -1,0 +1,130 @@
+"""Roads drawn with a known horizon, and pictures that show none."""
+
+import tracemalloc
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.detect.svm.horizon import USUAL, find_horizon
+from vdet.media.images import Image
+from vdet.synthetic import Renderer, default_clip, empty_road, frames
+from vdet.synthetic.camera import Camera
+
+STEP = 0.01  # of the rows that are looked at
+RNG = np.random.default_rng(0)
+
+
+def road(
+    horizon: float,
+    *,
+    size: tuple[int, int] = (640, 360),
+    curvature: float = 0,
+    lane: int = 0,
+    lanes: int = 3,
+    count: int = 3,
+) -> list[Image]:
+    """Draw consecutive frames of an empty road."""
+    width, height = size
+    camera = Camera(width, height, 0.6 * width + 0.6 * height, horizon * height, 1.3, curvature)
+    scene = empty_road(np.random.default_rng(7), camera, lane=lane, lanes=lanes, seed=7)
+    renderer = Renderer(replace(scene, frames=count))
+    return [renderer.image(index) for index in range(count)]
+
+
+@pytest.mark.parametrize("horizon", [0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.65])
+def test_the_lines_of_a_straight_road_meet_at_the_horizon(horizon: float) -> None:
+    assert find_horizon(road(horizon)) == pytest.approx(horizon, abs=STEP)
+
+
+@pytest.mark.parametrize("size", [(320, 180), (960, 540), (1242, 375), (640, 480)])
+@pytest.mark.parametrize("horizon", [0.4, 0.58])
+def test_frames_may_have_any_shape(size: tuple[int, int], horizon: float) -> None:
+    found = find_horizon(road(horizon, size=size))
+    assert found == pytest.approx(horizon, abs=2 * STEP)
+
+
+@pytest.mark.parametrize("curvature", [-1 / 600, 1 / 1000])
+@pytest.mark.parametrize(("lane", "lanes"), [(0, 2), (1, 2), (1, 3)])
+def test_the_road_may_bend_and_the_camera_be_in_any_lane(
+    curvature: float, lane: int, lanes: int
+) -> None:
+    images = road(0.5, curvature=curvature, lane=lane, lanes=lanes)
+    assert find_horizon(images) == pytest.approx(0.5, abs=2 * STEP)
+
+
+def test_traffic_does_not_hide_it() -> None:
+    scene = replace(default_clip(1, width=640, height=360), frames=5)
+    found = find_horizon([frame.image for frame in frames(scene)])
+    assert found == pytest.approx(scene.camera.horizon / 360, abs=2 * STEP)
+
+
+def test_one_frame_may_be_enough() -> None:
+    assert find_horizon(road(0.45, count=1)) == pytest.approx(0.45, abs=STEP)
+
+
+def test_it_does_not_depend_on_the_order_of_the_frames() -> None:
+    images = road(0.62)
+    assert find_horizon(images[::-1]) == find_horizon(images)
+
+
+def test_a_mirrored_road_has_the_same() -> None:
+    images = [np.ascontiguousarray(image[:, ::-1]) for image in road(0.42, lane=2)]
+    assert find_horizon(images) == pytest.approx(0.42, abs=2 * STEP)
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((180, 320, 3), np.uint8),
+        np.full((180, 320, 3), 255, np.uint8),
+        RNG.integers(0, 256, (180, 320, 3), dtype=np.uint8),
+        np.repeat(RNG.integers(0, 256, (1, 320, 3), dtype=np.uint8), 180, axis=0),
+        np.zeros((1, 1, 3), np.uint8),
+        np.zeros((1, 500, 3), np.uint8),
+    ],
+    ids=["black", "white", "noise", "upright lines", "a pixel", "a row"],
+)
+def test_where_no_lines_tell_it_is_where_it_usually_is(image: Image) -> None:
+    assert find_horizon([image]) == USUAL
+
+
+def test_no_frames_tell_nothing() -> None:
+    assert find_horizon([]) == USUAL
+
+
+def fan(*slopes: float, meeting: float = 0.45, upward: bool = False) -> Image:
+    """Draw lines of these slopes from where they meet in the middle of a picture, down or up."""
+    image = np.full((360, 640, 3), 90, np.uint8)
+    for slope in slopes:
+        side, drop = np.sign(slope), -abs(slope) if upward else abs(slope)
+        for near, far in ((60, 110), (130, 180)):
+            start, end = (
+                (round(320 + side * x), round(360 * meeting + drop * x)) for x in (near, far)
+            )
+            cv2.line(image, start, end, (240, 240, 240), 3, cv2.LINE_AA)
+    return image
+
+
+RIGHT = (0.3, 0.5, 0.7, 0.9)
+LEFT = tuple(-slope for slope in RIGHT)
+
+
+def test_lines_from_both_sides_are_needed() -> None:
+    assert find_horizon([fan(*LEFT, *RIGHT)]) == pytest.approx(0.45, abs=STEP)
+    assert find_horizon([fan(*RIGHT)]) == find_horizon([fan(*LEFT)]) == USUAL
+
+
+def test_lines_that_meet_below_themselves_do_not_count() -> None:
+    roofs = fan(*LEFT, *RIGHT, meeting=0.65, upward=True)
+    road_lines = fan(*LEFT, *RIGHT, meeting=0.4)
+    assert find_horizon([road_lines, roofs, roofs]) == pytest.approx(0.4, abs=STEP)
+
+
+def test_a_picture_far_taller_than_wide_is_not_enlarged() -> None:
+    tracemalloc.start()
+    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == USUAL
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10_000_000

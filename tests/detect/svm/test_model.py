@@ -1,0 +1,451 @@
+import io
+import json
+import math
+import pickle
+import tracemalloc
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings, SpatialSettings
+from vdet.detect.svm.model import BoxRegression, LinearModel, load_model, save_model
+from vdet.errors import ModelError, OutputError
+
+# 8 bins a channel and nothing else: 24 features
+SMALL = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+# 4 × 4 cells, each a block of its own, 2 directions: 32 features, and 24 of the histogram
+WITH_HOG = FeatureSettings(
+    patch=16,
+    hog=HogSettings(cell=4, block=1, orientations=2, channels=(0,)),
+    histogram=HistogramSettings(bins=8),
+)
+
+
+def model_of(members: int, features: FeatureSettings = SMALL, length: int = 24) -> LinearModel:
+    rng = np.random.default_rng(members)
+    weights = rng.normal(size=(members, length)).astype(np.float32)
+    biases, slopes, offsets = rng.normal(size=(3, members)).astype(np.float32)
+    provenance = {"data": "drawn", "accuracy": 0.5}
+    return LinearModel(features, weights, biases, slopes, offsets, provenance)
+
+
+def model_with_boxes() -> LinearModel:
+    rng = np.random.default_rng(9)
+    weights, biases = rng.normal(size=(4, 32)), rng.normal(size=4)
+    boxes = BoxRegression(weights.astype(np.float32), biases.astype(np.float32))
+    return replace(model_of(2, WITH_HOG, 56), boxes=boxes)
+
+
+def boxes_of(model: LinearModel) -> BoxRegression:
+    assert model.boxes is not None
+    return model.boxes
+
+
+def header_of(asked: FeatureSettings = SMALL, **changes: Any) -> dict[str, Any]:
+    header = {
+        "format": "vdet model",
+        "version": 2,
+        "features": asked.model_dump(mode="json"),
+        "provenance": {},
+    }
+    return {key: value for key, value in (header | changes).items() if value is not ...}
+
+
+def arrays_of(model: LinearModel) -> dict[str, npt.NDArray[Any]]:
+    return {name: getattr(model, name) for name in ("weights", "biases", "slopes", "offsets")}
+
+
+def write_npz(path: Path, header: object, **arrays: npt.NDArray[Any]) -> Path:
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    parts: dict[str, Any] = arrays_of(model_of(2)) | arrays
+    np.savez_compressed(path, header=np.frombuffer(text, np.uint8), **parts)
+    return path
+
+
+def box_arrays() -> dict[str, npt.NDArray[Any]]:
+    boxes = boxes_of(model_with_boxes())
+    return {"box_weights": boxes.weights, "box_biases": boxes.biases}
+
+
+def write_with_boxes(path: Path, **changes: npt.NDArray[Any]) -> Path:
+    arrays = arrays_of(model_with_boxes()) | box_arrays() | changes
+    return write_npz(path, header_of(WITH_HOG), **arrays)
+
+
+def write_members(path: Path, members: Mapping[str, bytes]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in members.items():
+            archive.writestr(f"{name}.npy", data)
+    return path
+
+
+def npy(array: npt.NDArray[Any]) -> bytes:
+    file = io.BytesIO()
+    np.save(file, array, allow_pickle=True)
+    return file.getvalue()
+
+
+def npy_header(kind: str, shape: str) -> bytes:
+    text = f"{{'descr': {kind!r}, 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text
+
+
+def members_of(model: LinearModel, **changes: bytes) -> dict[str, bytes]:
+    header = np.frombuffer(json.dumps(header_of()).encode(), np.uint8)
+    return {k: npy(v) for k, v in {"header": header, **arrays_of(model)}.items()} | changes
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "model.npz"
+
+
+def test_a_score_is_the_dot_product_plus_the_bias() -> None:
+    weights = np.array([[1, 2, 3], [0, -1, 0.5]], np.float32)
+    ones = np.ones(2, np.float32)
+    model = LinearModel(SMALL, weights, np.array([10, 20], np.float32), ones, ones)
+    vectors = np.array([[1, 1, 1], [2, 0, -1]], np.float32)
+    assert model.scores(vectors).tolist() == [[16, 19.5], [9, 19.5]]
+
+
+def test_the_probability_is_the_mean_of_the_members_sigmoids() -> None:
+    model = LinearModel(
+        SMALL,
+        np.array([[1.0], [2.0]], np.float32),
+        np.array([0.5, -1.0], np.float32),
+        np.array([-1.5, -0.5], np.float32),
+        np.array([0.25, 0.0], np.float32),
+    )
+    first = 1 / (1 + math.exp(-1.5 * (1.0 * 2 + 0.5) + 0.25))
+    second = 1 / (1 + math.exp(-0.5 * (2.0 * 2 - 1.0) + 0.0))
+    probability = model.probabilities(np.array([[2.0]], np.float32))
+    assert probability.dtype == np.float32
+    assert probability.tolist() == [pytest.approx((first + second) / 2, abs=1e-6)]
+
+
+def test_huge_scores_give_probabilities_of_0_and_1_without_overflow() -> None:
+    one = np.ones(1, np.float32)
+    model = LinearModel(SMALL, np.array([[1e30]], np.float32), 0 * one, -one, 0 * one)
+    probabilities = model.probabilities(np.array([[-1.0], [0.0], [1.0]], np.float32))
+    assert probabilities.tolist() == pytest.approx([0, 0.5, 1])
+
+
+def test_no_vectors_have_no_probabilities() -> None:
+    assert model_of(3).probabilities(np.empty((0, 24), np.float32)).shape == (0,)
+
+
+@pytest.mark.parametrize("members", [1, 3, 20])
+def test_a_saved_model_is_loaded_bit_for_bit(path: Path, members: int) -> None:
+    model = model_of(members)
+    save_model(model, path)
+    loaded = load_model(path)
+    assert loaded.features == model.features
+    assert loaded.provenance == model.provenance
+    for name, array in arrays_of(model).items():
+        np.testing.assert_array_equal(getattr(loaded, name), array)
+        assert getattr(loaded, name).dtype == np.float32
+
+
+def test_the_features_of_a_model_come_with_it(path: Path) -> None:
+    features = FeatureSettings(
+        color_space="HLS", hog=HogSettings(channels=(1,)), spatial=SpatialSettings(size=4)
+    )
+    save_model(model_of(1, features, 1568 + 96 + 48), path)
+    assert load_model(path).features == features
+    assert load_model(path, features).features == features
+
+
+def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
+    weights = np.array([[1, 0], [0, 1], [2, 0], [0, -1]], np.float32)
+    regression = BoxRegression(weights, np.array([-0.5, -0.5, 0.5, 0.5], np.float32))
+    sides = regression.sides(np.array([[0.25, 1], [0, 0]], np.float32))
+    assert sides.tolist() == [[-0.25, 0.5, 1, -0.5], [-0.5, -0.5, 0.5, 0.5]]
+
+
+def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
+    saved = model_with_boxes()
+    save_model(saved, path)
+    loaded = load_model(path, WITH_HOG)
+    np.testing.assert_array_equal(loaded.weights, saved.weights)
+    for name in ("weights", "biases"):
+        array = getattr(boxes_of(loaded), name)
+        np.testing.assert_array_equal(array, getattr(boxes_of(saved), name))
+        assert array.dtype == np.float32
+
+
+def test_a_model_without_boxes_is_loaded_without(path: Path) -> None:
+    save_model(replace(model_with_boxes(), boxes=None), path)
+    assert load_model(path).boxes is None
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "message"),
+    [
+        ("box_weights", np.zeros((4, 31), np.float32), "box_weights are damaged; train it again"),
+        ("box_weights", np.zeros((4, 56), np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((3, 32), np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros(128, np.float32), "box_weights are damaged"),
+        ("box_weights", np.zeros((4, 32)), "box_weights are damaged"),
+        ("box_weights", np.full((4, 32), np.nan, np.float32), "box_weights hold a value that is"),
+        ("box_biases", np.zeros(3, np.float32), "box_biases are damaged"),
+        ("box_biases", np.zeros((4, 1), np.float32), "box_biases are damaged"),
+        ("box_biases", np.zeros(4, "S4"), "box_biases are damaged"),
+        ("box_biases", np.array([0, 0, np.inf, 0], np.float32), "box_biases hold a value that is"),
+    ],
+)
+def test_a_regression_that_does_not_fit_is_refused(
+    path: Path, name: str, array: npt.NDArray[Any], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        load_model(write_with_boxes(path, **{name: array}))
+
+
+@pytest.mark.parametrize("missing", ["box_weights", "box_biases"])
+def test_half_a_regression_is_damage(path: Path, missing: str) -> None:
+    arrays = {name: array for name, array in box_arrays().items() if name != missing}
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(write_npz(path, header_of(WITH_HOG), **arrays_of(model_with_boxes()), **arrays))
+
+
+def test_a_regression_written_by_hand_is_read(path: Path) -> None:
+    assert boxes_of(load_model(write_with_boxes(path))).weights.shape == (4, 32)
+
+
+def test_a_model_without_provenance_has_an_empty_one(path: Path) -> None:
+    assert load_model(write_npz(path, header_of(provenance=...))).provenance == {}
+
+
+def test_a_model_asked_for_other_features_says_which_differ(path: Path) -> None:
+    save_model(model_of(1), path)
+    asked = SMALL.model_copy(update={"color_space": "HSV", "patch": 48})
+    with pytest.raises(ModelError, match="trained with other features") as error:
+        load_model(path, asked)
+    assert "features.color_space: YCrCb, asked for HSV" in str(error.value)
+    assert "features.patch: 32, asked for 48" in str(error.value)
+    assert "features.hog" not in str(error.value)
+
+
+def test_a_model_is_not_saved_into_a_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_model(model_of(1), tmp_path / "no" / "model.npz")
+
+
+def test_a_missing_model_is_named(path: Path) -> None:
+    with pytest.raises(ModelError, match=r"model\.npz: cannot be read: No such file"):
+        load_model(path)
+
+
+def test_a_folder_is_no_model(tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="cannot be read: Is a directory"):
+        load_model(tmp_path)
+
+
+@pytest.mark.parametrize("data", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
+def test_what_is_no_zip_file_is_no_model(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+    with pytest.raises(ModelError, match="is not a vdet model, or is damaged; make one with"):
+        load_model(path)
+
+
+def test_a_foreign_npz_is_no_model(path: Path) -> None:
+    np.savez(path, images=np.zeros(3))
+    with pytest.raises(ModelError, match="is not a vdet model"):
+        load_model(path)
+
+
+def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
+    save_model(model_of(3), path)
+    whole = path.read_bytes()
+    for length in range(0, len(whole), 37):
+        path.write_bytes(whole[:length])
+        with pytest.raises(ModelError, match="damaged"):
+            load_model(path)
+
+
+def test_a_mutated_model_is_refused_or_loads_with_all_its_parts(path: Path) -> None:
+    save_model(model_of(3), path)
+    whole = np.frombuffer(path.read_bytes(), np.uint8)
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(300):
+        mutated = whole.copy()
+        mutated[rng.integers(len(whole), size=rng.integers(1, 4))] = rng.integers(256)
+        path.write_bytes(mutated.tobytes())
+        try:
+            model = load_model(path)
+        except ModelError:
+            refused += 1
+        else:  # what the mutation hit is not part of the model: a date, an attribute
+            np.testing.assert_array_equal(model.weights, model_of(3).weights)
+    assert refused > 200
+
+
+@pytest.mark.parametrize("method", [1, 12, 14, 99])
+def test_another_compression_than_the_one_that_is_declared_is_damage(
+    path: Path, method: int
+) -> None:
+    save_model(model_of(3), path)
+    data = bytearray(path.read_bytes())
+    for mark, offset in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
+        at = data.find(mark)
+        while at >= 0:
+            data[at + offset] = method
+            at = data.find(mark, at + 1)
+    path.write_bytes(data)
+    with pytest.raises(ModelError):
+        load_model(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        (header_of(format="something else"), "is not a vdet model"),
+        (header_of(format=...), "is not a vdet model"),
+        ([1, 2], "is not a vdet model"),
+        (None, "is not a vdet model"),
+        (b"{not json", "is not a vdet model"),
+        (b"\xff\xfe\xff", "is not a vdet model"),
+        (b"[" * 100_000, "is not a vdet model"),
+        (header_of(version=1), r"of version 1, this program reads version 2; train it again"),
+        (header_of(version=[1]), r"of version \[1\]"),
+        (header_of(version="1"), "of version '1'"),
+        (header_of(version=...), "of version None"),
+        (header_of(features=...), "feature settings are not understood; train again"),
+        (header_of(features=[]), "feature settings are not understood"),
+        (header_of(features={"patch": 63}), "feature settings are not understood"),
+        (header_of(features={"patch": math.nan}), "feature settings are not understood"),
+        (header_of(features={"colour": "red"}), "feature settings are not understood"),
+        (header_of(provenance=[]), "provenance is not understood"),
+        (header_of(provenance="me"), "provenance is not understood"),
+        (header_of(provenance=None), "provenance is not understood"),
+    ],
+)
+def test_a_header_that_is_not_understood_is_refused(
+    path: Path, header: object, message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        load_model(write_npz(path, header))
+
+
+def test_a_header_of_another_type_is_refused(path: Path) -> None:
+    members = members_of(model_of(2), header=npy(np.full(100, np.nan)))
+    with pytest.raises(ModelError, match="is not a vdet model"):
+        load_model(write_members(path, members))
+
+
+@pytest.mark.parametrize("missing", ["header", "weights", "biases", "slopes", "offsets"])
+def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -> None:
+    members = members_of(model_of(2))
+    del members[missing]
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(write_members(path, members))
+
+
+def test_members_written_by_hand_are_a_model(path: Path) -> None:
+    assert load_model(write_members(path, members_of(model_of(2)))).biases.shape == (2,)
+
+
+@pytest.mark.parametrize(
+    ("name", "array", "message"),
+    [
+        ("weights", np.zeros((2, 23), np.float32), r"shape \(2, 23\), its features need \(2, 24\)"),
+        ("weights", np.zeros((3, 24), np.float32), r"shape \(3, 24\), its features need \(2, 24\)"),
+        ("weights", np.zeros(24, np.float32), "its features need"),
+        ("weights", np.zeros((2, 24, 1), np.float32), "its features need"),
+        ("weights", np.zeros((2, 24)), "weights are damaged"),
+        ("weights", np.full((2, 24), np.nan, np.float32), "weights hold a value that is not a num"),
+        ("biases", np.zeros((2, 1), np.float32), "its features need"),
+        ("biases", np.array([0, np.inf], np.float32), "biases hold a value that is not a number"),
+        ("biases", np.zeros(2, "S4"), "biases are damaged"),
+        ("biases", np.zeros(2, [("a", "f4")]), "biases are damaged"),
+        ("slopes", np.zeros(3, np.float32), "slopes are damaged"),
+        ("slopes", np.zeros(2, ">f4"), "slopes are damaged"),
+        ("slopes", np.array([np.nan, 0], np.float32), "slopes hold a value that is not a number"),
+        ("offsets", np.float32(0), "offsets are damaged"),
+        ("offsets", np.array([-np.inf, 0], np.float32), "offsets hold a value that is not a numb"),
+    ],
+)
+def test_an_array_that_does_not_fit_is_refused(
+    path: Path, name: str, array: npt.NDArray[Any], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        load_model(write_npz(path, header_of(), **{name: array}))
+
+
+@pytest.mark.parametrize("members", [0, 21])
+def test_no_members_and_too_many_are_refused(path: Path, members: int) -> None:
+    arrays = {name: np.zeros(members, np.float32) for name in ("biases", "slopes", "offsets")}
+    weights = np.zeros((members, 24), np.float32)
+    with pytest.raises(ModelError, match="train it again"):
+        load_model(write_npz(path, header_of(), weights=weights, **arrays))
+
+
+class _Trap:
+    """Makes a folder when it is unpickled."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Path.mkdir, (self.folder,)
+
+
+def test_pickled_objects_are_refused_and_not_run(path: Path, tmp_path: Path) -> None:
+    trap = np.array([_Trap(tmp_path / "sprung")], object)
+    for name in ("header", "weights"):
+        with pytest.raises(ModelError, match="damaged"):
+            load_model(write_members(path, members_of(model_of(2), **{name: npy(trap)})))
+    path.write_bytes(pickle.dumps(trap))
+    with pytest.raises(ModelError):
+        load_model(path)
+    assert not (tmp_path / "sprung").exists()
+
+
+def test_a_pickle_as_long_as_the_array_that_it_claims_to_be_is_not_run(
+    path: Path, tmp_path: Path
+) -> None:
+    pickled = pickle.dumps(_Trap(tmp_path / "sprung"))
+    pickled += bytes(-len(pickled) % 8)
+    data = npy_header("|O", f"({len(pickled) // 8},)") + pickled
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(write_members(path, members_of(model_of(2), weights=data)))
+    assert not (tmp_path / "sprung").exists()
+
+
+def test_no_memory_is_set_aside_for_a_shape_that_the_file_does_not_hold(path: Path) -> None:
+    data = npy_header("<f4", "(1000000000,)") + bytes(192)
+    write_members(path, members_of(model_of(2), weights=data))
+    tracemalloc.start()
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10_000_000
+
+
+@pytest.mark.parametrize(
+    "shape", ["(1000000000,)", "(2, 1000000000000000000)", "(-1,)", "(-2, -24)", "(True,)", "'x'"]
+)
+def test_a_shape_that_the_file_does_not_hold_is_refused(path: Path, shape: str) -> None:
+    data = npy_header("<f4", shape) + bytes(192)
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(write_members(path, members_of(model_of(2), weights=data)))
+
+
+def test_a_later_version_of_the_array_format_is_refused(path: Path) -> None:
+    data = npy(np.zeros((2, 24), np.float32)).replace(b"NUMPY\x01", b"NUMPY\x03")
+    with pytest.raises(ModelError, match="damaged"):
+        load_model(write_members(path, members_of(model_of(2), weights=data)))
+
+
+def test_a_zip_bomb_is_refused_by_its_size(path: Path) -> None:
+    write_members(path, members_of(model_of(2), bomb=bytes(65_000_000)))
+    assert path.stat().st_size < 100_000
+    with pytest.raises(ModelError, match="is far too large for a model"):
+        load_model(path)

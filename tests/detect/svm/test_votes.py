@@ -1,0 +1,293 @@
+"""Vehicles from votes whose truth is known: windows laid around drawn boxes."""
+
+from collections.abc import Sequence
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.config.schema import VoteSettings
+from vdet.detect.svm.heat import Region
+from vdet.detect.svm.votes import MOST_VOTES, Votes, split_regions
+from vdet.detect.svm.windows import Windows
+from vdet.geometry import Box
+
+Vote = tuple[float, float, float, float, float]
+"""x, y, width, height, weight."""
+
+LEFT, RIGHT = Box(100, 100, 80, 60), Box(160, 96, 90, 66)  # side by side, a third in common
+EVERYWHERE = Box(-1000, -1000, 5000, 5000)
+
+
+def votes_of(*votes: Vote) -> Votes:
+    """Make votes that weigh the same for whether and where."""
+    table = np.array(votes, np.float64).reshape(-1, 5)
+    return Votes(table[:, :4], table[:, 4], table[:, 4])
+
+
+def around(box: Box, weight: float = 0.1, seed: int = 0, count: int = 12) -> list[Vote]:
+    """Draw votes for a vehicle, each a few pixels off."""
+    off = np.random.default_rng(seed).normal(scale=0.04 * box.width, size=(count, 4))
+    true = np.array([box.x, box.y, box.width, box.height])
+    return [(x, y, width, height, weight) for x, y, width, height in (true + off).tolist()]
+
+
+def exactly(box: Box, weight: float) -> Vote:
+    return box.x, box.y, box.width, box.height, weight
+
+
+def split(votes: Sequence[Vote], *regions: Box, **settings: float) -> list[Region]:
+    """Give the vehicles in regions, of one that is everywhere where none is given."""
+    hot = [Region(box, box.center, 1.0) for box in regions or [EVERYWHERE]]
+    return split_regions(hot, votes_of(*votes), VoteSettings.model_validate(settings))
+
+
+def boxes(regions: list[Region]) -> list[Box]:
+    return [region.box for region in regions]
+
+
+class TestVehicles:
+    def test_a_vehicle_is_where_its_votes_agree(self) -> None:
+        (vehicle,) = split(around(LEFT))
+        assert vehicle.box.iou(LEFT) > 0.9
+
+    def test_votes_that_are_the_same_are_the_vehicle(self) -> None:
+        (vehicle,) = split([exactly(LEFT, 0.25)] * 4)
+        assert vehicle == Region(LEFT, LEFT.center, 1.0)
+
+    def test_two_that_overlap_are_told_apart(self) -> None:
+        found = split(around(LEFT, seed=1) + around(RIGHT, seed=2), LEFT.union(RIGHT))
+        assert len(found) == 2
+        left, right = sorted(boxes(found), key=lambda box: box.x)
+        assert left.iou(LEFT) > 0.9
+        assert right.iou(RIGHT) > 0.9
+
+    def test_the_one_that_more_votes_agree_with_comes_first(self) -> None:
+        weak, strong = around(LEFT, 0.05), around(RIGHT, 0.1)
+        first, second = split(weak + strong)
+        assert first.box.iou(RIGHT) > 0.9
+        assert first.peak > second.peak
+
+    def test_scattered_votes_do_not_pull_the_box_far(self) -> None:
+        stray = [exactly(LEFT.moved_to(x, y), 0.1) for x, y in ((60, 100), (140, 130), (100, 60))]
+        (vehicle, *_) = split(around(LEFT) + stray)
+        assert vehicle.box.iou(LEFT) > 0.85
+
+    def test_a_heavier_vote_pulls_more(self) -> None:
+        near, far = LEFT, LEFT.moved_to(120, 100)
+        (even,) = split([exactly(near, 1), exactly(far, 1)])
+        (uneven,) = split([exactly(near, 1), exactly(far, 3)])
+        assert 105 < even.box.x < 115
+        assert 115 < uneven.box.x < 120
+
+    def test_sides_between_pixels_go_to_the_nearest(self) -> None:
+        (vehicle,) = split([(10.4, 20.6, 30.3, 40.3, 1)])
+        assert vehicle.box == Box(10, 21, 31, 40)
+        assert vehicle.centroid == pytest.approx((25.55, 40.75))
+
+    def test_one_beyond_the_sides_is_not_cut_off_here(self) -> None:
+        (vehicle,) = split([exactly(Box(-30, 40, 80, 60), 1)])
+        assert vehicle.box == Box(-30, 40, 80, 60)
+
+
+class TestWeights:
+    def test_the_peak_is_the_weight_that_agrees(self) -> None:
+        other = LEFT.moved_to(110, 100)
+        (vehicle,) = split([exactly(LEFT, 0.5), exactly(other, 0.25)])
+        assert vehicle.peak == pytest.approx(0.5 + 0.25 * LEFT.iou(other))
+
+    @pytest.mark.parametrize(("least", "count"), [(0, 1), (0.299, 1), (0.301, 0)])
+    def test_a_vehicle_needs_some(self, least: float, count: int) -> None:
+        assert len(split([exactly(LEFT, 0.1)] * 3, least=least)) == count
+
+    def test_many_weak_votes_are_a_vehicle_and_one_is_none(self) -> None:
+        assert len(split(around(LEFT, 0.02, count=20))) == 1
+        assert split(around(LEFT, 0.02, count=1)) == []
+
+    def test_whether_and_where_are_weighed_apart(self) -> None:
+        off = LEFT.moved_to(120, 100)
+        table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
+        votes = Votes(table, whether=np.array([0.2, 0.6]), where=np.array([1e4, 1.0]))
+        (vehicle,) = split_regions([Region(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        assert vehicle.box == LEFT
+        assert vehicle.peak == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
+
+    def test_a_lone_sure_vote_keeps_no_vehicle_from_being_found(self) -> None:
+        lone = exactly(LEFT.moved_to(300, 100), 0)[:4]
+        table = np.array([lone, *[exactly(LEFT, 0)[:4]] * 3], np.float64)
+        votes = Votes(
+            table, whether=np.array([0.01, 0.1, 0.1, 0.1]), where=np.array([9, 1, 1, 1.0])
+        )
+        (vehicle,) = split_regions([Region(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        assert vehicle.box == LEFT
+
+    def test_votes_without_weight_are_none(self) -> None:
+        assert split([exactly(LEFT, 0)], least=0) == []
+
+
+class TestParts:
+    BONNET = Box(110, 130, 36, 28)  # in LEFT
+
+    def test_of_a_vehicle_found_after_it_are_not_reported(self) -> None:
+        found = split(around(LEFT, 0.1) + around(self.BONNET, 0.05, seed=3))
+        assert len(found) == 1
+        assert found[0].box.iou(LEFT) > 0.8
+
+    def test_of_a_vehicle_found_before_it_are_not_reported_either(self) -> None:
+        found = split([exactly(LEFT, 0.6), exactly(self.BONNET, 1)])
+        assert boxes(found) == [LEFT]
+
+    def test_that_are_far_stronger_than_what_holds_them_are_vehicles(self) -> None:
+        found = split([exactly(LEFT, 0.4), exactly(self.BONNET, 1)])
+        assert boxes(found) == [self.BONNET, LEFT]
+
+    def test_votes_for_a_part_of_one_vehicle_do_not_count_for_another(self) -> None:
+        part = Box(140, 110, 44, 40)  # in LEFT but for its end, which lies in RIGHT
+        assert RIGHT.iou(part) > 0.1
+        found = split([exactly(LEFT, 1), exactly(RIGHT, 0.5), exactly(part, 0.25)])
+        assert boxes(found) == [LEFT, RIGHT]
+        assert found[1].peak == 0.5
+
+    def test_what_sticks_out_far_enough_is_no_part(self) -> None:
+        beside = self.BONNET.moved_to(LEFT.right - 18, 130)  # half of it in LEFT
+        found = split([exactly(LEFT, 1), exactly(beside, 0.5)])
+        assert boxes(found) == [LEFT, beside]
+        assert boxes(split([exactly(LEFT, 1), exactly(beside, 0.5)], inside=0.4)) == [LEFT]
+
+
+class TestRegions:
+    def test_hear_the_votes_whose_middle_lies_in_them(self) -> None:
+        one, other = Box(0, 0, 200, 200), Box(200, 0, 200, 200)
+        votes = [exactly(LEFT, 1), exactly(LEFT.moved_to(300, 100), 1)]
+        assert boxes(split(votes, one)) == [LEFT]
+        assert boxes(split(votes, other)) == [LEFT.moved_to(300, 100)]
+        assert boxes(split(votes, other, one)) == [LEFT.moved_to(300, 100), LEFT]
+
+    def test_of_one_border_hear_a_vote_once(self) -> None:
+        vote = exactly(Box(90, 90, 20, 20), 1)  # its middle is (100, 100)
+        quarters = [Box(x, y, 100, 100) for x in (0, 100) for y in (0, 100)]
+        assert boxes(split([vote], *quarters)) == [Box(90, 90, 20, 20)]
+
+    def test_without_votes_have_no_vehicles(self) -> None:
+        assert split([]) == []
+        assert split(around(LEFT), Box(0, 0, 10, 10)) == []
+        assert split_regions([], votes_of(*around(LEFT)), VoteSettings()) == []
+
+
+def collected(*windows: Windows, **settings: float) -> Votes:
+    """Collect the votes in a frame of 100 × 100 pixels."""
+    return Votes.of(windows, (100, 100), VoteSettings.model_validate(settings))
+
+
+class TestCollecting:
+    def test_each_detection_of_each_frame_votes_by_probability_times_share(self) -> None:
+        def windows(count: int, x: int) -> Windows:
+            vehicles = np.tile(np.array([x, 0, 10, 20], np.float32), (count, 1))
+            vehicles[:, 0] += np.arange(count)
+            values = np.linspace(0.5, 1, count, dtype=np.float32)
+            shares = np.asarray(values / 4, np.float32)
+            return Windows(np.zeros((count, 4), np.int32), values, shares, vehicles)
+
+        votes = collected(windows(2, 0), windows(0, 0), windows(1, 50))
+        assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 10, 20], [50, 0, 10, 20]]
+        assert votes.whether.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
+        assert votes.boxes.dtype == votes.whether.dtype == votes.where.dtype == np.float64
+
+    def test_where_a_vehicle_is_the_surest_know_best(self) -> None:
+        box = np.tile(np.array([10, 10, 20, 20], np.float32), (3, 1))
+        sure, ones = np.array([0.5, 0.9, 1], np.float32), np.ones(3, np.float32)
+        windows = Windows(np.zeros((3, 4), np.int32), sure, ones, box)
+        where = collected(windows, sharpness=2).where
+        assert where[0] == pytest.approx(np.log(2) ** 2)
+        assert where[1] == pytest.approx(np.log(10) ** 2, rel=1e-5)
+        assert np.isfinite(where[2])
+        assert where[2] > 10 * where[1]
+        assert collected(windows, sharpness=0).where.tolist() == [1, 1, 1]
+
+    def test_a_vehicle_is_voted_for_as_far_as_the_frame_shows_it(self) -> None:
+        vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
+        ones = np.ones(4, np.float32)
+        windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
+        votes = collected(windows)
+        assert votes.boxes.tolist() == [[90, 10, 10, 20], [0, 0, 5, 5], [60, 95, 20, 5]]
+        assert len(votes.whether) == len(votes.where) == 3
+
+    def test_votes_for_a_cut_off_vehicle_agree_whatever_they_guess_of_its_rest(self) -> None:
+        votes = np.array([[60, 40, width, 30] for width in (45, 60, 90, 120)], np.float32)
+        quarters = np.full(4, 0.25, np.float32)
+        windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
+        regions = [Region(Box(60, 40, 40, 30), (80, 55), 1)]
+        (vehicle,) = split_regions(regions, collected(windows), VoteSettings())
+        assert vehicle.box == Box(60, 40, 40, 30)
+        assert vehicle.peak == pytest.approx(0.25)
+
+    def test_of_too_many_the_surest_are_heard_in_their_order(self) -> None:
+        rng = np.random.default_rng(0)
+        weights = rng.permutation(MOST_VOTES + 100) / 1000
+        votes = votes_of(*((i, 0, 10, 10, weight) for i, weight in enumerate(weights.tolist())))
+        heard = votes.within(EVERYWHERE)
+        assert len(heard.where) == MOST_VOTES
+        assert heard.where.min() == 0.1
+        assert (np.diff(heard.boxes[:, 0]) > 0).all()
+
+    def test_too_many_votes_of_a_vehicle_are_one_vehicle(self) -> None:
+        (vehicle,) = split(around(LEFT, 0.01, count=2 * MOST_VOTES))
+        assert vehicle.box.iou(LEFT) > 0.9
+
+
+@pytest.mark.parametrize("agreement", [0, 1])
+@pytest.mark.parametrize("inside", [0, 1])
+def test_it_comes_to_an_end_whatever_the_settings(agreement: float, inside: float) -> None:
+    votes = around(LEFT) + around(RIGHT)
+    found = split(votes, agreement=agreement, inside=inside, least=0)
+    assert 1 <= len(found) <= len(votes)
+
+
+some_votes = st.lists(  # no two of the same weight: of equal ones the first comes first
+    st.tuples(
+        st.floats(-50, 400),
+        st.floats(-50, 300),
+        st.floats(4, 200),
+        st.floats(4, 200),
+        st.floats(0.01, 1),
+    ),
+    min_size=1,
+    max_size=25,
+    unique_by=lambda vote: vote[4],
+)
+
+
+@given(some_votes, st.floats(0, 1), st.floats(0, 1))
+def test_boxes_lie_within_the_hull_of_the_votes(
+    votes: list[Vote], agreement: float, inside: float
+) -> None:
+    table = np.array(votes)
+    (left, top), (right, bottom) = table[:, :2].min(axis=0), (table[:, :2] + table[:, 2:4]).max(0)
+    found = split(votes, agreement=agreement, inside=inside, least=0)
+    for box in boxes(found):
+        assert left - 1 <= box.x < box.right <= right + 1
+        assert top - 1 <= box.y < box.bottom <= bottom + 1
+    assert found
+
+
+@given(some_votes, st.randoms(use_true_random=False))
+def test_the_order_of_the_votes_does_not_matter(votes: list[Vote], random: Random) -> None:
+    shuffled = list(votes)
+    random.shuffle(shuffled)
+    one, other = (sorted(boxes(split(each)), key=str) for each in (votes, shuffled))
+    assert len(one) == len(other)
+    for a, b in zip(one, other, strict=True):
+        np.testing.assert_allclose(
+            [a.x, a.y, a.width, a.height], [b.x, b.y, b.width, b.height], atol=1
+        )
+
+
+@given(some_votes)
+def test_vehicles_weigh_no_more_than_the_votes_together(votes: list[Vote]) -> None:
+    found = split(votes, least=0)
+    assert max(region.peak for region in found) <= sum(vote[4] for vote in votes) + 1e-9
+    assert [region.peak for region in found] == sorted(
+        (region.peak for region in found), reverse=True
+    )

@@ -1,0 +1,209 @@
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from seed import SEED
+from vdet.config.schema import WindowSettings
+from vdet.detect.svm.windows import Boxes, WindowGrid, Windows, every_nth, lay_grid
+
+LARGE, SMALL = SEED.search.windows
+ROWS = 2000  # of a frame that no band here reaches the end of
+
+
+def band(size: int, overlap: float, top: int, bottom: int) -> WindowSettings:
+    return WindowSettings(size=size, overlap=overlap, top=top, bottom=bottom)
+
+
+def stepped(size: int, step: int, top: int, bottom: int) -> WindowSettings:
+    return WindowSettings(size=size, step=step, top=top, bottom=bottom)
+
+
+def boxes_of(settings: WindowSettings, width: int, height: int = ROWS, cells: int = 8) -> Boxes:
+    return lay_grid(settings, width, height, cells=cells).boxes
+
+
+def test_the_seed_sets_have_423_and_408_windows_on_a_720p_frame() -> None:
+    assert len(lay_grid(LARGE, 1280, 720)) == len(boxes_of(LARGE, 1280, 720)) == 423
+    assert len(lay_grid(SMALL, 1280, 720)) == len(boxes_of(SMALL, 1280, 720)) == 408
+
+
+def test_the_large_set_lies_in_47_columns_and_9_rows() -> None:
+    x, y = boxes_of(LARGE, 1280)[:, :2].T
+    assert np.unique(x).tolist() == list(range(0, 47 * 25, 25))
+    assert np.unique(y).tolist() == list(range(380, 380 + 9 * 25, 25))
+
+
+def test_the_small_set_lies_in_102_columns_and_4_rows() -> None:
+    x, y = boxes_of(SMALL, 1280)[:, :2].T
+    assert np.unique(x).tolist() == list(range(0, 102 * 12, 12))
+    assert np.unique(y).tolist() == [400, 412, 424, 436]
+
+
+def test_windows_are_laid_row_by_row_from_the_top_left() -> None:
+    boxes = boxes_of(band(10, 0.5, 7, 22), 20)
+    expected = [[0, 7], [5, 7], [10, 7], [0, 12], [5, 12], [10, 12]]
+    assert boxes.tolist() == [[x, y, 10, 10] for x, y in expected]
+    assert boxes.dtype == np.int32
+
+
+def test_without_overlap_windows_tile_the_band() -> None:
+    assert boxes_of(band(10, 0, 0, 20), 30)[:, :2].tolist() == [
+        [0, 0], [10, 0], [20, 0], [0, 10], [10, 10], [20, 10],
+    ]  # fmt: skip
+
+
+def test_step_and_buffer_are_truncated() -> None:
+    # size 20, overlap 0.33: step int(13.4) = 13, buffer int(6.6) = 6, columns (100 - 6) // 13 = 7
+    assert boxes_of(band(20, 0.33, 0, 20), 100)[:, 0].tolist() == [0, 13, 26, 39, 52, 65, 78]
+
+
+def test_a_frame_narrower_than_a_window_has_none() -> None:
+    boxes = boxes_of(band(64, 0.5, 0, 64), 63)
+    assert boxes.shape == (0, 4)
+    assert boxes.dtype == np.int32
+
+
+def test_a_band_that_rounding_left_too_low_holds_its_windows_all_the_same() -> None:
+    low = band(64, 0.5, 0, 64).model_copy(update={"bottom": 63})  # as scaling may leave it
+    np.testing.assert_array_equal(boxes_of(low, 640), boxes_of(band(64, 0.5, 0, 64), 640))
+
+
+def test_a_band_ends_where_the_frame_does() -> None:
+    settings = band(10, 0.5, 0, 100)
+    np.testing.assert_array_equal(boxes_of(settings, 30, 42), boxes_of(band(10, 0.5, 0, 42), 30))
+    assert boxes_of(settings, 30, 9).shape == (0, 4)
+
+
+def test_a_window_scaled_down_to_nothing_is_not_laid() -> None:
+    nothing = band(64, 0.5, 0, 64).model_copy(update={"size": 0})
+    assert boxes_of(nothing, 640).shape == (0, 4)
+
+
+def test_a_last_window_that_would_stick_out_by_a_pixel_is_left_out() -> None:
+    # step 25 and buffer 102 are together a pixel short of 128, so 47 windows would end at 1278
+    boxes = boxes_of(LARGE, 1277)
+    assert (boxes[:, 0] + boxes[:, 2]).max() == 1253
+
+
+@given(
+    st.integers(8, 200),
+    st.floats(0, 0.99),
+    st.integers(0, 300),
+    st.integers(0, 400),
+    st.integers(1, 900),
+)
+def test_all_windows_lie_inside_band_and_frame(
+    size: int, overlap: float, top: int, spare: int, width: int
+) -> None:
+    assume(int(size * (1 - overlap)) >= 1)
+    settings = band(size, overlap, top, top + size + spare)
+    x, y, w, h = boxes_of(settings, width).T
+    assert (x >= 0).all()
+    assert (x + w <= width).all()
+    assert (y >= top).all()
+    assert (y + h <= settings.bottom).all()
+    assert ((w == size) & (h == size)).all()
+
+
+@given(st.integers(8, 200), st.floats(0, 0.95), st.integers(0, 300))
+def test_any_frame_that_can_hold_a_window_has_one_at_its_left(
+    size: int, overlap: float, spare: int
+) -> None:
+    assume(int(size * (1 - overlap)) >= 1)
+    boxes = boxes_of(band(size, overlap, 0, size), size + spare)
+    assert len(boxes) >= 1
+    assert boxes[0].tolist() == [0, 0, size, size]
+
+
+def test_a_step_is_counted_in_cells_of_the_patch() -> None:
+    # 8 cells across 64 pixels: a step of 2 is 16 pixels
+    boxes = boxes_of(stepped(64, 2, 8, 104), 100)
+    assert boxes[:, :2].tolist() == [[x, y] for y in (8, 24, 40) for x in (0, 16, 32)]
+    assert boxes_of(stepped(64, 2, 8, 104), 100, cells=16)[1].tolist() == [8, 8, 64, 64]
+
+
+def test_windows_of_a_fractional_step_lie_at_whole_pixels_and_do_not_drift() -> None:
+    x = boxes_of(stepped(100, 1, 0, 100), 200)[:, 0]  # 12.5 pixels
+    assert x.tolist() == [0, 12, 25, 38, 50, 62, 75, 88, 100]
+
+
+def test_a_step_fills_the_span_to_its_last_pixel() -> None:
+    assert boxes_of(stepped(64, 8, 0, 64), 128)[:, 0].tolist() == [0, 64]
+    assert boxes_of(stepped(64, 8, 0, 64), 127)[:, 0].tolist() == [0]
+
+
+@given(
+    st.integers(8, 200),
+    st.integers(1, 8),
+    st.sampled_from([4, 8, 16]),
+    st.integers(0, 300),
+    st.integers(0, 400),
+)
+def test_stepped_windows_lie_inside_and_no_further_one_would(
+    size: int, step: int, cells: int, top: int, spare: int
+) -> None:
+    settings = stepped(size, step, top, top + size + spare)
+    width = size + spare
+    grid = lay_grid(settings, width, ROWS, cells=cells)
+    x, y, w, h = grid.boxes.T
+    assert (x[0], y[0]) == (0, top)
+    assert (x + w).max() <= width
+    assert (y + h).max() <= settings.bottom
+    assert grid.columns == grid.rows
+    assert grid.columns * grid.step + size > width
+
+
+def test_the_share_of_a_window_is_one_over_the_windows_that_cover_a_pixel() -> None:
+    for settings in (band(64, 0.75, 0, 320), stepped(64, 2, 0, 320)):
+        grid = lay_grid(settings, 320, 320)
+        covered = np.zeros((320, 320))
+        for x, y, w, h in grid.boxes.tolist():
+            covered[y : y + h, x : x + w] += 1
+        assert covered[160, 160] == 16
+        assert grid.share == 1 / 16
+
+
+def test_windows_of_few_rows_share_with_fewer() -> None:
+    grid = WindowGrid(64, Fraction(16), Fraction(0), Fraction(100), columns=17, rows=2)
+    covered = np.zeros((320, 320))
+    for x, y, w, h in grid.boxes.tolist():
+        covered[y : y + h, x : x + w] += 1
+    assert covered.max() == 8
+    assert grid.share == 1 / 8
+
+
+def test_windows_without_overlap_share_with_none() -> None:
+    assert lay_grid(band(10, 0, 0, 20), 30, 20).share == 1
+    assert lay_grid(stepped(10, 12, 0, 20), 30, 20).share == 1  # with gaps between them
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 50])
+def test_grids_of_every_nth_window_are_together_the_whole_grid(n: int) -> None:
+    grid = lay_grid(stepped(100, 1, 40, 300), 555, 720)  # of a fractional step
+    parts = [every_nth(grid, n, across, down) for across in range(n) for down in range(n)]
+    together = np.concatenate([part.boxes for part in parts])
+    assert len(together) == sum(len(part) for part in parts) == len(grid)
+    assert {tuple(box) for box in together.tolist()} == {tuple(b) for b in grid.boxes.tolist()}
+
+
+def test_every_second_window_from_the_second_column_and_row_on() -> None:
+    grid = every_nth(lay_grid(band(10, 0.5, 0, 30), 30, 30), 2, 1, 1)
+    assert grid.boxes[:, :2].tolist() == [[5, 5], [15, 5], [5, 15], [15, 15]]
+
+
+def test_detected_keeps_windows_of_at_least_the_probability_in_order() -> None:
+    boxes = np.arange(16, dtype=np.int32).reshape(4, 4)
+    probabilities = np.array([0.5, 0.25, 0.75, 0.499], np.float32)
+    shares = np.array([1, 0.5, 0.25, 0.125], np.float32)
+    vehicles = boxes.astype(np.float32) + 0.5
+    windows = Windows(boxes, probabilities, shares, vehicles)
+    found = windows.detected(0.5)
+    assert found.boxes.tolist() == [[0, 1, 2, 3], [8, 9, 10, 11]]
+    assert found.probabilities.tolist() == [0.5, 0.75]
+    assert found.shares.tolist() == [1, 0.25]
+    assert found.vehicles.tolist() == [[0.5, 1.5, 2.5, 3.5], [8.5, 9.5, 10.5, 11.5]]
+    assert len(windows) == 4
+    assert len(found) == 2

@@ -1,0 +1,74 @@
+import logging
+from pathlib import Path
+
+import pytest
+
+from vdet.evaluate.clips.evaluate import RunResult, best, judge, judge_files, total
+from vdet.evaluate.clips.text import plain, run_lines, sweep_rows
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.rows import Row, collect
+
+TEN = range(1, 11)
+
+
+def video(frames: range, x: float = 0) -> LabelledVideo:
+    return collect(Path("scene"), [Row(0, frame, 1, x, 0, 100, 100) for frame in frames])
+
+
+def run(assignments: tuple[str, ...], *found: range) -> RunResult:
+    """Return a run over as many clips; in each the vehicle is found in these of ten frames."""
+    clips = [judge(f"clip {i}", video(frames), video(TEN)) for i, frames in enumerate(found)]
+    return RunResult(assignments, tuple(clips), total(clips))
+
+
+def write(path: Path, frames: range, ending: str) -> Path:
+    path.write_text("".join(f"{frame},1,1,1,100,100,{ending}\n" for frame in frames))
+    return path
+
+
+def test_the_total_counts_the_boxes_of_all_clips() -> None:
+    scores = run((), range(1, 11), range(1, 6)).total
+    assert (scores.matches, scores.misses, scores.vehicles) == (15, 5, 2)
+
+
+def test_several_clips_have_a_row_each_and_a_total() -> None:
+    lines = list(run_lines([run((), TEN, range(1, 6))]))
+    assert [line.split("  ")[0] for line in lines[1:4]] == ["clip 0", "clip 1", "total"]
+    assert any(line.startswith("largest of 1 losses in clip 1") for line in lines)
+
+
+def test_a_single_clip_needs_no_total() -> None:
+    assert not any(line.startswith("total") for line in run_lines([run((), TEN)]))
+
+
+def test_a_sweep_has_a_row_for_each_setting_and_names_the_best() -> None:
+    runs = [run(("a=1", "b=2"), range(1, 6)), run(("a=2", "b=2"), TEN)]
+    assert [row[0] for row in sweep_rows(runs)] == ["a=1 b=2", "a=2 b=2"]
+    assert best(runs) is runs[1]
+    assert list(run_lines(runs))[-1] == "best F1: a=2 b=2 (1.000)"
+
+
+def test_plain_values_of_one_run_and_of_a_sweep() -> None:
+    one = plain([run((), TEN)])
+    assert one["total"]["f1"] == one["videos"][0]["f1"] == 1
+    two = plain([run(("a=1",), TEN), run(("a=[x=1]",), TEN)])
+    assert [each["settings"] for each in two["sweep"]] == [{"a": "1"}, {"a": "[x=1]"}]
+
+
+def test_predictions_beyond_the_truth_are_warned_of(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    found = write(tmp_path / "found.txt", range(1, 21), "1,-1,-1,-1")
+    truth = write(tmp_path / "gt.txt", TEN, "1,3,1")
+    with caplog.at_level(logging.WARNING, logger="vdet"):
+        assert judge_files(found, truth).total.false_positives == 10
+    assert "has boxes up to frame 20, the truth ends with frame 10" in caplog.text
+    caplog.clear()
+    assert judge_files(found, truth, until=10).total.false_positives == 0
+    assert not caplog.text
+
+
+def test_until_cuts_the_truth_too(tmp_path: Path) -> None:
+    found = write(tmp_path / "found.txt", range(1, 4), "1,-1,-1,-1")
+    truth = write(tmp_path / "gt.txt", TEN, "1,3,1")
+    assert judge_files(found, truth, until=4).total.recall == 0.75

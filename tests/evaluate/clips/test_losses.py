@@ -1,0 +1,62 @@
+from pathlib import Path
+
+import pytest
+
+from vdet.evaluate.clips.losses import Loss, losses
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.matching import match
+from vdet.evaluate.preprocessing import compare
+from vdet.evaluate.rows import Row, collect
+
+
+def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
+    """Return a box of 100 pixels height that stands at `x` in these frames."""
+    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
+
+
+def video(*tracks: list[Row]) -> LabelledVideo:
+    return collect(Path("scene"), [row for track in tracks for row in track])
+
+
+def found_losses(found: LabelledVideo, truth: LabelledVideo) -> list[Loss]:
+    comparison = compare(found, truth)
+    return losses(comparison, match(comparison))
+
+
+TEN = range(1, 11)
+
+
+def test_nothing_is_lost_where_all_is_found() -> None:
+    assert found_losses(video(drive(1, TEN)), video(drive(7, TEN))) == []
+
+
+def test_frames_in_a_row_are_one_loss_and_the_longest_comes_first() -> None:
+    found = video(drive(1, range(3, 6)), drive(1, range(7, 11)))
+    late, gap = found_losses(found, video(drive(7, TEN)))
+    assert late == Loss("missed", 7, 1, 2, 0)
+    assert gap == Loss("missed", 7, 6, 6, 0)
+    assert (late.boxes, late.middle, gap.boxes, gap.middle) == (2, 1, 1, 6)
+
+
+def test_a_false_alarm_is_a_loss_too() -> None:
+    found = video(drive(1, TEN), drive(2, range(4, 8), x=300))
+    assert found_losses(found, video(drive(7, TEN))) == [Loss("false alarm", 2, 4, 7, 0)]
+
+
+def test_a_box_that_fits_badly_is_lost_on_both_sides_and_its_overlap_told() -> None:
+    # 100 wide against 250 wide over it: IoU 0.4
+    alarm, missed = found_losses(video(drive(1, TEN, width=250)), video(drive(7, TEN)))
+    assert (alarm.kind, missed.kind) == ("false alarm", "missed")
+    assert alarm.overlap == missed.overlap == pytest.approx(0.4)
+
+
+def test_frames_in_which_the_vehicle_is_ignored_part_a_loss() -> None:
+    ignored = [Row(0, 5, 7, 0, 0, 100, 100, ignored=True)]
+    truth = video(drive(7, range(1, 5)) + ignored + drive(7, range(6, 11)))
+    spans = [(loss.first, loss.last) for loss in found_losses(video(), truth)]
+    assert spans == [(6, 10), (1, 4)]
+
+
+def test_two_vehicles_missed_together_are_two_losses() -> None:
+    truth = video(drive(7, TEN), drive(8, TEN, x=300))
+    assert [loss.id for loss in found_losses(video(), truth)] == [7, 8]

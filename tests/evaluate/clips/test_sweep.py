@@ -1,0 +1,46 @@
+import pytest
+
+from vdet.errors import ConfigError
+from vdet.evaluate.clips.sweep import grid
+
+
+def test_nothing_swept_is_one_setting() -> None:
+    assert grid(()) == [()]
+
+
+def test_the_values_of_a_key_in_their_order() -> None:
+    assert grid(("heat.threshold=4,1, 2",)) == [
+        ("heat.threshold=4",),
+        ("heat.threshold=1",),
+        ("heat.threshold=2",),
+    ]
+
+
+def test_several_keys_make_a_grid() -> None:
+    assert grid(("a=1,2", "b=x,y")) == [
+        *(("a=1", "b=x"), ("a=1", "b=y")),
+        *(("a=2", "b=x"), ("a=2", "b=y")),
+    ]
+
+
+def test_a_comma_in_brackets_belongs_to_the_value() -> None:
+    values = "search.windows=[{size: 64, top: 1}],[{size: 96, top: 2}]"
+    assert grid((values,)) == [
+        ("search.windows=[{size: 64, top: 1}]",),
+        ("search.windows=[{size: 96, top: 2}]",),
+    ]
+
+
+def test_a_value_given_twice_is_run_once() -> None:
+    assert grid(("a=1,1",)) == [("a=1",)]
+
+
+@pytest.mark.parametrize("text", ["heat.threshold", "=1,2", "a=", "a=1,,2", "a=1,"])
+def test_what_is_no_sweep_is_refused(text: str) -> None:
+    with pytest.raises(ConfigError, match="expected KEY=VALUE,VALUE"):
+        grid((text,))
+
+
+def test_a_key_swept_twice_is_refused() -> None:
+    with pytest.raises(ConfigError, match="--sweep a: is given twice"):
+        grid(("a=1,2", "b=1", "a=3"))

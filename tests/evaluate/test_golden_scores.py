@@ -1,0 +1,59 @@
+"""Our metrics beside those of trackeval and pycocotools; `golden/make_golden.py` says how made."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.pooling import pool
+from vdet.evaluate.preprocessing import compare
+from vdet.evaluate.rows import Row, collect
+from vdet.evaluate.scores import score, score_comparison
+
+CASES = sorted(Path(__file__).parent.glob("golden/*.json"))
+
+
+def load(path: Path) -> dict[str, Any]:
+    case: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    return case
+
+
+def truth_of(case: dict[str, Any]) -> LabelledVideo:
+    rows = [
+        Row(0, frame, id_, x, y, width, height, ignored=ignored == 1)
+        for frame, id_, x, y, width, height, ignored in case["truth"]
+    ]
+    return collect(Path(case["name"]), rows)
+
+
+def prediction_of(case: dict[str, Any]) -> LabelledVideo:
+    return collect(Path(case["name"]), [Row(0, *row) for row in case["prediction"]])
+
+
+def test_all_the_cases_are_there() -> None:
+    assert len(CASES) == 20
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_scores_are_those_of_the_reference_tools(path: Path) -> None:
+    case = load(path)
+    scores = asdict(score(prediction_of(case), truth_of(case)))
+    assert {name: scores[name] for name in case["expected"]} == pytest.approx(
+        case["expected"], abs=1e-6
+    )
+
+
+def test_pooled_counts_are_the_sums_and_ratios_are_of_the_sums() -> None:
+    cases = [load(path) for path in CASES]
+    total = score_comparison(pool([compare(prediction_of(c), truth_of(c)) for c in cases]))
+    sums = {
+        name: sum(case["expected"][name] for case in cases)
+        for name in ("matches", "false_positives", "misses", "id_switches", "fragmentations")
+    }
+    assert {name: asdict(total)[name] for name in sums} == sums
+    boxes = sums["matches"] + sums["misses"]
+    mistakes = sums["misses"] + sums["false_positives"] + sums["id_switches"]
+    assert total.mota == pytest.approx(1 - mistakes / boxes)

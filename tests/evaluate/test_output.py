@@ -1,0 +1,57 @@
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from vdet.errors import OutputError
+from vdet.evaluate.output import check_outputs, write_page
+from vdet.files import write_json
+
+
+def test_the_folder_of_a_report_is_made(tmp_path: Path) -> None:
+    check_outputs(None, tmp_path / "a" / "b", overwrite=False, inputs=[])
+    assert write_page("<p>", tmp_path / "a" / "b").read_text() == "<p>"
+
+
+def test_an_earlier_report_is_kept(tmp_path: Path) -> None:
+    write_page("precious", tmp_path)
+    with pytest.raises(OutputError, match=r"report\.html: is there already; give --overwrite"):
+        check_outputs(None, tmp_path, overwrite=False, inputs=[])
+    check_outputs(None, tmp_path, overwrite=True, inputs=[])
+
+
+def test_earlier_numbers_are_kept(tmp_path: Path) -> None:
+    target = str(tmp_path / "a.json")
+    write_json({"f1": 0.5}, target)
+    assert json.loads(Path(target).read_text()) == {"f1": 0.5}
+    with pytest.raises(OutputError, match="is there already"):
+        check_outputs(target, None, overwrite=False, inputs=[])
+
+
+def test_a_file_is_no_folder_for_a_report(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot be made a folder"):
+        check_outputs(None, tmp_path / "file", overwrite=True, inputs=[])
+
+
+def test_without_matplotlib_the_error_says_how_to_get_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(OutputError, match=r'needs matplotlib; pip install "vdet\[report\]"'):
+        check_outputs(None, tmp_path / "report", overwrite=False, inputs=[])
+    assert not (tmp_path / "report").exists()
+    check_outputs("-", None, overwrite=False, inputs=[])
+
+
+def test_numbers_never_go_over_what_is_read(tmp_path: Path) -> None:
+    truth = tmp_path / "gt.txt"
+    truth.write_text("precious")
+    with pytest.raises(OutputError, match="is the input itself"):
+        check_outputs(str(truth), None, overwrite=True, inputs=[truth])
+
+
+def test_numbers_go_to_standard_output_for_a_dash(capsys: pytest.CaptureFixture[str]) -> None:
+    write_json({"recall": None}, "-")
+    assert json.loads(capsys.readouterr().out) == {"recall": None}

@@ -1,0 +1,165 @@
+"""Cases small enough to be worked out by hand; each says how."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.rows import Row, collect
+from vdet.evaluate.scores import score
+
+
+def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
+    """Return a box of 100 pixels height that stands at `x` in these frames."""
+    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
+
+
+def video(*tracks: list[Row]) -> LabelledVideo:
+    return collect(Path("scene"), [row for track in tracks for row in track])
+
+
+TEN = range(1, 11)
+
+
+def test_predictions_equal_to_the_truth_are_perfect() -> None:
+    truth = video(drive(1, TEN), drive(2, TEN, x=300))
+    scores = asdict(score(truth, truth))
+    detection = ("precision", "recall", "f1", "ap50", "ap50_95", "mean_iou")
+    best = (*detection, "mota", "motp", "idf1", "idp", "idr", "hota", "deta", "assa")
+    assert {name: scores[name] for name in best} == dict.fromkeys(best, pytest.approx(1))
+    assert (scores["id_switches"], scores["fragmentations"], scores["mostly_tracked"]) == (0, 0, 2)
+
+
+def test_misses_and_false_alarms_are_counted_in_boxes() -> None:
+    # 10 true boxes, 8 found; 2 predictions elsewhere: precision 8/10, recall 8/10
+    found = video(drive(1, range(1, 9)), drive(2, range(9, 11), x=300))
+    scores = score(found, video(drive(1, TEN)))
+    assert (scores.matches, scores.misses, scores.false_positives) == (8, 2, 2)
+    assert (scores.precision, scores.recall, scores.f1) == pytest.approx((0.8, 0.8, 0.8))
+    assert scores.mota == pytest.approx(1 - (2 + 2) / 10)
+
+
+def test_a_second_prediction_on_a_vehicle_is_a_false_alarm() -> None:
+    found = video(drive(1, TEN), drive(2, TEN, x=1))
+    scores = score(found, video(drive(1, TEN)))
+    assert (scores.precision, scores.recall) == (0.5, 1)
+    assert scores.false_tracks == 1
+
+
+def test_a_loose_box_lowers_the_overlap_of_the_matches_only() -> None:
+    scores = score(video(drive(1, TEN, width=80)), video(drive(1, TEN)))
+    assert (scores.mean_iou, scores.motp) == pytest.approx((0.8, 0.8))
+    assert (scores.f1, scores.mota, scores.idf1) == (1, 1, 1)
+
+
+def test_a_split_is_one_switch_and_half_of_the_identity() -> None:
+    # 5 of 10 boxes under either id: IDTP 5; A = 5·5/10 + 5·5/10 over 10 = 0.5
+    found = video(drive(1, range(1, 6)), drive(2, range(6, 11)))
+    scores = score(found, video(drive(1, TEN)))
+    assert (scores.id_switches, scores.fragmentations) == (1, 0)
+    assert scores.mota == pytest.approx(0.9)
+    assert (scores.idf1, scores.idp, scores.idr) == pytest.approx((0.5, 0.5, 0.5))
+    assert (scores.deta, scores.assa, scores.hota) == pytest.approx((1, 0.5, 0.5**0.5))
+
+
+def test_a_swap_of_two_vehicles_is_two_switches() -> None:
+    # each vehicle shares 5 boxes with either track: agreement 5/(10 + 10 - 5) = 1/3
+    first, second = range(1, 6), range(6, 11)
+    found = video(
+        drive(1, first) + drive(1, second, x=300), drive(2, first, x=300) + drive(2, second)
+    )
+    scores = score(found, video(drive(1, TEN), drive(2, TEN, x=300)))
+    assert scores.id_switches == 2
+    assert scores.mota == pytest.approx(0.9)
+    assert (scores.idf1, scores.assa) == pytest.approx((0.5, 1 / 3))
+    assert (scores.f1, scores.deta) == (1, 1)
+
+
+def test_a_switch_counts_though_the_vehicle_was_missed_in_between() -> None:
+    found = video(drive(1, range(1, 4)), drive(2, range(7, 11)))
+    assert score(found, video(drive(1, TEN))).id_switches == 1
+
+
+def test_a_gap_is_a_fragmentation_where_other_things_are_predicted_meanwhile() -> None:
+    found = drive(1, range(1, 4)) + drive(1, range(6, 11))
+    truth = video(drive(1, TEN), drive(2, TEN, x=300))
+    assert score(video(found, drive(2, TEN, x=300)), truth).fragmentations == 1
+    assert score(video(found), truth).fragmentations == 0
+
+
+@pytest.mark.parametrize(
+    ("found", "kind"),
+    [
+        (9, "mostly_tracked"),
+        (8, "partly_tracked"),
+        (2, "partly_tracked"),
+        (1, "mostly_lost"),
+        (0, "mostly_lost"),
+    ],
+)
+def test_a_vehicle_is_mostly_tracked_above_80_percent_and_mostly_lost_below_20(
+    found: int, kind: str
+) -> None:
+    scores = score(video(drive(1, range(1, 1 + found))), video(drive(1, TEN)))
+    kinds = ("mostly_tracked", "partly_tracked", "mostly_lost")
+    assert [name for name in kinds if getattr(scores, name)] == [kind]
+
+
+def test_nothing_predicted_is_all_missed() -> None:
+    scores = score(video(), video(drive(1, TEN)))
+    assert (scores.misses, scores.recall, scores.precision, scores.f1) == (10, 0, 0, 0)
+    assert (scores.mota, scores.idf1, scores.hota, scores.ap50) == (0, 0, 0, 0)
+    assert (scores.mostly_lost, scores.never_found, scores.mean_delay) == (1, 1, None)
+
+
+def test_without_vehicles_all_is_false_alarm() -> None:
+    scores = score(video(drive(1, TEN)), video())
+    assert (scores.false_positives, scores.precision, scores.recall) == (10, 0, 0)
+    assert (scores.false_tracks, scores.first_detections) == (1, ())
+
+
+def test_two_empty_videos_have_scores_too() -> None:
+    scores = score(video(), video())
+    assert (scores.vehicles, scores.tracks, scores.f1, scores.hota) == (0, 0, 0, 0)
+
+
+def test_ignore_regions_alone_swallow_everything() -> None:
+    truth = collect(Path("scene"), [Row(0, f, 9, 0, 0, 999, 999, ignored=True) for f in TEN])
+    scores = score(video(drive(1, TEN)), truth)
+    counted = (scores.vehicles, scores.tracks, scores.false_positives, scores.misses)
+    assert counted == (0, 0, 0, 0)
+    assert scores.false_tracks == 0
+
+
+def test_scores_can_be_written_as_json() -> None:
+    truth = video(drive(1, TEN))
+    assert json.loads(json.dumps(asdict(score(truth, truth))))["hota"] == 1
+
+
+PLACES = st.integers(0, 12).map(lambda step: step * 20.0)
+SCENES = st.dictionaries(st.tuples(st.integers(1, 6), st.integers(1, 4)), PLACES, max_size=20).map(
+    lambda boxes: video(*(drive(i, range(f, f + 1), x) for (f, i), x in boxes.items()))
+)
+
+
+@given(SCENES, SCENES)
+def test_ratios_keep_within_their_bounds(found: LabelledVideo, truth: LabelledVideo) -> None:
+    scores = asdict(score(found, truth))
+    ratios = ("precision", "recall", "f1", "ap50", "ap50_95", "idf1", "hota", "deta", "assa")
+    assert all(0 <= scores[name] <= 1 + 1e-9 for name in ratios)
+    assert scores["mota"] <= 1
+    assert scores["matches"] + scores["misses"] == scores["vehicle_boxes"]
+    assert scores["matches"] + scores["false_positives"] == scores["track_boxes"]
+    kinds = ("mostly_tracked", "partly_tracked", "mostly_lost")
+    assert sum(scores[name] for name in kinds) == scores["vehicles"]
+
+
+@given(SCENES)
+def test_any_truth_scored_against_itself_has_no_misses(truth: LabelledVideo) -> None:
+    scores = score(truth, truth)
+    assert (scores.misses, scores.false_positives) == (0, 0)
+    assert scores.recall == (1 if len(truth) else 0)

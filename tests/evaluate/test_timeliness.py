@@ -1,0 +1,60 @@
+from pathlib import Path
+
+import pytest
+
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.rows import Row, collect
+from vdet.evaluate.scores import score
+from vdet.evaluate.timeliness import FirstDetection
+
+
+def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
+    """Return a box of 100 pixels height that stands at `x` in these frames."""
+    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
+
+
+def video(*tracks: list[Row]) -> LabelledVideo:
+    return collect(Path("scene"), [row for track in tracks for row in track])
+
+
+def test_the_delay_is_from_the_first_true_frame_to_the_first_match() -> None:
+    truth = video(drive(8, range(5, 20)), drive(9, range(7, 20), x=300))
+    found = video(drive(1, range(12, 20)), drive(2, range(7, 20), x=300))
+    scores = score(found, truth)
+    assert scores.first_detections == (FirstDetection(8, 5, 12), FirstDetection(9, 7, 7))
+    assert [each.delay for each in scores.first_detections] == [7, 0]
+    assert scores.mean_delay == 3.5
+
+
+def test_a_vehicle_never_found_has_no_delay() -> None:
+    scores = score(video(drive(1, range(1, 5), x=300)), video(drive(8, range(1, 5))))
+    assert scores.first_detections == (FirstDetection(8, 1, None),)
+    assert scores.first_detections[0].delay is None
+    assert scores.never_found == 1
+
+
+def test_frames_in_which_the_vehicle_is_ignored_do_not_delay() -> None:
+    small = [Row(0, frame, 8, 0, 0, 100, 100, ignored=True) for frame in range(1, 5)]
+    truth = video(small + drive(8, range(5, 10)))
+    (first,) = score(video(drive(1, range(6, 10))), truth).first_detections
+    assert (first.appears, first.found) == (5, 6)
+
+
+@pytest.mark.parametrize(("on_vehicle", "false"), [(4, 1), (5, 0), (6, 0)])
+def test_a_track_is_false_when_more_than_half_of_it_matches_nothing(
+    on_vehicle: int, false: int
+) -> None:
+    track = drive(1, range(1, 1 + on_vehicle)) + drive(1, range(1 + on_vehicle, 11), x=300)
+    assert score(video(track), video(drive(8, range(1, 11)))).false_tracks == false
+
+
+def test_false_tracks_per_minute_go_by_the_length_of_the_video() -> None:
+    # 2 false tracks in 750 frames at 25 a second, half a minute
+    found = video(drive(1, range(1, 9), x=300), drive(2, range(20, 30), x=300))
+    truth = video(drive(8, range(741, 751)))
+    assert score(found, truth, rate=25).false_tracks_per_minute == pytest.approx(4)
+
+
+def test_false_tracks_per_minute_are_unknown_without_a_rate() -> None:
+    found = video(drive(1, range(1, 9)))
+    assert score(found, found).false_tracks_per_minute is None

@@ -1,0 +1,151 @@
+import logging
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from sklearn.calibration import CalibratedClassifierCV
+from sklearn.model_selection import StratifiedKFold
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import LinearSVC
+
+from vdet.config.schema import (
+    CalibrationSettings,
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    TrainingSettings,
+)
+from vdet.detect.svm.features import Vectors
+from vdet.errors import DataError
+from vdet.learn.fitting import fit
+
+COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+
+
+def clouds(count: int = 300) -> tuple[Vectors, npt.NDArray[np.bool_]]:
+    """Give two overlapping clouds of features of very different scale, one of them constant."""
+    rng = np.random.default_rng(0)
+    vehicle = rng.random(count) < 0.4
+    vectors = rng.normal(size=(count, 24)) + 0.6 * vehicle[:, np.newaxis]
+    vectors = (vectors + 2) * np.logspace(-2, 3, 24)
+    vectors[:, 5] = 7
+    return vectors.astype(np.float32), vehicle
+
+
+def training(*, ensemble: bool = True, **changes: object) -> TrainingSettings:
+    calibration = CalibrationSettings(ensemble=ensemble)
+    return TrainingSettings(C=0.01, calibration=calibration).model_copy(update=changes)
+
+
+@pytest.mark.parametrize("ensemble", [True, False])
+def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool) -> None:
+    vectors, vehicle = clouds()
+    model = fit(vectors, vehicle, COLOUR, training(ensemble=ensemble))
+    svm = CalibratedClassifierCV(
+        LinearSVC(C=0.01, random_state=0),
+        cv=StratifiedKFold(3, shuffle=True, random_state=0),
+        ensemble=ensemble,
+    )
+    reference = make_pipeline(StandardScaler(), svm).fit(vectors, vehicle)
+    expected = reference.predict_proba(vectors)[:, 1]
+    assert expected.std() > 0.2
+    np.testing.assert_allclose(model.probabilities(vectors), expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("ensemble", "folds", "members"), [(True, 3, 3), (True, 5, 5), (False, 3, 1)]
+)
+def test_an_ensemble_has_a_member_for_each_fold_and_otherwise_there_is_one(
+    ensemble: bool, folds: int, members: int
+) -> None:
+    vectors, vehicle = clouds()
+    calibration = CalibrationSettings(folds=folds, ensemble=ensemble)
+    model = fit(vectors, vehicle, COLOUR, training(calibration=calibration))
+    assert model.weights.shape == (members, 24)
+    assert model.biases.shape == model.slopes.shape == model.offsets.shape == (members,)
+    assert model.features == COLOUR
+
+
+def test_a_model_is_of_float32() -> None:
+    model = fit(*clouds(), COLOUR, training())
+    kinds = {a.dtype for a in (model.weights, model.biases, model.slopes, model.offsets)}
+    assert kinds == {np.dtype(np.float32)}
+
+
+def test_the_same_seed_gives_the_same_model_bit_for_bit() -> None:
+    one, same, other = (fit(*clouds(), COLOUR, training(seed=seed)) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(one.weights, same.weights)
+    np.testing.assert_array_equal(one.slopes, same.slopes)
+    assert (one.weights != other.weights).any()
+
+
+def test_a_feature_that_never_changes_does_no_harm() -> None:
+    model = fit(*clouds(), COLOUR, training())
+    assert np.isfinite(model.weights).all()
+
+
+@pytest.mark.parametrize(("vehicles", "others"), [(2, 30), (30, 2), (0, 30), (30, 0), (0, 0)])
+def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, others: int) -> None:
+    vehicle = np.array([True] * vehicles + [False] * others, bool)
+    vectors = np.ones((len(vehicle), 24), np.float32)
+    message = (
+        rf"a class has {min(vehicles, others)} training patches, training\.calibration\.folds "
+        "needs 3; give more patches"
+    )
+    with pytest.raises(DataError, match=message):
+        fit(vectors, vehicle, COLOUR, training())
+
+
+def test_an_svm_that_has_not_converged_is_said_in_a_warning(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with caplog.at_level(logging.WARNING, "vdet"):
+        fit(*clouds(), COLOUR, training(max_iterations=1, C=1e6))
+    assert "the SVM has not converged; raise training.max_iterations" in caplog.text
+
+
+def test_an_svm_that_has_converged_is_not_worth_a_word(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, "vdet"):
+        fit(*clouds(), COLOUR, training())
+    assert caplog.text == ""
+
+
+def test_a_patch_and_its_views_are_calibrated_together() -> None:
+    """A view of a patch that was learnt from would be known: its score would be too good."""
+    rng = np.random.default_rng(0)
+    vehicle = np.arange(90) % 2 == 0
+    noise = rng.normal(size=(90, 24)).astype(np.float32)  # nothing to be learnt, only by heart
+    twice = np.concatenate([noise, noise])
+    origins = np.tile(np.arange(90), 2)
+    loose = training(ensemble=False, C=10.0)
+    honest = fit(twice, np.tile(vehicle, 2), COLOUR, loose, origins)
+    leaking = fit(twice, np.tile(vehicle, 2), COLOUR, loose)
+    np.testing.assert_allclose(honest.weights, leaking.weights, atol=1e-3)
+    assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
+
+
+def test_views_have_no_say_in_the_calibration() -> None:
+    """Half of the patches are vehicles and no view is: the probabilities are of the patches."""
+    vectors, vehicle = clouds(400)
+    views = vectors[~vehicle]
+    rows = np.concatenate([vectors, views])
+    labels = np.concatenate([vehicle, np.zeros(len(views), bool)])
+    origins = np.concatenate([np.arange(400), np.flatnonzero(~vehicle)])
+    model = fit(rows, labels, COLOUR, training(ensemble=False), origins)
+    assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
+
+
+def test_rows_that_are_their_own_origins_are_patches() -> None:
+    vectors, vehicle = clouds()
+    plain = fit(vectors, vehicle, COLOUR, training())
+    told = fit(vectors, vehicle, COLOUR, training(), np.arange(len(vehicle)))
+    np.testing.assert_array_equal(plain.weights, told.weights)
+
+
+def test_views_do_not_make_up_for_patches_that_are_missing() -> None:
+    vectors, _ = clouds(40)
+    vehicle = np.arange(40) % 20 == 0
+    origins = np.where(vehicle, 0, np.arange(40))
+    with pytest.raises(DataError, match="a class has 1 training patches"):
+        fit(vectors, vehicle, COLOUR, training(), origins)

@@ -1,0 +1,93 @@
+"""An index that claims more than there can be is refused before it costs memory."""
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.errors import VideoError
+from vdet.media import VideoReader
+from vdet.media.claims import check_claims
+
+Writer = Callable[..., Path]
+MANY = 90_000_000
+
+
+def box(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I4s", 8 + len(content), kind) + content
+
+
+def with_claim(path: Path, count: int, size: int = 1) -> Path:
+    """Let the sample table say: `count` samples of `size` bytes."""
+    data = bytearray(path.read_bytes())
+    at = data.index(b"stsz")
+    data[at + 8 : at + 16] = struct.pack(">II", size, count)
+    path.write_bytes(data)
+    return path
+
+
+def test_more_samples_than_bytes_are_refused(tmp_path: Path, write_clip: Writer) -> None:
+    path = with_claim(write_clip(tmp_path / "bomb.mp4"), MANY)
+    with pytest.raises(VideoError, match=r"bomb\.mp4: claims 90,000,000 samples in \d,\d+ bytes"):
+        VideoReader(path)
+
+
+@pytest.mark.parametrize("parts", [1, 30])
+def test_so_are_fragments_however_many_share_the_claim(parts: int, tmp_path: Path) -> None:
+    run = box(b"trun", struct.pack(">III", 1, MANY // parts, 0))
+    data = box(b"ftyp", b"isom") + box(b"moof", box(b"traf", run)) * parts
+    (tmp_path / "bomb.mp4").write_bytes(data)
+    with pytest.raises(VideoError, match="claims 90,000,000 samples"):
+        check_claims(tmp_path / "bomb.mp4")
+
+
+def test_behind_a_box_of_64_bits_too(tmp_path: Path) -> None:
+    large = struct.pack(">I4sQ", 1, b"mdat", 16 + 5000) + bytes(5000)
+    table = box(b"moov", box(b"trak", box(b"stsz", struct.pack(">III", 0, 1, MANY))))
+    (tmp_path / "bomb.mov").write_bytes(large + table)
+    with pytest.raises(VideoError, match="claims 90,000,000"):
+        check_claims(tmp_path / "bomb.mov")
+
+
+def test_sizes_listed_one_by_one_are_bounded_by_the_file(tmp_path: Path) -> None:
+    table = box(b"moov", box(b"stsz", struct.pack(">III", 0, 0, MANY)))
+    (tmp_path / "listed.mp4").write_bytes(box(b"ftyp", b"isom") + table)
+    check_claims(tmp_path / "listed.mp4")
+
+
+def test_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
+    for suffix, options in (
+        ("mp4", {"sounds": ["aac"]}),
+        ("mov", {"sounds": ["pcm_s16le"], "sound_seconds": 100, "count": 2}),
+        ("mp4", {"movflags": "+frag_keyframe+empty_moov"}),
+        ("mkv", {}),
+    ):
+        check_claims(write_clip(tmp_path / f"clip.{suffix}", **options))
+
+
+@pytest.fixture(scope="module")
+def scratch(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("claims") / "any.mp4"
+
+
+BOXES = st.lists(
+    st.tuples(
+        st.sampled_from([0, 1, 8, 12, 16, 24, 2**32 - 1]),
+        st.sampled_from([b"moov", b"trak", b"stsz", b"trun", b"moof", b"free"]),
+        st.binary(max_size=20),
+    ).map(lambda part: struct.pack(">I4s", part[0], part[1]) + part[2]),
+    max_size=8,
+).map(b"".join)
+
+
+@given(BOXES | st.binary(max_size=60))
+def test_whatever_it_reads_it_ends(scratch: Path, data: bytes) -> None:
+    scratch.write_bytes(box(b"ftyp", b"isom") + data)
+    try:
+        check_claims(scratch)
+    except VideoError as error:
+        refused = str(error)
+        assert "claims" in refused

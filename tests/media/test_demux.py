@@ -1,0 +1,57 @@
+"""Packets come out of a file in spite of read errors."""
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any, cast
+
+import av
+from av.container import InputContainer
+
+from vdet.media.demux import packets
+
+
+class Failing:
+    """A container whose reads give what is in `script`: packets, or errors to raise."""
+
+    def __init__(self, *script: Any) -> None:
+        self.script = iter(script)
+
+    def demux(self, _streams: list[Any]) -> Iterator[Any]:
+        for step in self.script:
+            if isinstance(step, Exception):
+                raise step
+            yield step
+
+
+def error() -> av.FFmpegError:
+    return av.error.InvalidDataError(1, "damaged")
+
+
+def read(*script: Any) -> tuple[list[Any], int]:
+    errors: list[None] = []
+    container = cast(InputContainer, Failing(*script))
+    found = list(packets(container, on_error=lambda: errors.append(None)))
+    return found, len(errors)
+
+
+A, B = SimpleNamespace(size=10), SimpleNamespace(size=20)
+
+
+def test_reading_goes_on_after_an_error() -> None:
+    assert read(A, error(), B) == ([A, B], 1)
+
+
+def test_errors_in_a_row_are_told_once() -> None:
+    assert read(A, error(), error(), error(), B, error()) == ([A, B], 2)
+
+
+def test_a_file_of_nothing_but_errors_ends() -> None:
+    assert read(*(error() for _ in range(1000)), A) == ([], 1)
+
+
+def test_a_stream_that_appears_late_ends_nothing_but_the_reading() -> None:
+    assert read(A, B, IndexError("list index out of range")) == ([A, B], 0)
+
+
+def test_empty_packets_are_dropped() -> None:
+    assert read(SimpleNamespace(size=0), A) == ([A], 0)

@@ -1,0 +1,170 @@
+import struct
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.errors import ImageError, OutputError
+from vdet.media.images import Image, decode_image, read_image, write_image
+
+PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
+
+
+def smooth() -> Image:
+    """Give a picture that JPEG keeps well: blue grows to the right, red downwards."""
+    y, x = np.mgrid[0:48, 0:64]
+    return np.stack([x * 4, np.full_like(x, 99), y * 5], axis=2).astype(np.uint8)
+
+
+def encoded(suffix: str, image: np.ndarray) -> bytes:
+    return cv2.imencode(suffix, image)[1].tobytes()
+
+
+def turned_jpeg(image: Image, orientation: int) -> bytes:
+    """Encode as JPEG with an EXIF segment that holds nothing but the orientation."""
+    entry = struct.pack(">HHIHH", 0x0112, 3, 1, orientation, 0)
+    exif = b"Exif\0\0MM\0*\0\0\0\x08" + struct.pack(">H", 1) + entry + bytes(4)
+    jpeg = encoded(".jpg", image)
+    return jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(exif) + 2) + exif + jpeg[2:]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".bmp", ".tiff", ".PNG"])
+def test_a_written_picture_is_read_back_the_same(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"picture{suffix}"
+    write_image(path, PICTURE)
+    np.testing.assert_array_equal(read_image(path), PICTURE)
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".webp"])
+def test_a_compressed_picture_is_read_back_nearly_the_same(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"picture{suffix}"
+    write_image(path, smooth())
+    image = read_image(path)
+    assert image.dtype == np.uint8
+    np.testing.assert_allclose(image, smooth(), atol=12)
+
+
+def test_a_path_need_not_be_ascii(tmp_path: Path) -> None:
+    path = tmp_path / "Straße_車.png"
+    write_image(path, PICTURE)
+    np.testing.assert_array_equal(read_image(path), PICTURE)
+
+
+def test_the_format_is_told_from_the_content_not_from_the_suffix(tmp_path: Path) -> None:
+    path = tmp_path / "picture.jpg"
+    path.write_bytes(encoded(".png", PICTURE))
+    np.testing.assert_array_equal(read_image(path), PICTURE)
+
+
+def test_16_bit_values_are_scaled_to_8_bits(tmp_path: Path) -> None:
+    path = tmp_path / "deep.png"
+    path.write_bytes(encoded(".png", PICTURE.astype(np.uint16) * 257))
+    image = read_image(path)
+    assert image.dtype == np.uint8
+    np.testing.assert_array_equal(image, PICTURE)
+
+
+def test_16_bit_values_are_rounded() -> None:
+    deep = np.array([[0, 128, 129, 65406, 65407, 65535]], np.uint16)
+    image = decode_image(encoded(".png", deep))
+    assert image is not None
+    assert image[0, :, 0].tolist() == [0, 0, 1, 254, 255, 255]
+
+
+def test_a_grey_picture_has_three_equal_channels() -> None:
+    image = decode_image(encoded(".png", PICTURE[..., 0]))
+    assert image is not None
+    np.testing.assert_array_equal(image, np.repeat(PICTURE[..., :1], 3, axis=2))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_alpha_is_dropped(kind: type[np.generic]) -> None:
+    scale = 257 if kind is np.uint16 else 1
+    with_alpha = np.dstack([PICTURE, np.zeros((24, 32), np.uint8)]).astype(kind) * scale
+    image = decode_image(encoded(".png", with_alpha.astype(kind)))
+    assert image is not None
+    np.testing.assert_array_equal(image, PICTURE)
+
+
+def test_floating_point_values_run_from_0_to_1() -> None:
+    values = np.array([[-1, 0, 0.5, 1, 7, np.nan]], np.float32)
+    image = decode_image(encoded(".tiff", np.dstack([values] * 3)))
+    assert image is not None
+    assert image[0, :, 0].tolist() == [0, 0, 128, 255, 255, 0]
+
+
+@pytest.mark.parametrize(
+    ("orientation", "turns"), [(1, 0), (3, 2), (6, -1), (8, 1)]
+)  # turns counter-clockwise that bring it upright
+def test_a_photograph_is_turned_upright_as_its_exif_data_say(orientation: int, turns: int) -> None:
+    image = decode_image(turned_jpeg(smooth(), orientation))
+    assert image is not None
+    np.testing.assert_allclose(image, np.rot90(smooth(), turns), atol=12)
+
+
+def test_a_picture_of_one_pixel_is_read() -> None:
+    image = decode_image(encoded(".png", np.full((1, 1, 3), 7, np.uint8)))
+    assert image is not None
+    assert image.tolist() == [[[7, 7, 7]]]
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ImageError, match=r"no\.png: cannot be read: No such file"):
+        read_image(tmp_path / "no.png")
+
+
+def test_a_folder_is_no_picture(tmp_path: Path) -> None:
+    with pytest.raises(ImageError, match="cannot be read: Is a directory"):
+        read_image(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"this is not a picture\n",
+        encoded(".png", PICTURE)[:20],
+        encoded(".jpg", PICTURE)[:100],
+        b"\x89PNG\r\n\x1a\n",
+    ],
+    ids=["empty", "text", "cut png", "cut jpeg", "png signature alone"],
+)
+def test_what_is_no_picture_is_named(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "broken.png"
+    path.write_bytes(data)
+    with pytest.raises(ImageError, match=r"broken\.png: is not a picture, or is damaged"):
+        read_image(path)
+
+
+@given(
+    st.sampled_from([".png", ".jpg", ".bmp", ".tiff", ".webp"]),
+    st.integers(0, 300),
+    st.binary(max_size=40),
+)
+def test_any_bytes_are_a_picture_or_none(suffix: str, kept: int, junk: bytes) -> None:
+    image = decode_image(encoded(suffix, PICTURE)[:kept] + junk)
+    assert image is None or (image.dtype == np.uint8 and image.ndim == 3)
+
+
+def test_a_picture_of_a_trillion_pixels_is_refused_unread() -> None:
+    header = struct.pack(">IIBBBBB", 1_000_000, 1_000_000, 8, 2, 0, 0, 0)
+    png = encoded(".png", PICTURE)
+    chunk = b"IHDR" + header
+    bomb = png[:12] + chunk + struct.pack(">I", zlib.crc32(chunk)) + png[33:]
+    assert decode_image(bomb) is None
+
+
+@pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])
+def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str) -> None:
+    with pytest.raises(ImageError, match=r"written as .*\.jpg, .*\.png"):
+        write_image(tmp_path / name, PICTURE)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_picture_is_not_written_into_a_missing_folder(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be written"):
+        write_image(tmp_path / "no" / "picture.png", PICTURE)

@@ -1,0 +1,172 @@
+"""What counts as lost, and what a whole file may leave out."""
+
+from fractions import Fraction
+from typing import Any, cast
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.media.losses import Losses
+
+
+class Thing:
+    """A packet or a picture, as far as it is looked at."""
+
+    def __init__(self, pts: int | None, *, corrupt: bool, discard: bool, interlaced: bool) -> None:
+        self.pts = pts
+        self.is_corrupt = corrupt
+        self.is_discard = discard
+        self.interlaced_frame = interlaced
+
+
+def thing(
+    pts: int | None, *, corrupt: bool = False, discard: bool = False, interlaced: bool = False
+) -> Any:
+    return cast(Any, Thing(pts, corrupt=corrupt, discard=discard, interlaced=interlaced))
+
+
+PERIOD = 10
+
+
+def counted(
+    sent: list[Any], received: list[Any], *, errors: int = 0, paired: bool = True
+) -> Losses:
+    losses = Losses(Fraction(PERIOD), paired=paired)
+    for packet in sent:
+        losses.send(packet)
+    for _ in range(errors):
+        losses.fail_to_decode()
+    for picture in received:
+        losses.receive(picture)
+    losses.finish()
+    return losses
+
+
+def at(*numbers: int) -> list[Any]:
+    return [thing(PERIOD * number) for number in numbers]
+
+
+ALL = at(*range(20))
+
+
+def test_a_whole_stream_has_lost_nothing() -> None:
+    losses = counted(ALL, ALL)
+    assert (losses.damaged, losses.total, losses.evident) == (0, 20, False)
+
+
+def test_a_packet_that_gave_no_picture_is_lost_where_there_was_an_error() -> None:
+    losses = counted(ALL, at(*range(7), *range(9, 20)), errors=1)
+    assert (losses.damaged, losses.lost, losses.total) == (2, 2, 20)
+
+
+def test_without_an_error_it_may_have_been_meant_so() -> None:
+    losses = counted(ALL, at(*range(7), *range(9, 20)))
+    assert (losses.damaged, losses.total) == (0, 18)
+    assert losses.unpaired == 2  # a reason to look again
+    assert losses.jumped == 2
+
+
+def test_pictures_that_no_packet_came_of_are_seen_by_the_times() -> None:
+    some = at(*range(7), *range(12, 20))
+    assert counted(some, some, errors=1).damaged == 5
+
+
+def test_pictures_after_the_last_that_came_are_lost_too() -> None:
+    assert counted(at(*range(5), 19), at(*range(5)), errors=1).damaged == 15
+
+
+def test_a_picture_that_comes_late_was_not_lost_if_nothing_is_damaged() -> None:
+    swapped = at(*range(7), 8, 7, *range(9, 20))
+    losses = counted(swapped, swapped)
+    assert (losses.jumped, losses.damaged, losses.total) == (0, 0, 20)
+
+
+def test_amid_damage_it_is_of_no_use() -> None:
+    losses = Losses(Fraction(PERIOD), paired=True)
+    losses.fail_to_decode()
+    assert [losses.receive(picture) for picture in at(3, 5, 4, 5, 6)] == [
+        True, True, False, False, True,
+    ]  # fmt: skip
+
+
+def test_irregular_times_say_nothing() -> None:
+    uneven = at(0, 1, 5, 6, 9, 14, 15, 20, 26, 27)
+    losses = counted(uneven, uneven, errors=1)
+    assert (losses.jumped, losses.damaged) == (0, 1)
+
+
+def test_pictures_shown_with_errors_are_damaged() -> None:
+    pictures = [*ALL[:5], thing(50, corrupt=True), *ALL[6:]]
+    losses = counted(ALL, pictures)
+    assert (losses.damaged, losses.lost, losses.total) == (1, 0, 20)
+
+
+def test_damaged_packets_count_once_with_the_pictures_they_cost() -> None:
+    packets = [*ALL[:5], thing(50, corrupt=True), thing(60, corrupt=True), *ALL[7:]]
+    assert counted(packets, [*ALL[:5], *ALL[6:]]).damaged == 2
+
+
+@pytest.mark.parametrize(
+    ("received", "paired"),
+    [(at(*range(0, 20, 2)), False), ([thing(n * 20, interlaced=True) for n in range(10)], True)],
+)
+def test_packets_are_not_counted_against_pictures_where_that_means_nothing(
+    received: list[Any], paired: bool
+) -> None:
+    losses = Losses(Fraction(20), paired=paired)
+    for packet in ALL:
+        losses.send(packet)
+    losses.fail_to_decode()
+    for picture in received:
+        losses.receive(picture)
+    losses.finish()
+    assert losses.damaged == 1
+
+
+def test_packets_that_the_file_itself_cuts_away_are_not_lost() -> None:
+    cut = [thing(n * PERIOD, discard=n < 4) for n in range(20)]
+    assert counted(cut, ALL[4:], errors=1).damaged == 1
+
+
+def test_a_packet_cut_off_is_one_frame_lost() -> None:
+    losses = counted(ALL[:9], ALL[:9])
+    losses.cut_off()
+    assert (losses.damaged, losses.total) == (1, 10)
+
+
+class TestBytes:
+    def test_packets_side_by_side_are_no_evidence(self) -> None:
+        losses = Losses(Fraction(PERIOD), paired=True)
+        for position in range(1000, 100_000, 500):
+            losses.pass_bytes(position, 490)
+        assert not losses.evident
+        assert not losses.end(7, 100_000)
+        assert losses.damaged == 0
+
+    def test_a_hole_between_them_is(self) -> None:
+        losses = Losses(Fraction(PERIOD), paired=True)
+        losses.pass_bytes(1000, 500)
+        losses.pass_bytes(5000, 500)
+        assert losses.evident
+
+    def test_what_misses_at_the_end_is_lost_if_the_file_goes_on(self) -> None:
+        losses = counted(ALL, ALL)
+        losses.pass_bytes(1000, 500)
+        assert losses.end(7, 3000)
+        assert (losses.damaged, losses.total) == (7, 27)
+
+    def test_of_other_containers_nothing_is_known(self) -> None:
+        assert not counted(ALL, ALL).end(7, 3000)
+
+
+@given(
+    st.lists(st.none() | st.integers(-1000, 1000), max_size=30),
+    st.lists(st.none() | st.integers(-1000, 1000), max_size=30),
+    st.integers(0, 3),
+)
+def test_there_are_never_more_damaged_than_there_are(
+    sent: list[int | None], received: list[int | None], errors: int
+) -> None:
+    losses = counted([thing(t) for t in sent], [thing(t) for t in received], errors=errors)
+    assert 0 <= losses.damaged <= losses.total

@@ -1,0 +1,309 @@
+"""The video reader: parts of a file, files with faults, files that are no videos."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import cv2
+import numpy as np
+import pytest
+from av.stream import Disposition
+from numpy.typing import NDArray
+
+from vdet.config.schema import InputSettings
+from vdet.errors import VideoError
+from vdet.media import Frame, VideoReader
+
+Image = NDArray[np.uint8]
+Number = Callable[[Image], int]
+Writer = Callable[..., Path]
+Warnings = Callable[[], list[str]]
+GOPS = {"options": {"g": "10", "bf": "2"}, "count": 60}
+DAMAGED: dict[str, dict[str, Any]] = {
+    "mp4": {"movflags": "+faststart"},
+    "webm": {"codec": "libvpx-vp9", "options": {"deadline": "realtime", "g": "10"}},
+    "mkv": {"codec": "libsvtav1", "options": {"preset": "12", "g": "10"}},
+    "avi": {"codec": "mpeg4", "options": {"g": "10", "bf": "2", "q": "2"}},
+    "ts": {"codec": "libx264"},
+}
+TOLERANT = InputSettings(max_damaged=1)
+
+
+def overwrite(path: Path, places: int, size: int = 40) -> None:
+    """Put noise over some places of the last two thirds of a file."""
+    data = bytearray(path.read_bytes())
+    rng = np.random.default_rng(0)
+    for place in np.linspace(0.7, 0.4, places) * len(data):
+        data[int(place) : int(place) + size] = rng.bytes(size)
+    path.write_bytes(data)
+
+
+def read_damaged(path: Path, threads: int) -> tuple[list[Frame], int]:
+    """The frames, and how many were damaged or lost."""
+    with VideoReader(path, threads=threads, settings=TOLERANT) as reader:
+        return list(reader), reader.damaged
+
+
+def cut_off(path: Path, share: float) -> Path:
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * share)])
+    return path
+
+
+class TestRange:
+    @pytest.mark.parametrize(
+        ("limits", "expected"),
+        [
+            ({}, range(12)),
+            ({"start": Fraction(3, 25)}, range(3, 12)),
+            ({"end": Fraction(3, 25)}, range(3)),
+            ({"start": Fraction(1, 10), "end": Fraction(1, 5)}, range(3, 5)),
+            ({"frames": 4}, range(4)),
+            ({"start": Fraction(2, 25), "frames": 1}, range(2, 3)),
+            ({"start": Fraction(2, 25), "end": Fraction(4, 25), "frames": 5}, range(2, 4)),
+            ({"frames": 0}, range(0)),
+            ({"start": Fraction(9)}, range(0)),
+        ],
+    )
+    @pytest.mark.parametrize("suffix", ["mp4", "ts"])
+    def test_frames_from_start_to_before_end(
+        self,
+        limits: dict[str, Any],
+        expected: range,
+        suffix: str,
+        *,
+        tmp_path: Path,
+        write_clip: Writer,
+        read_number: Number,
+    ) -> None:
+        path = write_clip(tmp_path / f"clip.{suffix}")  # the first frame of a .ts is not at 0
+        with VideoReader(path, **limits) as reader:
+            read = list(reader)
+            assert reader.expected == len(expected)
+        assert [frame.index for frame in read] == list(expected)
+        assert [read_number(frame.image) for frame in read] == list(expected)
+        assert [frame.time for frame in read] == [
+            reader.info.start + Fraction(index, 25) for index in expected
+        ]
+
+    def test_leaving_early_lets_go_of_the_file(self, plain_clip: Path, warnings: Warnings) -> None:
+        with VideoReader(plain_clip) as reader:
+            assert next(iter(reader)).index == 0
+        assert list(reader) == []
+        assert warnings() == []
+
+    def test_two_readers_do_not_know_of_one_another(self, plain_clip: Path) -> None:
+        with VideoReader(plain_clip) as one, VideoReader(plain_clip, threads=1) as other:
+            pairs = list(zip(one, other, strict=True))
+        assert len(pairs) == 12
+        assert all((a.image == b.image).all() for a, b in pairs)
+
+
+@pytest.mark.parametrize("rotation", [90, 180, 270])
+def test_a_turned_clip_looks_as_another_program_shows_it(
+    rotation: int, tmp_path: Path, write_clip: Writer
+) -> None:
+    path = write_clip(tmp_path / "turned.mp4", rotation=rotation)
+    capture = cv2.VideoCapture(str(path))
+    _, other = capture.read()
+    capture.release()
+    with VideoReader(path) as reader:
+        ours = next(iter(reader)).image
+        assert reader.info.rotation == rotation
+    assert np.abs(ours.astype(int) - other).mean() < 3
+
+
+def test_info_tells_what_the_file_says(tmp_path: Path, write_clip: Writer) -> None:
+    rate = Fraction(30_000, 1001)
+    path = write_clip(tmp_path / "a.mp4", rate=rate, matrix=1, sounds=["aac"])
+    with VideoReader(path) as reader:
+        info = reader.info
+    assert (info.path, info.rate, info.time_base) == (path, rate, Fraction(1, 90_000))
+    assert (info.start, info.pixel_aspect) == (Fraction(0), Fraction(1))
+    assert info.frames == 12
+    assert info.duration == pytest.approx(12 / rate, abs=0.001)
+    assert (info.color.matrix, info.color.primaries, info.color.transfer) == (1, 2, 2)
+    assert info.has_sound
+
+
+def test_a_cover_picture_is_not_the_video(
+    tmp_path: Path, write_clip: Writer, read_number: Number
+) -> None:
+    source = write_clip(tmp_path / "plain.mp4")
+    path = tmp_path / "cover.mp4"
+    with av.open(str(source)) as original, av.open(str(path), "w") as target:
+        cover = target.add_stream("png", rate=1)
+        assert isinstance(cover, av.VideoStream)
+        cover.width, cover.height, cover.pix_fmt = 32, 32, "rgb24"
+        cover.disposition = Disposition.attached_pic
+        copy = target.add_stream_from_template(original.streams.video[0])
+        target.mux(cover.encode(av.VideoFrame(32, 32, "rgb24")) + cover.encode(None))
+        for packet in original.demux(original.streams.video[0]):
+            if packet.size:
+                packet.stream = copy
+                target.mux(packet)
+    with VideoReader(path) as reader:
+        assert [read_number(frame.image) for frame in reader] == list(range(12))
+
+
+def test_frames_of_another_size_are_scaled_to_the_first(
+    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+) -> None:
+    small = write_clip(tmp_path / "small.h264", count=6)
+    large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
+    path = tmp_path / "both.h264"
+    path.write_bytes(small.read_bytes() + large.read_bytes())
+    with VideoReader(path) as reader:
+        frames = list(reader)
+    assert {frame.image.shape for frame in frames} == {(96, 160, 3)}
+    assert [read_number(frame.image) for frame in frames] == [*range(6), *range(9)]
+    assert [frame.time for frame in frames] == [Fraction(index, 25) for index in range(15)]
+    assert warnings() == [f"{path}: frames of 320×192 pixels scaled to 160×96"]
+
+
+class TestFaults:
+    @pytest.mark.parametrize(
+        ("suffix", "options"),
+        [
+            ("mkv", {}),
+            ("mp4", {"movflags": "+faststart"}),
+            ("mp4", {"movflags": "+frag_keyframe+empty_moov"}),
+            ("ts", {}),
+        ],
+    )
+    def test_a_clip_cut_off_gives_the_frames_before_the_cut(
+        self,
+        suffix: str,
+        options: dict[str, str],
+        *,
+        tmp_path: Path,
+        write_clip: Writer,
+        read_number: Number,
+        warnings: Warnings,
+    ) -> None:
+        path = cut_off(write_clip(tmp_path / f"cut.{suffix}", **GOPS, **options), 0.6)
+        with VideoReader(path) as reader:
+            numbers = [read_number(frame.image) for frame in reader]
+        assert numbers[:20] == list(range(20))
+        assert numbers == sorted(set(numbers))  # B-frames just before the cut may be missing
+        if suffix == "mkv" or options.get("movflags") == "+faststart":  # the length is told ahead
+            (warning,) = warnings()
+            assert warning.startswith(f"{path}: ")
+            assert f"ends early: {len(numbers)} of 60 frames could be read" in warning
+        else:
+            assert len(warnings()) <= 1
+
+    def test_an_mp4_without_its_index_is_refused(self, tmp_path: Path, write_clip: Writer) -> None:
+        path = cut_off(write_clip(tmp_path / "cut.mp4", **GOPS), 0.3)
+        with pytest.raises(VideoError, match=r"cut\.mp4: is not a video, or one that was cut off"):
+            VideoReader(path)
+
+    @pytest.mark.parametrize("kind", DAMAGED)
+    def test_damage_is_skipped_counted_and_told_alike_whatever_the_number_of_threads(
+        self, kind: str, *, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / f"damaged.{kind}", **(GOPS | DAMAGED[kind]))
+        overwrite(path, 4 if kind == "mp4" else 2)
+        (frames, damaged), *others = (read_damaged(path, threads) for threads in (1, 2, 5))
+        for other, count in others:
+            assert count == damaged
+            assert [frame.time for frame in other] == [frame.time for frame in frames]
+            for one, another in zip(frames, other, strict=True):
+                np.testing.assert_array_equal(one.image, another.image)
+        assert 0 <= 60 - len(frames) <= damaged
+        assert damaged > 0
+        (warning,) = set(warnings())
+        assert f"{path}: {damaged} of " in warning
+
+    def test_damage_in_the_middle_leaves_both_ends(
+        self, tmp_path: Path, write_clip: Writer, read_number: Number
+    ) -> None:
+        path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
+        overwrite(path, 1, size=600)
+        with VideoReader(path, settings=TOLERANT) as reader:
+            frames = list(reader)
+        assert [read_number(frame.image) for frame in frames[:10]] == list(range(10))
+        assert read_number(frames[-1].image) == 59
+        assert frames[-1].time == Fraction(59, 25)
+
+    def test_more_damage_than_is_tolerated_is_an_error_after_the_last_frame(
+        self, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    ) -> None:
+        path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
+        overwrite(path, 4)
+        with (
+            VideoReader(path) as reader,
+            pytest.raises(VideoError, match=r"more than input\.max_damaged \(0.05\)"),
+        ):
+            for _ in reader:
+                pass
+        assert reader.damaged > 3
+        assert warnings() == []
+
+    def test_damage_is_not_told_of_a_part_that_was_not_read(
+        self, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    ) -> None:
+        path = cut_off(write_clip(tmp_path / "cut.mkv", **GOPS), 0.6)
+        with VideoReader(path, frames=5) as reader:
+            assert len(list(reader)) == 5
+        assert warnings() == []
+
+
+def test_pixels_that_cannot_be_converted_are_one_error(
+    plain_clip: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> Image:
+        raise av.error.InvalidDataError(1, "no such conversion")
+
+    monkeypatch.setattr("vdet.media.reader.to_bgr", refuse)
+    with (
+        VideoReader(plain_clip) as reader,
+        pytest.raises(VideoError, match=r"plain\.mp4: its pixels \(yuv420p\) cannot be converted"),
+    ):
+        list(reader)
+
+
+class TestRefusals:
+    """One line: the file, what is wrong, what to do."""
+
+    @staticmethod
+    def refusal(path: Path) -> str:
+        with pytest.raises(VideoError) as caught:
+            VideoReader(path)
+        message = str(caught.value)
+        assert message.startswith(f"{path}: ")
+        assert "\n" not in message
+        return message
+
+    def test_a_missing_file(self, tmp_path: Path) -> None:
+        assert "no such file" in self.refusal(tmp_path / "none.mp4")
+
+    def test_a_folder(self, tmp_path: Path) -> None:
+        assert "is a folder" in self.refusal(tmp_path)
+
+    @pytest.mark.parametrize(
+        "content", ["", "plain text\n" * 40, "1\n00:00:01,000 --> 00:00:02,000\nsubtitle\n"]
+    )
+    def test_a_file_that_is_no_video(self, content: str, tmp_path: Path) -> None:
+        path = tmp_path / "text.mp4"
+        path.write_text(content)
+        assert "give a" in self.refusal(path)
+
+    def test_sound_alone(self, tmp_path: Path, write_clip: Writer) -> None:
+        source = write_clip(tmp_path / "plain.mp4", sounds=["aac"])
+        path = tmp_path / "sound.mp4"
+        with av.open(str(source)) as original, av.open(str(path), "w") as target:
+            copy = target.add_stream_from_template(original.streams.audio[0])
+            for packet in original.demux(original.streams.audio[0]):
+                if packet.size:
+                    packet.stream = copy
+                    target.mux(packet)
+        assert "no moving pictures" in self.refusal(path)
+
+    def test_a_video_without_frames(self, tmp_path: Path, write_clip: Writer) -> None:
+        path = write_clip(tmp_path / "empty.mp4", movflags="+faststart")
+        data = path.read_bytes()
+        path.write_bytes(data[: data.index(b"mdat") + 4])
+        assert "not one frame" in self.refusal(path)

@@ -1,0 +1,164 @@
+"""Sound goes over into the written video, packet by packet, in step with the picture."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from vdet.config.schema import OutputSettings
+from vdet.media import VideoReader, VideoWriter
+
+Writer = Callable[..., Path]
+Warnings = Callable[[], list[str]]
+Sound = list[tuple[Fraction, bytes]]
+FAST = OutputSettings(preset="ultrafast")
+
+
+def copy(
+    source: Path, target: Path, *, first: int = 0, last: int | None = None, whole: bool = True
+) -> Path:
+    """Write the frames `first` … `last - 1` of `source`."""
+    with (
+        VideoReader(source, start=Fraction(first, 25)) as reader,
+        VideoWriter(target, reader.info, FAST, whole_sound=whole) as writer,
+    ):
+        for frame in reader:
+            if last is None or frame.index < last:
+                writer.write(frame)
+    return target
+
+
+def sound(path: Path, track: int = 0) -> Sound:
+    """The packets with their times after the first picture."""
+    with av.open(str(path)) as container:
+        stream, picture = container.streams.audio[track], container.streams.video[0]
+        begin = (picture.start_time or 0) * (picture.time_base or 0)
+        return [
+            ((packet.pts or 0) * packet.time_base - begin, bytes(packet))
+            for packet in container.demux(stream)
+            if packet.size
+        ]
+
+
+def assert_same(sound: Sound, original: Sound) -> None:
+    assert [data for _, data in sound] == [data for _, data in original]
+    times = [time for time, _ in sound]
+    assert times == pytest.approx([time for time, _ in original], abs=0.001)
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mov", "mkv"])
+@pytest.mark.parametrize("codec", ["aac", "ac3", "libmp3lame"])
+def test_all_of_it_is_kept_to_the_bit(
+    codec: str, suffix: str, tmp_path: Path, write_clip: Writer, warnings: Warnings
+) -> None:
+    source = write_clip(tmp_path / "in.mp4", sounds=[codec], sound_seconds=1)
+    written = sound(copy(source, tmp_path / f"out.{suffix}"))
+    original = [packet for packet in sound(source) if suffix != "mkv" or packet[0] >= 0]
+    assert len(original) > 20
+    assert_same(written, original)
+    assert warnings() == []
+
+
+def test_every_sound_is_kept_with_its_language(tmp_path: Path, write_clip: Writer) -> None:
+    source = write_clip(tmp_path / "in.mkv", sounds=["aac", "libmp3lame"])
+    with av.open(str(source)) as original, av.open(str(tmp_path / "tagged.mkv"), "w") as tagged:
+        streams = {s.index: tagged.add_stream_from_template(s) for s in original.streams}
+        streams[2].metadata["language"] = "fra"
+        for packet in original.demux():
+            if packet.size:
+                packet.stream = streams[packet.stream.index]
+                tagged.mux(packet)
+    target = copy(tmp_path / "tagged.mkv", tmp_path / "out.mkv")
+    for track in (0, 1):
+        kept = [packet for packet in sound(tmp_path / "tagged.mkv", track) if packet[0] >= 0]
+        assert_same(sound(target, track), kept)
+    with av.open(str(target)) as container:
+        assert [stream.language for stream in container.streams.audio] == [None, "fra"]
+
+
+def test_sound_from_a_transport_stream_fits_into_mp4(tmp_path: Path, write_clip: Writer) -> None:
+    source = write_clip(tmp_path / "in.ts", sounds=["aac"], count=25)  # its times begin late
+    target = copy(source, tmp_path / "out.mp4")
+    times = [time for time, _ in sound(target)]
+    assert times == pytest.approx([time for time, _ in sound(source)], abs=0.001)
+    with av.open(str(target)) as container:
+        assert sum(frame.samples for frame in container.decode(audio=0)) >= 46_000
+
+
+def test_a_part_has_the_sound_of_that_part(tmp_path: Path, write_clip: Writer) -> None:
+    source = write_clip(tmp_path / "in.mp4", sounds=["aac"], count=40)
+    target = copy(source, tmp_path / "out.mp4", first=10, last=30, whole=False)
+    begin, end = Fraction(10, 25), Fraction(30, 25)
+    packet = Fraction(1024, 48_000)
+    expected = [
+        (time - begin, data) for time, data in sound(source) if begin - packet <= time < end
+    ]
+    assert len(expected) == pytest.approx(0.8 / packet, abs=2)
+    assert_same(sound(target), expected)
+
+
+def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
+    tmp_path: Path, write_clip: Writer, warnings: Warnings
+) -> None:
+    source = write_clip(tmp_path / "in.mov", sounds=["pcm_mulaw", "aac"])
+    target = copy(source, tmp_path / "out.mp4")
+    assert warnings() == [f"{source}: its sound (pcm_mulaw) cannot go into mp4; left out"]
+    with av.open(str(target)) as container:
+        assert [stream.codec_context.name for stream in container.streams.audio] == ["aac"]
+        assert container.streams.video[0].frames == 12
+
+
+def test_a_clip_with_nothing_but_such_sound_is_written_silent(
+    tmp_path: Path, write_clip: Writer, warnings: Warnings
+) -> None:
+    target = copy(write_clip(tmp_path / "in.mov", sounds=["pcm_mulaw"]), tmp_path / "out.mp4")
+    assert len(warnings()) == 1
+    with av.open(str(target)) as container:
+        assert not container.streams.audio
+
+
+def test_picture_and_sound_lie_side_by_side_in_the_file(tmp_path: Path, write_clip: Writer) -> None:
+    source = write_clip(tmp_path / "in.mkv", sounds=["aac"], count=100)
+    target = copy(source, tmp_path / "out.mkv")
+    with av.open(str(target)) as container:
+        times = [
+            (packet.dts or 0) * packet.time_base for packet in container.demux() if packet.size
+        ]
+    assert max(earlier - later for earlier, later in pairwise(times)) < Fraction(1, 2)
+
+
+def test_a_source_cut_off_gives_the_sound_before_the_cut(
+    tmp_path: Path, write_clip: Writer, warnings: Warnings
+) -> None:
+    source = write_clip(tmp_path / "in.mkv", sounds=["aac"], count=50)
+    data = source.read_bytes()
+    source.write_bytes(data[: len(data) // 2])
+    target = copy(source, tmp_path / "out.mp4")
+    assert len(warnings()) == 1
+    kept = sound(target)
+    assert len(kept) > 10
+    assert_same(kept, sound(source)[-len(kept) :])
+
+
+def test_damaged_sound_does_not_cost_the_picture(
+    tmp_path: Path, write_clip: Writer, warnings: Warnings
+) -> None:
+    source = write_clip(tmp_path / "in.ts", sounds=["aac"], count=50)
+    data = bytearray(source.read_bytes())
+    rng = np.random.default_rng(0)
+    sound_id = 0x101  # of the second stream, in bits 11 … 23 of each packet of 188 bytes
+    for first in range(0, len(data), 5 * 188):
+        if int.from_bytes(data[first + 1 : first + 3]) & 0x1FFF == sound_id:
+            data[first + 24 : first + 188] = rng.bytes(164)
+    source.write_bytes(data)
+    target = copy(source, tmp_path / "out.mp4")
+    (warning,) = warnings()
+    assert warning.startswith(f"{source}: ")
+    assert warning.endswith("damaged sound packets left out")
+    with VideoReader(target) as reader:
+        assert len(list(reader)) == 50
+    assert sound(target)

@@ -1,0 +1,209 @@
+"""The video writer: what it writes, and that it writes all of it or nothing."""
+
+import resource
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vdet.config.schema import OutputSettings
+from vdet.errors import OutputError, VideoError
+from vdet.media import (
+    ColorTags,
+    Frame,
+    FrameWriter,
+    NullWriter,
+    VideoInfo,
+    VideoReader,
+    VideoWriter,
+)
+
+Image = NDArray[np.uint8]
+Draw = Callable[[int, int, int], Image]
+Writer = Callable[..., Path]
+FAST = OutputSettings(preset="ultrafast")
+INFO = VideoInfo(Path("unused"), 160, 96, Fraction(25), Fraction(1, 12_800))
+
+
+@pytest.fixture
+def frames(draw_frame: Draw) -> list[Frame]:
+    """Twelve frames whose times begin at 7 s."""
+    return [
+        Frame(index, 7 + Fraction(index, 25), draw_frame(index, 160, 96)) for index in range(12)
+    ]
+
+
+def failing(frames: list[Frame], error: type[BaseException]) -> Iterator[Frame]:
+    yield from frames
+    raise error
+
+
+def write(path: Path, frames: Iterable[Frame], info: VideoInfo = INFO) -> Path:
+    with VideoWriter(path, info, FAST) as writer:
+        for frame in frames:
+            writer.write(frame)
+    return path
+
+
+def read(path: Path) -> list[Frame]:
+    with VideoReader(path) as reader:
+        return list(reader)
+
+
+def listing(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+class TestFile:
+    @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".MP4"])
+    def test_it_holds_the_frames_from_second_0(
+        self,
+        suffix: str,
+        frames: list[Frame],
+        tmp_path: Path,
+        read_number: Callable[[Image], int],
+    ) -> None:
+        written = read(write(tmp_path / f"out{suffix}", frames))
+        assert [read_number(frame.image) for frame in written] == list(range(12))
+        assert [frame.time for frame in written] == [Fraction(index, 25) for index in range(12)]
+
+    def test_times_are_exact_however_uneven(self, frames: list[Frame], tmp_path: Path) -> None:
+        ticks = [5, 6, 700, 701, 90_000, 90_013, 90_014, 10**7, 10**7 + 1, 10**7 + 2, 10**8, 10**9]
+        base = Fraction(1, 30_000)
+        moved = [
+            replace(frame, time=tick * base) for frame, tick in zip(frames, ticks, strict=True)
+        ]
+        written = read(write(tmp_path / "out.mp4", moved, replace(INFO, time_base=base)))
+        assert [frame.time for frame in written] == [(tick - 5) * base for tick in ticks]
+
+    @pytest.mark.parametrize("count", [1, 2, 12])
+    @pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
+    def test_the_last_frame_is_shown_as_long_as_the_others(
+        self, suffix: str, count: int, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        with av.open(str(write(tmp_path / f"out{suffix}", frames[:count]))) as container:
+            assert container.duration == count * av.time_base // 25
+
+    def test_a_browser_plays_it_while_it_loads(self, frames: list[Frame], tmp_path: Path) -> None:
+        data = write(tmp_path / "out.mp4", frames).read_bytes()
+        assert data.index(b"moov") < data.index(b"mdat")
+        with av.open(str(tmp_path / "out.mp4")) as container:
+            context = container.streams.video[0].codec_context
+            assert (context.name, context.pix_fmt) == ("h264", "yuv420p")
+
+    def test_odd_sides_grow_by_a_pixel(self, tmp_path: Path, draw_frame: Draw) -> None:
+        image = draw_frame(5, 153, 97)
+        info = replace(INFO, width=153, height=97)
+        (frame,) = read(write(tmp_path / "out.mp4", [Frame(0, Fraction(0), image)], info))
+        assert frame.image.shape == (98, 154, 3)
+        assert np.abs(frame.image[:97, :153].astype(int) - image).mean() < 3
+
+    def test_settings_are_those_of_the_encoder(self, frames: list[Frame], tmp_path: Path) -> None:
+        sizes = []
+        for crf in (10, 40):
+            path = tmp_path / f"{crf}.mp4"
+            with VideoWriter(path, INFO, OutputSettings(preset="fast", crf=crf)) as writer:
+                for frame in frames:
+                    writer.write(frame)
+            assert f"crf={crf}.0".encode() in path.read_bytes()
+            sizes.append(path.stat().st_size)
+        assert sizes[0] > sizes[1]
+
+    def test_pixels_keep_their_shape(self, frames: list[Frame], tmp_path: Path) -> None:
+        path = write(tmp_path / "out.mp4", frames, replace(INFO, pixel_aspect=Fraction(4, 3)))
+        with VideoReader(path) as reader:
+            assert reader.info.pixel_aspect == Fraction(4, 3)
+
+    @pytest.mark.parametrize(
+        ("source", "written"),
+        [
+            (ColorTags(), ColorTags()),
+            (ColorTags(1, 1, 1), ColorTags(1, 1, 6)),
+            (ColorTags(9, 16, 9), ColorTags(9, 16, 6)),
+        ],
+    )
+    def test_colours_are_tagged_if_those_of_the_source_were(
+        self, source: ColorTags, written: ColorTags, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        path = write(tmp_path / "out.mp4", frames, replace(INFO, color=source))
+        with VideoReader(path) as reader:
+            assert reader.info.color == written
+            corner = next(iter(reader)).image[60:90, 10:70]
+        assert np.abs(corner.mean(axis=(0, 1)) - (40, 30, 210)).max() < 5
+
+    @pytest.mark.parametrize("name", ["ж视频 é.mp4", "a:b.mp4", "100% %03d.mp4", "-o.mp4"])
+    def test_any_name_will_do(self, name: str, frames: list[Frame], tmp_path: Path) -> None:
+        assert len(read(write(tmp_path / name, frames))) == 12
+        assert listing(tmp_path) == [name]
+
+
+class TestAllOrNothing:
+    def test_nothing_has_the_name_before_the_end(self, frames: list[Frame], tmp_path: Path) -> None:
+        path = tmp_path / "out.mp4"
+        with VideoWriter(path, INFO, FAST) as writer:
+            writer.write(frames[0])
+            assert not path.exists()
+        assert listing(tmp_path) == ["out.mp4"]
+
+    @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+    @pytest.mark.parametrize("count", [0, 3])
+    def test_an_exception_leaves_what_was_there(
+        self, error: type[BaseException], count: int, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        path = tmp_path / "out.mp4"
+        path.write_bytes(b"before")
+        with pytest.raises(error):
+            write(path, failing(frames[:count], error))
+        assert path.read_bytes() == b"before"
+        assert listing(tmp_path) == ["out.mp4"]
+
+    def test_no_frames_make_no_file(self, tmp_path: Path) -> None:
+        with pytest.raises(VideoError, match=r"out\.mp4: there was no frame to write"):
+            write(tmp_path / "out.mp4", [])
+        assert listing(tmp_path) == []
+
+    @pytest.fixture
+    def full_disk(self) -> Iterator[None]:
+        limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
+        yield
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+    @pytest.mark.usefixtures("full_disk")
+    @pytest.mark.parametrize("suffix", [".mp4", ".mkv"])
+    def test_a_full_disk_is_one_error_and_no_file(self, suffix: str, tmp_path: Path) -> None:
+        rng = np.random.default_rng(0)
+        noise = [
+            Frame(index, Fraction(index, 25), rng.integers(0, 256, (96, 160, 3), np.uint8))
+            for index in range(12)
+        ]
+        with pytest.raises(OutputError, match=r"out\.\w+: cannot be written: File too large"):
+            write(tmp_path / f"out{suffix}", noise)
+        assert listing(tmp_path) == []
+
+
+class TestRefusals:
+    def test_a_folder_that_is_missing(self, tmp_path: Path) -> None:
+        with pytest.raises(OutputError, match=r"out\.mp4: cannot be written"):
+            write(tmp_path / "none" / "out.mp4", [])
+
+    @pytest.mark.parametrize("name", ["out.avi", "out", "out.mp4.txt"])
+    def test_a_kind_of_file_that_is_not_written(self, name: str, tmp_path: Path) -> None:
+        with pytest.raises(OutputError, match=r"\.mp4, \.mov, \.mkv"):
+            VideoWriter(tmp_path / name, INFO, FAST)
+
+
+def test_the_null_writer_takes_frames_and_leaves_nothing(
+    frames: list[Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    writer: FrameWriter
+    with NullWriter() as writer:
+        for frame in frames:
+            writer.write(frame)
+    assert listing(tmp_path) == []

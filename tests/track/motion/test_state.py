@@ -1,0 +1,82 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.geometry import Float64Array
+from vdet.track.motion.state import MotionState, measurement_of
+
+BOX = np.array([100.0, 50.0, 40.0, 20.0])
+ALL = np.ones(4)
+
+
+def offset(*by: float) -> Float64Array:
+    return np.asarray(BOX + np.array(by))
+
+
+def still(box: Float64Array = BOX, noise: float = 0.1, velocity: float = 0.1) -> MotionState:
+    return MotionState.at_rest(box, noise, velocity)
+
+
+def after(boxes: list[Float64Array], noise: float = 0.1) -> MotionState:
+    """Follow boxes, one a frame; the state expects the next."""
+    state = still(boxes[0], noise)
+    for box in boxes[1:]:
+        state = state.predicted(0.01).corrected(measurement_of(box), noise, ALL)
+    return state.predicted(0.01)
+
+
+def test_a_new_state_is_its_box_and_stands_still() -> None:
+    assert still().box == pytest.approx(BOX)
+    assert still().predicted(0.01).box == pytest.approx(BOX)
+
+
+def test_a_steady_motion_is_predicted_without_lag() -> None:
+    state = after([offset(3 * n, -n, 0, 0) for n in range(60)])
+    assert state.box == pytest.approx(offset(180, -60, 0, 0), abs=0.1)
+
+
+def test_steady_growth_is_predicted_without_lag() -> None:
+    sizes = [np.array([0, 0, 40, 20]) * math.exp(0.02 * n) for n in range(61)]
+    assert after(sizes[:-1]).box[2:] == pytest.approx(sizes[-1][2:], rel=0.005)
+
+
+def test_the_uncertainty_grows_with_prediction_and_falls_with_measurement() -> None:
+    variance = still().covariance[:, 0, 0]
+    predicted = still().predicted(0.01)
+    corrected = predicted.corrected(measurement_of(BOX), 0.1, ALL)
+    assert (predicted.covariance[:, 0, 0] > variance).all()
+    assert (corrected.covariance[:, 0, 0] < variance).all()
+
+
+@pytest.mark.parametrize(("noise", "taken"), [(1e-6, 1.0), (0.1, 0.5), (1e3, 0.0)])
+def test_a_measurement_counts_as_much_as_it_is_surer_than_the_state(
+    noise: float, taken: float
+) -> None:
+    state = still(noise=0.1).corrected(measurement_of(offset(8, 0, 0, 0)), noise, ALL)
+    assert state.box[0] == pytest.approx(BOX[0] + 8 * taken, abs=1e-4)
+
+
+def test_what_was_not_seen_is_not_corrected() -> None:
+    before = still().predicted(0.01)
+    state = before.corrected(measurement_of(BOX * 2), 0.1, np.array([1.0, 1.0, 0.0, 1.0]))
+    assert (state.mean[2] == before.mean[2]).all()
+    assert (state.covariance[2] == before.covariance[2]).all()
+    assert state.mean[3, 0] > before.mean[3, 0]
+
+
+def test_slowing_down_leaves_place_and_size() -> None:
+    state = after([offset(3 * n, 0, n, n) for n in range(9)])
+    slow = state.slowed(0.5, 0)
+    assert slow.box == pytest.approx(state.box)
+    assert slow.mean[:2, 1] == pytest.approx(state.mean[:2, 1] / 2)
+    assert (slow.mean[2:, 1] == 0).all()
+
+
+@given(scale=st.floats(0.1, 10), x=st.floats(-500, 500), y=st.floats(-500, 500))
+def test_near_and_far_vehicles_are_followed_alike(scale: float, x: float, y: float) -> None:
+    boxes = [offset(4 * n + n % 3, n % 2, n, n % 4) for n in range(8)]
+    moved = [box * scale + [x, y, 0, 0] for box in boxes]
+    assert after(moved).box == pytest.approx(after(boxes).box * scale + [x, y, 0, 0], abs=1e-6)

@@ -1,0 +1,408 @@
+"""Rules 2 to 11, each on a scene of textured rectangles; the n-th has always the same texture."""
+
+import pytest
+
+from seed import SEED, tracker_but
+from textured_road import textured_road
+from vdet.config.schema import TrackerSettings
+from vdet.detect.svm.heat import Region
+from vdet.geometry import Box
+from vdet.track.rules.association import Association
+from vdet.track.rules.car import Car
+from vdet.track.rules.template import Image
+
+SETTINGS = SEED.tracker
+LEFT, RIGHT = Box(100, 200, 100, 80), Box(320, 200, 100, 80)
+
+
+def road(*boxes: Box | None) -> Image:
+    return textured_road(900, 480, *boxes)
+
+
+def a_car(box: Box, frame: Image, shown_as: int | None = None) -> Car:
+    car = Car(SETTINGS.detections_needed, SETTINGS.history, shown_as)
+    car.see(box, box.center, frame)
+    return car
+
+
+def region(box: Box, peak: float = 2.0) -> Region:
+    return Region(box, box.center, peak)
+
+
+def associate(
+    cars: list[Car],
+    boxes: list[Box],
+    frame: Image | None = None,
+    settings: TrackerSettings = SETTINGS,
+    peak: float = 2.0,
+) -> Association:
+    frame = road() if frame is None else frame
+    return Association(cars, [region(box, peak) for box in boxes], frame, settings)
+
+
+def boxes_of(association: Association) -> dict[Car, Box]:
+    return {car: place.box for car, place in association.places.items()}
+
+
+# Rule 2
+
+
+def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
+    cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
+    over_right, over_left = Box(310, 190, 100, 80), Box(90, 190, 100, 80)
+    result = associate(cars, [over_right, over_left])
+    assert boxes_of(result) == {cars[1]: over_right, cars[0]: over_left}
+    assert result.cars == cars
+
+
+def test_the_centroid_that_counts_is_the_average_one() -> None:
+    car = a_car(Box(100, 200, 100, 80), road())
+    car.see(Box(160, 200, 100, 80), (210, 240), road())
+    around_the_average = Box(130, 200, 70, 80)
+    assert boxes_of(associate([car], [around_the_average])) == {car: around_the_average}
+
+
+def test_a_car_has_one_place_even_if_two_regions_contain_it() -> None:
+    car = a_car(LEFT, road())
+    result = associate([car], [Box(80, 190, 110, 90), Box(100, 180, 120, 90)])
+    assert result.places[car].box == Box(80, 190, 110, 90)
+
+
+def test_a_region_that_contains_a_car_is_not_lost_to_a_neighbour() -> None:
+    inside, beside = a_car(RIGHT, road()), a_car(LEFT, road())
+    result = associate([beside, inside], [Box(205, 200, 80, 80), RIGHT])
+    assert boxes_of(result) == {inside: RIGHT, beside: Box(205, 200, 80, 80)}
+
+
+# Rule 3
+
+AROUND_BOTH = Box(90, 190, 340, 100)
+
+
+def two_cars(*shown_as: int | None) -> list[Car]:
+    frame = road(LEFT, RIGHT)
+    ids = shown_as or (None, None)
+    return [a_car(LEFT, frame, ids[0]), a_car(RIGHT, frame, ids[1])]
+
+
+def test_of_several_cars_in_a_region_those_that_are_still_there_are_confirmed() -> None:
+    cars = two_cars()
+    left, right = LEFT.moved_to(120, 205), RIGHT.moved_to(300, 195)
+    result = associate(cars, [AROUND_BOTH], road(left, right))
+    assert boxes_of(result) == {cars[0]: left, cars[1]: right}
+
+
+def test_a_region_of_several_cars_with_one_confirmed_is_that_cars() -> None:
+    cars = two_cars()
+    result = associate(cars, [AROUND_BOTH], road(None, RIGHT))
+    assert boxes_of(result) == {cars[1]: AROUND_BOTH}
+    assert result.cars == cars
+
+
+def test_a_region_of_several_cars_with_none_confirmed_is_the_nearest_ones() -> None:
+    cars = two_cars()
+    nearer_to_right = Box(140, 190, 340, 100)
+    result = associate(cars, [nearer_to_right], road())
+    assert boxes_of(result) == {cars[1]: nearer_to_right}
+
+
+@pytest.mark.parametrize(("distance", "confirmed"), [(50, True), (49, False)])
+def test_a_car_is_confirmed_within_the_match_distance(distance: int, confirmed: bool) -> None:
+    cars = two_cars()
+    settings = tracker_but(match_distance=distance)
+    result = associate(cars, [AROUND_BOTH], road(LEFT.moved_to(150, 200), RIGHT), settings)
+    assert (cars[0] in result.places) is confirmed
+
+
+def test_a_car_is_confirmed_by_a_match_of_the_least_score() -> None:
+    cars = two_cars()
+    noisy = road(LEFT, RIGHT)
+    noisy[200:280, 100:200] = noisy[200:280, 100:200] // 2 + road(None, LEFT)[200:280, 100:200] // 2
+    strict = tracker_but(match_score=0.9)
+    assert cars[0] in associate(cars, [AROUND_BOTH], noisy).places
+    assert cars[0] not in associate(cars, [AROUND_BOTH], noisy, strict).places
+
+
+# Rules 4 and 5
+
+CLOSE = Box(150, 200, 100, 80)
+
+
+def overlapping_cars(*shown_as: int | None) -> tuple[list[Car], Image]:
+    """Two cars, the second 50 pixels further right and hiding half of the first."""
+    frame = road(LEFT, CLOSE)
+    return [a_car(LEFT, frame, shown_as[0]), a_car(CLOSE, frame, shown_as[1])], frame
+
+
+def test_confirmed_cars_that_overlap_become_one_new_car_shown_at_once() -> None:
+    cars, frame = overlapping_cars(None, None)
+    around = Box(95, 195, 160, 90)
+    result = associate(cars, [around], frame)
+    (car,) = result.cars
+    assert car not in cars
+    assert boxes_of(result) == {car: around}
+    place = result.places[car]
+    car.see(place.box, place.centroid, frame)
+    assert car.is_shown
+    assert car.box == around
+
+
+@pytest.mark.parametrize(
+    ("shown_as", "kept"), [((7, 4), 4), ((None, 4), 4), ((7, None), 7), ((None, None), None)]
+)
+def test_a_merged_car_keeps_the_lowest_id_that_was_shown(
+    shown_as: tuple[int | None, int | None], kept: int | None
+) -> None:
+    cars, frame = overlapping_cars(*shown_as)
+    (car,) = associate(cars, [Box(95, 195, 160, 90)], frame).cars
+    assert car.id == kept
+
+
+def test_if_two_of_three_cars_overlap_all_three_become_one() -> None:
+    far = Box(400, 200, 100, 80)
+    frame = road(LEFT, CLOSE, far)
+    cars = [a_car(box, frame) for box in (LEFT, CLOSE, far)]
+    result = associate(cars, [Box(95, 195, 410, 90)], frame)
+    assert len(result.cars) == 1
+
+
+@pytest.mark.parametrize(("merge_overlap", "cars_left"), [(49, 1), (50, 2)])
+def test_cars_merge_when_they_overlap_by_more_than_the_setting(
+    merge_overlap: int, cars_left: int
+) -> None:
+    cars, frame = overlapping_cars(None, None)
+    settings = tracker_but(merge_overlap=merge_overlap)
+    assert len(associate(cars, [Box(95, 195, 160, 90)], frame, settings).cars) == cars_left
+
+
+def test_confirmed_cars_apart_stay_apart_and_move_to_their_matches() -> None:
+    cars = two_cars(3, 5)
+    left, right = LEFT.moved_to(110, 200), RIGHT.moved_to(310, 204)
+    result = associate(cars, [AROUND_BOTH], road(left, right))
+    assert result.cars == cars
+    assert [car.id for car in result.cars] == [3, 5]
+    assert boxes_of(result) == {cars[0]: left, cars[1]: right}
+    assert [place.centroid for place in result.places.values()] == [left.center, right.center]
+
+
+# Rules 6 and 7
+
+
+@pytest.mark.parametrize(("peak", "needed"), [(4.0, 10), (4.1, 3)])
+def test_a_peak_above_4_makes_the_car_inside_need_only_3_detections(
+    peak: float, needed: int
+) -> None:
+    car = a_car(LEFT, road())
+    associate([car], [LEFT], peak=peak)
+    assert car.needed == needed
+
+
+def test_the_confident_peak_and_its_count_are_settings() -> None:
+    settings = tracker_but(confident_peak=1.5, confident_detections_needed=2)
+    car = a_car(LEFT, road())
+    associate([car], [LEFT], settings=settings, peak=2.0)
+    assert car.needed == 2
+
+
+@pytest.mark.parametrize(("width", "added"), [(66, False), (67, True), (250, True)])
+def test_a_region_wider_than_two_thirds_of_its_car_is_added(width: int, added: bool) -> None:
+    car = a_car(LEFT, road())
+    result = associate([car], [Box(110, 200, width, 80)])
+    assert (car in result.places) is added
+    assert result.cars == [car]
+
+
+@pytest.mark.parametrize(("width", "added"), [(200, False), (201, True)])
+def test_a_region_wider_than_200_pixels_is_added_to_any_car(width: int, added: bool) -> None:
+    car = a_car(Box(100, 200, 320, 80), road())
+    assert (car in associate([car], [Box(150, 200, width, 80)]).places) is added
+
+
+def test_what_is_wide_and_what_share_is_good_are_settings() -> None:
+    narrow = Box(120, 200, 60, 80)
+    for settings in (tracker_but(wide=59), tracker_but(good_fraction=0.5)):
+        car = a_car(LEFT, road())
+        assert car in associate([car], [narrow], settings=settings).places
+
+
+# Rule 8
+
+
+@pytest.mark.parametrize(("x", "car_is_near"), [(250, True), (251, False)])
+def test_a_region_of_good_size_within_50_pixels_of_a_car_is_added_to_it(
+    x: int, car_is_near: bool
+) -> None:
+    car = a_car(LEFT, road())
+    result = associate([car], [Box(x, 200, 80, 80)])
+    assert (car in result.places) is car_is_near
+    assert len(result.cars) == (1 if car_is_near else 2)
+
+
+def test_near_is_a_setting() -> None:
+    car = a_car(LEFT, road())
+    beside = Box(230, 200, 80, 80)
+    assert car not in associate([car], [beside], settings=tracker_but(near=29)).places
+
+
+@pytest.mark.parametrize(("width", "added"), [(66, False), (67, True)])
+def test_a_near_region_that_is_too_narrow_is_neither_added_nor_a_new_car(
+    width: int, added: bool
+) -> None:
+    car = a_car(LEFT, road())
+    result = associate([car], [Box(210, 200, width, 80)])
+    assert (car in result.places) is added
+    assert result.cars == [car]
+
+
+def test_of_two_near_cars_the_nearer_gets_the_region() -> None:
+    cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
+    assert list(associate(cars, [Box(225, 200, 80, 80)]).places) == [cars[1]]
+
+
+def test_of_two_near_cars_the_one_without_a_region_goes_first() -> None:
+    cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
+    beside = Box(225, 200, 80, 80)
+    assert boxes_of(associate(cars, [RIGHT, beside])) == {cars[1]: RIGHT, cars[0]: beside}
+
+
+# Rules 9 and 10
+
+LORRY = Box(100, 200, 200, 100)
+ITS_FRONT, ITS_REAR = Box(80, 200, 70, 100), Box(250, 200, 60, 100)
+COMBINED = Box(80, 200, 230, 100)
+
+
+@pytest.mark.parametrize("parts", [[ITS_FRONT, ITS_REAR], [ITS_REAR, ITS_FRONT]])
+def test_two_regions_by_a_car_that_make_up_its_size_are_added_as_one(parts: list[Box]) -> None:
+    car = a_car(LORRY, road())
+    result = associate([car], parts)
+    assert boxes_of(result) == {car: COMBINED}
+    assert result.places[car].centroid == pytest.approx(((70 * 115 + 60 * 280) / 130, 250))
+    assert result.cars == [car]
+
+
+def test_of_several_other_regions_the_nearest_to_the_car_is_combined() -> None:
+    car = a_car(LORRY, road())
+    further = Box(330, 200, 60, 100)
+    result = associate([car], [ITS_FRONT, further, ITS_REAR])
+    assert sorted(boxes_of(result).values(), key=lambda box: box.x) == [COMBINED, further]
+    assert result.places[car].box == COMBINED
+
+
+def test_a_region_that_is_not_near_the_car_is_not_combined() -> None:
+    car = a_car(LORRY, road())
+    too_narrow, too_far = Box(305, 200, 60, 100), Box(355, 200, 90, 100)
+    assert list(boxes_of(associate([car], [too_narrow, too_far])).values()) == [too_far]
+
+
+def test_a_wide_region_alone_is_not_combined_with_itself() -> None:
+    car = a_car(Box(100, 200, 260, 100), road())
+    beside = Box(365, 200, 260, 100)
+    assert boxes_of(associate([car], [beside])) == {car: beside}
+
+
+def test_a_region_inside_a_car_is_combined_with_one_beside_it() -> None:
+    car = a_car(LORRY, road())
+    too_narrow = Box(90, 200, 120, 100)
+    result = associate([car], [too_narrow, ITS_REAR])
+    assert boxes_of(result) == {car: Box(90, 200, 220, 100)}
+    assert result.cars == [car]
+
+
+def test_a_region_that_a_car_has_already_is_combined_with_one_beside_it() -> None:
+    car = a_car(LORRY, road())
+    its_own = Box(90, 200, 150, 100)
+    assert boxes_of(associate([car], [ITS_REAR, its_own])) == {car: Box(90, 200, 220, 100)}
+
+
+def test_how_wide_the_combined_regions_may_be_is_a_setting() -> None:
+    car = a_car(LORRY, road())
+    at_limit = associate([car], [ITS_FRONT, ITS_REAR], settings=tracker_but(max_combined=230))
+    assert car not in at_limit.cars
+    below = associate([car], [ITS_FRONT, ITS_REAR], settings=tracker_but(max_combined=231))
+    assert below.cars == [car]
+
+
+def test_regions_that_are_not_the_cars_size_combined_are_judged_alone() -> None:
+    car = a_car(LEFT, road())
+    left, right = Box(30, 200, 80, 80), Box(190, 200, 80, 80)
+    result = associate([car], [left, right])
+    assert result.places[car].box == left
+    assert [boxes_of(result)[new] for new in result.cars if new is not car] == [right]
+
+
+def test_what_is_about_the_cars_size_is_a_setting() -> None:
+    car = a_car(LORRY, road())
+    strict = tracker_but(combined_tolerance=0.1)
+    assert car not in associate([car], [ITS_FRONT, ITS_REAR], settings=strict).places
+
+
+HIDING = Box(100, 200, 260, 100)
+ONE, OTHER = Box(70, 200, 120, 100), Box(250, 200, 110, 100)
+
+
+@pytest.mark.parametrize("regions", [[ONE, OTHER], [OTHER, ONE]])
+def test_regions_of_a_cars_size_but_too_wide_make_two_cars_shown_at_once(
+    regions: list[Box],
+) -> None:
+    car = a_car(HIDING, road(), shown_as=4)
+    result = associate([car], regions)
+    assert car not in result.cars
+    assert boxes_of(result) == dict(zip(result.cars, [OTHER, ONE], strict=True))
+    for new, place in result.places.items():
+        new.see(place.box, place.centroid, road())
+        assert new.is_shown
+
+
+def test_of_the_two_cars_the_nearer_one_keeps_the_id() -> None:
+    car = a_car(HIDING, road(), shown_as=4)
+    result = associate([car], [ONE, OTHER])
+    assert {place.box: new.id for new, place in result.places.items()} == {OTHER: 4, ONE: None}
+
+
+def test_a_car_that_has_a_region_already_may_still_become_two() -> None:
+    car = a_car(HIDING, road(), shown_as=4)
+    its_own = Box(60, 200, 205, 100)
+    beside = Box(300, 200, 70, 100)
+    result = associate([car], [its_own, beside])
+    assert sorted(place.box.x for place in result.places.values()) == [60, 300]
+    assert car not in result.cars
+
+
+# Rule 11
+
+
+@pytest.mark.parametrize(("peak", "needed"), [(4.0, 10), (4.1, 3)])
+def test_a_region_with_no_car_near_is_a_new_car(peak: float, needed: int) -> None:
+    known = a_car(LEFT, road())
+    far = Box(600, 200, 90, 80)
+    result = associate([known], [far], peak=peak)
+    old, new = result.cars
+    assert old is known
+    assert boxes_of(result) == {new: far}
+    assert (new.needed, new.id, new.in_a_row) == (needed, None, 0)
+
+
+def test_how_many_detections_a_new_car_needs_is_set() -> None:
+    settings = tracker_but(detections_needed=6, confident_detections_needed=2)
+    assert associate([], [LEFT], settings=settings, peak=2).cars[0].needed == 6
+    assert associate([], [LEFT], settings=settings, peak=5).cars[0].needed == 2
+
+
+def test_a_region_beside_a_car_that_has_its_own_is_a_new_car() -> None:
+    car = a_car(LEFT, road())
+    beside = Box(220, 200, 90, 80)
+    result = associate([car], [LEFT, beside])
+    assert result.places[car].box == LEFT
+    assert [boxes_of(result)[new] for new in result.cars if new is not car] == [beside]
+
+
+def test_two_regions_side_by_side_are_two_new_cars() -> None:
+    assert len(associate([], [LEFT, Box(210, 200, 90, 80)]).cars) == 2
+
+
+def test_without_regions_the_cars_stay_as_they_are() -> None:
+    cars = two_cars()
+    result = associate(cars, [])
+    assert result.cars == cars
+    assert result.places == {}
