@@ -13,7 +13,6 @@ import click
 import vdet
 from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import Plan, Wishes, make_plan
-from vdet.batch.pools import Cluster, Pool, Processes
 from vdet.batch.run import run_batch
 from vdet.cli.options import PathOf, scheduler_option
 from vdet.cli.progress import files_bar, tell
@@ -22,6 +21,7 @@ from vdet.detect.svm.model import LinearModel
 from vdet.errors import SOME_FAILED, VdetError
 from vdet.pipeline.run import VideoJob
 from vdet.pipeline.sinks.tracks import SUFFIXES
+from vdet.workers import DaskCluster, LocalProcesses, Workers
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -135,9 +135,9 @@ def _run(plan: Plan, options: BatchOptions, work: Work, *, quiet: bool) -> list[
     """Run the batch, tell of it on standard error, and return what failed."""
     digest = hashlib.sha256(work.model_path.read_bytes()).hexdigest()
     origin = Origin(f"vdet {vdet.__version__}", work.model_path.name, digest)
-    pool, threads = _pool(options, len(plan.jobs))
+    workers, threads = _workers(options, len(plan.jobs))
     results = run_batch(
-        plan, work.model, work.settings, origin, pool=pool, threads=work.threads or threads
+        plan, work.model, work.settings, origin, workers=workers, threads=work.threads or threads
     )
     failed = []
     with files_bar(len(plan.jobs), quiet=quiet) as advance, closing(results):
@@ -155,15 +155,15 @@ def _run(plan: Plan, options: BatchOptions, work: Work, *, quiet: bool) -> list[
     return failed
 
 
-def _pool(options: BatchOptions, files: int) -> tuple[Pool, int]:
+def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
     """Return where to work, and how many threads the search of each file has there."""
     if options.scheduler:
-        return Cluster(options.scheduler), 1
+        return DaskCluster(options.scheduler), 1
     from joblib import cpu_count
 
     cores = cpu_count()
     jobs = min(options.jobs or cores, files)
-    return Processes(jobs), max(1, cores // jobs)
+    return LocalProcesses(jobs), max(1, cores // jobs)
 
 
 def _tell(job: VideoJob, record: Record, *, quiet: bool) -> None:
