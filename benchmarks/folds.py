@@ -33,7 +33,7 @@ from vdet.learn.fitting import fit
 from vdet.learn.training_set import lesson_of
 from vdet.media import VideoReader
 from vdet.pipeline.following import seek_horizon
-from vdet.pipeline.threads import quiet_libraries
+from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import Follow, tracker_of
 
 BLOCKS = 5
@@ -66,7 +66,7 @@ def main() -> None:
     truth = read_truth(options.truth)
     settings = load_settings(None, SETTINGS).settings
     models = _models(options.patches, truth.last_frame, settings)
-    with quiet_libraries():
+    with single_threaded_libraries():
         searched, size = _search(options.video, truth.last_frame, models, settings)
         for key, values in SWEEPS.items():
             print(

@@ -10,7 +10,7 @@ from vdet.lanes.camera import Camera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
 from vdet.pipeline.run import VideoJob, process_video
-from vdet.pipeline.threads import ahead, behind
+from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250
 CAMERA = Camera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
@@ -27,8 +27,8 @@ def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[st
         with (
             VideoReader(path, frames=FRAMES) as reader,
             VideoWriter(out, reader.info, default.settings.output) as writer,
-            behind(writer.write) as encode,
-            ahead(reader) as frames,
+            write_async(writer.write) as encode,
+            prefetch(reader) as frames,
         ):
             for frame in frames:
                 encode(frame)

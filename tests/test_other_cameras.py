@@ -23,7 +23,7 @@ from vdet.evaluate.scores import score, score_comparison
 from vdet.geometry import Box, Float64Array
 from vdet.media import Frame
 from vdet.pipeline.following import follow, seek_horizon
-from vdet.pipeline.threads import quiet_libraries
+from vdet.pipeline.threads import single_threaded_libraries
 from vdet.resources import shipped_model
 from vdet.synthetic import counts, frames, traffic, truth
 from vdet.synthetic.camera import Camera
@@ -73,7 +73,7 @@ def model() -> LinearModel:
 
 def shown(model: LinearModel, camera: Camera, clip: Iterable[Frame]) -> LabelledVideo:
     """Find and follow the vehicles of a clip; give the boxes shown in the judged frames."""
-    with quiet_libraries():
+    with single_threaded_libraries():
         return in_memory(
             row(result.frame.index, track.id, track.box)
             for result in follow(clip, model, DEFAULT, camera.width, camera.height)

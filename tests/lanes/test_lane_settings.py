@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from vdet.config.lanes import LaneSettings, ViewSettings
-from vdet.config.scaling import scale_lengths
+from vdet.config.section import scale_lengths
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
-from vdet.config.scaling import scale_lengths
 from vdet.config.schema import Settings
+from vdet.config.section import scale_lengths
 from vdet.detect.svm.heat import Region
 from vdet.media.images import Image
 from vdet.track.rules.tracker import Cars

@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from seed import SEED
-from vdet.config.scaling import scale_lengths
+from vdet.config.section import scale_lengths
 from vdet.config.schema import HeatSettings, SearchSettings, Settings, WindowSettings
 
 SETS = range(len(Settings().search.windows))
