@@ -6,6 +6,7 @@ import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import UnionType
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -24,6 +25,12 @@ class LoadedSettings:
     settings: Settings
     features: FeatureSettings | None
     """The feature settings where a file or an assignment gives any, else None."""
+
+
+_TAG = "method"
+"""Names the kind of a section that has several."""
+
+_TAGGED = {name for name, field in Settings.model_fields.items() if field.discriminator == _TAG}
 
 
 def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> LoadedSettings:
@@ -71,6 +78,8 @@ def _overlay(below: Any, above: Any) -> Any:
     if isinstance(below, dict) and above is None:  # a section of which nothing is given
         return below
     if isinstance(below, dict) and isinstance(above, dict):
+        if above.get(_TAG, below.get(_TAG)) != below.get(_TAG):
+            below = {}  # another kind of section, with its own defaults
         return below | {key: _overlay(below.get(key), value) for key, value in above.items()}
     if (
         isinstance(below, list)
@@ -82,10 +91,15 @@ def _overlay(below: Any, above: Any) -> Any:
 
 
 def _describe(detail: ErrorDetails, places: dict[Key, str]) -> str:
-    key = tuple(detail["loc"])
+    key = _written_key(tuple(detail["loc"]))
     place = _place(key, places)
     expected = _expected(detail)
     return f"{place}: {format_key(key)}: {expected}" if key else f"{place}: {expected}"
+
+
+def _written_key(key: Key) -> Key:
+    """Return the key as users write it: without the kind of a section, which pydantic adds."""
+    return key if len(key) < 2 or key[0] not in _TAGGED else (key[0], *key[2:])
 
 
 def _place(key: Key, places: dict[Key, str]) -> str:
@@ -132,7 +146,9 @@ def _suggestion(key: Key) -> str:
 def _names_beside(key: Key) -> list[str]:
     section: Any = Settings
     for part in key[:-1]:
-        if not isinstance(part, int):
+        if isinstance(section, UnionType):  # the section that the tag names
+            (section,) = [k for k in get_args(section) if k.model_fields[_TAG].default == part]
+        elif not isinstance(part, int):
             section = section.model_fields[part].annotation
         elif args := get_args(section):  # tuple[WindowSettings, ...]
             section = args[0]

@@ -14,7 +14,6 @@ from vdet.config.detecting import (
     VoteSettings,
     WindowSettings,
 )
-from vdet.config.following import MotionSettings, TrackerSettings
 from vdet.config.lanes import LaneSettings
 from vdet.config.learning import (
     BoxSettings,
@@ -29,6 +28,7 @@ from vdet.config.learning import (
     ViewSettings,
 )
 from vdet.config.section import FRAME_LENGTH, Fraction, Section
+from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
 
 __all__ = [
     "FRAME_LENGTH",
@@ -42,9 +42,10 @@ __all__ = [
     "InputSettings",
     "LaneSettings",
     "MiningSettings",
-    "MotionSettings",
+    "MotionTrackerSettings",
     "OutputSettings",
     "PerspectiveSettings",
+    "RulesTrackerSettings",
     "SearchSettings",
     "Section",
     "Settings",
@@ -95,7 +96,7 @@ class Settings(Section):
     mining: MiningSettings = MiningSettings()
     search: SearchSettings = SearchSettings()
     heat: HeatSettings = HeatSettings()
-    tracker: TrackerSettings = TrackerSettings()
+    tracker: TrackerSettings = MotionTrackerSettings()
     lanes: LaneSettings = LaneSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
