@@ -1,12 +1,12 @@
 """The original's settings, as they ship, for tests of its numbers."""
 
 from vdet.config.loading import load_settings
-from vdet.config.schema import TrackerSettings
+from vdet.config.schema import RulesTrackerSettings
 from vdet.resources import find_config
 
 SEED = load_settings(find_config("seed")).settings
 
 
-def tracker_but(**changes: object) -> TrackerSettings:
+def tracker_but(**changes: object) -> RulesTrackerSettings:
     """Give the original's tracker with some settings replaced."""
-    return TrackerSettings.model_validate(SEED.tracker.model_dump() | changes)
+    return RulesTrackerSettings.model_validate(SEED.tracker.model_dump() | changes)

@@ -16,7 +16,7 @@ SINKS = "vdet.sinks"
 
 _BUILT_IN = {
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM"},
-    TRACKERS: {"motion": "vdet.track.motion:MOTION", "rules": "vdet.track.rules:RULES"},
+    TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {
         "video": "vdet.pipeline.sinks.video:VIDEO",
         "tracks": "vdet.pipeline.sinks.tracks:TRACKS",

@@ -14,7 +14,7 @@ from vdet.lanes.calibration import Pattern
 from vdet.lanes.calibration import calibrate as fit_camera
 from vdet.lanes.camera_file import save_camera
 from vdet.lanes.preview import check_previews, write_previews
-from vdet.pipeline.stills import find_images
+from vdet.pipeline.pictures import find_images
 
 log = logging.getLogger("vdet")
 

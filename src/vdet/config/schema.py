@@ -13,7 +13,6 @@ from vdet.config.features import (
     HogSettings,
     SpatialSettings,
 )
-from vdet.config.following import MotionSettings, TrackerSettings
 from vdet.config.heat import HeatSettings, VoteSettings
 from vdet.config.input import InputSettings
 from vdet.config.lanes import LaneSettings
@@ -21,6 +20,7 @@ from vdet.config.mining import MiningSettings
 from vdet.config.output import OutputSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
+from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
 from vdet.config.training import BoxSettings, CalibrationSettings, TrainingSettings, ViewSettings
 from vdet.errors import ConfigError
 
@@ -36,9 +36,10 @@ __all__ = [
     "InputSettings",
     "LaneSettings",
     "MiningSettings",
-    "MotionSettings",
+    "MotionTrackerSettings",
     "OutputSettings",
     "PerspectiveSettings",
+    "RulesTrackerSettings",
     "ScoreSettings",
     "SearchSettings",
     "Section",
@@ -58,7 +59,7 @@ class Settings(Section):
     """Everything, a field a section."""
 
     detector: SerializeAsAny[DetectorSettings] = SvmSettings()
-    tracker: TrackerSettings = TrackerSettings()
+    tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
     lanes: LaneSettings = LaneSettings()
     training: TrainingSettings = TrainingSettings()
     mining: MiningSettings = MiningSettings()

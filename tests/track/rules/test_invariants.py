@@ -1,22 +1,22 @@
-"""What holds for the tracker whatever it is given."""
+"""What holds for the rules tracker whatever it is given."""
 
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seed import tracker_but
-from vdet.config.schema import TrackerSettings
-from vdet.detect.svm.heat import Region
+from vdet.config.schema import RulesTrackerSettings
+from vdet.detect.detections import Detections
 from vdet.geometry import Box
-from vdet.track.rules.template import Image
-from vdet.track.rules.tracker import Cars
+from vdet.media.images import Image
+from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import Track
 
 WIDTH, HEIGHT = 320, 180
 TEXTURED = np.random.default_rng(0).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
 PICTURES = [TEXTURED, np.roll(TEXTURED, 9, axis=1), np.full_like(TEXTURED, 128)]
 
-# Small lengths, so that every rule has its turn in a small frame.
+# Small lengths, so that every rule is applied in a small frame.
 EAGER = tracker_but(
     min_region=10,
     near=15,
@@ -33,12 +33,12 @@ EAGER = tracker_but(
 
 
 @st.composite
-def regions(draw: st.DrawFn) -> Region:
+def regions(draw: st.DrawFn) -> tuple[Box, float]:
     """A region anywhere in the frame or across its border."""
     x = draw(st.integers(-30, WIDTH))
     y = draw(st.integers(-30, HEIGHT))
-    box = Box(x, y, draw(st.integers(0, 120)), draw(st.integers(0, 90)))
-    return Region(box, box.center, draw(st.floats(1.4, 9)))
+    box = Box(x, y, draw(st.integers(1, 120)), draw(st.integers(1, 90)))
+    return box, draw(st.floats(1.4, 9))
 
 
 pictures = st.sampled_from(PICTURES)
@@ -50,12 +50,17 @@ lasting = st.lists(regions(), min_size=1, max_size=4).flatmap(
     )
 )
 clips = st.lists(frames, max_size=12) | lasting
-Clip = list[tuple[Image, list[Region]]]
+Clip = list[tuple[Image, list[tuple[Box, float]]]]
 
 
-def run(clip: Clip, tracker: TrackerSettings) -> list[list[Track]]:
-    cars = Cars(tracker)
-    return [cars.update(image, found) for image, found in clip]
+def run(clip: Clip, tracker: RulesTrackerSettings) -> list[list[Track]]:
+    cars = RulesTracker(tracker)
+    return [cars.update(_detections(found), n / 25, image) for n, (image, found) in enumerate(clip)]
+
+
+def _detections(found: list[tuple[Box, float]]) -> Detections:
+    corners = [(box.x, box.y, box.right, box.bottom) for box, _ in found]
+    return Detections(corners, [1.0] * len(found), strengths=[peak for _, peak in found])
 
 
 @settings(deadline=None)
