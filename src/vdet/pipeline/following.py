@@ -8,7 +8,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Detector, horizon_of, nothing_detected
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.lanes.road import Look, RoadWatch
+from vdet.lanes.road import FrameView, RoadFinder
 from vdet.media import Frame
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.threads import each_with
@@ -28,7 +28,7 @@ def follow(
     height: int,
     *,
     threads: int = 1,
-    watch: RoadWatch | None = None,
+    watch: RoadFinder | None = None,
 ) -> Generator[FrameResult]:
     """Find and follow the cars through frames of one size, in order; and the lane, with `watch`.
 
@@ -44,15 +44,15 @@ def follow(
     detector = Detector(model, settings, width, height, horizon=horizon)
     track = tracker_of(settings, width, height)
 
-    def search(frame: Frame) -> tuple[Windows, Look | None]:
+    def search(frame: Frame) -> tuple[Windows, FrameView | None]:
         windows = detector.search(frame.image, frame.index)
-        return windows, watch.look(frame.image) if watch else None
+        return windows, watch.observe(frame.image) if watch else None
 
     with each_with(search, frames, threads) as searched:
         for frame, (windows, look) in searched:
             detection = detector.accumulate(windows)
             tracks = track(frame.image, detection.regions)
-            road = watch.follow(look) if watch and look else None
+            road = watch.update(look) if watch and look else None
             yield FrameResult(frame, detection, tuple(tracks), road)
 
 
@@ -66,10 +66,10 @@ def seek_horizon(frames: Iterable[Frame], settings: Settings) -> tuple[Iterable[
 
 
 def pass_on(
-    frames: Iterable[Frame], settings: Settings, width: int, height: int, watch: RoadWatch | None
+    frames: Iterable[Frame], settings: Settings, width: int, height: int, watch: RoadFinder | None
 ) -> Generator[FrameResult]:
     """Give frames without cars; the lane is found all the same."""
     nothing = nothing_detected(settings, width, height)
     for frame in frames:
-        road = watch.follow(watch.look(frame.image)) if watch else None
+        road = watch.update(watch.observe(frame.image)) if watch else None
         yield FrameResult(frame, nothing, (), road)

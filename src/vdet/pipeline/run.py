@@ -15,7 +15,7 @@ from vdet.detect.svm.search import lay_grids
 from vdet.detect.svm.stages import check_stages
 from vdet.errors import ConfigError, ImageError, VideoError
 from vdet.files import check_output
-from vdet.lanes.road import LaneRequest, RoadWatch
+from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media import Frame, FrameWriter, NullWriter, VideoInfo, VideoReader, VideoWriter
 from vdet.pipeline.annotation import StagePictures, annotate
 from vdet.pipeline.following import follow, pass_on
@@ -187,9 +187,11 @@ def _video_writer(
     return VideoWriter(job.video, info, output, whole_sound=not part, threads=threads)
 
 
-def _road_watch(lanes: LaneRequest | None, settings: Settings, info: VideoInfo) -> RoadWatch | None:
+def _road_watch(
+    lanes: LaneRequest | None, settings: Settings, info: VideoInfo
+) -> RoadFinder | None:
     try:
-        return RoadWatch(lanes, settings.lanes, info.width, info.height) if lanes else None
+        return RoadFinder(lanes, settings.lanes, info.width, info.height) if lanes else None
     except ConfigError as error:
         raise VideoError(f"{info.path}: {error}") from error
 

@@ -14,9 +14,8 @@ from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import check_output, make_folder
 from vdet.geometry import Box
 from vdet.lanes.drawing import draw_lane
-from vdet.lanes.lane import Lane
-from vdet.lanes.record import lane_record
-from vdet.lanes.road import LaneRequest, Road, RoadWatch
+from vdet.lanes.lane import Lane, lane_record
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media.images import SUFFIXES, Image, read_image, write_image
 from vdet.pipeline.annotation import write_lane_stages
 from vdet.pipeline.threads import quiet_libraries
@@ -133,10 +132,10 @@ def process_still(
 def _road(source: Path, image: Image, settings: Settings, lanes: LaneRequest) -> Road:
     height, width = image.shape[:2]
     try:
-        watch = RoadWatch(lanes, settings.lanes, width, height)
+        finder = RoadFinder(lanes, settings.lanes, width, height)
     except ConfigError as error:
         raise ImageError(f"{source}: {error}") from error
-    return watch.follow(watch.look(image))
+    return finder.update(finder.observe(image))
 
 
 def _annotated(image: Image, boxes: Sequence[LabelledBox], road: Road | None) -> Image:

@@ -27,7 +27,7 @@ from typing import Any, Protocol, TextIO
 
 from vdet.errors import OutputError
 from vdet.files import replacing
-from vdet.lanes.record import lane_record
+from vdet.lanes.lane import lane_record
 from vdet.lanes.road import Road
 from vdet.media import Frame
 from vdet.track.track import Track
