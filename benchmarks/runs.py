@@ -6,14 +6,14 @@ from pathlib import Path
 
 from benchmarks.material import Config
 from benchmarks.rounds import Subject, measure
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
 from vdet.pipeline.run import VideoJob, process_video
 from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250
-CAMERA = Camera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
+CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
 """Like the one of the project video; its maps cost the same whatever the numbers."""
 
 

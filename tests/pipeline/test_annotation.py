@@ -12,15 +12,15 @@ from vdet.config.lanes import LaneSettings
 from vdet.detect.svm.detector import detect_still
 from vdet.draw.boxes import color_of, draw_box
 from vdet.geometry import Box
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
-from vdet.lanes.road import LaneRequest, Road, RoadWatch
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.pipeline.annotation import StagePictures, annotate
 from vdet.pipeline.result import FrameResult
 from vdet.track.track import Track
 
-LENS = Camera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 CORNER = Box(0, 0, 12, 12)
 LANE = Lane(
     curvature=0.0,
@@ -32,9 +32,9 @@ LANE = Lane(
 )
 
 
-def seen(camera: Camera | None) -> Road:
-    watch = RoadWatch(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
-    return watch.follow(watch.look(road(CAR)))
+def seen(camera: CalibratedCamera | None) -> Road:
+    finder = RoadFinder(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
+    return finder.update(finder.observe(road(CAR)))
 
 
 def result_of(

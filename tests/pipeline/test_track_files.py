@@ -11,9 +11,8 @@ from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
 from vdet.evaluate.predictions import read_predictions
 from vdet.geometry import Box
-from vdet.lanes.lane import Lane
-from vdet.lanes.record import lane_record
-from vdet.lanes.road import LaneRequest, Road, RoadWatch
+from vdet.lanes.lane import Lane, lane_record
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media.frame import Frame
 from vdet.pipeline.sinks.tracks import check_suffix, track_writer
 from vdet.track.track import Track
@@ -77,8 +76,8 @@ def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
 
 def road(lane: Lane | None) -> Road:
     image = np.zeros((36, 64, 3), np.uint8)
-    watch = RoadWatch(LaneRequest(), LaneSettings(), 64, 36)
-    return replace(watch.follow(watch.look(image)), lane=lane)
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 64, 36)
+    return replace(finder.update(finder.observe(image)), lane=lane)
 
 
 def write_with_lanes(path: Path) -> str:

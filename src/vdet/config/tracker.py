@@ -120,9 +120,3 @@ class RulesTrackerSettings(TrackerSettings):
         12, ge=1, description="a car is deleted after this many matches in a row"
     )
     max_misses: int = Field(5, ge=1, description="a car is deleted after this many misses in a row")
-
-
-TrackerSettings = Annotated[
-    MotionTrackerSettings | RulesTrackerSettings, Field(discriminator="method")
-]
-"""The settings of the tracker that `method` names."""

@@ -16,7 +16,7 @@ from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
 from vdet.files import OutputFiles
-from vdet.lanes.road import LaneRequest, RoadView, RoadWatch
+from vdet.lanes.road import LaneRequest, FrameView, RoadFinder
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
@@ -154,7 +154,7 @@ def follow(
     video: VideoInfo,
     *,
     threads: int = 1,
-    roads: RoadWatch | None = None,
+    roads: RoadFinder | None = None,
 ) -> Generator[FrameResult]:
     """Find and follow the vehicles, and with `roads` the lane, through the frames of a video.
 
@@ -163,7 +163,7 @@ def follow(
     """
     tracker = make_tracker(settings, video.width, video.height)
 
-    def search(frame: Frame) -> tuple[Any, RoadView | None]:
+    def search(frame: Frame) -> tuple[Any, FrameView | None]:
         candidates = detector.search(frame.image, frame.index)
         return candidates, roads.observe(frame.image) if roads else None
 
@@ -210,7 +210,7 @@ def _results(
     size = video.width, video.height
     images, frames = peek(read)
     try:
-        roads = RoadWatch(job.lanes, settings.lanes, *size) if job.lanes else None
+        roads = RoadFinder(job.lanes, settings.lanes, *size) if job.lanes else None
         detector = _detector(images, job.source, model, size)
         yield from follow(frames, detector, settings, video, threads=threads, roads=roads)
     except (ConfigError, ImageError) as error:

@@ -13,7 +13,7 @@ from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
-from vdet.lanes.road import LaneRequest, Road, RoadWatch
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.media.images import PICTURE_SUFFIXES, Image, read_image
 from vdet.pipeline.result import FrameResult
@@ -186,5 +186,5 @@ def _tracks(detections: Detections) -> tuple[Track, ...]:
 
 def _road(image: Image, settings: Settings, lanes: LaneRequest) -> Road:
     height, width = image.shape[:2]
-    roads = RoadWatch(lanes, settings.lanes, width, height)
+    roads = RoadFinder(lanes, settings.lanes, width, height)
     return roads.update(roads.observe(image))

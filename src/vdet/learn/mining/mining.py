@@ -107,7 +107,7 @@ def mine(
     with VideoReader(job.video, frames=last) as reader, patch_archive(job.output) as archive:
         advance = progress(last)
         images, frames = peek(reader)
-        windows_of = _search(job, detector, settings, reader.info, images)
+        windows_of = _search(job, detector, reader.info, images)
         for frame in frames:
             number = frame.index + 1
             labelled = truth.frame(number)
@@ -130,7 +130,6 @@ def mine(
 def _search(
     job: MiningJob,
     model: DetectorModel,
-    settings: Settings,
     info: VideoInfo,
     images: Sequence[Image],
 ) -> Callable[[Image], Windows]:

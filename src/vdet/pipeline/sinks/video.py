@@ -45,8 +45,8 @@ class VideoSink:
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(self, *raised: Any) -> object:
-        return self._stack.__exit__(*raised)
+    def __exit__(self, *raised: Any) -> None:
+        self._stack.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
         """Draw the vehicles that are shown, and hand the frame to the encoder."""

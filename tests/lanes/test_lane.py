@@ -1,11 +1,10 @@
-"""A lane as JSON."""
+"""The JSON form of a lane."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from vdet.lanes.lane import Lane
-from vdet.lanes.record import lane_record
+from vdet.lanes.lane import Lane, lane_record
 
 LANE = Lane(
     curvature=-1 / 812.34567,
@@ -33,5 +32,5 @@ def test_a_straight_road_has_no_radius() -> None:
     assert record["radius"] is None
 
 
-def test_where_no_lane_is_shown_there_is_no_record() -> None:
+def test_no_lane_has_no_record() -> None:
     assert lane_record(None) is None

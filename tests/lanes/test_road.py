@@ -1,4 +1,4 @@
-"""Lanes on generated roads: what is found is compared with where the lines were drawn."""
+"""Lanes on generated roads, compared with the lines that were drawn."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.lanes.finder import LaneFinder
-from vdet.lanes.lane import Lane, Polyline
+from vdet.geometry import Float64Array
+from vdet.lanes.lane import Lane
+from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media.images import Image
 from vdet.synthetic.camera import Camera
 from vdet.synthetic.render import render
@@ -25,8 +26,8 @@ SHADOWS = tuple(
 )
 
 
-def places(line: Polyline, camera: Camera) -> tuple[float, float]:
-    """Give where a line is on the road at its nearest and its farthest point, metres."""
+def lateral_ends(line: Float64Array, camera: Camera) -> tuple[float, float]:
+    """Return the lateral position of a line at its nearest and farthest point, metres."""
     distance = camera.focal * camera.above_ground / (line[[0, -1], 1] - camera.horizon)
     lateral = (line[[0, -1], 0] - camera.width / 2) * distance / camera.focal
     near, far = (lateral - camera.curvature * distance**2 / 2).tolist()
@@ -36,7 +37,7 @@ def places(line: Polyline, camera: Camera) -> tuple[float, float]:
 def check(lane: Lane | None, camera: Camera, left: float = -1.85, right: float = 1.85) -> None:
     assert lane is not None
     for line, truth in ((lane.left, left), (lane.right, right)):
-        near, far = places(line, camera)
+        near, far = lateral_ends(line, camera)
         assert near == pytest.approx(truth, abs=0.10)
         assert far == pytest.approx(truth, abs=0.30)
     assert lane.width == pytest.approx(right - left, abs=0.10)
@@ -75,7 +76,7 @@ def test_finds_worn_lines(make_road: MakeRoad, drive: Drive, strength: float) ->
 
 
 @pytest.mark.parametrize("radius", [np.inf, 1500, -500])
-def test_shadow_bands_across_the_road_are_no_lines(
+def test_shadow_bands_across_the_road_are_not_lines(
     make_road: MakeRoad, drive: Drive, radius: float
 ) -> None:
     scene = make_road(curvature=1 / radius, light=Light(noise=3.0, shadows=SHADOWS))
@@ -95,7 +96,7 @@ def test_works_at_any_frame_size(make_road: MakeRoad, drive: Drive, size: tuple[
 
 
 @pytest.mark.parametrize("shift", [-0.8, 0.8])
-def test_tells_how_far_the_camera_is_from_the_middle_of_its_lane(
+def test_offset_is_the_distance_from_the_middle_of_the_lane(
     make_road: MakeRoad, drive: Drive, shift: float
 ) -> None:
     scene = make_road(lines=(Line(-1.85 - shift), Line(1.85 - shift, dash=3.0)))
@@ -106,7 +107,7 @@ def test_tells_how_far_the_camera_is_from_the_middle_of_its_lane(
 
 
 @pytest.mark.parametrize("missing", [-1.85, 1.85])
-def test_no_lane_is_shown_where_one_line_was_never_seen(
+def test_no_lane_is_found_if_one_line_was_never_seen(
     make_road: MakeRoad, drive: Drive, missing: float
 ) -> None:
     scene = make_road(lines=(Line(-missing),))
@@ -114,7 +115,7 @@ def test_no_lane_is_shown_where_one_line_was_never_seen(
 
 
 @pytest.mark.parametrize("missing", [-1.85, 1.85])
-def test_a_line_that_ends_is_carried_for_a_while_and_then_the_lane_is_not_shown(
+def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost(
     make_road: MakeRoad, drive: Drive, missing: float
 ) -> None:
     whole = make_road(curvature=1 / 900)
@@ -125,7 +126,7 @@ def test_a_line_that_ends_is_carried_for_a_while_and_then_the_lane_is_not_shown(
     assert lanes[-3:] == [None] * 3
 
 
-def test_a_lane_that_comes_back_is_found_again(make_road: MakeRoad, drive: Drive) -> None:
+def test_a_lane_that_reappears_is_found_again(make_road: MakeRoad, drive: Drive) -> None:
     whole = make_road()
     bare = make_road(lines=(), frames=LaneSettings().track.carry + 1)
     lanes = drive(whole, bare, whole)
@@ -133,17 +134,15 @@ def test_a_lane_that_comes_back_is_found_again(make_road: MakeRoad, drive: Drive
     check(lanes[-1], whole.camera)
 
 
-def test_a_change_of_lanes_is_followed_from_one_lane_into_the_other(
-    make_road: MakeRoad, drive: Drive
-) -> None:
+def test_a_lane_change_ends_in_the_other_lane(make_road: MakeRoad, drive: Drive) -> None:
     moves = np.arange(0, 3.75, 0.15)  # metres a frame; a quick change at ten frames a second
     scenes = []
     for moved in moves.tolist():
         lines = tuple(Line(lateral - moved) for lateral in (-1.85, 1.85, 5.55))
         scenes.append(make_road(lines=lines, size=(640, 360), frames=1))
     offsets = np.array([lane.offset for lane in drive(*scenes) if lane])
-    behind = np.mod(moves - offsets + 1.85, 3.7) - 1.85
-    assert np.abs(behind).max() < 0.3
+    lag = np.mod(moves - offsets + 1.85, 3.7) - 1.85
+    assert np.abs(lag).max() < 0.3
     assert np.abs(offsets).max() < 2.0
     assert offsets[-1] < 0 < offsets[1]
 
@@ -153,11 +152,11 @@ def test_a_pitching_camera_keeps_the_lane_and_its_width(
 ) -> None:
     scene = make_road(curvature=1 / 800)
     camera = scene.camera
-    finder = LaneFinder(settings_for(camera), camera.width, camera.height)
-    for nod in (0, 3, 6, 8, 4, -3, -6, -3):  # pixels by which the horizon moves
-        nodding = replace(camera, horizon=camera.horizon + nod)
-        lane = finder.find(render(replace(scene, camera=nodding), 0))
-        check(lane, nodding)
+    finder = RoadFinder(LaneRequest(), settings_for(camera), camera.width, camera.height)
+    for shift in (0, 3, 6, 8, 4, -3, -6, -3):  # pixels by which the horizon moves
+        pitched = replace(camera, horizon=camera.horizon + shift)
+        view = finder.observe(render(replace(scene, camera=pitched), 0))
+        check(finder.update(view).lane, pitched)
 
 
 @pytest.fixture
@@ -182,30 +181,33 @@ def pictures() -> dict[str, Image]:
 
 
 @pytest.mark.parametrize("name", ["black", "white", "noise", "blobs", "ramp", "room"])
-def test_a_picture_without_a_lane_shows_none(pictures: dict[str, Image], name: str) -> None:
-    finder = LaneFinder(LaneSettings(), 1280, 720)
-    assert [finder.find(pictures[name]) for _ in range(3)] == [None] * 3
+def test_a_picture_without_a_lane_has_none(pictures: dict[str, Image], name: str) -> None:
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 1280, 720)
+    for _ in range(3):
+        assert finder.update(finder.observe(pictures[name])).lane is None
 
 
-def test_a_road_at_night_without_light_shows_no_lane(make_road: MakeRoad, drive: Drive) -> None:
+def test_a_dark_road_has_no_lane(make_road: MakeRoad, drive: Drive) -> None:
     assert drive(make_road(light=Light(gain=0.03), frames=3)) == [None] * 3
 
 
 @pytest.mark.parametrize("size", [(16, 16), (64, 36), (50, 400)])
-def test_odd_frame_sizes_do_no_harm(size: tuple[int, int]) -> None:
+def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
     image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
-    assert LaneFinder(LaneSettings(), *size).find(image) is None
+    finder = RoadFinder(LaneRequest(), LaneSettings(), *size)
+    assert finder.update(finder.observe(image)).lane is None
 
 
-def test_glances_may_be_taken_before_any_is_followed(
+def test_all_frames_may_be_observed_before_the_first_update(
     make_road: MakeRoad,
     drive: Drive,
     settings_for: Callable[[Camera], LaneSettings],
 ) -> None:
     scene = make_road(curvature=1 / 900, frames=3)
-    finder = LaneFinder(settings_for(scene.camera), 1280, 720)
-    glances = [finder.glance(render(scene, index)) for index in range(3)]
-    for lane, other in zip(map(finder.follow, glances), drive(scene), strict=True):
+    finder = RoadFinder(LaneRequest(), settings_for(scene.camera), 1280, 720)
+    views = [finder.observe(render(scene, index)) for index in range(3)]
+    for view, other in zip(views, drive(scene), strict=True):
+        lane = finder.update(view).lane
         assert lane is not None
         assert other is not None
         assert (lane.left == other.left).all()
