@@ -67,9 +67,9 @@ def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -
     rows, columns = image.shape[:2]
     scale = _text_scale(image, text)
     stroke = max(1, round(1.5 * scale))
-    margin = max(2, round(6 * scale))
+    margin = max(3, round(6 * scale))
     (width, height), baseline = cv2.getTextSize(text, _FONT, scale, stroke)
-    tag_width, tag_height = width + 2 * margin, height + baseline // 2 + 2 * margin
+    tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
     x = max(0, min(corner[0], columns - tag_width))
     y = max(0, min(corner[1], rows) - tag_height)
     _fill(image, Box(x, y, tag_width, tag_height), color)
