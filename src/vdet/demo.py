@@ -16,7 +16,7 @@ from vdet.learn.training import train
 from vdet.pipeline.run import VideoJob, process_video
 from vdet.synthetic.clip import write_clip, write_truth
 from vdet.synthetic.patches import write_patches
-from vdet.synthetic.worlds import default_clip
+from vdet.synthetic.random_scenes import demo_scene
 
 PATCHES = 1200
 """Of each class."""
@@ -108,7 +108,7 @@ def run_demo(
     """
     say(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
     write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
-    scene = default_clip(seed)
+    scene = demo_scene(seed)
     write_clip(files.clip, scene)
     write_truth(files.truth, scene)
     say("2/4 training …")

@@ -11,7 +11,7 @@ from vdet.config.lanes import LaneSettings
 from vdet.lanes.finder import LaneFinder
 from vdet.lanes.lane import Lane, Polyline
 from vdet.media.images import Image
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Light, Line, Scene, Shadow
 
@@ -25,7 +25,7 @@ SHADOWS = tuple(
 )
 
 
-def places(line: Polyline, camera: Camera) -> tuple[float, float]:
+def places(line: Polyline, camera: PinholeCamera) -> tuple[float, float]:
     """Give where a line is on the road at its nearest and its farthest point, metres."""
     distance = camera.focal * camera.above_ground / (line[[0, -1], 1] - camera.horizon)
     lateral = (line[[0, -1], 0] - camera.width / 2) * distance / camera.focal
@@ -33,7 +33,9 @@ def places(line: Polyline, camera: Camera) -> tuple[float, float]:
     return near, far
 
 
-def check(lane: Lane | None, camera: Camera, left: float = -1.85, right: float = 1.85) -> None:
+def check(
+    lane: Lane | None, camera: PinholeCamera, left: float = -1.85, right: float = 1.85
+) -> None:
     assert lane is not None
     for line, truth in ((lane.left, left), (lane.right, right)):
         near, far = places(line, camera)
@@ -149,7 +151,7 @@ def test_a_change_of_lanes_is_followed_from_one_lane_into_the_other(
 
 
 def test_a_pitching_camera_keeps_the_lane_and_its_width(
-    make_road: MakeRoad, settings_for: Callable[[Camera], LaneSettings]
+    make_road: MakeRoad, settings_for: Callable[[PinholeCamera], LaneSettings]
 ) -> None:
     scene = make_road(curvature=1 / 800)
     camera = scene.camera
@@ -200,7 +202,7 @@ def test_odd_frame_sizes_do_no_harm(size: tuple[int, int]) -> None:
 def test_glances_may_be_taken_before_any_is_followed(
     make_road: MakeRoad,
     drive: Drive,
-    settings_for: Callable[[Camera], LaneSettings],
+    settings_for: Callable[[PinholeCamera], LaneSettings],
 ) -> None:
     scene = make_road(curvature=1 / 900, frames=3)
     finder = LaneFinder(settings_for(scene.camera), 1280, 720)

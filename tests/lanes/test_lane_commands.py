@@ -24,7 +24,7 @@ from vdet.lanes.camera_file import save_camera
 from vdet.lanes.undistortion import Undistorter
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image, read_image, write_image
-from vdet.synthetic.camera import Camera as RoadCamera
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 
@@ -80,7 +80,7 @@ def road(make_road: Callable[..., Scene]) -> Scene:
 def files(
     road: Scene,
     undistorter: Undistorter,
-    settings_for: Callable[[RoadCamera], LaneSettings],
+    settings_for: Callable[[PinholeCamera], LaneSettings],
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Files:
     folder = tmp_path_factory.mktemp("lanes")
@@ -145,7 +145,7 @@ def box_of(item: dict[str, Any]) -> Box:
     return Box(item["x"], item["y"], item["width"], item["height"])
 
 
-def check_lane(lane: dict[str, Any], camera: RoadCamera) -> None:
+def check_lane(lane: dict[str, Any], camera: PinholeCamera) -> None:
     """Compare a lane as JSON has it with the road that was drawn."""
     assert set(lane) == {"radius", "offset", "width", "left", "right"}
     assert lane["radius"] == pytest.approx(1 / camera.curvature, rel=0.25)

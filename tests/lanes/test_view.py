@@ -10,22 +10,24 @@ from hypothesis import strategies as st
 
 from vdet.config.lanes import LaneSettings, ViewSettings
 from vdet.lanes.view import View
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
 
-SettingsFor = Callable[[Camera], LaneSettings]
-
-
-@pytest.fixture
-def camera() -> Camera:
-    return Camera.dashboard(1280, 720)
+SettingsFor = Callable[[PinholeCamera], LaneSettings]
 
 
 @pytest.fixture
-def view(camera: Camera, settings_for: SettingsFor) -> View:
+def camera() -> PinholeCamera:
+    return PinholeCamera.dashboard(1280, 720)
+
+
+@pytest.fixture
+def view(camera: PinholeCamera, settings_for: SettingsFor) -> View:
     return View(settings_for(camera).view, camera.width, camera.height)
 
 
-def test_metres_of_the_ground_lie_where_the_camera_sees_them(view: View, camera: Camera) -> None:
+def test_metres_of_the_ground_lie_where_the_camera_sees_them(
+    view: View, camera: PinholeCamera
+) -> None:
     x, z = np.array([-1.85, 0, 1.85, 4.0]), np.array([6.0, 20.0, 42.0, 9.0])
     expected = camera.project(np.column_stack([x, np.zeros(4), z]))
     assert view.to_frame(x, z) == pytest.approx(expected, abs=0.01)
@@ -43,7 +45,9 @@ def test_columns_lie_evenly_about_the_vanishing_points_column(view: View) -> Non
     assert view.columns(view.laterals) == pytest.approx(np.arange(len(view.laterals)))
 
 
-def test_a_line_on_the_road_is_upright_and_where_it_should_be(view: View, camera: Camera) -> None:
+def test_a_line_on_the_road_is_upright_and_where_it_should_be(
+    view: View, camera: PinholeCamera
+) -> None:
     frame = np.zeros((720, 1280, 3), np.uint8)
     ground = np.array([[0.9, 0, 5], [0.9, 0, 60], [1.1, 0, 60], [1.1, 0, 5]], float)
     cv2.fillPoly(frame, [np.rint(camera.project(ground)).astype(np.int32)], (255, 255, 255))
@@ -60,14 +64,14 @@ def test_pixels_of_the_frame_and_from_above_are_the_same_ground(x: float, z: flo
     assert row == pytest.approx((view.distances[0] - z) * view.along, abs=1e-6)
 
 
-def test_its_outline_is_the_border_of_what_is_seen(view: View, camera: Camera) -> None:
+def test_its_outline_is_the_border_of_what_is_seen(view: View, camera: PinholeCamera) -> None:
     half = len(view.laterals) / 2 / view.across
     corners = [[-half, 0, 42], [half, 0, 42], [half, 0, 6], [-half, 0, 6]]
     assert view.outline == pytest.approx(camera.project(np.array(corners)), abs=0.5)
 
 
 def test_the_camera_need_not_be_in_the_middle_of_the_lane_that_the_trapezoid_is_laid_on(
-    camera: Camera, settings_for: SettingsFor
+    camera: PinholeCamera, settings_for: SettingsFor
 ) -> None:
     middle = settings_for(camera).view
     shift = 0.5 * camera.focal / camera.width  # half a metre, by the distance
