@@ -15,6 +15,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 import numpy.typing as npt
+from vdet.pipeline.following import seek_horizon
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
@@ -32,7 +33,6 @@ from vdet.learn.extraction import extract
 from vdet.learn.fitting import fit
 from vdet.learn.training_set import lesson_of
 from vdet.media import VideoReader
-from vdet.pipeline.following import seek_horizon
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import Follow, tracker_of
 

@@ -4,12 +4,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+from vdet.pipeline.run import VideoJob, process_video
+
 from benchmarks.material import Config
 from benchmarks.rounds import Subject, measure
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
-from vdet.pipeline.run import VideoJob, process_video
 from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250

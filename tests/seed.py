@@ -1,8 +1,9 @@
 """The original's settings, as they ship, for tests of its numbers."""
 
+from vdet.resources import find_config
+
 from vdet.config.loading import load_settings
 from vdet.config.schema import RulesTrackerSettings
-from vdet.resources import find_config
 
 SEED = load_settings(find_config("seed")).settings
 

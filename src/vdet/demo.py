@@ -18,7 +18,7 @@ from vdet.pipeline.loop import Progress, VideoJob, no_progress, run_video
 from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic.clip import write_clip, write_truth
 from vdet.synthetic.patches import write_patches
-from vdet.synthetic.worlds import default_clip
+from vdet.synthetic.random_scenes import demo_scene
 
 PATCHES = 1200
 """Of each class."""
@@ -110,7 +110,7 @@ def run_demo(
     """
     say(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
     write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
-    scene = default_clip(seed)
+    scene = demo_scene(seed)
     write_clip(files.clip, scene)
     write_truth(files.truth, scene)
     say("2/4 training …")

@@ -9,7 +9,7 @@ import pytest
 from conftest import Run
 from quick import only_windows
 from vdet import demo
-from vdet.synthetic import default_clip
+from vdet.synthetic import demo_scene
 from vdet.synthetic.scene import Scene
 
 FEW_WINDOWS = only_windows("size: 128, overlap: 0.7, top: 370, bottom: 600")
@@ -17,13 +17,13 @@ FRAMES = 12
 
 
 def _short_clip(seed: int) -> Scene:
-    return replace(default_clip(seed, width=320, height=180), frames=FRAMES)
+    return replace(demo_scene(seed, width=320, height=180), frames=FRAMES)
 
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "PATCHES", 60)
-    monkeypatch.setattr(demo, "default_clip", _short_clip)
+    monkeypatch.setattr(demo, "demo_scene", _short_clip)
 
 
 @pytest.mark.usefixtures("small")

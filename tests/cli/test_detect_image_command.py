@@ -10,7 +10,7 @@ import pytest
 from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
 from vdet.media.images import read_image, write_image
-from vdet.synthetic import render, truth
+from vdet.synthetic import render, true_boxes
 from vdet.synthetic.scene import Scene
 
 FEW_WINDOWS = only_windows("size: 160, overlap: 0.7, top: 380, bottom: 600")
@@ -42,7 +42,7 @@ def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Sc
     for box in item["boxes"]:
         assert set(box) == {"x", "y", "width", "height", "peak"}
         assert 0 <= box["x"] < box["x"] + box["width"] <= 320
-    near = [true.box for true in truth(scene, 10) if true.box.width > 20]
+    near = [true.box for true in true_boxes(scene, 10) if true.box.width > 20]
     assert any(
         abs(box["x"] + box["width"] / 2 - true.center[0]) < true.width
         for box in item["boxes"]

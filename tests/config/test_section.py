@@ -3,8 +3,8 @@ from typing import Any
 import pytest
 
 from seed import SEED
-from vdet.config.section import scale_lengths
 from vdet.config.schema import HeatSettings, SearchSettings, Settings, WindowSettings
+from vdet.config.section import scale_lengths
 
 SETS = range(len(Settings().search.windows))
 LENGTHS = {

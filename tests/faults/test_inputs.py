@@ -9,13 +9,13 @@ from pathlib import Path
 
 import av
 import pytest
+from vdet.pipeline.run import VideoJob, process_video
 
 from faults.conftest import Start
 from red_cars import SETTINGS, red_finder
 from running import frames_of, names, unfinished, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
-from vdet.pipeline.run import VideoJob, process_video
 
 COUNT = 60
 

@@ -8,25 +8,25 @@ from vdet.config.lanes import LaneSettings, TopViewSettings
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, RoadFinder
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Light, Line, Road, Scene
+from vdet.synthetic.scene import Carriageway, Light, Line, Scene
 
 YELLOW = (60, 180, 225)
 NEAR, FAR = 6.0, 42.0
 
 
 @pytest.fixture(scope="session")
-def settings_for() -> Callable[[Camera], LaneSettings]:
+def settings_for() -> Callable[[PinholeCamera], LaneSettings]:
     """Make settings whose top view shows the road from 6 m to 42 m ahead of a level camera."""
 
-    def row(camera: Camera, distance: float) -> float:
+    def row(camera: PinholeCamera, distance: float) -> float:
         return (camera.horizon + camera.focal * camera.above_ground / distance) / camera.height
 
-    def column(camera: Camera, lateral: float, distance: float) -> float:
+    def column(camera: PinholeCamera, lateral: float, distance: float) -> float:
         return 0.5 + camera.focal * lateral / distance / camera.width
 
-    def make(camera: Camera) -> LaneSettings:
+    def make(camera: PinholeCamera) -> LaneSettings:
         view = TopViewSettings(
             top=row(camera, FAR),
             bottom=row(camera, NEAR),
@@ -55,8 +55,8 @@ def make_road() -> Callable[..., Scene]:
         frames: int = 4,
     ) -> Scene:
         return Scene(
-            camera=Camera.dashboard(*size, curvature=curvature),
-            road=Road(left=-7.0, right=7.0, lines=lines, asphalt=asphalt),
+            camera=PinholeCamera.dashboard(*size, curvature=curvature),
+            road=Carriageway(left=-7.0, right=7.0, lines=lines, asphalt=asphalt),
             light=light or Light(),
             frames=frames,
             seed=3,
@@ -66,7 +66,9 @@ def make_road() -> Callable[..., Scene]:
 
 
 @pytest.fixture
-def drive(settings_for: Callable[[Camera], LaneSettings]) -> Callable[..., list[Lane | None]]:
+def drive(
+    settings_for: Callable[[PinholeCamera], LaneSettings],
+) -> Callable[..., list[Lane | None]]:
     """Find the lane in each frame of consecutive scenes."""
 
     def find(*scenes: Scene) -> list[Lane | None]:

@@ -23,7 +23,7 @@ from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.camera_file import save_camera
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image, read_image, write_image
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 
@@ -79,7 +79,7 @@ def road(make_road: Callable[..., Scene]) -> Scene:
 def files(
     road: Scene,
     undistorter: Undistorter,
-    settings_for: Callable[[Camera], LaneSettings],
+    settings_for: Callable[[PinholeCamera], LaneSettings],
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Files:
     folder = tmp_path_factory.mktemp("lanes")
@@ -144,7 +144,7 @@ def box_of(item: dict[str, Any]) -> Box:
     return Box(item["x"], item["y"], item["width"], item["height"])
 
 
-def check_lane(lane: dict[str, Any], camera: Camera) -> None:
+def check_lane(lane: dict[str, Any], camera: PinholeCamera) -> None:
     """Compare a lane in JSON with the road that was drawn."""
     assert set(lane) == {"radius", "offset", "width", "left", "right"}
     assert lane["radius"] == pytest.approx(1 / camera.curvature, rel=0.25)

@@ -12,7 +12,7 @@ from vdet.geometry import Float64Array
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media.images import Image
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Light, Line, Scene, Shadow
 
@@ -26,7 +26,7 @@ SHADOWS = tuple(
 )
 
 
-def lateral_ends(line: Float64Array, camera: Camera) -> tuple[float, float]:
+def lateral_ends(line: Float64Array, camera: PinholeCamera) -> tuple[float, float]:
     """Return the lateral position of a line at its nearest and farthest point, metres."""
     distance = camera.focal * camera.above_ground / (line[[0, -1], 1] - camera.horizon)
     lateral = (line[[0, -1], 0] - camera.width / 2) * distance / camera.focal
@@ -34,7 +34,9 @@ def lateral_ends(line: Float64Array, camera: Camera) -> tuple[float, float]:
     return near, far
 
 
-def check(lane: Lane | None, camera: Camera, left: float = -1.85, right: float = 1.85) -> None:
+def check(
+    lane: Lane | None, camera: PinholeCamera, left: float = -1.85, right: float = 1.85
+) -> None:
     assert lane is not None
     for line, truth in ((lane.left, left), (lane.right, right)):
         near, far = lateral_ends(line, camera)
@@ -148,7 +150,7 @@ def test_a_lane_change_ends_in_the_other_lane(make_road: MakeRoad, drive: Drive)
 
 
 def test_a_pitching_camera_keeps_the_lane_and_its_width(
-    make_road: MakeRoad, settings_for: Callable[[Camera], LaneSettings]
+    make_road: MakeRoad, settings_for: Callable[[PinholeCamera], LaneSettings]
 ) -> None:
     scene = make_road(curvature=1 / 800)
     camera = scene.camera
@@ -201,7 +203,7 @@ def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
 def test_all_frames_may_be_observed_before_the_first_update(
     make_road: MakeRoad,
     drive: Drive,
-    settings_for: Callable[[Camera], LaneSettings],
+    settings_for: Callable[[PinholeCamera], LaneSettings],
 ) -> None:
     scene = make_road(curvature=1 / 900, frames=3)
     finder = RoadFinder(LaneRequest(), settings_for(scene.camera), 1280, 720)

@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from vdet.pipeline.following import follow
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, drive, red_finder
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media.images import Image
-from vdet.pipeline.following import follow
 
 LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 COUNT = 40

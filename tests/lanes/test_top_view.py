@@ -10,22 +10,24 @@ from hypothesis import strategies as st
 
 from vdet.config.lanes import LaneSettings, TopViewSettings
 from vdet.lanes.top_view import TopView
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
 
-SettingsFor = Callable[[Camera], LaneSettings]
-
-
-@pytest.fixture
-def camera() -> Camera:
-    return Camera.dashboard(1280, 720)
+SettingsFor = Callable[[PinholeCamera], LaneSettings]
 
 
 @pytest.fixture
-def top_view(camera: Camera, settings_for: SettingsFor) -> TopView:
+def camera() -> PinholeCamera:
+    return PinholeCamera.dashboard(1280, 720)
+
+
+@pytest.fixture
+def top_view(camera: PinholeCamera, settings_for: SettingsFor) -> TopView:
     return TopView(settings_for(camera).view, camera.width, camera.height)
 
 
-def test_ground_points_lie_where_the_camera_sees_them(top_view: TopView, camera: Camera) -> None:
+def test_ground_points_lie_where_the_camera_sees_them(
+    top_view: TopView, camera: PinholeCamera
+) -> None:
     x, z = np.array([-1.85, 0, 1.85, 4.0]), np.array([6.0, 20.0, 42.0, 9.0])
     expected = camera.project(np.column_stack([x, np.zeros(4), z]))
     assert top_view.ground_to_frame(x, z) == pytest.approx(expected, abs=0.01)
@@ -44,7 +46,7 @@ def test_columns_are_symmetric_about_the_vanishing_point(top_view: TopView) -> N
 
 
 def test_a_line_on_the_road_is_upright_and_at_its_position(
-    top_view: TopView, camera: Camera
+    top_view: TopView, camera: PinholeCamera
 ) -> None:
     frame = np.zeros((720, 1280, 3), np.uint8)
     ground = np.array([[0.9, 0, 5], [0.9, 0, 60], [1.1, 0, 60], [1.1, 0, 5]], float)
@@ -63,7 +65,7 @@ def test_frame_and_top_view_pixels_show_the_same_ground(x: float, z: float) -> N
 
 
 def test_outline_is_the_border_of_the_top_view_in_the_frame(
-    top_view: TopView, camera: Camera
+    top_view: TopView, camera: PinholeCamera
 ) -> None:
     half = len(top_view.laterals) / 2 / top_view.across
     corners = [[-half, 0, 42], [half, 0, 42], [half, 0, 6], [-half, 0, 6]]
@@ -71,7 +73,7 @@ def test_outline_is_the_border_of_the_top_view_in_the_frame(
 
 
 def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
-    camera: Camera, settings_for: SettingsFor
+    camera: PinholeCamera, settings_for: SettingsFor
 ) -> None:
     middle = settings_for(camera).view
     shift = 0.5 * camera.focal / camera.width  # half a metre; divide by the distance

@@ -14,6 +14,8 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from vdet.pipeline.following import HORIZON_FRAMES, follow, seek_horizon
+from vdet.pipeline.run import Summary, VideoJob, process_video
 
 from conftest import Run
 from quick import QUICK, QUICK_OPTIONS
@@ -35,9 +37,7 @@ from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image
 from vdet.media.pixels import to_bgr
-from vdet.pipeline.following import HORIZON_FRAMES, follow, seek_horizon
-from vdet.pipeline.run import Summary, VideoJob, process_video
-from vdet.synthetic import frames, truth
+from vdet.synthetic import frames, true_boxes
 from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import Cars
 
@@ -81,7 +81,7 @@ class TestFollow:
         nearest = 3  # its number in the scene
         overlaps = []
         for result in results[8:]:
-            (box,) = (v.box for v in truth(scene, result.frame.index) if v.id == nearest)
+            (box,) = (v.box for v in true_boxes(scene, result.frame.index) if v.id == nearest)
             overlaps.append(max((track.box.iou(box) for track in result.tracks), default=0))
         assert min(overlaps) > 0.3
         assert np.mean(overlaps) > 0.5

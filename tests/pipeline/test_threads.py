@@ -11,7 +11,14 @@ import cv2
 import pytest
 from threadpoolctl import threadpool_info
 
-from vdet.pipeline.threads import Stalled, prefetch, run_in_thread, write_async, map_ordered, single_threaded_libraries
+from vdet.pipeline.threads import (
+    Stalled,
+    map_ordered,
+    prefetch,
+    run_in_thread,
+    single_threaded_libraries,
+    write_async,
+)
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])

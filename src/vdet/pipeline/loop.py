@@ -16,7 +16,7 @@ from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
 from vdet.files import OutputFiles
-from vdet.lanes.road import LaneRequest, FrameView, RoadFinder
+from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult

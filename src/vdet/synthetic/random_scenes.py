@@ -1,4 +1,4 @@
-"""Scenes from a seed: empty roads of every kind, traffic on them, and the clip of the demo."""
+"""Random scenes from a seed: empty roads, roads with traffic, and the road of the demo."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -6,18 +6,18 @@ from typing import Literal
 
 import numpy as np
 
-from vdet.synthetic.camera import Camera
+from vdet.draw.boxes import Color
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import (
     PERIOD,
     Body,
-    Color,
+    Carriageway,
     Light,
     Line,
-    Road,
     RoadsideObject,
     Scene,
+    SceneVehicle,
     Shadow,
-    Vehicle,
     Wall,
     Waypoint,
 )
@@ -45,15 +45,15 @@ _LOOKALIKES: tuple[tuple[Literal["sign", "bin", "hut"], float, float], ...] = (
 )  # kind, width, height
 
 
-def default_clip(seed: int, *, width: int = 960, height: int = 540) -> Scene:
-    """Return the clip of the demo: 10 s at 25 frames a second.
+def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
+    """Return the scene of the demo: 10 s at 25 frames a second.
 
-    From the left lane, a vehicle follows its lane far ahead (id 1) and another one drives two
-    lanes to the right (2); a third is overtaken and leaves at the right edge (3); a fourth comes
-    in at the right edge, overtakes, and hides the second for about two seconds (4).
+    The camera drives in the left lane. Vehicle 1 drives far ahead in the same lane, vehicle 2 two
+    lanes to the right. The camera overtakes vehicle 3, which leaves at the right edge. Vehicle 4
+    enters at the right edge, overtakes, and hides vehicle 2 for about two seconds.
     """
     rng = np.random.default_rng(seed)
-    scene = empty_road(rng, Camera.dashboard(width, height), lane=0, lanes=3, seed=seed)
+    scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)
     near, far = LANE_WIDTH, 2 * LANE_WIDTH
     paths = (
         ((0.0, 25.0, 0.0), (4.0, 29.0, 0.1), (10.0, 26.0, -0.1)),
@@ -63,7 +63,7 @@ def default_clip(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     )
     paints = rng.permutation(len(_PAINTS))
     vehicles = tuple(
-        Vehicle(
+        SceneVehicle(
             id=number,
             path=tuple(Waypoint(*point) for point in path),
             color=_PAINTS[paints[number]],
@@ -74,14 +74,20 @@ def default_clip(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     return replace(scene, vehicles=vehicles, rate=Fraction(25), frames=250)
 
 
-def traffic(
-    camera: Camera, *, lane: int, lanes: int, frames: int, seed: int, light: Light | None = None
+def traffic_scene(
+    camera: PinholeCamera,
+    *,
+    lane: int,
+    lanes: int,
+    frames: int,
+    seed: int,
+    light: Light | None = None,
 ) -> Scene:
-    """Return a clip at 25 frames a second with a near and a far vehicle in every lane.
+    """Return a scene at 25 frames a second with a near and a far vehicle in each lane.
 
-    All drive steadily, a little faster than the camera, which is in lane `lane`, counted from 0 at
-    the left, of `lanes`. Ids count from 1 at the left, near before far. Without `light` it is drawn
-    from the seed, as the rest is.
+    All vehicles drive at constant speeds, a little faster than the camera. The camera is in lane
+    `lane` of `lanes`, counted from 0 at the left. Ids count from 1 at the left, near before far.
+    Without `light`, the light is random like the rest.
     """
     rng = np.random.default_rng(seed)
     scene = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
@@ -93,24 +99,24 @@ def traffic(
         for ahead, gained in ((9 + 1.2 * abs(lateral), 2 * end), (24 + abs(lateral), 3 * end))
     ]
     vehicles = tuple(
-        Vehicle(number, path, random_paint(rng), random_body(rng))
+        SceneVehicle(number, path, random_paint(rng), random_body(rng))
         for number, path in enumerate(paths, start=1)
     )
     return replace(scene, light=light or scene.light, vehicles=vehicles, rate=rate, frames=frames)
 
 
 def empty_road(
-    rng: np.random.Generator, camera: Camera, *, lane: int, lanes: int, seed: int
+    rng: np.random.Generator, camera: PinholeCamera, *, lane: int, lanes: int, seed: int
 ) -> Scene:
-    """Return a road without vehicles, its colours, light and roadside drawn from `rng`.
+    """Return a road without vehicles, with random colours, light and roadside.
 
-    The camera drives in the middle of lane `lane`, counted from 0 at the left, of `lanes`.
+    The camera drives in the middle of lane `lane` of `lanes`, counted from 0 at the left.
     """
     left = -(lane + 0.5) * LANE_WIDTH
     right = left + lanes * LANE_WIDTH
     dashed = [Line(left + number * LANE_WIDTH, dash=3.0, gap=9.0) for number in range(1, lanes)]
     asphalt = int(rng.integers(58, 120))
-    road = Road(
+    road = Carriageway(
         left=left - 1.5,
         right=right + 2.0,
         lines=(Line(left, _YELLOW), *dashed, Line(right)),
@@ -128,7 +134,7 @@ def empty_road(
 
 
 def random_body(rng: np.random.Generator) -> Body:
-    """Return a saloon, hatchback, off-roader, van or coupé, no two alike."""
+    """Return a saloon, hatchback, off-roader, van or coupé of a random size."""
     shape = _SHAPES[rng.integers(len(_SHAPES))]
     return replace(
         shape,
@@ -139,7 +145,7 @@ def random_body(rng: np.random.Generator) -> Body:
 
 
 def random_paint(rng: np.random.Generator) -> Color:
-    """Return a colour that cars have."""
+    """Return a random colour that is usual for cars."""
     paint = np.array(_PAINTS[rng.integers(len(_PAINTS))]) + rng.integers(-12, 13, 3)
     blue, green, red = (int(value) for value in np.clip(paint, 8, 245))
     return blue, green, red

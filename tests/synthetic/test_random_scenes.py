@@ -3,30 +3,28 @@ from itertools import pairwise
 
 import pytest
 
-from vdet.geometry import Box
-from vdet.synthetic.camera import Camera
-from vdet.synthetic.clip import counts
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import LANE_WIDTH, demo_scene, traffic_scene
 from vdet.synthetic.scene import Light, Scene
-from vdet.synthetic.truth import TrueBox, truth
-from vdet.synthetic.worlds import LANE_WIDTH, default_clip, traffic
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
 
 def history(scene: Scene, number: int) -> list[tuple[int, TrueBox]]:
-    """A vehicle's frames and boxes, of every fifth frame."""
+    """Return the frame numbers and boxes of a vehicle, for every fifth frame."""
     return [
         (index, box)
         for index in range(0, scene.frames, 5)
-        for box in truth(scene, index)
+        for box in true_boxes(scene, index)
         if box.id == number
     ]
 
 
 @pytest.fixture(params=[0, 1, 2])
 def scene(request: pytest.FixtureRequest) -> Scene:
-    return default_clip(request.param)
+    return demo_scene(request.param)
 
 
-def test_ids_count_from_1_and_are_never_used_twice(scene: Scene) -> None:
+def test_ids_count_from_1(scene: Scene) -> None:
     assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4]
 
 
@@ -46,17 +44,17 @@ def test_one_vehicle_enters_at_the_right_edge_and_stays(scene: Scene) -> None:
     assert seen[-1][0] == scene.frames - 5
 
 
-def test_one_vehicle_is_hidden_by_another_that_passes_and_comes_back(scene: Scene) -> None:
+def test_one_vehicle_is_hidden_while_another_passes(scene: Scene) -> None:
     late = [box.hidden for index, box in history(scene, 2) if index > 110]
     assert late[0] < 0.1
     assert max(late) > 0.9
     assert late[-1] < 0.1
 
 
-def test_vehicles_in_full_view_have_the_sizes_that_window_sets_are_made_for(scene: Scene) -> None:
+def test_vehicles_in_full_view_have_the_sizes_that_the_window_sets_cover(scene: Scene) -> None:
     unit = scene.camera.height / 720
     for index in range(0, scene.frames, 5):
-        for vehicle in truth(scene, index):
+        for vehicle in true_boxes(scene, index):
             box = vehicle.box
             if vehicle.visibility > 0.99:
                 assert 55 * unit < box.width < 420 * unit
@@ -65,17 +63,17 @@ def test_vehicles_in_full_view_have_the_sizes_that_window_sets_are_made_for(scen
 
 
 def test_the_same_seed_gives_the_same_scene() -> None:
-    assert default_clip(5) == default_clip(5)
-    assert default_clip(5) != default_clip(6)
+    assert demo_scene(5) == demo_scene(5)
+    assert demo_scene(5) != demo_scene(6)
 
 
-CAMERAS = (Camera.dashboard(1280, 720), Camera(1242, 375, 721, 172.5, 1.65))
+CAMERAS = (PinholeCamera.dashboard(1280, 720), PinholeCamera(1242, 375, 721, 172.5, 1.65))
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("lane", [0, 1, 2])
-def test_traffic_is_near_and_far_in_every_lane(camera: Camera, lane: int) -> None:
-    scene = traffic(camera, lane=lane, lanes=3, frames=30, seed=1)
+def test_each_lane_has_a_near_and_a_far_vehicle(camera: PinholeCamera, lane: int) -> None:
+    scene = traffic_scene(camera, lane=lane, lanes=3, frames=30, seed=1)
     lanes: dict[int, list[float]] = {0: [], 1: [], 2: []}
     for vehicle in scene.vehicles:
         ahead, lateral = vehicle.position(0.0) or (0.0, 0.0)
@@ -86,18 +84,18 @@ def test_traffic_is_near_and_far_in_every_lane(camera: Camera, lane: int) -> Non
 
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize(("lane", "hidden"), [(0, {2, 6}), (1, {4}), (2, {2, 6})])
-def test_all_traffic_counts_but_what_nearer_vehicles_hide(
-    camera: Camera, lane: int, hidden: set[int]
+def test_all_vehicles_must_be_found_except_those_that_nearer_ones_hide(
+    camera: PinholeCamera, lane: int, hidden: set[int]
 ) -> None:
-    scene = traffic(camera, lane=lane, lanes=3, frames=30, seed=1)
+    scene = traffic_scene(camera, lane=lane, lanes=3, frames=30, seed=1)
     for index in (0, 15, 29):
-        boxes = truth(scene, index)
+        boxes = true_boxes(scene, index)
         assert {box.id for box in boxes} == {1, 2, 3, 4, 5, 6}
-        assert {box.id for box in boxes if not counts(box, camera.height)} == hidden
+        assert {box.id for box in boxes if not must_be_found(box, camera.height)} == hidden
 
 
-def test_traffic_drives_steadily_to_the_last_frame() -> None:
-    scene = traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
+def test_traffic_keeps_its_speed_and_lane_to_the_last_frame() -> None:
+    scene = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
     for vehicle in scene.vehicles:
         places = [vehicle.position(scene.time(index)) or (0.0, 0.0) for index in (0, 14, 28)]
         steps = [after[0] - before[0] for before, after in pairwise(places)]
@@ -106,27 +104,10 @@ def test_traffic_drives_steadily_to_the_last_frame() -> None:
         assert len({lateral for _, lateral in places}) == 1
 
 
-def test_traffic_takes_the_light_that_it_is_given() -> None:
+def test_traffic_uses_the_light_that_it_is_given() -> None:
     dusk = Light(gain=0.5)
-    given = traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1, light=dusk)
-    drawn = traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
+    given = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1, light=dusk)
+    drawn = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
     assert given == replace(drawn, light=dusk)
     assert drawn.light != dusk
-    assert drawn != traffic(CAMERAS[0], lane=1, lanes=3, frames=30, seed=2)
-
-
-@pytest.mark.parametrize(
-    ("width", "height", "hidden", "expected"),
-    [(40, 24, 0.5, True), (39, 24, 0.0, False), (40, 23, 0.0, False), (90, 60, 0.51, False)],
-)
-def test_a_vehicle_counts_when_large_and_half_of_it_not_hidden(
-    width: int, height: int, hidden: float, expected: bool
-) -> None:
-    vehicle = TrueBox(1, Box(0, 0, width, height), visibility=1 - hidden, hidden=hidden)
-    assert counts(vehicle, 720) is expected
-
-
-def test_the_smallest_size_that_counts_grows_with_the_frame() -> None:
-    vehicle = TrueBox(1, Box(0, 0, 20, 12), visibility=1.0, hidden=0.0)
-    assert counts(vehicle, 360)
-    assert not counts(vehicle, 540)
+    assert drawn != traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=2)

@@ -1,25 +1,27 @@
-"""The ground: asphalt, verge and solid lines that stand still, dashes and texture that move."""
+"""The ground: asphalt, verge and lane lines.
+
+The colours and the solid lines are the same in all frames; dashes and texture move.
+"""
 
 from collections.abc import Iterator
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from vdet.geometry import Float32Array
+from vdet.geometry import Float32Array, Float64Array
 from vdet.media.images import Image
-from vdet.synthetic.camera import NEAR, Points, along
+from vdet.synthetic.camera import NEAR, distances
 from vdet.synthetic.painting import fill, mixed
-from vdet.synthetic.scene import PERIOD, Line, Road, Scene, Shadow
+from vdet.synthetic.scene import PERIOD, Carriageway, Line, Scene, Shadow
 
 _TEXEL = 0.1  # metres a pixel of the finest texture
 _HALF_WIDTH = 30.0  # metres of texture to either side of the camera
-_NEUTRAL = 128  # texture value that leaves the colour as it is
+_NEUTRAL = 128  # texture value that does not change the colour
 _FAR = 100.0  # metres; dashes end here
 
 
 class Ground:
-    """What lies below the horizon of a scene: a base painted once, and what moves over it."""
+    """Draws the part of a scene below the horizon."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -35,7 +37,7 @@ class Ground:
         self._maps = [self._map(level, rows) for level, rows in self._levels()]
 
     def paint_base(self, image: Image) -> None:
-        """Paint what never moves: colours of road and verge, solid lines."""
+        """Paint what is the same in all frames: colours of road and verge, solid lines."""
         pixel = self._distance[:, None] / self._scene.camera.focal
         image[self._top :] = _colors(self._scene.road, self._lateral, pixel)
         for line in self._scene.road.lines:
@@ -43,7 +45,7 @@ class Ground:
                 _draw_stripe(image, self._scene, line, NEAR, 6 * _FAR)
 
     def draw(self, image: Image, station: float) -> None:
-        """Draw dashes and texture over the base, as they are at a station of the camera."""
+        """Draw dashes and texture over the base, as seen from a station of the camera."""
         for line in self._scene.road.lines:
             for start, end in _dashes(line, station):
                 _draw_stripe(image, self._scene, line, start, end)
@@ -52,7 +54,7 @@ class Ground:
         cv2.multiply(ground, cv2.merge([gain, gain, gain]), dst=ground, scale=1 / _NEUTRAL)
 
     def _gain(self, station: float) -> Image:
-        """Return the texture as it lies on the screen, uint8 `(rows below the horizon, W)`."""
+        """Return the texture projected to the image, uint8 `(rows below the horizon, W)`."""
         parts = [
             cv2.remap(
                 self._texture[level],
@@ -66,14 +68,14 @@ class Ground:
         return np.asarray(np.concatenate(parts), dtype=np.uint8)
 
     def _map(self, level: int, rows: slice) -> tuple[int, Float32Array, Float32Array]:
-        """Return a level of the texture, and where in it rows of the screen lie at station 0."""
+        """Return a texture level, and the columns and rows in it of image rows at station 0."""
         x = (self._lateral[rows] + np.float32(_HALF_WIDTH)) / np.float32(_texel(level))
         y = np.empty_like(x)
         y[:] = self._distance[rows, None] / np.float32(_texel(level))
         return level, x, y
 
     def _levels(self) -> Iterator[tuple[int, slice]]:
-        """Choose a texture for each run of rows, so that a row does not step over texels."""
+        """Choose a texture level for each run of image rows, so that no row skips texels."""
         step = self._distance**2 / (self._scene.camera.focal * self._scene.camera.above_ground)
         coarse = int(np.searchsorted(-step, -16 * _TEXEL))
         fine = int(np.searchsorted(-step, -4 * _TEXEL))
@@ -87,7 +89,7 @@ def _texel(level: int) -> float:
 
 
 def _texture(scene: Scene) -> Image:
-    """Return brightness over the ground, uint8, 128 as it is; `PERIOD` × 60 m at 10 cm a pixel.
+    """Return the brightness of the ground, uint8, 128 is neutral; `PERIOD` × 60 m at 10 cm a pixel.
 
     Rows are stations, columns run from 30 m left to 30 m right of the camera.
     """
@@ -106,7 +108,7 @@ def _texture(scene: Scene) -> Image:
 
 
 def brightness(scene: Scene, station: float) -> float:
-    """Return how much light a vehicle has at a station, 0 to 1."""
+    """Return the light on a vehicle at a station, 0 to 1."""
     light = 1.0
     for shadow in scene.light.shadows:
         if (station - shadow.station) % PERIOD < shadow.length:
@@ -121,7 +123,7 @@ def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Flo
     return np.asarray(cv2.resize(noise, (columns, rows), interpolation=cv2.INTER_CUBIC))
 
 
-def _cast(gain: npt.NDArray[np.float64], shadow: Shadow, patches: Float32Array) -> None:
+def _cast(gain: Float64Array, shadow: Shadow, patches: Float32Array) -> None:
     """Darken the texture where a shadow lies."""
     start, end = (int(s / _TEXEL) for s in (shadow.station, shadow.station + shadow.length))
     dark = patches[start:end] > 0 if shadow.dappled else np.True_
@@ -129,7 +131,7 @@ def _cast(gain: npt.NDArray[np.float64], shadow: Shadow, patches: Float32Array) 
 
 
 def _pyramid(finest: Image) -> list[Image]:
-    """Return the texture at 1, 4 and 16 times the texel's size."""
+    """Return the texture at 1, 4 and 16 times the texel size."""
     levels = [finest]
     for _ in range(2):
         rows, columns = levels[-1].shape
@@ -138,7 +140,7 @@ def _pyramid(finest: Image) -> list[Image]:
     return levels
 
 
-def _colors(road: Road, lateral: Float32Array, pixel: Float32Array) -> Float32Array:
+def _colors(road: Carriageway, lateral: Float32Array, pixel: Float32Array) -> Float32Array:
     """Return the colour at each lateral position; `pixel` is a pixel's width in metres."""
     inside = np.minimum(lateral - road.left, road.right - lateral) / pixel + 0.5
     paved = np.clip(inside, 0, 1)[..., None]
@@ -147,7 +149,7 @@ def _colors(road: Road, lateral: Float32Array, pixel: Float32Array) -> Float32Ar
 
 
 def _dashes(line: Line, station: float) -> Iterator[tuple[float, float]]:
-    """Give the dashes in sight as `(start, end)`, metres ahead; none for a solid line."""
+    """Give the visible dashes as `(start, end)`, metres ahead; none for a solid line."""
     if line.dash is None:
         return
     period = line.dash + line.gap
@@ -158,13 +160,13 @@ def _dashes(line: Line, station: float) -> Iterator[tuple[float, float]]:
 
 def _draw_stripe(image: Image, scene: Scene, line: Line, start: float, end: float) -> None:
     """Draw a lane line from `start` to `end`, metres ahead."""
-    outline = scene.camera.outline(stripe(line, start, end))
+    outline = scene.camera.outline(_stripe(line, start, end))
     fill(image, outline, mixed(scene.road.asphalt, line.color, line.strength))
 
 
-def stripe(line: Line, start: float, end: float) -> Points:
+def _stripe(line: Line, start: float, end: float) -> Float64Array:
     """Return the outline of a piece of lane line on the ground, points `(n, 3)` in metres."""
-    z = along(start, end)
+    z = distances(start, end)
     side = np.repeat([-0.5, 0.5], len(z)) * line.width
     z = np.concatenate([z, z[::-1]])
     return np.stack([line.lateral + side, np.zeros_like(z), z], axis=1)
