@@ -64,7 +64,7 @@ def main() -> None:
     parser.add_argument("patches", type=Path, nargs="+", help="the sets, the mined one among them")
     options = parser.parse_args()
     truth = read_truth(options.truth)
-    settings = load_settings(None, SETTINGS).settings
+    settings = load_settings(None, SETTINGS)
     models = _models(options.patches, truth.last_frame, settings)
     with single_threaded_libraries():
         searched, size = _search(options.video, truth.last_frame, models, settings)
@@ -140,7 +140,7 @@ def _sweep(
     truth: LabelledVideo,
 ) -> Iterator[str]:
     """Give the lines of a table: the F1 of each value, whole and block by block."""
-    variants = [load_settings(None, [f"{key}={value}"]).settings for value in values]
+    variants = [load_settings(None, [f"{key}={value}"]) for value in values]
     found = [
         _tracks(Detector(model, each, *size), tracker_of(each, *size), searched)
         for each in variants

@@ -4,10 +4,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.resources import find_config, shipped_model
-
-from vdet.config.loading import load_settings
+from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.media import VideoReader
 from vdet.media.images import Image
@@ -29,7 +28,7 @@ class Config:
 
 
 def config(name: str) -> Config:
-    settings = load_settings(find_config(name)).settings
+    settings = load_settings(find_config(name))
     return Config(settings, load_model(shipped_model(settings.features)))
 
 

@@ -4,13 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from vdet.pipeline.run import VideoJob, process_video
-
 from benchmarks.material import Config
 from benchmarks.rounds import Subject, measure
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
+from vdet.pipeline.loop import VideoJob, run_video
 from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250
@@ -36,13 +35,13 @@ def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[st
 
     def detect(lanes: LaneRequest | None = None) -> None:
         job = VideoJob(path, out, frames=FRAMES, lanes=lanes)
-        process_video(job, default.model, default.settings)
+        run_video(job, default.model, default.settings)
 
     def detect_with_lanes() -> None:
         detect(LaneRequest(CAMERA))
 
     def detect_only() -> None:
-        process_video(VideoJob(path, frames=FRAMES), default.model, default.settings)
+        run_video(VideoJob(path, frames=FRAMES), default.model, default.settings)
 
     subjects: dict[str, Subject] = {
         "pass through": pass_through,

@@ -12,9 +12,9 @@ from statistics import median
 import numpy as np
 import pytest
 from vdet.pipeline.following import follow, seek_horizon
-from vdet.resources import shipped_model
 
 from vdet.config.schema import Settings
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.evaluate.comparison import Comparison
 from vdet.evaluate.labelled_video import LabelledVideo

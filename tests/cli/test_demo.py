@@ -47,7 +47,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(demo, "PATCHES", PATCHES)
         patch.setattr(demo, "demo_scene", short_clip)
-        settings = load_settings(None, QUICK).settings
+        settings = load_settings(None, QUICK)
         result = run_demo(files, settings, say=said.append, progress=progress)
     return Demo(files, result, said, totals)
 

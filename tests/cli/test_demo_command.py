@@ -58,9 +58,9 @@ def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_wrong_setting_is_refused_before_anything_is_drawn(run: Run, tmp_path: Path) -> None:
-    result = run("demo", tmp_path / "demo", "--set", "heat.treshold=2")
+    result = run("demo", tmp_path / "demo", "--set", "detector.heat.treshold=2")
     assert result.code == 1
-    assert "heat.treshold" in result.err
+    assert "detector.heat.treshold" in result.err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -171,7 +171,11 @@ def test_boxes_lie_in_the_picture_whatever_its_size(
 ) -> None:
     path = tmp_path / "odd.png"
     write_image(path, render(scene, 10)[:179, :318])
-    loose = ("heat.threshold=0.01", "search.probability=0.05", "tracker.motion.strong=0.01")
+    loose = (
+        "detector.heat.threshold=0.01",
+        "detector.search.probability=0.05",
+        "tracker.motion.strong=0.01",
+    )
     options = [word for assignment in loose for word in ("--set", assignment)]
     result = run("detect-image", path, "--json", "-", "--model", model_path, *options)
     (item,) = json.loads(result.out)
