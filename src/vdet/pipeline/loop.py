@@ -147,7 +147,7 @@ def run_video(
     return Summary(info.width, info.height, frames, len(ids), time.perf_counter() - began)
 
 
-def follow(
+def follow_frames(
     frames: Iterable[Frame],
     detector: VideoDetector,
     settings: Settings,
@@ -212,7 +212,7 @@ def _results(
     try:
         roads = RoadFinder(job.lanes, settings.lanes, *size) if job.lanes else None
         detector = _detector(images, job.source, model, size)
-        yield from follow(frames, detector, settings, video, threads=threads, roads=roads)
+        yield from follow_frames(frames, detector, settings, video, threads=threads, roads=roads)
     except (ConfigError, ImageError) as error:
         raise VideoError(f"{job.source}: {error}") from error
 
