@@ -30,7 +30,9 @@ _GROWTH = 3.0
 """How much larger or smaller its box may be then, as an area."""
 
 
-def buffered_iou(expected: Float64Array, buffers: Float64Array, found: Float64Array) -> Float64Array:
+def buffered_iou(
+    expected: Float64Array, buffers: Float64Array, found: Float64Array
+) -> Float64Array:
     """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
 
     Both boxes are widened by the buffer of the expected one, in shares of their own sizes. So two

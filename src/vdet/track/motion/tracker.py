@@ -159,9 +159,7 @@ class MotionTracker:
             gone = hidden and predicted
             if vehicle.is_present(self._settings) and wide_enough and not gone:
                 vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
-                track = Track(
-                    vehicle.id, _rounded(box), vehicle.score, predicted, vehicle.class_id
-                )
+                track = Track(vehicle.id, _rounded(box), vehicle.score, predicted, vehicle.class_id)
                 tracks.append(track)
         return sorted(tracks, key=lambda track: track.id)
 
