@@ -8,8 +8,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import ImageError, VideoError
 from vdet.evaluate.clips.following import follow_under_all
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.truth import read_truth
 from vdet.media import VideoReader
 from vdet.track.track import Track
@@ -80,7 +79,9 @@ def detect(
             raise VideoError(f"{clip.video}: {error}") from error
     if clip.until is not None and frames < clip.until:
         read_truth(clip.truth_path, frame_count=frames)  # refuses it, and names the line
-    return [in_memory(each, frame_count=frames, rate=float(info.rate)) for each in rows]
+    return [
+        LabelledVideo.from_rows(each, frame_count=frames, rate=float(info.rate)) for each in rows
+    ]
 
 
 def _row(number: int, track: Track) -> Row:
