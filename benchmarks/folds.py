@@ -15,6 +15,7 @@ from pathlib import Path
 import joblib
 import numpy as np
 import numpy.typing as npt
+from vdet.pipeline.following import seek_horizon
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
@@ -31,8 +32,7 @@ from vdet.learn.extraction import extract
 from vdet.learn.fitting import fit
 from vdet.learn.training_set import lesson_of
 from vdet.media import VideoReader
-from vdet.pipeline.following import seek_horizon
-from vdet.pipeline.threads import quiet_libraries
+from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import Follow, tracker_of
 
 BLOCKS = 5
@@ -63,9 +63,9 @@ def main() -> None:
     parser.add_argument("patches", type=Path, nargs="+", help="the sets, the mined one among them")
     options = parser.parse_args()
     truth = read_truth(options.truth)
-    settings = load_settings(None, SETTINGS).settings
+    settings = load_settings(None, SETTINGS)
     models = _models(options.patches, truth.last_frame, settings)
-    with quiet_libraries():
+    with single_threaded_libraries():
         searched, size = _search(options.video, truth.last_frame, models, settings)
         for key, values in SWEEPS.items():
             print(
@@ -139,7 +139,7 @@ def _sweep(
     truth: LabelledVideo,
 ) -> Iterator[str]:
     """Give the lines of a table: the F1 of each value, whole and block by block."""
-    variants = [load_settings(None, [f"{key}={value}"]).settings for value in values]
+    variants = [load_settings(None, [f"{key}={value}"]) for value in values]
     found = [
         _tracks(Detector(model, each, *size), tracker_of(each, *size), searched)
         for each in variants

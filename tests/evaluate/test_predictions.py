@@ -10,16 +10,16 @@ from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.scores import score
 
-HEADER = "frame,time,id,x,y,width,height,from_match\n"
+HEADER = "frame,time,id,x,y,width,height,predicted\n"
 TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
 CSV = f"{HEADER}0,0.0,1,10,20,30,40,False\n2,0.08,1,11,20,30,40,True\n"
 JSONL = "".join(
     json.dumps({"frame": frame, "time": frame * 0.04, "tracks": tracks}) + "\n"
     for frame, tracks in enumerate(
         [
-            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "from_match": False}],
+            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "predicted": False}],
             [],
-            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "from_match": True}],
+            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "predicted": True}],
             [],
         ]
     )

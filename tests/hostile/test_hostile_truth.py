@@ -39,7 +39,7 @@ CVAT = (
     )
     + "</annotations>\n"
 )
-CSV = "frame,time,id,x,y,width,height,from_match\n" + "".join(
+CSV = "frame,time,id,x,y,width,height,predicted\n" + "".join(
     f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,0\n" for f, i in BOXES
 )
 JSONL = "".join(
@@ -48,7 +48,7 @@ JSONL = "".join(
             "frame": f,
             "time": f / 25,
             "tracks": [
-                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "from_match": False}
+                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "predicted": False}
                 for i in (1, 2)
             ],
         }

@@ -9,25 +9,18 @@ from typing import TypeVar
 from vdet.batch.manifest import Origin, Record, appending
 from vdet.batch.plan import Plan
 from vdet.batch.pools import Pool
-from vdet.batch.task import process_file, record_of_killed
-from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
+from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import make_folder, remove_stale
-from vdet.pipeline.run import VideoJob
+from vdet.pipeline.loop import VideoJob
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 def run_batch(
-    plan: Plan, model: LinearModel, settings: Settings, origin: Origin, *, pool: Pool, threads: int
+    plan: Plan, work: Work, origin: Origin, *, pool: Pool
 ) -> Generator[tuple[VideoJob, Record]]:
     """Do the jobs of a plan; yield each when it has ended, with its record in the manifest.
-
-    Parameters
-    ----------
-    threads
-        For each file: of the search, of the decoder, and of the encoder.
 
     Raises
     ------
@@ -37,7 +30,7 @@ def run_batch(
         The cluster of `pool` cannot be used, or no more.
     """
     make_folder(plan.folder)
-    function = partial(process_file, model=model, settings=settings, threads=threads)
+    function = partial(process_file, work=work)
     try:
         with (
             appending(plan.manifest, origin) as add,
@@ -48,7 +41,7 @@ def run_batch(
                 add(record)
                 yield job, record
     finally:
-        for folder in {output.parent for job in plan.jobs for output in job.outputs}:
+        for folder in {output.path.parent for job in plan.jobs for output in job.outputs}:
             remove_stale(folder)
 
 

@@ -134,7 +134,7 @@ class TestLayingGrids:
         ("width", "height"), [(640, 360), (1920, 1080), (1279, 721), (853, 480)]
     )
     def test_the_sets_scale_with_the_rows_of_the_frame(self, width: int, height: int) -> None:
-        large, small = lay_grids(SEED, SEED.features, width, height)
+        large, small = lay_grids(SEED, SEED.svm.features, width, height)
         factor = height / 720
         assert large.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (380, 128, 128)]]
         assert small.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (400, 64, 64)]]

@@ -33,7 +33,7 @@ def model_of(features: FeatureSettings, members: int = 2) -> LinearModel:
 
 @pytest.mark.parametrize(
     "features",
-    [SEED.features, FeatureSettings(), COLOUR, FeatureSettings(patch=16, color_space="HSV")],
+    [SEED.svm.features, FeatureSettings(), COLOUR, FeatureSettings(patch=16, color_space="HSV")],
     ids=["seed", "default", "colour only", "smaller patch"],
 )
 def test_every_window_is_cropped_resized_described_and_scored(features: FeatureSettings) -> None:
@@ -78,7 +78,7 @@ def test_windows_scored_some_at_a_time_are_scored_alike(
 def test_what_lies_outside_a_window_does_not_matter() -> None:
     other = np.zeros_like(FRAME)
     other[0:64, 0:64] = FRAME[0:64, 0:64]
-    engine = PatchSearch(model_of(SEED.features), ONE)
+    engine = PatchSearch(model_of(SEED.svm.features), ONE)
     one, two = (engine.search(FramePyramid(image)).probabilities for image in (FRAME, other))
     assert one == two
 

@@ -8,7 +8,8 @@ import pytest
 from red_cars import CAR, COLOUR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, red_finder, road
 from vdet.config.schema import FeatureSettings, Settings, WindowSettings
 from vdet.detect.svm.detector import Detection, detect_still
-from vdet.detect.svm.stages import LabelledBox, write_stages
+from vdet.detect.svm.heat import Heat
+from vdet.detect.svm.stages import LabelledBox, blend_heat, write_stages
 from vdet.draw.boxes import color_of
 from vdet.geometry import Box
 from vdet.media.images import Image, read_image
@@ -152,3 +153,49 @@ def test_earlier_stages_are_replaced(tmp_path: Path) -> None:
     pictures = written(tmp_path, road(), [])
     assert list(pictures) == NAMES
     np.testing.assert_array_equal(pictures["3-hits.png"], road())
+
+
+def flat(value: float) -> Heat:
+    return Heat(np.full((24, 32), value, np.float32))
+
+
+class TestHeat:
+    def test_without_heat_the_picture_is_only_darker(self) -> None:
+        image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), np.uint8)
+        blended = blend_heat(image, flat(0))
+        np.testing.assert_allclose(blended, image / 2, atol=1)
+
+    def test_is_white_at_its_peak_and_red_below(self) -> None:
+        heat = flat(0)
+        heat.values[5, 7], heat.values[9, 9] = 8.0, 2.0
+        blended = blend_heat(np.zeros((24, 32, 3), np.uint8), heat)
+        assert blended[5, 7].min() > 190
+        blue, green, red = blended[9, 9].tolist()
+        assert red > 100 > green == blue == 0
+        assert blended[0, 0].max() < 12
+
+    def test_does_not_depend_on_the_unit_of_heat(self) -> None:
+        rng = np.random.default_rng(0)
+        image = rng.integers(0, 256, (24, 32, 3), np.uint8)
+        values = rng.integers(0, 9, (24, 32)).astype(np.float32)
+        np.testing.assert_array_equal(
+            blend_heat(image, Heat(values)), blend_heat(image, Heat(values * 4))
+        )
+
+    def test_flat_heat_is_all_peak(self) -> None:
+        assert blend_heat(np.zeros((24, 32, 3), np.uint8), flat(3)).min() > 190
+
+    @pytest.mark.parametrize("shrink", [2, 4, 8])
+    def test_of_a_shrunk_map_lies_where_it_belongs(self, shrink: int) -> None:
+        values = np.zeros((-(-21 // shrink), -(-30 // shrink)), np.float32)
+        values[1, 2] = 5
+        blended = blend_heat(np.zeros((21, 30, 3), np.uint8), Heat(values, shrink))
+        assert blended.shape == (21, 30, 3)
+        rows, columns = np.nonzero(blended.min(axis=2) > 190)
+        assert set(rows.tolist()) == set(range(shrink, min(21, 2 * shrink)))
+        assert set(columns.tolist()) == set(range(2 * shrink, min(30, 3 * shrink)))
+
+    def test_the_picture_itself_is_not_changed(self) -> None:
+        image = np.full((24, 32, 3), 255, np.uint8)
+        blend_heat(image, flat(1))
+        assert image.min() == 255

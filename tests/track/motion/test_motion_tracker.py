@@ -103,7 +103,7 @@ def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> No
     places = moving(CAR, dx=5, frames=40)
     frames = [[] if 30 <= n < 36 else [place] for n, place in enumerate(places)]
     shown = follow(frames)
-    assert [track.from_match for tracks in shown[28:38] for track in tracks] == (
+    assert [track.predicted for tracks in shown[28:38] for track in tracks] == (
         [False] * 2 + [True] * 6 + [False] * 2
     )
     for place, tracks in list(zip(places, shown, strict=True))[30:]:
@@ -140,7 +140,7 @@ def test_a_shown_vehicle_has_its_region_before_a_new_one() -> None:
     aside, between = Box(455, 380, 100, 70), Box(430, 390, 100, 70)
     shown = follow([*[[CAR]] * 20, [CAR, aside], [between]])
     assert between.iou(aside) > between.iou(CAR)
-    assert [(track.id, track.from_match) for track in shown[-1]] == [(1, False)]
+    assert [(track.id, track.predicted) for track in shown[-1]] == [(1, False)]
 
 
 # One vehicle behind another

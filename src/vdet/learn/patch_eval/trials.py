@@ -81,7 +81,7 @@ def run_trial(
     for held in parts:
         lesson = lesson_of(data, ~held)
         model = fit(
-            lesson.vectors, lesson.vehicle, settings.features, settings.training, lesson.origins
+            lesson.vectors, lesson.vehicle, settings.svm.features, settings.training, lesson.origins
         )
         rows.append(np.flatnonzero(held))
         probabilities.append(_probabilities(model, data.vectors[held]))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vdet.config.schema import MotionSettings
+from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import visible
 from vdet.track.motion.overlapping import is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
@@ -36,7 +36,7 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
 
 
 def without_duplicates(
-    vehicles: Sequence[Vehicle], size: tuple[int, int], settings: MotionSettings
+    vehicles: Sequence[Vehicle], size: tuple[int, int], settings: MotionTrackerSettings
 ) -> list[Vehicle]:
     """Drop vehicles that a surer one accounts for; of equally sure ones the older stays."""
     kept: list[Vehicle] = []
@@ -44,7 +44,7 @@ def without_duplicates(
         seen = [v.state.box for v in kept if v.confirmed and not v.misses]
         if vehicle.misses == 0 and seen:
             box, *others = visible(np.stack([vehicle.state.box, *seen]), size)
-            inside = not vehicle.confirmed and is_part(box, np.stack(others), settings.same)
+            inside = not vehicle.confirmed and is_part(box, np.stack(others), settings.part)
             if inside or is_same(box, np.stack(others)):
                 continue
         kept.append(vehicle)

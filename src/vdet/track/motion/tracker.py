@@ -5,9 +5,10 @@ from itertools import count, product
 
 import numpy as np
 
-from vdet.config.schema import MotionSettings
-from vdet.detect.svm.heat import Region
+from vdet.config.schema import MotionTrackerSettings
+from vdet.detect.detections import Detections
 from vdet.geometry import Box, Float64Array, iou_matrix, visible
+from vdet.media.images import Image
 from vdet.track.motion.identity import take_over_ids, without_duplicates
 from vdet.track.motion.overlapping import (
     are_hidden,
@@ -33,25 +34,20 @@ class MotionTracker:
         Size of the frames, pixels.
     """
 
-    def __init__(self, settings: MotionSettings, width: int, height: int) -> None:
+    def __init__(self, settings: MotionTrackerSettings, width: int, height: int) -> None:
         self._settings = settings
         self._size = width, height
         self._vehicles: list[Vehicle] = []
         self._ids = count(1)
 
-    def update(self, regions: Sequence[Region]) -> list[Track]:
-        """Follow the vehicles into the next frame.
-
-        Parameters
-        ----------
-        regions
-            Its regions in full-frame pixels; what lies outside the frame does not count.
-
-        Returns
-        -------
-        The vehicles shown in this frame, by id.
-        """
-        sightings = self._sightings(regions)
+    def update(
+        self,
+        detections: Detections,
+        time: float,  # noqa: ARG002
+        image: Image | None = None,  # noqa: ARG002 - boxes are enough
+    ) -> list[Track]:
+        """Follow the vehicles into the next frame; as `VideoTracker.update`."""
+        sightings = self._sightings(detections)
         for vehicle in self._vehicles:
             vehicle.predict(self._settings)
         self._vehicles = self._staying()
@@ -71,14 +67,11 @@ class MotionTracker:
         self._vehicles = without_duplicates(self._vehicles, self._size, self._settings)
         return self._tracks()
 
-    def _sightings(self, regions: Sequence[Region]) -> list[Sighting]:
-        clipped = [(region.box.clipped(*self._size), region.peak) for region in regions]
+    def _sightings(self, detections: Detections) -> list[Sighting]:
+        clipped = [box.clipped(*self._size) for box in detections.rounded]
         return [
-            Sighting(
-                np.array([box.x, box.y, box.width, box.height], np.float64),
-                min(peak / self._settings.strong, 1.0),
-            )
-            for box, peak in clipped
+            Sighting(np.array([box.x, box.y, box.width, box.height], np.float64), float(score))
+            for box, score in zip(clipped, detections.scores, strict=True)
             if box.area
         ]
 
@@ -127,7 +120,7 @@ class MotionTracker:
         missed = [row for row in range(len(expected)) if row not in found and not hidden[row]]
         for row, other in product(self._confirmed(found), self._confirmed(missed)):
             region, both = found[row], expected[[row, other]]
-            if other in shared or not shows_both(region.box, both, self._settings.same):
+            if other in shared or not shows_both(region.box, both, self._settings.part):
                 continue
             for each in (row, other):
                 box = stretched(expected[each], around(both), region.box)
@@ -146,7 +139,9 @@ class MotionTracker:
             gone = hidden and vehicle.misses
             if vehicle.is_present(self._settings) and wide_enough and not gone:
                 vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
-                tracks.append(Track(vehicle.id, _rounded(box), from_match=vehicle.misses > 0))
+                tracks.append(
+                    Track(vehicle.id, _rounded(box), score=1.0, predicted=vehicle.misses > 0)
+                )
         return sorted(tracks, key=lambda track: track.id)
 
 

@@ -6,7 +6,7 @@ Schemes", 1954: what is weaker than the leak never adds up, however long it last
 
 from dataclasses import dataclass
 
-from vdet.config.schema import MotionSettings
+from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import Float64Array
 from vdet.track.motion.state import MotionState
 from vdet.track.motion.views import view
@@ -60,48 +60,53 @@ class Vehicle:
     hidden_misses: int = 0
 
     @classmethod
-    def new(cls, sighting: Sighting, settings: MotionSettings) -> "Vehicle":
+    def new(cls, sighting: Sighting, settings: MotionTrackerSettings) -> "Vehicle":
         """Make a vehicle of its first region."""
         noise = _noise(sighting, settings)
         return cls(
-            MotionState.at_rest(sighting.box, noise, settings.velocity),
+            MotionState.at_rest(sighting.box, noise, settings.velocity / 25),
             sighting.clearness - settings.leak,
         )
 
-    def predict(self, settings: MotionSettings) -> None:
+    def predict(self, settings: MotionTrackerSettings) -> None:
         """Move on to the next frame."""
-        self.state = self.state.predicted(settings.acceleration)
+        self.state = self.state.predicted(settings.acceleration / 125)
 
-    def see(self, sighting: Sighting, size: tuple[int, int], settings: MotionSettings) -> None:
+    def see(
+        self, sighting: Sighting, size: tuple[int, int], settings: MotionTrackerSettings
+    ) -> None:
         """Take in its region in this frame of `size`, width and height in pixels."""
         seen = view(self.state, sighting.box, size)
         self.state = seen.state.corrected(seen.measured, _noise(sighting, settings), seen.seen)
         self.misses = self.hidden_misses = 0
         self._weigh(sighting.clearness - settings.leak, settings)
 
-    def miss(self, settings: MotionSettings) -> None:
+    def miss(self, settings: MotionTrackerSettings) -> None:
         """Note a frame without a region for it."""
         self.misses += 1
-        motion = _SLOWING if self.misses > settings.carried else 1.0
+        motion = _SLOWING if self.misses > settings.carried * 25 else 1.0
         self.state = self.state.slowed(motion, _SETTLING)
         self._weigh(-settings.leak, settings)
 
-    def is_present(self, settings: MotionSettings) -> bool:
+    def is_present(self, settings: MotionTrackerSettings) -> bool:
         """Tell whether it is known and was seen lately."""
-        return self.confirmed and self.evidence > 0 and self.misses <= settings.carried
+        return self.confirmed and self.evidence > 0 and self.misses <= settings.carried * 25
 
-    def is_over(self, settings: MotionSettings) -> bool:
+    def is_over(self, settings: MotionTrackerSettings) -> bool:
         """Tell whether to forget it."""
         if not self.confirmed:
             return self.evidence <= 0
         in_the_open = self.misses - self.hidden_misses
-        return in_the_open > settings.remembered or self.hidden_misses > settings.remembered_hidden
+        return (
+            in_the_open > settings.remembered * 25
+            or self.hidden_misses > settings.remembered_hidden * 25
+        )
 
-    def _weigh(self, evidence: float, settings: MotionSettings) -> None:
-        self.evidence = min(max(self.evidence + evidence, 0.0), settings.needed)
-        self.confirmed |= self.evidence >= settings.needed
+    def _weigh(self, evidence: float, settings: MotionTrackerSettings) -> None:
+        self.evidence = min(max(self.evidence + evidence, 0.0), settings.needed * 25)
+        self.confirmed |= self.evidence >= settings.needed * 25
 
 
-def _noise(sighting: Sighting, settings: MotionSettings) -> float:
+def _noise(sighting: Sighting, settings: MotionTrackerSettings) -> float:
     """Return the deviation of a region's box: its variance grows as its votes become fewer."""
     return float(settings.noise / max(sighting.clearness, _FAINTEST) ** 0.5)

@@ -34,13 +34,13 @@ from vdet.detect.svm.dense.located import LocatedSearch
 from vdet.detect.svm.dense.strips import Strip
 from vdet.detect.svm.features import FeatureExtractor, Layout, to_patch
 from vdet.detect.svm.horizon import find_horizon
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.detect.svm.windows import WindowGrid, Windows, every_nth
 from vdet.geometry import iou_matrix
 from vdet.media.images import Image
-from vdet.resources import shipped_model
 
 SHIPPED = {"seed": SEED, "default": Settings()}
 GRIDS = {
