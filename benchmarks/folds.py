@@ -22,8 +22,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Detector
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.scores import score
 from vdet.evaluate.truth import read_truth
 from vdet.learn.augmentation import views_of
@@ -166,7 +165,7 @@ def _tracks(detector: Detector, track: Follow, searched: Sequence[Windows]) -> L
         for each in track(blank, detector.accumulate(windows).regions):
             box = each.box
             rows.append(Row(0, number, each.id, box.x, box.y, box.width, box.height))
-    return in_memory(rows, frame_count=len(searched), rate=25.0)
+    return LabelledVideo.from_rows(rows, frame_count=len(searched), rate=25.0)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

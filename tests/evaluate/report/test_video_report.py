@@ -1,20 +1,19 @@
-"""The charts are drawn, and say what they should; what they look like is for people to see."""
+"""The charts and pictures of the report on videos: their contents, not their looks."""
 
 from pathlib import Path
 
 import numpy as np
 
 from vdet.evaluate.clips.evaluate import RunResult, judge, total
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.report.loss_pictures import FOUND_COLOR, TILE, TRUE_COLOR, loss_pictures
+from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
 from vdet.evaluate.report.video_charts import sweep_chart, tightness_chart, timeline_chart
-from vdet.evaluate.rows import Row, collect
+from vdet.evaluate.report.video_page import FOUND_COLOR, TILE, TRUE_COLOR, loss_pictures
 
 TEN = range(1, 11)
 
 
 def video(*rows: Row) -> LabelledVideo:
-    return collect(Path("scene"), rows)
+    return checked_video(Path("scene"), rows)
 
 
 def drive(id_: int, frames: range, x: float = 0) -> list[Row]:
@@ -26,7 +25,7 @@ def run(assignments: tuple[str, ...], found: range) -> RunResult:
     return RunResult(assignments, (clip,), total([clip]))
 
 
-def test_a_timeline_names_vehicles_tracks_and_switches() -> None:
+def test_a_timeline_names_vehicles_tracks_and_false_alarms() -> None:
     found = video(*drive(4, range(1, 5)), *drive(9, range(6, 11)), *drive(5, TEN, x=200))
     svg = timeline_chart(judge("clip", found, video(*drive(7, TEN))))
     for name in ("vehicle 7", "#4", "#9", "false alarms"):
@@ -59,7 +58,7 @@ def test_the_same_chart_twice_is_the_same_file() -> None:
     assert tightness_chart(run((), TEN)) == tightness_chart(run((), TEN))
 
 
-def test_a_loss_is_pictured_with_its_boxes_in_its_middle_frame(clip_path: Path) -> None:
+def test_a_loss_is_shown_by_its_middle_frame_with_boxes(clip_path: Path) -> None:
     found = video(*drive(1, TEN, x=20), *drive(2, range(2, 5), x=250))
     result = judge("clip", found, video(*drive(7, TEN)), video=clip_path)
     (missed,) = loss_pictures(result, "missed")
@@ -71,7 +70,7 @@ def test_a_loss_is_pictured_with_its_boxes_in_its_middle_frame(clip_path: Path) 
     assert titles == ["false alarm, track 1, frame 5", "false alarm, track 2, frame 3"]
 
 
-def test_a_loss_at_the_edge_is_pictured_inside_the_frame(clip_path: Path) -> None:
+def test_the_picture_of_a_loss_at_the_edge_lies_inside_the_frame(clip_path: Path) -> None:
     result = judge("clip", video(), video(*drive(7, TEN, x=290)), video=clip_path)
     (picture,) = loss_pictures(result, "missed")
     assert picture.image[:, -8:].any(axis=2).mean() > 0.9, "no black border"

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import TruthError
-from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.predictions import read_predictions
+from vdet.evaluate.scores import score
 
 HEADER = "frame,time,id,x,y,width,height,predicted\n"
 TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
@@ -42,6 +43,59 @@ def test_the_same_tracks_are_read_from_every_format(tmp_path: Path, suffix: str)
     assert not video.ignored.any()
 
 
+SCORED_CSV = "frame,time,id,x,y,width,height,score,predicted\n0,0.0,1,10,20,30,40,{score},False\n"
+SCORED_JSONL = (
+    '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
+    '"score": {score}, "predicted": false}}]}}\n'
+)
+SCORED_TXT = "1,1,11,21,30,40,{score},-1,-1,-1\n"
+SCORED = {"txt": SCORED_TXT, "csv": SCORED_CSV, "jsonl": SCORED_JSONL}
+
+
+@pytest.mark.parametrize("suffix", SCORED)
+@pytest.mark.parametrize("value", [0, 0.25, 1])
+def test_every_format_may_give_scores(tmp_path: Path, suffix: str, value: float) -> None:
+    video = read(tmp_path, suffix, SCORED[suffix].format(score=value))
+    assert video.scores.tolist() == [value]
+    assert video.boxes.tolist() == [[10, 20, 30, 40]]
+
+
+def test_scores_rank_the_boxes_for_average_precision(tmp_path: Path) -> None:
+    row = "0,0.0,{},{},0,100,100,{}\n"
+    header = "frame,time,id,x,y,width,height,score\n"
+    found = row.format(1, 0, 0.9) + row.format(2, 500, 0.2)
+    truth = LabelledVideo.from_rows([Row(0, 1, 1, 0, 0, 100, 100)])
+    assert score(read(tmp_path, "csv", header + found), truth).ap50 == 1
+    swapped = row.format(1, 0, 0.2) + row.format(2, 500, 0.9)
+    assert score(read(tmp_path, "csv", header + swapped), truth).ap50 == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "value", "message"),
+    [
+        ("csv", "1.5", ":2: the score 1.5 is not between 0 and 1"),
+        ("csv", "-0.1", ":2: the score -0.1 is not between 0 and 1"),
+        ("csv", "", ":2: '' is not a number"),
+        ("csv", "nan", ":2: 'nan' is not a number"),
+        ("jsonl", "1.5", ":1: tracks.0.score: Input should be less than or equal to 1"),
+        ("jsonl", "-0.1", ":1: tracks.0.score: Input should be greater than or equal to 0"),
+        ("jsonl", "null", ":1: tracks.0.score: Input should be a valid number"),
+        ("jsonl", "NaN", ":1: tracks.0.score: Input should be a finite number"),
+    ],
+)
+def test_a_score_outside_0_to_1_is_refused_with_its_line(
+    tmp_path: Path, suffix: str, value: str, message: str
+) -> None:
+    with pytest.raises(TruthError) as caught:
+        read(tmp_path, suffix, SCORED[suffix].format(score=value))
+    assert f"tracks.{suffix}{message}" in str(caught.value)
+
+
+def test_a_header_with_two_scores_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TruthError, match=r":1: the header names the column score twice"):
+        read(tmp_path, "csv", "frame,time,id,x,y,width,height,score,score\n")
+
+
 def test_only_jsonl_tells_how_many_frames_the_video_has(tmp_path: Path) -> None:
     counts = {suffix: read(tmp_path, suffix, text).frame_count for suffix, text in FORMATS.items()}
     assert counts == {"txt": None, "csv": None, "jsonl": 4}
@@ -57,11 +111,11 @@ def test_a_single_time_tells_no_rate(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])
-def test_nothing_found_is_a_video_without_boxes(tmp_path: Path, suffix: str, content: str) -> None:
+def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, content: str) -> None:
     assert len(read(tmp_path, suffix, content)) == 0
 
 
-def test_the_columns_of_a_csv_may_stand_in_any_order(tmp_path: Path) -> None:
+def test_the_columns_of_a_csv_may_have_any_order(tmp_path: Path) -> None:
     video = read(tmp_path, "csv", "id,x,y,width,height,time,frame\n1,10,20,30,40,0.0,0\n")
     assert video.boxes.tolist() == [[10, 20, 30, 40]]
 
@@ -93,7 +147,7 @@ def record(**changes: object) -> str:
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
     ],
 )
-def test_a_wrong_line_is_refused_by_its_number(
+def test_a_wrong_line_is_refused_with_its_number(
     tmp_path: Path, suffix: str, content: str, message: str
 ) -> None:
     with pytest.raises(TruthError) as caught:

@@ -9,10 +9,10 @@ from vdet.errors import TruthError
 from vdet.files import read_whole
 
 LIMIT = 10_000_000
-"""No frame, id or pixel is beyond it: what is larger is damage, and would overflow further on."""
+"""Largest frame number, id or pixel. A larger number is damage, and would overflow later."""
 
 MAX_BYTES = 64_000_000
-"""Of a file of boxes."""
+"""Largest size of a file of boxes."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -36,19 +36,19 @@ def read_text(path: Path) -> str:
 
 
 def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
-    """Give every line that is not blank, stripped, with its number from 1."""
+    """Yield every line that is not blank, stripped, with its number from 1."""
     for number, line in enumerate(io.StringIO(text, newline=None), start=1):
         if stripped := line.strip():
             yield number, stripped
 
 
-def number(text: str) -> float:
-    """Return the decimal number that `text` spells, at most `LIMIT` either way.
+def parse_number(text: str) -> float:
+    """Return the decimal number in `text`.
 
     Raises
     ------
     ValueError
-        It is another thing: words, NaN, infinity, something larger.
+        The text is no decimal number (words, NaN, infinity), or the number is beyond `LIMIT`.
     """
     stripped = text.strip()
     if not _NUMBER.fullmatch(stripped):
@@ -59,15 +59,15 @@ def number(text: str) -> float:
     return value
 
 
-def whole(text: str) -> int:
-    """Return the whole number that `text` spells (`3` and `3.0` are both 3).
+def parse_whole(text: str) -> int:
+    """Return the whole number in `text`; `3` and `3.0` are both 3.
 
     Raises
     ------
     ValueError
-        It is not one, or it is beyond `LIMIT`.
+        The text is no whole number, or the number is beyond `LIMIT`.
     """
-    value = number(text)
+    value = parse_number(text)
     if not value.is_integer():
         raise ValueError(f"{text.strip()!r:.40} is not a whole number")
     return int(value)
