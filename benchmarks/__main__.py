@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.material import config, frames, video
 from benchmarks.runs import peak_memory, run_times, seconds_of_video
 from benchmarks.searches import search_times, times_per_megapixel
-from vdet.pipeline.threads import quiet_libraries
+from vdet.pipeline.threads import single_threaded_libraries
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def measure_all(folder: Path, rounds: int) -> list[Row]:
     default, seed = config("default"), config("seed")
     images = frames(path)
     print(f"measuring on {path.name} …", file=sys.stderr)
-    with quiet_libraries():
+    with single_threaded_libraries():
         searched = search_times(path, images, default, seed, rounds)
         by_height = times_per_megapixel(images, default, rounds)
     ran = run_times(path, default, folder, rounds)

@@ -15,14 +15,14 @@ from pathlib import Path
 import joblib
 import numpy as np
 import numpy.typing as npt
+from vdet.pipeline.following import seek_horizon
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Detector
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.scores import score
 from vdet.evaluate.truth import read_truth
 from vdet.learn.augmentation import views_of
@@ -32,8 +32,7 @@ from vdet.learn.extraction import extract
 from vdet.learn.fitting import fit
 from vdet.learn.training_set import lesson_of
 from vdet.media import VideoReader
-from vdet.pipeline.following import seek_horizon
-from vdet.pipeline.threads import quiet_libraries
+from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import Follow, tracker_of
 from vdet.workers import make_workers
 
@@ -65,9 +64,9 @@ def main() -> None:
     parser.add_argument("patches", type=Path, nargs="+", help="the sets, the mined one among them")
     options = parser.parse_args()
     truth = read_truth(options.truth)
-    settings = load_settings(None, SETTINGS).settings
+    settings = load_settings(None, SETTINGS)
     models = _models(options.patches, truth.last_frame, settings)
-    with quiet_libraries():
+    with single_threaded_libraries():
         searched, size = _search(options.video, truth.last_frame, models, settings)
         for key, values in SWEEPS.items():
             print(
@@ -143,7 +142,7 @@ def _sweep(
     truth: LabelledVideo,
 ) -> Iterator[str]:
     """Give the lines of a table: the F1 of each value, whole and block by block."""
-    variants = [load_settings(None, [f"{key}={value}"]).settings for value in values]
+    variants = [load_settings(None, [f"{key}={value}"]) for value in values]
     found = [
         _tracks(Detector(model, each, *size), tracker_of(each, *size), searched)
         for each in variants
@@ -169,7 +168,7 @@ def _tracks(detector: Detector, track: Follow, searched: Sequence[Windows]) -> L
         for each in track(blank, detector.accumulate(windows).regions):
             box = each.box
             rows.append(Row(0, number, each.id, box.x, box.y, box.width, box.height))
-    return in_memory(rows, frame_count=len(searched), rate=25.0)
+    return LabelledVideo.from_rows(rows, frame_count=len(searched), rate=25.0)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

@@ -4,13 +4,13 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.config.loading import load_settings
+from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.media import VideoReader
 from vdet.media.images import Image
-from vdet.resources import find_config, shipped_model
-from vdet.synthetic import default_clip, write_clip
+from vdet.synthetic import demo_scene, write_clip
 
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
 
@@ -28,7 +28,7 @@ class Config:
 
 
 def config(name: str) -> Config:
-    settings = load_settings(find_config(name)).settings
+    settings = load_settings(find_config(name))
     return Config(settings, load_model(shipped_model(settings.features)))
 
 
@@ -40,7 +40,7 @@ def video(folder: Path) -> Path:
         if place and (path := Path(place) / "project_video.mp4").exists():
             return path
     path = folder / "generated.mp4"
-    write_clip(path, default_clip(1, width=1280, height=720))
+    write_clip(path, demo_scene(1, width=1280, height=720))
     return path
 
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from benchmarks.material import Config
 from benchmarks.rounds import Subject, measure
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
-from vdet.pipeline.run import VideoJob, process_video
-from vdet.pipeline.threads import ahead, behind
+from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250
-CAMERA = Camera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
+CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
 """Like the one of the project video; its maps cost the same whatever the numbers."""
 
 
@@ -27,21 +27,21 @@ def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[st
         with (
             VideoReader(path, frames=FRAMES) as reader,
             VideoWriter(out, reader.info, default.settings.output) as writer,
-            behind(writer.write) as encode,
-            ahead(reader) as frames,
+            write_async(writer.write) as encode,
+            prefetch(reader) as frames,
         ):
             for frame in frames:
                 encode(frame)
 
     def detect(lanes: LaneRequest | None = None) -> None:
         job = VideoJob(path, out, frames=FRAMES, lanes=lanes)
-        process_video(job, default.model, default.settings)
+        run_video(job, default.model, default.settings)
 
     def detect_with_lanes() -> None:
         detect(LaneRequest(CAMERA))
 
     def detect_only() -> None:
-        process_video(VideoJob(path, frames=FRAMES), default.model, default.settings)
+        run_video(VideoJob(path, frames=FRAMES), default.model, default.settings)
 
     subjects: dict[str, Subject] = {
         "pass through": pass_through,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.looping import loop_video
 from benchmarks.material import config, video
-from vdet.pipeline.run import VideoJob, process_video
+from vdet.pipeline.loop import VideoJob, run_video
 
 FRAMES = 20_000
 FEWEST = 1000
@@ -132,7 +132,7 @@ def main() -> None:
             folder / "long.mp4", folder / "out.mp4", tracks=folder / "out.jsonl", frames=frames
         )
         default = config("default")
-        summary = process_video(job, default.model, default.settings, progress=watch)
+        summary = run_video(job, default.model, default.settings, progress=watch)
     print(file=sys.stderr)
     print("\n".join(table(watch.samples)))
     first, last = tenths(watch.samples)

@@ -13,7 +13,7 @@ from vdet.config.schema import Settings, TrainingSettings, ViewSettings
 from vdet.detect.svm.model import save_model
 from vdet.learn.dataset import find_patches
 from vdet.learn.training import train
-from vdet.synthetic import default_clip, write_clip, write_patches
+from vdet.synthetic import demo_scene, write_clip, write_patches
 from vdet.synthetic.scene import Scene
 
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.
@@ -70,7 +70,7 @@ def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> 
 @pytest.fixture(scope="session")
 def scene() -> Scene:
     """A second and a bit of the demo's road, 320×180 pixels."""
-    return replace(default_clip(1, width=320, height=180), frames=30)
+    return replace(demo_scene(1, width=320, height=180), frames=30)
 
 
 @pytest.fixture(scope="session")

@@ -11,22 +11,20 @@ from statistics import median
 
 import numpy as np
 import pytest
+from vdet.pipeline.following import follow, seek_horizon
 
 from vdet.config.schema import Settings
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.comparison import Comparison, compare
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.matching import match
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.rows import Row, in_memory
 from vdet.evaluate.scores import score, score_comparison
 from vdet.geometry import Box, Float64Array
 from vdet.media import Frame
-from vdet.pipeline.following import follow, seek_horizon
-from vdet.pipeline.threads import quiet_libraries
-from vdet.resources import shipped_model
-from vdet.synthetic import counts, frames, traffic, truth
-from vdet.synthetic.camera import Camera
+from vdet.pipeline.threads import single_threaded_libraries
+from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import Light, Scene
 
 DEFAULT = Settings()
@@ -39,7 +37,7 @@ JUDGED = range(20, FRAMES)
 class View:
     """A camera in a lane of three, and what is asked of the default in the judged frames."""
 
-    camera: Camera
+    camera: PinholeCamera
     least_f1: float
     most_false: int
     lane: int = 1
@@ -48,20 +46,20 @@ class View:
     @property
     def scene(self) -> Scene:
         """The same vehicles for every camera, so that only the camera makes the difference."""
-        return traffic(
+        return traffic_scene(
             self.camera, lane=self.lane, lanes=3, frames=FRAMES, seed=1, light=self.light
         )
 
 
 DUSK = Light(gain=0.5, noise=3.0)
 VIEWS = {  # behind each the F1 and false boxes measured, from which the bounds keep some distance
-    "dashboard": View(Camera.dashboard(1280, 720), 0.93, 6),  # 1.00, 0
-    "fewer rows": View(Camera.dashboard(960, 540), 0.87, 12),  # 0.94, 6
-    "wide": View(Camera(1242, 375, 721, 0.46 * 375, 1.65), 0.77, 25),  # 0.84, 19
-    "high horizon": View(Camera(1920, 1080, 1500, 0.45 * 1080, 1.4), 0.93, 6),  # 1.00, 0
-    "dusk": View(Camera(640, 360, 560, 0.52 * 360, 1.3), 0.90, 9, light=DUSK),  # 0.97, 3
-    "right lane": View(Camera.dashboard(960, 540), 0.92, 7, lane=2),  # 0.99, 1
-    "left lane": View(Camera.dashboard(960, 540), 0.88, 10, lane=0),  # 0.95, 4
+    "dashboard": View(PinholeCamera.dashboard(1280, 720), 0.93, 6),  # 1.00, 0
+    "fewer rows": View(PinholeCamera.dashboard(960, 540), 0.87, 12),  # 0.94, 6
+    "wide": View(PinholeCamera(1242, 375, 721, 0.46 * 375, 1.65), 0.77, 25),  # 0.84, 19
+    "high horizon": View(PinholeCamera(1920, 1080, 1500, 0.45 * 1080, 1.4), 0.93, 6),  # 1.00, 0
+    "dusk": View(PinholeCamera(640, 360, 560, 0.52 * 360, 1.3), 0.90, 9, light=DUSK),  # 0.97, 3
+    "right lane": View(PinholeCamera.dashboard(960, 540), 0.92, 7, lane=2),  # 0.99, 1
+    "left lane": View(PinholeCamera.dashboard(960, 540), 0.88, 10, lane=0),  # 0.95, 4
 }
 each_view = pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS.keys())
 
@@ -71,10 +69,10 @@ def model() -> LinearModel:
     return load_model(shipped_model(DEFAULT.features))
 
 
-def shown(model: LinearModel, camera: Camera, clip: Iterable[Frame]) -> LabelledVideo:
+def shown(model: LinearModel, camera: PinholeCamera, clip: Iterable[Frame]) -> LabelledVideo:
     """Find and follow the vehicles of a clip; give the boxes shown in the judged frames."""
-    with quiet_libraries():
-        return in_memory(
+    with single_threaded_libraries():
+        return LabelledVideo.from_rows(
             row(result.frame.index, track.id, track.box)
             for result in follow(clip, model, DEFAULT, camera.width, camera.height)
             for track in result.tracks
@@ -84,10 +82,10 @@ def shown(model: LinearModel, camera: Camera, clip: Iterable[Frame]) -> Labelled
 
 def to_be_shown(scene: Scene) -> LabelledVideo:
     """Give the true boxes of the judged frames; vehicles that do not count are to be ignored."""
-    return in_memory(
-        row(index, each.id, each.box, ignored=not counts(each, scene.camera.height))
+    return LabelledVideo.from_rows(
+        row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
         for index in JUDGED
-        for each in truth(scene, index)
+        for each in true_boxes(scene, index)
     )
 
 

@@ -17,19 +17,19 @@ from seed import SEED
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import detect_still, still_boxes
 from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.geometry import Box
 from vdet.learn.dataset import find_patches, read_patches
 from vdet.learn.splits import hold_out
 from vdet.media import VideoReader
 from vdet.media.images import Image, read_image
-from vdet.resources import shipped_model
 
 pytestmark = pytest.mark.realdata
 
 
 WINDOW_BY_WINDOW = SEED.model_copy(
-    update={"search": SEED.search.model_copy(update={"engine": "patch"})}
+    update={"search": SEED.svm.search.model_copy(update={"engine": "patch"})}
 )
 """The original's settings, searched as it searched."""
 

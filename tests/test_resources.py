@@ -2,11 +2,11 @@ from pathlib import Path
 
 import pytest
 
-from vdet.config.loading import load_settings
+from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import FeatureSettings, Settings
+from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import load_model
 from vdet.errors import ConfigError, ModelError
-from vdet.resources import find_config, shipped_model
 
 
 @pytest.fixture(autouse=True)
@@ -15,8 +15,8 @@ def _somewhere_else(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_shipped_configs_are_found_by_their_names() -> None:
-    assert load_settings(find_config("default")).settings == Settings()
-    assert load_settings(find_config("seed")).settings.features.patch == 64
+    assert load_settings(find_config("default")) == Settings()
+    assert load_settings(find_config("seed")).features.patch == 64
 
 
 def test_a_path_is_taken_as_it_is(tmp_path: Path) -> None:
@@ -39,7 +39,7 @@ def test_an_unknown_name_names_the_shipped_configs(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "length"), [("default", 4800), ("seed", 4800)])
 def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> None:
-    features = load_settings(find_config(name)).settings.features
+    features = load_settings(find_config(name)).features
     path = shipped_model(features)
     assert path.stem == name
     model = load_model(path, features)

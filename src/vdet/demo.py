@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.scores import Scores, score
@@ -13,10 +14,11 @@ from vdet.files import check_output, make_folder
 from vdet.learn.dataset import find_patches
 from vdet.learn.report import TrainingReport
 from vdet.learn.training import train
-from vdet.pipeline.run import VideoJob, process_video
+from vdet.pipeline.loop import Progress, VideoJob, no_progress, run_video
+from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic.clip import write_clip, write_truth
 from vdet.synthetic.patches import write_patches
-from vdet.synthetic.worlds import default_clip
+from vdet.synthetic.random_scenes import demo_scene
 
 PATCHES = 1200
 """Of each class."""
@@ -93,7 +95,7 @@ def run_demo(
     *,
     seed: int = 1,
     say: Callable[[str], object] = lambda _: None,
-    progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
+    progress: Progress = no_progress,
 ) -> DemoResult:
     """Make the data, train on them, detect in the clip, and compare with the truth.
 
@@ -104,11 +106,11 @@ def run_demo(
     say
         Told what comes next, a line a step.
     progress
-        As `process_video` takes it, for the longer steps.
+        As `run_video` takes it, for the longer steps.
     """
     say(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
     write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
-    scene = default_clip(seed)
+    scene = demo_scene(seed)
     write_clip(files.clip, scene)
     write_truth(files.truth, scene)
     say("2/4 training …")
@@ -117,9 +119,14 @@ def run_demo(
     save_model(model, files.model)
     report.write(files.report)
     say("3/4 finding the vehicles …")
-    middle = scene.frames / scene.rate / 2
-    job = VideoJob(files.clip, files.result, files.tracks, stages=files.stages, at=middle)
-    summary = process_video(job, model, settings, progress=progress)
+    outputs = (
+        Output("video", files.result),
+        Output("tracks", files.tracks),
+        Output("stages", files.stages),
+    )
+    job = VideoJob(files.clip, outputs, at=scene.frames / scene.rate / 2)
+    detector = load_detector(settings.detector, files.model)
+    summary = run_video(job, detector, settings, progress=progress)
     say("4/4 comparing with the truth …")
     scores = score(read_predictions(files.tracks), read_truth(files.truth), rate=float(scene.rate))
     return DemoResult(report, scores, summary.frames, summary.seconds)

@@ -119,7 +119,7 @@ def holder_of(file: Path) -> int:
 def test_training_on_a_cluster_gives_the_same_model(run: Run, address: str, tmp_path: Path) -> None:
     patches = tmp_path / "patches"
     write_patches(patches, seed=5, vehicles=80, non_vehicles=80)
-    cheap = ("--set", "features.hog.channels=[0]")
+    cheap = ("--set", "detector.features.hog.channels=[0]")
     there, here = tmp_path / "there.npz", tmp_path / "here.npz"
     assert run("train", patches, "-o", there, *cheap, "--scheduler", address).code == 0
     assert run("train", patches, "-o", here, *cheap, "--jobs", "1").code == 0

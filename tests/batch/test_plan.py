@@ -9,7 +9,7 @@ import pytest
 
 from vdet.batch.plan import Plan, Wishes, make_plan
 from vdet.errors import BatchError, OutputError
-from vdet.pipeline.run import VideoJob
+from vdet.pipeline.loop import VideoJob
 
 COMMON = VideoJob(Path(), frames=7)
 Make = Callable[..., Plan]

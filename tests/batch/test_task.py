@@ -10,7 +10,7 @@ from red_cars import HEIGHT, SETTINGS, WIDTH, red_finder
 from running import names, write_drive
 from vdet.batch.manifest import Record
 from vdet.batch.task import process_file, record_of_killed
-from vdet.pipeline.run import VideoJob, process_video
+from vdet.pipeline.loop import VideoJob, run_video
 
 
 @pytest.fixture
@@ -47,9 +47,9 @@ def test_warnings_of_this_file_are_recorded_and_no_others(
         log.warning("%s: 3 frames damaged", job.source)
         log.warning("%s0: another file, in another thread", job.source)
         log.info("%s: nothing to worry about", job.source)
-        return process_video(*arguments, **options)  # type: ignore[arg-type]
+        return run_video(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("vdet.batch.task.process_video", warn_and_process)
+    monkeypatch.setattr("vdet.batch.task.run_video", warn_and_process)
     before = list(logging.getLogger("vdet").handlers)
     assert process(job).warnings == (f"{job.source}: 3 frames damaged",)
     assert logging.getLogger("vdet").handlers == before
@@ -75,7 +75,7 @@ def test_a_folder_that_cannot_be_made_is_an_error_of_the_file(
 def test_with_vdet_debug_a_bug_shows_its_traceback(
     job: VideoJob, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("vdet.batch.task.process_video", None)
+    monkeypatch.setattr("vdet.batch.task.run_video", None)
     monkeypatch.delenv("VDET_DEBUG", raising=False)
     assert "internal error" in str(process(job).error)
     assert capsys.readouterr().err == ""

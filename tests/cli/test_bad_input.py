@@ -153,7 +153,7 @@ def test_a_model_that_cannot_be_used(
 def test_settings_that_ask_for_other_features(
     run: Run, clip_path: Path, model_path: Path, out: Path
 ) -> None:
-    options = ("--model", model_path, "--set", "features.color_space=HSV")
+    options = ("--model", model_path, "--set", "detector.features.color_space=HSV")
     line = _failure(run, clip_path, out, *options)
     assert "was trained with other features (features.color_space: YCrCb, asked for HSV)" in line
 

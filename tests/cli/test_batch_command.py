@@ -11,7 +11,7 @@ import vdet
 from conftest import Run
 from running import frames_of, names, write_drive
 from vdet.config.schema import Settings
-from vdet.resources import shipped_model
+from vdet.detect.svm.kind import shipped_model
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from vdet.errors import OutputError
 from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.truth import read_truth
 from vdet.media import VideoReader
-from vdet.synthetic import default_clip
+from vdet.synthetic import demo_scene
 from vdet.synthetic.scene import Scene
 
 PATCHES = 400
@@ -22,7 +22,7 @@ FRAMES = 30
 
 
 def short_clip(seed: int) -> Scene:
-    return replace(default_clip(seed, width=320, height=180), frames=FRAMES)
+    return replace(demo_scene(seed, width=320, height=180), frames=FRAMES)
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(demo, "PATCHES", PATCHES)
-        patch.setattr(demo, "default_clip", short_clip)
-        settings = load_settings(None, QUICK).settings
+        patch.setattr(demo, "demo_scene", short_clip)
+        settings = load_settings(None, QUICK)
         result = run_demo(files, settings, say=said.append, progress=progress)
     return Demo(files, result, said, totals)
 

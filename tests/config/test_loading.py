@@ -52,14 +52,14 @@ def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
 
 def test_assignments_lie_over_the_file_and_later_ones_over_earlier_ones(path: Path) -> None:
     heat = load(
-        path, "heat: {frames: 5, blur: 7, threshold: 2}", "heat.frames=6", "heat.blur=8",
-        "heat.frames=7",
+        path, "detector.heat: {frames: 5, blur: 7, threshold: 2}", "detector.heat.frames=6", "detector.heat.blur=8",
+        "detector.heat.frames=7",
     ).settings.heat  # fmt: skip
     assert (heat.frames, heat.blur, heat.threshold) == (7, 8, 2.0)
 
 
 def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
-    search = load(path, "search: {perspective: {sizes: [0.5]}}").settings.search
+    search = load(path, "detector.search: {perspective: {sizes: [0.5]}}").settings.search
     assert len(Settings().search.perspective.sizes) > 1
     assert search.perspective.sizes == (0.5,)
 
@@ -71,18 +71,18 @@ def test_a_list_in_an_assignment_replaces_the_whole_list_in_the_file(path: Path)
 
 
 def test_an_assignment_may_name_one_item_of_a_list() -> None:
-    sizes = load_settings(None, ["search.perspective.sizes.1=0.07"]).settings
+    sizes = load_settings(None, ["detector.search.perspective.sizes.1=0.07"])
     first, _, *others = Settings().search.perspective.sizes
     assert sizes.search.perspective.sizes == (first, 0.07, *others)
 
 
 def test_an_assignment_may_name_one_setting_of_an_item(path: Path) -> None:
-    windows = load(path, WINDOWS, "search.windows.1.step=2").settings.search.windows
+    windows = load(path, WINDOWS, "detector.search.windows.1.step=2").settings.search.windows
     assert windows == (FIRST, SECOND.model_copy(update={"step": 2}))
 
 
 def test_an_assignment_may_give_overlap_in_place_of_step(path: Path) -> None:
-    assignments = ["search.windows.0.overlap=0.5", "search.windows.0.step=null"]
+    assignments = ["detector.search.windows.0.overlap=0.5", "detector.search.windows.0.step=null"]
     window = load(path, WINDOWS, *assignments).settings.search.windows[0]
     assert (window.overlap, window.step) == (0.5, None)
 
@@ -95,7 +95,7 @@ def test_an_assignment_may_replace_a_whole_item(path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "assignments"),
-    [("features: {color_space: HSV}", []), ("", ["features.color_space=HSV"])],
+    [("detector.features: {color_space: HSV}", []), ("", ["detector.features.color_space=HSV"])],
 )
 def test_features_are_told_apart_where_they_are_asked_for(
     path: Path, text: str, assignments: list[str]
@@ -104,11 +104,11 @@ def test_features_are_told_apart_where_they_are_asked_for(
 
 
 def test_features_asked_for_as_they_are_by_default_are_asked_for(path: Path) -> None:
-    assert load(path, "features: {patch: 32}").features == FeatureSettings()
+    assert load(path, "detector.features: {patch: 32}").features == FeatureSettings()
 
 
 def test_features_are_not_asked_for_by_other_settings(path: Path) -> None:
-    assert load(path, "heat: {frames: 3}", "tracker.history=3").features is None
+    assert load(path, "detector.heat: {frames: 3}", "tracker.history=3").features is None
 
 
 def test_an_error_names_file_line_column_key_and_what_was_expected(path: Path) -> None:
@@ -119,7 +119,7 @@ def test_an_error_names_file_line_column_key_and_what_was_expected(path: Path) -
 
 
 def test_all_errors_are_given_at_once(path: Path) -> None:
-    text = "heat: {frames: 0, blur: -1}\ntraining:\n  C: -1\ntrakcer: {}\n"
+    text = "detector.heat: {frames: 0, blur: -1}\ntraining:\n  C: -1\ntrakcer: {}\n"
     assert sorted(refusal(path, text, "output.crf=99", "nonsense")) == [
         "--set nonsense: expected KEY=VALUE, as in tracker.history=12",
         "--set: output.crf: should be less than or equal to 51 (got 99)",
@@ -134,51 +134,93 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
     ("text", "message"),
     [
         ("tracker: {histroy: 3}", "1:11: tracker.histroy: is no setting; did you mean history?"),
-        ("heat: {x: 3}", "1:8: heat.x: is no setting; known here: frames, weight, shrink, "),
-        ("features: {hog: {cel: 3}}", "1:18: features.hog.cel: is no setting; did you mean cell?"),
-        ("heat: 3", "1:1: heat: should be a section, key: value (got 3)"),
-        ("heat: {frames: 2001-01-01}", "1:8: heat.frames: should be a valid integer (got datetime"),
-        ("heat: {threshold: .nan}", "1:8: heat.threshold: should be a finite number (got nan)"),
-        ("heat: {threshold: 1e999}", "1:8: heat.threshold: should be a finite number (got inf)"),
-        ("heat: {threshold: -.inf}", "1:8: heat.threshold: should be a finite number (got -inf)"),
-        ("heat: {frames: 2.5}", "1:8: heat.frames: should be a valid integer, got a number with a"),
-        ("features: {color_space: BGR}", "1:12: features.color_space: should be 'YCrCb', 'HSV', "),
-        ("features: {patch: 62}", "1:1: features: patch must be a multiple of hog.cell (4)"),
-        ("features: {hog: {block: 8, cell: 16}}", "1:1: features: hog.block × hog.cell must not"),
-        ("features: {hog: {channels: [0, 0]}}", "1:12: features.hog: channels must differ"),
         (
-            "features: {hog: {channels: []}, histogram: {bins: 0}}",
+            "detector.heat: {x: 3}",
+            "1:8: heat.x: is no setting; known here: frames, weight, shrink, ",
+        ),
+        (
+            "detector.features: {hog: {cel: 3}}",
+            "1:18: features.hog.cel: is no setting; did you mean cell?",
+        ),
+        ("detector.heat: 3", "1:1: heat: should be a section, key: value (got 3)"),
+        (
+            "detector.heat: {frames: 2001-01-01}",
+            "1:8: heat.frames: should be a valid integer (got datetime",
+        ),
+        (
+            "detector.heat: {threshold: .nan}",
+            "1:8: heat.threshold: should be a finite number (got nan)",
+        ),
+        (
+            "detector.heat: {threshold: 1e999}",
+            "1:8: heat.threshold: should be a finite number (got inf)",
+        ),
+        (
+            "detector.heat: {threshold: -.inf}",
+            "1:8: heat.threshold: should be a finite number (got -inf)",
+        ),
+        (
+            "detector.heat: {frames: 2.5}",
+            "1:8: heat.frames: should be a valid integer, got a number with a",
+        ),
+        (
+            "detector.features: {color_space: BGR}",
+            "1:12: features.color_space: should be 'YCrCb', 'HSV', ",
+        ),
+        (
+            "detector.features: {patch: 62}",
+            "1:1: features: patch must be a multiple of hog.cell (4)",
+        ),
+        (
+            "detector.features: {hog: {block: 8, cell: 16}}",
+            "1:1: features: hog.block × hog.cell must not",
+        ),
+        (
+            "detector.features: {hog: {channels: [0, 0]}}",
+            "1:12: features.hog: channels must differ",
+        ),
+        (
+            "detector.features: {hog: {channels: []}, histogram: {bins: 0}}",
             "1:1: features: at least one of hog, histogram and spatial must be on",
         ),
         (
-            "search: {windows: [], perspective: {sizes: []}}",
+            "detector.search: {windows: [], perspective: {sizes: []}}",
             "1:1: search: windows or perspective.sizes must be given",
         ),
-        ("search: {windows: [5]}", "1:20: search.windows[0]: should be a section, key: value"),
-        ("search: {windows: 5}", "1:10: search.windows: should be a list"),
         (
-            "search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
+            "detector.search: {windows: [5]}",
+            "1:20: search.windows[0]: should be a section, key: value",
+        ),
+        ("detector.search: {windows: 5}", "1:10: search.windows: should be a list"),
+        (
+            "detector.search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
             "1:20: search.windows[0]: bottom must be at least top + size",
         ),
         (
-            "search: {windows: [{size: 64, overlap: 0.99, top: 0, bottom: 64}]}",
+            "detector.search: {windows: [{size: 64, overlap: 0.99, top: 0, bottom: 64}]}",
             "1:20: search.windows[0]: overlap leaves a step of less than a pixel",
         ),
         (
-            "search: {windows: [{size: 64, top: 0, bottom: 64}]}",
+            "detector.search: {windows: [{size: 64, top: 0, bottom: 64}]}",
             "1:20: search.windows[0]: one of overlap and step must be given, the other left out",
         ),
         (
-            "search: {windows: [{size: 64, overlap: 0.5, step: 1, top: 0, bottom: 64}]}",
+            "detector.search: {windows: [{size: 64, overlap: 0.5, step: 1, top: 0, bottom: 64}]}",
             "1:20: search.windows[0]: one of overlap and step must be given, the other left out",
         ),
         (
-            "search: {windows: [{size: 64, step: 0, top: 0, bottom: 64}]}",
+            "detector.search: {windows: [{size: 64, step: 0, top: 0, bottom: 64}]}",
             "1:31: search.windows[0].step: should be greater than or equal to 1 (got 0)",
         ),
-        ("heat: {shrink: 3}", "1:8: heat.shrink: should be 1, 2, 4 or 8 (got 3)"),
-        ("heat: {weight: some}", "1:8: heat.weight: should be 'none' or 'coverage' (got 'some')"),
-        ("search: {engine: fast}", "1:10: search.engine: should be 'auto', 'dense' or 'patch' (go"),
+        ("detector.heat: {shrink: 3}", "1:8: heat.shrink: should be 1, 2, 4 or 8 (got 3)"),
+        (
+            "detector.heat: {weight: some}",
+            "1:8: heat.weight: should be 'none' or 'coverage' (got 'some')",
+        ),
+        (
+            "detector.search: {engine: fast}",
+            "1:10: search.engine: should be 'auto', 'dense' or 'patch' (go",
+        ),
         ("'': 1", "1:1: : is no setting; known here: reference_height, features, "),
     ],
 )
@@ -188,7 +230,7 @@ def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str)
 
 
 def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
-    assert refusal(path, "search: {windows: [{size: 64, step: 1}]}") == [
+    assert refusal(path, "detector.search: {windows: [{size: 64, step: 1}]}") == [
         "my.yaml:1:20: search.windows[0].top: is missing",
         "my.yaml:1:20: search.windows[0].bottom: is missing",
     ]
@@ -197,17 +239,32 @@ def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("heat.frames=x", "heat.frames: should be a valid integer"),
-        ("heat.frames.0=5", "heat.frames: should be a valid integer"),
-        ("search.perspective.sizes.7=0.3", "search.perspective.sizes: should be a list, or in"),
-        ("search.perspective.sizes.-1=0.3", "search.perspective.sizes: should be a list, or in"),
-        ("search.perspective.sizes.x=0.3", "search.perspective.sizes: should be a list, or in"),
-        ("search.perspective.sizes.0=3", "search.perspective.sizes[0]: should be less than or equ"),
-        ("search.windows.0.size=64", "search.windows: should be a list, or in --set the number of"),
+        ("detector.heat.frames=x", "detector.heat.frames: should be a valid integer"),
+        ("detector.heat.frames.0=5", "detector.heat.frames: should be a valid integer"),
+        (
+            "detector.search.perspective.sizes.7=0.3",
+            "detector.search.perspective.sizes: should be a list, or in",
+        ),
+        (
+            "search.perspective.sizes.-1=0.3",
+            "detector.search.perspective.sizes: should be a list, or in",
+        ),
+        (
+            "detector.search.perspective.sizes.x=0.3",
+            "detector.search.perspective.sizes: should be a list, or in",
+        ),
+        (
+            "detector.search.perspective.sizes.0=3",
+            "search.perspective.sizes[0]: should be less than or equ",
+        ),
+        (
+            "detector.search.windows.0.size=64",
+            "detector.search.windows: should be a list, or in --set the number of",
+        ),
         ("tracker.0=3", "tracker[0]: is no setting; known here: method, history, "),
         ("0=3", "[0]: is no setting; known here: reference_height, "),
         ("9" * 5000 + "=3", "9999"),
-        ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: should be a valid integer"),
+        ("heat.frames" + ".a" * 5000 + "=3", "detector.heat.frames: should be a valid integer"),
     ],
 )
 def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, message: str) -> None:
@@ -220,8 +277,14 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, me
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("search.windows.1.sise=3", "search.windows[1].sise: is no setting; did you mean size?"),
-        ("search.windows.0.0=3", "search.windows[0][0]: is no setting; known here: size, "),
+        (
+            "detector.search.windows.1.sise=3",
+            "search.windows[1].sise: is no setting; did you mean size?",
+        ),
+        (
+            "detector.search.windows.0.0=3",
+            "search.windows[0][0]: is no setting; known here: size, ",
+        ),
     ],
 )
 def test_so_is_one_in_an_assignment_to_an_item_of_the_file(
@@ -232,7 +295,9 @@ def test_so_is_one_in_an_assignment_to_an_item_of_the_file(
 
 
 def test_a_value_that_an_assignment_mends_is_no_error(path: Path) -> None:
-    assert load(path, "heat: {frames: 0}", "heat.frames=3").settings.heat.frames == 3
+    assert (
+        load(path, "detector.heat: {frames: 0}", "detector.heat.frames=3").settings.heat.frames == 3
+    )
 
 
 @pytest.mark.parametrize("value", ["[" * 200 + "]" * 200, "9" * 300, "x" * 5000])
@@ -297,4 +362,4 @@ def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
 def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> None:
     file = tmp_path / "my.yaml"
     file.write_text("heat:\n  # threshold: 2\n")
-    assert load_settings(file).settings == load_settings().settings
+    assert load_settings(file).settings == load_settings()

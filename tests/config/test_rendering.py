@@ -98,7 +98,7 @@ def test_printed_settings_are_read_back_the_same(settings: Settings) -> None:
 def test_the_default_config_is_the_defaults_printed() -> None:
     path = CONFIGS / "default.yaml"
     text = path.read_text(encoding="utf-8")
-    assert load_settings(path).settings == Settings()
+    assert load_settings(path) == Settings()
     assert text == render(Settings())
 
 
@@ -106,7 +106,7 @@ def test_the_seed_config_is_printed_but_for_its_first_line() -> None:
     path = CONFIGS / "seed.yaml"
     first, *rest = path.read_text(encoding="utf-8").splitlines()
     assert first.startswith("# The original system")
-    assert rest == render(load_settings(path).settings).splitlines()[1:]
+    assert rest == render(load_settings(path)).splitlines()[1:]
 
 
 def test_no_other_config_ships() -> None:

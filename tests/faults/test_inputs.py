@@ -15,7 +15,7 @@ from red_cars import SETTINGS, red_finder
 from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
-from vdet.pipeline.run import VideoJob, process_video
+from vdet.pipeline.loop import VideoJob, run_video
 
 COUNT = 60
 
@@ -45,7 +45,7 @@ def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Call
 
 
 def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: VideoJob) -> None:
-    process_video(job, red_finder(), SETTINGS, progress=after(5, job.source.unlink))
+    run_video(job, red_finder(), SETTINGS, progress=after(5, job.source.unlink))
     assert frames_of(job.video) == COUNT
 
 
@@ -61,7 +61,7 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    summary = process_video(job, red_finder(), SETTINGS, progress=shrink)
+    summary = run_video(job, red_finder(), SETTINGS, progress=shrink)
     assert COUNT // 4 < summary.frames < COUNT * 3 // 4
     assert frames_of(job.video) == summary.frames
     assert f"ends early: {summary.frames} of {COUNT} frames could be read" in caplog.text
@@ -108,7 +108,7 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
 def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path)
     with pytest.raises(VideoError, match=r"pipe\.ts: nothing could be read or written for 1 s"):
-        process_video(stalling, red_finder(), SETTINGS, patience=1)
+        run_video(stalling, red_finder(), SETTINGS, patience=1)
     assert names(tmp_path / "out") == []
     pipe.close()
     until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))

@@ -69,14 +69,14 @@ KILLS_ITS_PROCESS = """
 import os, signal
 from vdet.batch import task
 
-process = task.process_video
+process = task.run_video
 
 def killing(job, *arguments, **options):
     if job.source.name == "kills.mp4":
         os.kill(os.getpid(), signal.SIGKILL)
     return process(job, *arguments, **options)
 
-task.process_video = killing
+task.run_video = killing
 """
 
 

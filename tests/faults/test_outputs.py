@@ -14,7 +14,7 @@ from running import names, write_drive
 from vdet.batch.task import process_file
 from vdet.media import Frame
 from vdet.media.encoder import Encoder
-from vdet.pipeline.run import VideoJob
+from vdet.pipeline.loop import VideoJob
 from vdet.track.motion import MotionTracker
 from vdet.track.rules.tracker import Cars
 

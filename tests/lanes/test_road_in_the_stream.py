@@ -1,29 +1,28 @@
-"""The lane, followed in the same stream as the cars."""
+"""The lane, found in the same stream of frames as the vehicles."""
 
 import weakref
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from vdet.pipeline.following import follow
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, drive, red_finder
 from vdet.config.lanes import LaneSettings
-from vdet.lanes.camera import Camera
-from vdet.lanes.road import LaneRequest, RoadWatch
-from vdet.lanes.undistortion import Undistorter
+from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media.images import Image
-from vdet.pipeline.following import follow
 
-LENS = Camera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 COUNT = 40
 
 
-def watch() -> RoadWatch:
-    return RoadWatch(LaneRequest(LENS), LaneSettings(), WIDTH, HEIGHT)
+def road_finder() -> RoadFinder:
+    return RoadFinder(LaneRequest(LENS), LaneSettings(), WIDTH, HEIGHT)
 
 
-def test_cars_are_searched_in_the_frame_as_it_came() -> None:
-    with_lanes = follow(drive(15), red_finder(), SETTINGS, WIDTH, HEIGHT, watch=watch())
+def test_vehicles_are_searched_in_the_original_frame() -> None:
+    with_lanes = follow(drive(15), red_finder(), SETTINGS, WIDTH, HEIGHT, watch=road_finder())
     without = follow(drive(15), red_finder(), SETTINGS, WIDTH, HEIGHT)
     for one, other in zip(with_lanes, without, strict=True):
         assert one.tracks == other.tracks
@@ -32,13 +31,15 @@ def test_cars_are_searched_in_the_frame_as_it_came() -> None:
 
 def test_every_frame_is_undistorted() -> None:
     undistorter = Undistorter(LENS, WIDTH, HEIGHT)
-    for result in follow(drive(5), red_finder(), SETTINGS, WIDTH, HEIGHT, watch=watch(), threads=2):
+    for result in follow(
+        drive(5), red_finder(), SETTINGS, WIDTH, HEIGHT, watch=road_finder(), threads=2
+    ):
         assert result.road is not None
         np.testing.assert_array_equal(result.road.image, undistorter.image(result.frame.image))
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_few_undistorted_frames_are_held_at_a_time(
+def test_few_undistorted_frames_are_in_memory_at_a_time(
     monkeypatch: pytest.MonkeyPatch, threads: int
 ) -> None:
     made: list[weakref.ref[Image]] = []
@@ -54,7 +55,7 @@ def test_few_undistorted_frames_are_held_at_a_time(
     monkeypatch.setattr(Undistorter, "image", watched(Undistorter.image))
     stream = drive(COUNT), red_finder(), SETTINGS, WIDTH, HEIGHT
     most = 0
-    for _ in follow(*stream, threads=threads, watch=watch()):
+    for _ in follow(*stream, threads=threads, watch=road_finder()):
         most = max(most, sum(image() is not None for image in made))
     assert len(made) == COUNT
     assert 0 < most <= threads + 3

@@ -6,21 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from vdet.pipeline.annotation import StagePictures, annotate, draw_tracks
 
 from red_cars import CAR, COLOUR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.config.lanes import LaneSettings
 from vdet.detect.svm.detector import detect_still
 from vdet.draw.boxes import color_of, draw_box
 from vdet.geometry import Box
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
-from vdet.lanes.road import LaneRequest, Road, RoadWatch
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
-from vdet.pipeline.annotation import StagePictures, annotate
 from vdet.pipeline.result import FrameResult
 from vdet.track.track import Track
 
-LENS = Camera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 CORNER = Box(0, 0, 12, 12)
 LANE = Lane(
     curvature=0.0,
@@ -32,9 +32,9 @@ LANE = Lane(
 )
 
 
-def seen(camera: Camera | None) -> Road:
-    watch = RoadWatch(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
-    return watch.follow(watch.look(road(CAR)))
+def seen(camera: CalibratedCamera | None) -> Road:
+    finder = RoadFinder(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
+    return finder.update(finder.observe(road(CAR)))
 
 
 def result_of(
@@ -106,3 +106,29 @@ class TestStagePictures:
         with_road = result_of(road_seen=replace(seen(LENS), lane=lane))
         names = self.offered(tmp_path, Fraction(0), with_road)
         assert names[5:] == ["6-road.png", "7-above.png", "8-mask.png", "9-fit.png"]
+
+
+class TestTracks:
+    def test_only_boxes_and_their_labels_are_drawn_on(self) -> None:
+        image = np.full((720, 1280, 3), 255, np.uint8)
+        boxes = [Box(200, 400, 120, 90), Box(800, 420, 240, 150)]
+        draw_tracks(image, [Track(n, box, False) for n, box in enumerate(boxes, start=1)])
+        allowed = np.zeros(image.shape[:2], bool)
+        for box in boxes:
+            allowed[box.y - 32 : box.bottom, box.x : box.right] = True
+            allowed[box.y + 5 : box.bottom - 5, box.x + 5 : box.right - 5] = False
+        drawn = (image != 255).any(axis=2)
+        assert drawn.any()
+        assert not (drawn & ~allowed).any()
+
+    def test_each_id_has_its_own_color(self) -> None:
+        image = np.full((240, 320, 3), 255, np.uint8)
+        draw_tracks(image, [Track(3, Box(20, 100, 50, 50), False)])
+        draw_tracks(image, [Track(4, Box(200, 100, 50, 50), False)])
+        assert tuple(image[149, 45]) == color_of(3)
+        assert tuple(image[149, 225]) == color_of(4)
+
+    def test_no_tracks_leave_the_picture_as_it_was(self) -> None:
+        image = np.full((240, 320, 3), 255, np.uint8)
+        draw_tracks(image, [])
+        assert image.min() == 255

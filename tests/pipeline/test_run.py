@@ -14,6 +14,7 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from vdet.pipeline.following import HORIZON_FRAMES, follow, seek_horizon
 
 from conftest import Run
 from quick import QUICK, QUICK_OPTIONS
@@ -35,9 +36,8 @@ from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image
 from vdet.media.pixels import to_bgr
-from vdet.pipeline.following import HORIZON_FRAMES, follow, seek_horizon
-from vdet.pipeline.run import Summary, VideoJob, process_video
-from vdet.synthetic import frames, truth
+from vdet.pipeline.loop import Summary, VideoJob, run_video
+from vdet.synthetic import frames, true_boxes
 from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import Cars
 
@@ -59,7 +59,7 @@ def red_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run_red(job: VideoJob, settings: Settings = SETTINGS) -> Summary:
-    return process_video(job, red_finder(), settings)
+    return run_video(job, red_finder(), settings)
 
 
 def read(path: Path) -> list[Frame]:
@@ -74,14 +74,14 @@ def since_first(path: Path) -> list[Fraction]:
 
 class TestFollow:
     def test_finds_the_vehicle_of_a_drawn_scene(self, scene: Scene, model_path: Path) -> None:
-        settings = load_settings(None, QUICK).settings
+        settings = load_settings(None, QUICK)
         drawn = islice(frames(scene), 16)
         results = list(follow(drawn, load_model(model_path), settings, 320, 180))
         assert [result.frame.index for result in results] == list(range(16))
         nearest = 3  # its number in the scene
         overlaps = []
         for result in results[8:]:
-            (box,) = (v.box for v in truth(scene, result.frame.index) if v.id == nearest)
+            (box,) = (v.box for v in true_boxes(scene, result.frame.index) if v.id == nearest)
             overlaps.append(max((track.box.iou(box) for track in result.tracks), default=0))
         assert min(overlaps) > 0.3
         assert np.mean(overlaps) > 0.5
@@ -213,7 +213,7 @@ class TestMemory:
                 held.append(sum(isinstance(item, Frame) for item in gc.get_objects()))
 
         job = VideoJob(red_clip, tmp_path / "out.mp4", tmp_path / "out.csv")
-        process_video(job, red_finder(), SETTINGS, threads=2, progress=lambda _: advance)
+        run_video(job, red_finder(), SETTINGS, threads=2, progress=lambda _: advance)
         assert held
         assert 0 < max(held) <= QUEUED
 
@@ -231,7 +231,7 @@ class TestOutputs:
             told.append(total)
             return told.append
 
-        process_video(VideoJob(red_clip, frames=20), red_finder(), SETTINGS, progress=progress)
+        run_video(VideoJob(red_clip, frames=20), red_finder(), SETTINGS, progress=progress)
         assert told[0] == 20
         assert sum(advance or 0 for advance in told[1:]) == 20
 
@@ -312,7 +312,7 @@ class TestBreakage:
             raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            process_video(job, red_finder(), SETTINGS, progress=lambda _: interrupt)
+            run_video(job, red_finder(), SETTINGS, progress=lambda _: interrupt)
 
     def test_the_work_is_interrupted(self, job: VideoJob, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(Cars, "update", _breaking(Cars.update, KeyboardInterrupt()))

@@ -11,13 +11,13 @@ from vdet.errors import ImageError, OutputError
 from vdet.files import write_json
 from vdet.geometry import Box
 from vdet.media.images import read_image, write_image
-from vdet.pipeline.stills import (
-    StillJob,
+from vdet.pipeline.pictures import (
+    PictureJob,
     StillResult,
     find_images,
     list_results,
     plan,
-    process_still,
+    run_picture,
 )
 
 
@@ -59,7 +59,7 @@ class TestFindingImages:
 class TestPlan:
     def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
         source, out = tmp_path / "a.png", tmp_path / "found.jpg"
-        assert plan([source], out, None, overwrite=False) == [StillJob(source, out, None)]
+        assert plan([source], out, None, overwrite=False) == [PictureJob(source, out, None)]
 
     def test_one_picture_goes_into_a_folder_that_is_named(self, tmp_path: Path) -> None:
         out = tmp_path / "new" / "out"
@@ -123,7 +123,7 @@ class TestProcessing:
 
     @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
     def test_gives_the_boxes_of_the_detection(self, source: Path, settings: Settings) -> None:
-        result = process_still(StillJob(source, None, None), red_finder(), settings)
+        result = run_picture(PictureJob(source, None, None), red_finder(), settings)
         detection = detect_still(red_finder(), settings, road(CAR))
         assert result == StillResult(
             source, WIDTH, HEIGHT, tuple(still_boxes(detection, settings, WIDTH, HEIGHT))
@@ -133,12 +133,12 @@ class TestProcessing:
         assert peak > settings.heat.threshold
 
     def test_writes_nothing_that_is_not_asked_for(self, source: Path) -> None:
-        process_still(StillJob(source, None, None), red_finder(), SETTINGS)
+        run_picture(PictureJob(source, None, None), red_finder(), SETTINGS)
         assert [path.name for path in source.parent.iterdir()] == ["road.png"]
 
     def test_draws_the_boxes_into_the_picture_only(self, source: Path) -> None:
         out = source.with_name("out.png")
-        result = process_still(StillJob(source, out, None), red_finder(), SETTINGS)
+        result = run_picture(PictureJob(source, out, None), red_finder(), SETTINGS)
         ((box, _),) = result.boxes
         changed = (read_image(out) != road(CAR)).any(axis=2)
         assert changed[box.y : box.bottom, box.x].all()
@@ -148,20 +148,20 @@ class TestProcessing:
     def test_an_empty_road_is_written_as_it_is(self, tmp_path: Path) -> None:
         source, out = tmp_path / "empty.png", tmp_path / "out.png"
         write_image(source, road())
-        result = process_still(StillJob(source, out, None), red_finder(), SETTINGS)
+        result = run_picture(PictureJob(source, out, None), red_finder(), SETTINGS)
         assert result.boxes == ()
         np.testing.assert_array_equal(read_image(out), road())
 
     def test_stages_show_the_frame_without_the_boxes_of_the_output(self, source: Path) -> None:
-        job = StillJob(source, source.with_name("out.png"), source.with_name("stages"))
-        process_still(job, red_finder(), SETTINGS)
+        job = PictureJob(source, source.with_name("out.png"), source.with_name("stages"))
+        run_picture(job, red_finder(), SETTINGS)
         assert len(list(source.with_name("stages").iterdir())) == 5
 
     def test_a_picture_that_is_too_small_is_named(self, tmp_path: Path) -> None:
         source = tmp_path / "tiny.png"
         write_image(source, road(CAR)[:, :20])
         with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
-            process_still(StillJob(source, tmp_path / "out.png", None), red_finder(), SETTINGS)
+            run_picture(PictureJob(source, tmp_path / "out.png", None), red_finder(), SETTINGS)
         assert not (tmp_path / "out.png").exists()
 
 

@@ -11,7 +11,14 @@ import cv2
 import pytest
 from threadpoolctl import threadpool_info
 
-from vdet.pipeline.threads import Stalled, ahead, aside, behind, each_with, quiet_libraries
+from vdet.pipeline.threads import (
+    Stalled,
+    map_ordered,
+    prefetch,
+    run_in_thread,
+    single_threaded_libraries,
+    write_async,
+)
 
 PLACES = ("source", "function", "taker")
 Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
@@ -86,22 +93,22 @@ def noting(items: Iterable[int], seen: list[int]) -> Iterator[int]:
 class TestAhead:
     @pytest.mark.parametrize("depth", [1, 4, 100])
     def test_gives_all_items_in_order(self, depth: int) -> None:
-        with ahead(range(50), depth) as items:
+        with prefetch(range(50), depth) as items:
             assert list(items) == list(range(50))
 
     def test_gives_nothing_where_there_is_nothing(self) -> None:
-        with ahead(range(0)) as items:
+        with prefetch(range(0)) as items:
             assert list(items) == []
 
     def test_works_before_it_is_asked(self) -> None:
         made: list[int] = []
-        with ahead(noting(range(3), made)):
+        with prefetch(noting(range(3), made)):
             until(lambda: made == [0, 1, 2])
 
     @pytest.mark.parametrize("depth", [1, 3])
     def test_lets_so_many_wait_and_holds_one_more(self, depth: int) -> None:
         made: list[int] = []
-        with ahead(noting(range(50), made), depth) as items:
+        with prefetch(noting(range(50), made), depth) as items:
             for taken in range(4):
                 assert len(settled(made)) - taken == depth + 1
                 next(items)
@@ -112,7 +119,7 @@ class TestAhead:
     ) -> None:
         error = kind("source")
         read: list[int] = []
-        with pytest.raises(kind) as caught, ahead(failing(error, after=7)) as items:
+        with pytest.raises(kind) as caught, prefetch(failing(error, after=7)) as items:
             read.extend(items)
         assert caught.value is error
         assert read == list(range(7))
@@ -121,13 +128,13 @@ class TestAhead:
     def test_an_error_of_the_reader_ends_the_source(self, kind: type[BaseException]) -> None:
         error = kind("reader")
         made: list[int] = []
-        with pytest.raises(kind) as caught, ahead(noting(range(10**9), made), 2) as items:
+        with pytest.raises(kind) as caught, prefetch(noting(range(10**9), made), 2) as items:
             fail(error, after=next(items))
         assert caught.value is error
         assert len(made) <= 1 + 2 + 1
 
     def test_the_reader_may_stop_early(self) -> None:
-        with ahead(iter(int, 1)) as items:
+        with prefetch(iter(int, 1)) as items:
             assert next(items) == 0
 
     @pytest.mark.parametrize("take", [1, 3])
@@ -141,7 +148,7 @@ class TestAhead:
             finally:
                 threads.append(threading.current_thread())
 
-        with ahead(items()) as read:
+        with prefetch(items()) as read:
             assert list(islice(read, take)) == list(range(take))
         opened, closed = threads
         assert opened is closed is not threading.current_thread()
@@ -152,7 +159,7 @@ class TestAhead:
             hang.wait()
 
         read: list[int] = []
-        with pytest.raises(Stalled), ahead(items(), patience=0.2) as given:
+        with pytest.raises(Stalled), prefetch(items(), patience=0.2) as given:
             read.extend(given)
         assert read == [1]
 
@@ -164,36 +171,36 @@ class TestAhead:
             hang.wait()
             yield 1
 
-        with pytest.raises(KeyboardInterrupt), ahead(items()) as given:
+        with pytest.raises(KeyboardInterrupt), prefetch(items()) as given:
             next(given)
 
 
 class TestAside:
     def test_gives_what_the_call_gives(self) -> None:
-        assert aside(lambda: threading.current_thread().name) == "vdet-ahead"
+        assert run_in_thread(lambda: threading.current_thread().name) == "vdet-prefetch"
 
     def test_raises_what_the_call_raises(self) -> None:
         error = ValueError("call")
         with pytest.raises(ValueError, match="call") as caught:
-            aside(lambda: fail(error, after=1))
+            run_in_thread(lambda: fail(error, after=1))
         assert caught.value is error
 
     def test_a_call_that_hangs_is_given_up(self, hang: threading.Event) -> None:
         with pytest.raises(Stalled):
-            aside(hang.wait, patience=0.1)
+            run_in_thread(hang.wait, patience=0.1)
 
 
 class TestBehind:
     @pytest.mark.parametrize("depth", [1, 4, 100])
     def test_hands_all_items_over_in_order(self, depth: int) -> None:
         taken: list[int] = []
-        with behind(taken.append, depth) as hand_over:
+        with write_async(taken.append, depth) as hand_over:
             hand_all(range(50), hand_over)
         assert taken == list(range(50))
 
     def test_nothing_may_be_handed_over(self) -> None:
         taken: list[int] = []
-        with behind(taken.append):
+        with write_async(taken.append):
             pass
         assert taken == []
 
@@ -206,7 +213,7 @@ class TestBehind:
                 hand_over(item)
                 handed.append(item)
 
-        with behind(lambda _: gate.wait(5), depth=3) as hand_over:
+        with write_async(lambda _: gate.wait(5), depth=3) as hand_over:
             giver = threading.Thread(target=give_all)
             giver.start()
             try:
@@ -228,7 +235,7 @@ class TestBehind:
                 raise error
             taken.append(item)
 
-        with pytest.raises(kind) as caught, behind(take, 2) as hand_over:
+        with pytest.raises(kind) as caught, write_async(take, 2) as hand_over:
             hand_all(range(10**9), hand_over)
         assert caught.value is error
         assert taken == [0, 1, 2]
@@ -239,7 +246,7 @@ class TestBehind:
         def take(_: int) -> None:
             raise error
 
-        with pytest.raises(ValueError, match="taker") as caught, behind(take) as hand_over:
+        with pytest.raises(ValueError, match="taker") as caught, write_async(take) as hand_over:
             hand_over(0)
         assert caught.value is error
 
@@ -252,9 +259,9 @@ class TestBehind:
             yield
             seen.append("left")
 
-        with behind(seen.append, within=within()) as hand_over:
+        with write_async(seen.append, within=within()) as hand_over:
             hand_over(1)
-        assert seen == ["vdet-behind", 1, "left"]
+        assert seen == ["vdet-write", 1, "left"]
 
     @Errors
     def test_an_error_of_the_giver_is_one_in_the_context_too(
@@ -274,7 +281,7 @@ class TestBehind:
         taken: list[int] = []
         with (
             pytest.raises(kind) as caught,
-            behind(taken.append, within=within()) as hand_over,
+            write_async(taken.append, within=within()) as hand_over,
         ):
             hand_all(failing(error, after=2), hand_over)
         assert caught.value is error
@@ -289,7 +296,7 @@ class TestBehind:
             yield
             raise ValueError(place)
 
-        with pytest.raises(ValueError, match=place), behind(int, within=within()) as hand_over:
+        with pytest.raises(ValueError, match=place), write_async(int, within=within()) as hand_over:
             hand_over(0)
 
     def test_a_taker_that_hangs_is_given_up_and_left_alone(self, hang: threading.Event) -> None:
@@ -305,7 +312,7 @@ class TestBehind:
 
         with (
             pytest.raises(Stalled),
-            behind(lambda _: hang.wait(), 1, within=within(), patience=0.2) as hand_over,
+            write_async(lambda _: hang.wait(), 1, within=within(), patience=0.2) as hand_over,
         ):
             hand_all(range(10), hand_over)
         assert left == [], "the thread hangs: what it has open is not touched"
@@ -318,7 +325,7 @@ class TestBehind:
     ) -> None:
         error = kind("giver")
         taken: list[int] = []
-        with pytest.raises(kind) as caught, behind(taken.append) as hand_over:
+        with pytest.raises(kind) as caught, write_async(taken.append) as hand_over:
             hand_all(failing(error, after=2), hand_over)
         assert caught.value is error
         assert taken == [0, 1]
@@ -331,22 +338,22 @@ class TestEachWith:
             time.sleep(0.003 * (10 - item))
             return item**2
 
-        with each_with(slow_at_first, range(10), threads) as pairs:
+        with map_ordered(slow_at_first, range(10), threads) as pairs:
             assert list(pairs) == [(item, item**2) for item in range(10)]
 
     def test_nothing_gives_no_pairs(self) -> None:
-        with each_with(str, range(0), 2) as pairs:
+        with map_ordered(str, range(0), 2) as pairs:
             assert list(pairs) == []
 
     def test_so_many_threads_work_at_once(self) -> None:
         together = threading.Barrier(3, timeout=5)
-        with each_with(lambda _: together.wait(), range(3), threads=3) as pairs:
+        with map_ordered(lambda _: together.wait(), range(3), threads=3) as pairs:
             assert sorted(turn for _, turn in pairs) == [0, 1, 2]
 
     @pytest.mark.parametrize("threads", [1, 3])
     def test_no_more_items_are_taken_than_threads_and_one(self, threads: int) -> None:
         taken: list[int] = []
-        with each_with(str, noting(range(50), taken), threads) as pairs:
+        with map_ordered(str, noting(range(50), taken), threads) as pairs:
             for received, _ in enumerate(pairs, start=1):
                 assert len(taken) - received <= threads
 
@@ -363,7 +370,7 @@ class TestEachWith:
                 raise error
             return item
 
-        with pytest.raises(kind) as caught, each_with(fail_at_5, range(50), threads) as pairs:
+        with pytest.raises(kind) as caught, map_ordered(fail_at_5, range(50), threads) as pairs:
             received.extend(item for item, _ in pairs)
         assert caught.value is error
         assert received == list(range(5))
@@ -373,7 +380,7 @@ class TestEachWith:
         error = kind("items")
         with (
             pytest.raises(kind) as caught,
-            each_with(str, failing(error, after=3), threads=2) as pairs,
+            map_ordered(str, failing(error, after=3), threads=2) as pairs,
         ):
             list(pairs)
         assert caught.value is error
@@ -390,7 +397,7 @@ class TestEachWith:
 
         with (
             pytest.raises(kind) as caught,
-            each_with(begin, range(10**9), threads=2) as pairs,
+            map_ordered(begin, range(10**9), threads=2) as pairs,
         ):
             fail(error, after=next(pairs))
         assert caught.value is error
@@ -405,9 +412,9 @@ class TestTogether:
         source: Iterable[int], function: Callable[[int], int], take: Callable[[int], object]
     ) -> None:
         with ExitStack() as stack:
-            hand_over = stack.enter_context(behind(take))
-            items = stack.enter_context(ahead(source))
-            for _, result in stack.enter_context(each_with(function, items, threads=2)):
+            hand_over = stack.enter_context(write_async(take))
+            items = stack.enter_context(prefetch(source))
+            for _, result in stack.enter_context(map_ordered(function, items, threads=2)):
                 hand_over(result)
 
     def test_everything_arrives_in_order(self) -> None:
@@ -461,7 +468,7 @@ class TestQuietLibraries:
 
     def test_inside_they_have_one_thread_and_afterwards_as_many_as_before(self) -> None:
         before = [pool["num_threads"] for pool in threadpool_info()]
-        with quiet_libraries():
+        with single_threaded_libraries():
             assert cv2.getNumThreads() == 1
             assert {pool["num_threads"] for pool in threadpool_info()} == {1}
         assert cv2.getNumThreads() == 2
@@ -469,6 +476,6 @@ class TestQuietLibraries:
 
     @Errors
     def test_an_error_restores_them_too(self, kind: type[BaseException]) -> None:
-        with pytest.raises(kind), quiet_libraries():
+        with pytest.raises(kind), single_threaded_libraries():
             raise kind
         assert cv2.getNumThreads() == 2

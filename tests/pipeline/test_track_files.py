@@ -11,21 +11,20 @@ from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
 from vdet.evaluate.predictions import read_predictions
 from vdet.geometry import Box
-from vdet.lanes.lane import Lane
-from vdet.lanes.record import lane_record
-from vdet.lanes.road import LaneRequest, Road, RoadWatch
+from vdet.lanes.lane import Lane, lane_record
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media.frame import Frame
 from vdet.pipeline.sinks.tracks import check_suffix, track_writer
 from vdet.track.track import Track
 
 IMAGE = np.zeros((2, 2, 3), np.uint8)
 FRAMES: list[tuple[int, Fraction, list[Track]]] = [
-    (4, Fraction(4, 25), [Track(1, Box(10, 20, 30, 40), from_match=False)]),
+    (4, Fraction(4, 25), [Track(1, Box(10, 20, 30, 40), predicted=False)]),
     (5, Fraction(1, 3), []),
     (
         6,
         Fraction(6, 25),
-        [Track(1, Box(11, 21, 31, 41), from_match=True), Track(2, Box(0, -3, 5, 6), False)],
+        [Track(1, Box(11, 21, 31, 41), predicted=True), Track(2, Box(0, -3, 5, 6), False)],
     ),
 ]
 
@@ -57,7 +56,7 @@ def test_motchallenge_text_counts_frames_and_pixels_from_1(tmp_path: Path) -> No
 
 def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
     assert write(tmp_path / "tracks.csv") == (
-        "frame,time,id,x,y,width,height,from_match\n"
+        "frame,time,id,x,y,width,height,predicted\n"
         "4,0.160000,1,10,20,30,40,0\n"
         "6,0.240000,1,11,21,31,41,1\n"
         "6,0.240000,2,0,-3,5,6,0\n"
@@ -67,18 +66,18 @@ def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
 def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
     assert write(tmp_path / "tracks.jsonl") == (
         '{"frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
-        '"height": 40, "from_match": false}]}\n'
+        '"height": 40, "predicted": false}]}\n'
         '{"frame": 5, "time": 0.333333, "tracks": []}\n'
         '{"frame": 6, "time": 0.24, "tracks": [{"id": 1, "x": 11, "y": 21, "width": 31, '
-        '"height": 41, "from_match": true}, {"id": 2, "x": 0, "y": -3, "width": 5, '
-        '"height": 6, "from_match": false}]}\n'
+        '"height": 41, "predicted": true}, {"id": 2, "x": 0, "y": -3, "width": 5, '
+        '"height": 6, "predicted": false}]}\n'
     )
 
 
 def road(lane: Lane | None) -> Road:
     image = np.zeros((36, 64, 3), np.uint8)
-    watch = RoadWatch(LaneRequest(), LaneSettings(), 64, 36)
-    return replace(watch.follow(watch.look(image)), lane=lane)
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 64, 36)
+    return replace(finder.update(finder.observe(image)), lane=lane)
 
 
 def write_with_lanes(path: Path) -> str:
@@ -105,7 +104,7 @@ def test_other_formats_have_no_place_for_a_lane(tmp_path: Path, suffix: str) -> 
 
 
 def test_without_frames_only_a_heading_is_written(tmp_path: Path) -> None:
-    heading = "frame,time,id,x,y,width,height,from_match\n"
+    heading = "frame,time,id,x,y,width,height,predicted\n"
     texts = [write(tmp_path / f"tracks{suffix}", []) for suffix in (".txt", ".csv", ".jsonl")]
     assert texts == ["", heading, ""]
 

@@ -130,7 +130,7 @@ def test_frames_so_wide_that_no_search_of_them_would_end_are_refused_by_name(
     source = write_clip(
         tmp_path / "wide.mkv", size=(16_000, 100), count=1, codec="ffv1", pix_fmt="bgr0"
     )
-    fine = "search.windows=[{size: 60, overlap: 0.9, top: 0, bottom: 720}]"
+    fine = "detector.search.windows=[{size: 60, overlap: 0.9, top: 0, bottom: 720}]"
     result = run("detect-video", source, tmp_path / "out.mp4", "--set", fine)
     assert result.code == 1
     assert "wide.mkv: " in result.err

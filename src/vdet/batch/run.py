@@ -7,11 +7,9 @@ from typing import TypeVar
 
 from vdet.batch.manifest import Origin, Record, appending
 from vdet.batch.plan import Plan
-from vdet.batch.task import process_file, record_of_killed
-from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
+from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import make_folder, remove_stale
-from vdet.pipeline.run import VideoJob
+from vdet.pipeline.loop import VideoJob
 from vdet.workers import WorkerKilledError, Workers
 
 T = TypeVar("T")
@@ -19,22 +17,11 @@ R = TypeVar("R")
 
 
 def run_batch(
-    plan: Plan,
-    model: LinearModel,
-    settings: Settings,
-    origin: Origin,
-    *,
-    workers: Workers,
-    threads: int,
+    plan: Plan, work: Work, origin: Origin, *, workers: Workers
 ) -> Generator[tuple[VideoJob, Record]]:
     """Process the files of a plan; yield each when it has ended, with its record in the manifest.
 
     At the end, temporary files of killed worker processes are removed.
-
-    Parameters
-    ----------
-    threads
-        Threads of the search, of the decoder and of the encoder, for each file.
 
     Raises
     ------
@@ -44,7 +31,7 @@ def run_batch(
         The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)
-    function = partial(process_file, model=model, settings=settings, threads=threads)
+    function = partial(process_file, work=work)
     try:
         with (
             appending(plan.manifest, origin) as add,
@@ -55,7 +42,7 @@ def run_batch(
                 add(record)
                 yield job, record
     finally:
-        for folder in {output.parent for job in plan.jobs for output in job.outputs}:
+        for folder in {output.path.parent for job in plan.jobs for output in job.outputs}:
             remove_stale(folder)
 
 

@@ -51,11 +51,11 @@ def describe_boxes(
         Too many patches are unreadable.
     """
     told = {file.source for file in (*files, *boxed) if file.sides}
-    if not told or not settings.features.hog.channels:
+    if not told or not settings.svm.features.hog.channels:
         return None
     training = settings.training
     describe = partial(
-        extract, settings=settings.features, max_broken=training.max_broken, workers=workers
+        extract, settings=settings.svm.features, max_broken=training.max_broken, workers=workers
     )
     whole = training.views.model_copy(update={"parts": 0.0})  # parts have no box
     look = partial(views_of, settings=whole)
@@ -81,7 +81,7 @@ def fit_split_boxes(
         Of `data`; from `boxes` the same split holds out its share.
     """
     training = settings.training
-    length = Layout.of(settings.features).hog_length
+    length = Layout.of(settings.svm.features).hog_length
     parts = [(data, held)]
     if boxes.boxed is not None:
         parts.append((boxes.boxed, _held(boxes.boxed, name, training)))
@@ -99,7 +99,7 @@ def learn_boxes(
     lessons: Sequence[Lesson], filled: Lesson | None, settings: Settings
 ) -> BoxRegression | None:
     """Fit on lessons that tell sides, and, for less, on `filled`; None where no side is told."""
-    length = Layout.of(settings.features).hog_length
+    length = Layout.of(settings.svm.features).hog_length
     learnt = [_Told.of(lesson, length) for lesson in lessons]
     known = sum(len(told.sides) for told in learnt)
     if not known:

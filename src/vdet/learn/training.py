@@ -67,7 +67,7 @@ def train(
     workers = make_workers(jobs, scheduler)
     data = extract(
         files,
-        settings.features,
+        settings.svm.features,
         max_broken=training.max_broken,
         look=partial(views_of, settings=training.views),
         seed=training.seed,
@@ -111,7 +111,7 @@ def _fit_split(
         raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
     lesson = lesson_of(data, ~held)
-    model = fit(lesson.vectors, lesson.vehicle, settings.features, training, lesson.origins)
+    model = fit(lesson.vectors, lesson.vehicle, settings.svm.features, training, lesson.origins)
     regression, error = None, None
     if boxes is not None:
         regression, error = fit_split_boxes(data, held, boxes, name, settings)

@@ -76,7 +76,7 @@ class _Channel(Generic[T]):
 
 
 @contextlib.contextmanager
-def ahead(
+def prefetch(
     items: Iterable[T], depth: int = 4, *, patience: float | None = None
 ) -> Iterator[Iterator[T]]:
     """Go through `items` in a thread; at most `depth` wait for the reader, and one for room.
@@ -96,7 +96,7 @@ def ahead(
         except BaseException as error:
             channel.put(_End(error))
 
-    thread = threading.Thread(target=fill, name="vdet-ahead", daemon=True)
+    thread = threading.Thread(target=fill, name="vdet-prefetch", daemon=True)
     thread.start()
     try:
         yield channel.take(patience)
@@ -105,17 +105,17 @@ def ahead(
         thread.join(_MOMENT)
 
 
-def aside(call: Callable[[], T], *, patience: float | None = None) -> T:
+def run_in_thread(call: Callable[[], T], *, patience: float | None = None) -> T:
     """Return what `call` gives; it runs in a thread, so that even if it hangs Ctrl-C is heard.
 
     `Stalled` is raised where it does not end within `patience` seconds.
     """
-    with ahead((call() for _ in range(1)), patience=patience) as results:
+    with prefetch((call() for _ in range(1)), patience=patience) as results:
         return next(results)
 
 
 @contextlib.contextmanager
-def behind(
+def write_async(
     take: Callable[[T], object],
     depth: int = 4,
     *,
@@ -144,7 +144,7 @@ def behind(
         if not channel.put(item, patience):
             raise failures[0]
 
-    thread = threading.Thread(target=drain, name="vdet-behind", daemon=True)
+    thread = threading.Thread(target=drain, name="vdet-write", daemon=True)
     thread.start()
     try:
         yield hand_over
@@ -165,7 +165,7 @@ def _closing(items: Iterable[object]) -> AbstractContextManager[object]:
 
 
 @contextlib.contextmanager
-def each_with(
+def map_ordered(
     function: Callable[[T], R], items: Iterable[T], threads: int
 ) -> Iterator[Iterator[tuple[T, R]]]:
     """Pair items with what `function` makes of them, some in parallel, all in order."""
@@ -188,7 +188,7 @@ def each_with(
 
 
 @contextlib.contextmanager
-def quiet_libraries() -> Iterator[None]:
+def single_threaded_libraries() -> Iterator[None]:
     """Keep OpenCV and BLAS to one thread a call: the parallel work is by frames."""
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)

@@ -1,23 +1,59 @@
-"""Which of the two trackers follows a video's vehicles."""
+"""A tracker from its settings, whatever its method."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
-from vdet.config.scaling import scale_lengths
-from vdet.config.schema import Settings
-from vdet.detect.svm.heat import Region
-from vdet.media.images import Image
-from vdet.track.rules.tracker import Cars
-from vdet.track.track import Track
+from vdet.config.schema import (
+    MotionTrackerSettings,
+    RulesTrackerSettings,
+    Settings,
+    TrackerSettings,
+)
+from vdet.config.section import scale_lengths
+from vdet.plugins import TRACKERS, load_plugin
+from vdet.track.protocol import VideoTracker
 
-Follow = Callable[[Image, Sequence[Region]], list[Track]]
-"""Takes the next frame, BGR uint8 `(H, W, 3)`, and its regions; gives the shown tracks, by id."""
+
+@dataclass(frozen=True, slots=True)
+class TrackerKind:
+    """A method of tracking, as it is registered under its name.
+
+    Attributes
+    ----------
+    settings
+        Class of the section `tracker` for this method; its `method` has the name as default.
+    make
+        Takes these settings and the width and height of the frames, pixels.
+    """
+
+    settings: type[TrackerSettings]
+    make: Callable[[Any, int, int], VideoTracker]
 
 
-def tracker_of(settings: Settings, width: int, height: int) -> Follow:
-    """Return the tracker that `tracker.method` names, new, for frames of `width` × `height`."""
-    if settings.tracker.method == "rules":
-        return Cars(scale_lengths(settings.tracker, height / settings.reference_height)).update
-    from vdet.track.motion import MotionTracker  # scipy takes long to import
+def make_tracker(settings: Settings, width: int, height: int) -> VideoTracker:
+    """Return a new tracker for the frames of one video, `width` × `height` pixels.
 
-    tracker = MotionTracker(settings.tracker.motion, width, height)
-    return lambda _, regions: tracker.update(regions)
+    Raises
+    ------
+    ConfigError
+        There is no method of that name.
+    """
+    kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.method)
+    return kind.make(settings.tracker, width, height)
+
+
+def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
+    from vdet.track.motion.tracker import MotionTracker  # scipy takes long to import
+
+    return MotionTracker(settings, width, height)
+
+
+def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001
+    from vdet.track.rules.tracker import RulesTracker
+
+    return RulesTracker(scale_lengths(settings, height / settings.reference_height))
+
+
+MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
+RULES = TrackerKind(RulesTrackerSettings, _make_rules)

@@ -1,4 +1,4 @@
-"""What the tracker says about a frame."""
+"""What a tracker says about a frame."""
 
 from dataclasses import dataclass
 
@@ -7,22 +7,29 @@ from vdet.geometry import Box
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """A car as it is shown in one frame.
+    """A vehicle as it is shown in one frame.
 
     Attributes
     ----------
     id
-        1, 2, 3 … in the order in which the cars of a video are first shown; never used again for
-        another car.
+        1, 2, 3 … in the order in which the vehicles of a video are first shown; an id is never
+        used again for another vehicle.
     box
-        Where it is, whole pixels of the full frame. Of the motion tracker: its estimate for this
-        frame, the part inside the frame. Of the original's rules: the average of the car's last
-        rectangles (`tracker.history` of them), which lie in the frame.
-    from_match
-        Whether the frame has no region for the car: it is shown where its motion leads, or, by the
-        original's rules, where its image was found again.
+        Its place, whole pixels of the full frame. From the motion tracker: the estimate for this
+        frame, the part inside the frame. From the rules: the average of the car's last rectangles
+        (`tracker.history` of them), which lie in the frame.
+    score
+        0 to 1: the share of shown boxes with such a score that are vehicles.
+    predicted
+        Whether the detector did not see the vehicle in this frame: it is shown where its motion
+        leads or, by the rules, where its image was found again.
+    class_id
+        Its class as the detector numbers them (`Detections.names`); None where the detector does
+        not tell classes.
     """
 
     id: int
     box: Box
-    from_match: bool
+    score: float
+    predicted: bool
+    class_id: int | None = None

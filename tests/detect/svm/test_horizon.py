@@ -9,8 +9,8 @@ import pytest
 
 from vdet.detect.svm.horizon import USUAL, find_horizon
 from vdet.media.images import Image
-from vdet.synthetic import Renderer, default_clip, empty_road, frames
-from vdet.synthetic.camera import Camera
+from vdet.synthetic import Renderer, demo_scene, empty_road, frames
+from vdet.synthetic.camera import PinholeCamera
 
 STEP = 0.01  # of the rows that are looked at
 RNG = np.random.default_rng(0)
@@ -27,7 +27,9 @@ def road(
 ) -> list[Image]:
     """Draw consecutive frames of an empty road."""
     width, height = size
-    camera = Camera(width, height, 0.6 * width + 0.6 * height, horizon * height, 1.3, curvature)
+    camera = PinholeCamera(
+        width, height, 0.6 * width + 0.6 * height, horizon * height, 1.3, curvature
+    )
     scene = empty_road(np.random.default_rng(7), camera, lane=lane, lanes=lanes, seed=7)
     renderer = Renderer(replace(scene, frames=count))
     return [renderer.image(index) for index in range(count)]
@@ -55,7 +57,7 @@ def test_the_road_may_bend_and_the_camera_be_in_any_lane(
 
 
 def test_traffic_does_not_hide_it() -> None:
-    scene = replace(default_clip(1, width=640, height=360), frames=5)
+    scene = replace(demo_scene(1, width=640, height=360), frames=5)
     found = find_horizon([frame.image for frame in frames(scene)])
     assert found == pytest.approx(scene.camera.horizon / 360, abs=2 * STEP)
 

@@ -226,8 +226,8 @@ def test_a_model_asked_for_other_features_says_which_differ(path: Path) -> None:
     asked = SMALL.model_copy(update={"color_space": "HSV", "patch": 48})
     with pytest.raises(ModelError, match="trained with other features") as error:
         load_model(path, asked)
-    assert "features.color_space: YCrCb, asked for HSV" in str(error.value)
-    assert "features.patch: 32, asked for 48" in str(error.value)
+    assert "detector.features.color_space: YCrCb, asked for HSV" in str(error.value)
+    assert "detector.features.patch: 32, asked for 48" in str(error.value)
     assert "features.hog" not in str(error.value)
 
 

@@ -9,7 +9,7 @@ from seed import SEED
 from vdet.config.schema import WindowSettings
 from vdet.detect.svm.windows import Boxes, WindowGrid, Windows, every_nth, lay_grid
 
-LARGE, SMALL = SEED.search.windows
+LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that no band here reaches the end of
 
 

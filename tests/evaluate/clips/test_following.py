@@ -2,6 +2,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from vdet.pipeline.following import follow
 
 from quick import QUICK
 from vdet.config.loading import load_settings
@@ -15,7 +16,6 @@ from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
 from vdet.evaluate.clips.following import follow_under_all
 from vdet.media import VideoReader
 from vdet.media.images import Image
-from vdet.pipeline.following import follow
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
@@ -23,7 +23,7 @@ FRAMES = 10
 
 
 def settings(*assignments: str) -> Settings:
-    return load_settings(None, (*QUICK, *assignments)).settings
+    return load_settings(None, (*QUICK, *assignments))
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +42,13 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     clip_path: Path, model: LinearModel
 ) -> None:
     variants = [
-        settings("heat.threshold=0.1"),
-        settings("heat.threshold=0.3", "heat.frames=3"),
-        settings("search.probability=0.8"),
+        settings("detector.heat.threshold=0.1"),
+        settings("detector.heat.threshold=0.3", "detector.heat.frames=3"),
+        settings("detector.search.probability=0.8"),
         settings("tracker.history=2"),
-        settings("search.perspective.sizes=[0.25]", "search.alternate=2"),
-        settings("search.perspective={sizes: [0.25], horizon: 0.5}"),
-        settings("heat.regions=votes", "heat.votes.least=0.02"),
+        settings("detector.search.perspective.sizes=[0.25]", "detector.search.alternate=2"),
+        settings("detector.search.perspective={sizes: [0.25], horizon: 0.5}"),
+        settings("detector.heat.regions=votes", "detector.heat.votes.least=0.02"),
         settings("tracker={method: motion, motion: {strong: 0.05}}"),
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
@@ -73,7 +73,11 @@ def test_settings_that_search_alike_share_the_search(
 
     whole = FrameSearch.search
     monkeypatch.setattr(FrameSearch, "search", search)
-    variants = [settings(), settings("heat.threshold=1"), settings("search.probability=0.9")]
+    variants = [
+        settings(),
+        settings("detector.heat.threshold=1"),
+        settings("detector.search.probability=0.9"),
+    ]
     with VideoReader(clip_path, frames=3) as reader:
         assert len(list(follow_under_all(reader, model, variants, 320, 180))) == 3
     assert searched == [0, 0, 1, 1, 2, 2]
@@ -110,7 +114,10 @@ def test_clips_are_pooled_under_each_setting(
     clips = [open_clip(clip_path, truth_path, until=3), open_clip(clip_path, truth_path, until=2)]
     variants = [Variant((f"heat.threshold={n}",), settings(f"heat.threshold={n}")) for n in (1, 2)]
     runs = evaluate_clips(clips, model, variants)
-    assert [run.assignments for run in runs] == [("heat.threshold=1",), ("heat.threshold=2",)]
+    assert [run.assignments for run in runs] == [
+        ("detector.heat.threshold=1",),
+        ("detector.heat.threshold=2",),
+    ]
     for run in runs:
         boxes = [clip.scores.vehicle_boxes for clip in run.clips]
         assert run.total.vehicle_boxes == sum(boxes) > 0

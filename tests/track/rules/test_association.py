@@ -2,16 +2,21 @@
 
 import pytest
 
-from seed import SEED, tracker_but
+from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
-from vdet.config.schema import TrackerSettings
-from vdet.detect.svm.heat import Region
+from vdet.config.schema import RulesTrackerSettings
 from vdet.geometry import Box
-from vdet.track.rules.association import Association
-from vdet.track.rules.car import Car
-from vdet.track.rules.template import Image
+from vdet.media.images import Image
+from vdet.track.rules.association import (
+    Association,
+    any_overlap,
+    combine,
+    is_about_size,
+    is_good_size,
+)
+from vdet.track.rules.car import Car, Region
 
-SETTINGS = SEED.tracker
+SETTINGS = SEED_TRACKER
 LEFT, RIGHT = Box(100, 200, 100, 80), Box(320, 200, 100, 80)
 
 
@@ -21,7 +26,7 @@ def road(*boxes: Box | None) -> Image:
 
 def a_car(box: Box, frame: Image, shown_as: int | None = None) -> Car:
     car = Car(SETTINGS.detections_needed, SETTINGS.history, shown_as)
-    car.see(box, box.center, frame)
+    car.see(region(box), frame)
     return car
 
 
@@ -33,7 +38,7 @@ def associate(
     cars: list[Car],
     boxes: list[Box],
     frame: Image | None = None,
-    settings: TrackerSettings = SETTINGS,
+    settings: RulesTrackerSettings = SETTINGS,
     peak: float = 2.0,
 ) -> Association:
     frame = road() if frame is None else frame
@@ -57,7 +62,7 @@ def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
 
 def test_the_centroid_that_counts_is_the_average_one() -> None:
     car = a_car(Box(100, 200, 100, 80), road())
-    car.see(Box(160, 200, 100, 80), (210, 240), road())
+    car.see(Region(Box(160, 200, 100, 80), (210, 240), 2.0), road())
     around_the_average = Box(130, 200, 70, 80)
     assert boxes_of(associate([car], [around_the_average])) == {car: around_the_average}
 
@@ -142,7 +147,7 @@ def test_confirmed_cars_that_overlap_become_one_new_car_shown_at_once() -> None:
     assert car not in cars
     assert boxes_of(result) == {car: around}
     place = result.places[car]
-    car.see(place.box, place.centroid, frame)
+    car.see(place, frame)
     assert car.is_shown
     assert car.box == around
 
@@ -350,7 +355,7 @@ def test_regions_of_a_cars_size_but_too_wide_make_two_cars_shown_at_once(
     assert car not in result.cars
     assert boxes_of(result) == dict(zip(result.cars, [OTHER, ONE], strict=True))
     for new, place in result.places.items():
-        new.see(place.box, place.centroid, road())
+        new.see(place, road())
         assert new.is_shown
 
 
@@ -406,3 +411,41 @@ def test_without_regions_the_cars_stay_as_they_are() -> None:
     result = associate(cars, [])
     assert result.cars == cars
     assert result.places == {}
+
+
+# Sizes of rules 4 and 7 to 10
+
+
+@pytest.mark.parametrize(
+    ("width", "car_width", "good"),
+    [(100, 150, False), (101, 150, True), (200, 400, False), (201, 400, True), (150, 100, True)],
+)
+def test_good_size_is_over_two_thirds_of_the_car_or_over_200_pixels(
+    width: int, car_width: int, good: bool
+) -> None:
+    assert is_good_size(Box(0, 0, width, 50), Box(0, 0, car_width, 99), SETTINGS) is good
+
+
+def test_good_size_is_set_by_share_and_width() -> None:
+    narrow, car = Box(0, 0, 90, 50), Box(0, 0, 150, 50)
+    assert not is_good_size(narrow, car, SETTINGS)
+    assert is_good_size(narrow, car, tracker_but(good_fraction=0.5))
+    assert is_good_size(narrow, car, tracker_but(wide=89))
+
+
+@pytest.mark.parametrize(("width", "about"), [(79, False), (80, True), (160, True), (161, False)])
+def test_about_the_size_is_within_a_third_of_the_cars_width(width: int, about: bool) -> None:
+    assert is_about_size(Box(0, 0, width, 50), Box(0, 0, 120, 90), SETTINGS) is about
+
+
+def test_combined_regions_have_one_box_the_common_centroid_and_the_higher_peak() -> None:
+    both = combine(region(Box(0, 0, 60, 60), peak=2), region(Box(100, 0, 20, 60), peak=5))
+    assert both == Region(Box(0, 0, 120, 60), (50, 30), 5)
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "overlap"), [(59, 59, True), (60, 59, False), (59, 60, False), (300, 300, False)]
+)
+def test_overlap_counts_across_and_down(x: int, y: int, overlap: bool) -> None:
+    boxes = [Box(500, 500, 100, 100), Box(0, 0, 100, 100), Box(x, y, 100, 100)]
+    assert any_overlap(boxes, 40) is overlap

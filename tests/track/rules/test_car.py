@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from seed import SEED, tracker_but
+from seed import SEED_TRACKER, tracker_but
 from vdet.geometry import Box
-from vdet.track.rules.car import Car
-from vdet.track.rules.template import Image
+from vdet.media.images import Image
+from vdet.track.rules.car import Car, MatchMethod, Region, find_template
 
 BOX = Box(100, 60, 80, 60)
 FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
@@ -13,7 +13,7 @@ FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
 def seen(times: int = 1, needed: int = 10) -> Car:
     car = Car(needed=needed, history=10)
     for _ in range(times):
-        car.see(BOX, (140, 90), FRAME)
+        car.see(Region(BOX, (140, 90), 2.0), FRAME)
     return car
 
 
@@ -24,7 +24,7 @@ def shifted(frame: Image, dx: int, dy: int) -> Image:
 def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
     car = seen()
     for i in range(10):
-        car.see(Box(10 * i, 20 + i, 60 + 2 * i, 51), (10.0 * i, 5.0), FRAME)
+        car.see(Region(Box(10 * i, 20 + i, 60 + 2 * i, 51), (10.0 * i, 5.0), 2.0), FRAME)
     assert car.box == Box(45, 24, 69, 51)
     assert car.centroid == (45.0, 5.0)
 
@@ -32,44 +32,44 @@ def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
 def test_the_last_ten_images_are_kept_cut_from_their_frames() -> None:
     car = Car(needed=10, history=10)
     for x in range(12):
-        car.see(Box(x, 0, 50, 60), (x, 0), FRAME)
-    assert len(car.sightings) == 10
-    for x, sighting in enumerate(car.sightings, start=2):
-        np.testing.assert_array_equal(sighting.image, FRAME[0:60, x : x + 50])
+        car.see(Region(Box(x, 0, 50, 60), (x, 0), 2.0), FRAME)
+    assert len(car.detections) == 10
+    for x, detection in enumerate(car.detections, start=2):
+        np.testing.assert_array_equal(detection.image, FRAME[0:60, x : x + 50])
 
 
 def test_a_kept_image_does_not_change_with_the_frame_that_it_was_cut_from() -> None:
     frame = FRAME.copy()
     car = Car(needed=10, history=10)
-    car.see(BOX, (140, 90), frame)
+    car.see(Region(BOX, (140, 90), 2.0), frame)
     frame[:] = 0
-    np.testing.assert_array_equal(car.sightings[-1].image, FRAME[60:120, 100:180])
+    np.testing.assert_array_equal(car.detections[-1].image, FRAME[60:120, 100:180])
 
 
 @pytest.mark.parametrize("history", [1, 3])
 def test_the_history_setting_says_how_many_are_averaged(history: int) -> None:
     car = Car(needed=10, history=history)
     for x in (0, 30, 60, 90):
-        car.see(Box(x, 0, 50, 50), (x, 0), FRAME)
+        car.see(Region(Box(x, 0, 50, 50), (x, 0), 2.0), FRAME)
     assert car.box.x == {1: 90, 3: 60}[history]
 
 
 def test_detections_are_counted_in_a_row_and_in_all() -> None:
     car = seen(3)
     car.miss()
-    assert (car.detected, car.in_a_row, car.detections, car.misses) == (False, 0, 3, 1)
+    assert (car.detected, car.in_a_row, car.count, car.misses) == (False, 0, 3, 1)
     car.miss()
     assert car.misses == 2
-    car.see(BOX, (140, 90), FRAME)
-    assert (car.detected, car.in_a_row, car.detections, car.misses) == (True, 1, 4, 0)
+    car.see(Region(BOX, (140, 90), 2.0), FRAME)
+    assert (car.detected, car.in_a_row, car.count, car.misses) == (True, 1, 4, 0)
 
 
 def test_a_match_counts_as_a_detection_and_moves_the_centroid_with_the_box() -> None:
     car = seen()
     car.see_match(BOX.moved_to(106, 52), FRAME)
-    assert car.sightings[-1].box == Box(106, 52, 80, 60)
-    assert car.sightings[-1].centroid == (146, 82)
-    assert (car.detected, car.detections, car.in_a_row, car.matches) == (True, 2, 2, 1)
+    assert car.detections[-1].box == Box(106, 52, 80, 60)
+    assert car.detections[-1].centroid == (146, 82)
+    assert (car.detected, car.count, car.in_a_row, car.matches) == (True, 2, 2, 1)
 
 
 def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
@@ -78,7 +78,7 @@ def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     car.miss()
     car.see_match(BOX, FRAME)
     assert car.matches == 2
-    car.see(BOX, (140, 90), FRAME)
+    car.see(Region(BOX, (140, 90), 2.0), FRAME)
     assert car.matches == 0
 
 
@@ -88,7 +88,7 @@ def test_a_car_is_shown_when_detected_now_and_often_enough_in_a_row() -> None:
     assert car.is_shown
     car.miss()
     assert not car.is_shown
-    car.see(BOX, (140, 90), FRAME)
+    car.see(Region(BOX, (140, 90), 2.0), FRAME)
     assert not car.is_shown
 
 
@@ -104,20 +104,20 @@ def test_a_car_vouched_for_counts_as_detected_that_often() -> None:
     car = seen()
     car.vouch(10)
     assert car.is_shown
-    assert (car.in_a_row, car.detections) == (10, 10)
+    assert (car.in_a_row, car.count) == (10, 10)
 
 
 def test_vouching_takes_no_detections_away() -> None:
     car = seen(12)
     car.vouch(10)
-    assert (car.in_a_row, car.detections) == (12, 12)
+    assert (car.in_a_row, car.count) == (12, 12)
 
 
-def test_the_latest_image_is_looked_for_around_the_latest_box() -> None:
+def test_the_latest_image_is_searched_around_the_latest_box() -> None:
     car = Car(needed=10, history=10)
-    car.see(Box(0, 0, 60, 60), (30, 30), FRAME)
-    car.see(BOX, (140, 90), FRAME)
-    assert car.find_in(shifted(FRAME, 7, -4), SEED.tracker) == BOX.moved_to(107, 56)
+    car.see(Region(Box(0, 0, 60, 60), (30, 30), 2.0), FRAME)
+    car.see(Region(BOX, (140, 90), 2.0), FRAME)
+    assert car.find_in(shifted(FRAME, 7, -4), SEED_TRACKER) == BOX.moved_to(107, 56)
 
 
 def test_the_settings_limit_the_search() -> None:
@@ -128,3 +128,127 @@ def test_the_settings_limit_the_search() -> None:
 
 def test_two_cars_alike_are_two_cars() -> None:
     assert len({seen(), seen()}) == 2
+
+
+# The search for a template
+
+METHODS: list[MatchMethod] = ["ccoeff_normed", "ccorr_normed", "sqdiff_normed"]
+BACKGROUND = 90
+
+
+def texture(width: int, height: int, seed: int = 0) -> Image:
+    rng = np.random.default_rng(seed)
+    return rng.integers(0, 256, (height, width, 3), dtype=np.uint8)
+
+
+def frame_with(piece: Image, x: int, y: int, width: int = 300, height: int = 200) -> Image:
+    frame = np.full((height, width, 3), BACKGROUND, np.uint8)
+    frame[y : y + piece.shape[0], x : x + piece.shape[1]] = piece
+    return frame
+
+
+def search(
+    frame: Image,
+    template: Image,
+    near: Box,
+    *,
+    distance: int = 50,
+    method: MatchMethod = "ccoeff_normed",
+    min_score: float = 0.5,
+) -> Box | None:
+    return find_template(
+        frame, template, near, distance=distance, method=method, min_score=min_score
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_moved_template_is_found_to_the_pixel_with_a_perfect_score(method: MatchMethod) -> None:
+    piece = texture(60, 40)
+    found = search(
+        frame_with(piece, 120, 77), piece, Box(100, 80, 60, 40), method=method, min_score=1
+    )
+    assert found == Box(120, 77, 60, 40)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_score_below_the_least_one_is_no_match(method: MatchMethod) -> None:
+    frame = frame_with(texture(60, 40, seed=1), 100, 80)
+    assert (
+        search(frame, texture(60, 40), Box(100, 80, 60, 40), method=method, min_score=0.95) is None
+    )
+
+
+def test_noise_lowers_the_score() -> None:
+    piece = texture(60, 40)
+    noise = np.random.default_rng(5).integers(0, 128, piece.shape, dtype=np.uint8)
+    frame = frame_with(piece // 2 + noise, 100, 80)
+    assert search(frame, piece, Box(100, 80, 60, 40), min_score=0.6) == Box(100, 80, 60, 40)
+    assert search(frame, piece, Box(100, 80, 60, 40), min_score=0.9) is None
+
+
+def test_the_distance_is_the_longest_way_and_a_straight_line() -> None:
+    piece = texture(60, 40)
+    near = Box(100, 80, 60, 40)
+    assert search(frame_with(piece, 130, 120), piece, near, distance=50) == Box(130, 120, 60, 40)
+    assert search(frame_with(piece, 130, 120), piece, near, distance=49) is None
+    assert search(frame_with(piece, 140, 120), piece, near, distance=50) is None
+
+
+def test_with_no_distance_only_the_old_place_counts() -> None:
+    piece = texture(60, 40)
+    near = Box(100, 80, 60, 40)
+    assert search(frame_with(piece, 100, 80), piece, near, distance=0) == near
+    assert search(frame_with(piece, 101, 80), piece, near, distance=0) is None
+
+
+@pytest.mark.parametrize(("x", "y"), [(0, 0), (240, 160), (0, 160)])
+def test_a_template_is_found_in_the_corner_of_a_frame(x: int, y: int) -> None:
+    piece = texture(60, 40)
+    near = Box(min(x + 20, 240), max(y - 20, 0), 60, 40)
+    assert search(frame_with(piece, x, y), piece, near) == Box(x, y, 60, 40)
+
+
+def test_a_place_partly_outside_the_frame_is_searched_where_it_is_inside() -> None:
+    piece = texture(60, 40)
+    assert search(frame_with(piece, 0, 0), piece, Box(-20, -10, 60, 40)) == Box(0, 0, 60, 40)
+
+
+@pytest.mark.parametrize("near", [Box(900, 80, 60, 40), Box(-900, 80, 60, 40)])
+def test_a_place_far_outside_the_frame_has_no_match(near: Box) -> None:
+    piece = texture(60, 40)
+    assert search(frame_with(piece, 0, 0), piece, near) is None
+
+
+@pytest.mark.parametrize(("width", "height"), [(301, 40), (60, 201)])
+def test_a_template_larger_than_the_frame_has_no_match(width: int, height: int) -> None:
+    frame = np.full((200, 300, 3), BACKGROUND, np.uint8)
+    assert search(frame, texture(width, height), Box(0, 0, width, height), min_score=0) is None
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("color", [(0, 0, 0), (BACKGROUND,) * 3, (10, 200, 90)])
+def test_a_template_of_one_colour_has_no_match(
+    method: MatchMethod, color: tuple[int, int, int]
+) -> None:
+    piece = np.full((40, 60, 3), color, np.uint8)
+    frame = frame_with(piece, 100, 80)
+    assert search(frame, piece, Box(100, 80, 60, 40), method=method) is None
+
+
+def test_an_empty_template_has_no_match() -> None:
+    frame = np.full((200, 300, 3), BACKGROUND, np.uint8)
+    assert search(frame, frame[:0], Box(0, 0, 300, 0), min_score=0) is None
+
+
+@pytest.mark.parametrize("level", [0, BACKGROUND, 255])
+def test_nothing_is_found_in_a_frame_of_one_colour(level: int) -> None:
+    frame = np.full((200, 300, 3), level, np.uint8)
+    assert search(frame, texture(60, 40), Box(100, 80, 60, 40)) is None
+
+
+def test_the_method_decides_what_fits() -> None:
+    piece = texture(60, 40) // 2
+    brighter = frame_with(piece + 100, 100, 80)
+    near = Box(100, 80, 60, 40)
+    assert search(brighter, piece, near, method="ccoeff_normed", min_score=0.99) == near
+    assert search(brighter, piece, near, method="sqdiff_normed", min_score=0.99) is None

@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
-from vdet.config.scaling import scale_lengths
-from vdet.config.schema import FeatureSettings, SearchSettings, Settings
+from vdet.config.schema import FeatureSettings, SearchSettings, SvmSettings
+from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense import dense_search, why_not_dense
 from vdet.detect.svm.horizon import USUAL
 from vdet.detect.svm.model import LinearModel
@@ -15,8 +15,8 @@ from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.scored import Scored
-from vdet.detect.svm.windows import Boxes, WindowGrid, Windows, lay_grid
-from vdet.errors import ConfigError, ImageError
+from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
+from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.geometry import Float32Array
 from vdet.media.images import Image
 
@@ -36,14 +36,14 @@ class GridSearch(Protocol):
 
 
 class FrameSearch:
-    """Scores all windows of frames of one size; holds nothing that a search changes.
+    """Scores the windows of frames of one size; nothing in it changes, so threads may share it.
 
     Parameters
     ----------
     width, height
         Size of the frames, pixels.
     horizon
-        Its row, share of the frames' height, for the sets that follow the perspective.
+        Row of the horizon, share of the frames' height, for the sets that follow the perspective.
 
     Attributes
     ----------
@@ -52,8 +52,10 @@ class FrameSearch:
 
     Raises
     ------
+    FrameSizeError
+        No search window fits into such a frame.
     ImageError
-        No search window fits into such a frame, or more than `MAX_WINDOWS` do.
+        More than `MAX_WINDOWS` windows fit.
     ConfigError
         The dense engine is asked for, and the model's features cannot be computed densely.
     """
@@ -61,83 +63,62 @@ class FrameSearch:
     def __init__(
         self,
         model: LinearModel,
-        settings: Settings,
+        settings: SvmSettings,
         width: int,
         height: int,
         *,
         horizon: float = USUAL,
     ) -> None:
-        self.grids = grids = tuple(
-            lay_grids(settings, model.features, width, height, horizon=horizon)
-        )
+        grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
         if not grids:
-            raise ImageError(
+            raise FrameSizeError(
                 f"no search window fits into a frame of {width}×{height} pixels; "
-                "give a larger one, or other search.windows"
+                "give a larger one, or other detector.search.windows"
             )
         if (count := sum(map(len, grids))) > MAX_WINDOWS:
             raise ImageError(
                 f"{count:,} search windows would be laid over a frame of {width}×{height} pixels, "
-                f"more than {MAX_WINDOWS:,}; give search.windows larger steps, or fewer rows"
+                f"more than {MAX_WINDOWS:,}; give detector.search.windows larger steps, or fewer "
+                "rows"
             )
-        grid_search = dense_search if _is_dense(settings.search, model.features) else PatchSearch
-        searches = [grid_search(model, grid) for grid in grids]
-        turns = min(settings.search.alternate, len(grids))
-        self._turns = [
-            _SetSearch(model, settings, grids[i::turns], searches[i::turns]) for i in range(turns)
-        ]
-        self._whole = _SetSearch(model, settings, grids, searches)
-
-    def search(self, image: Image, turn: int | None = None) -> Windows:
-        """Score windows of a frame, BGR uint8 `(H, W, 3)`; may be called from threads.
-
-        Parameters
-        ----------
-        turn
-            Number of a video's frame: only the sets whose turn it is are searched
-            (`search.alternate`). None for all of them.
-        """
-        sets = self._whole if turn is None else self._turns[turn % len(self._turns)]
-        return sets.search(image)
-
-
-class _SetSearch:
-    """Scores the windows of some sets."""
-
-    def __init__(
-        self,
-        model: LinearModel,
-        settings: Settings,
-        grids: Sequence[WindowGrid],
-        searches: Sequence[GridSearch],
-    ) -> None:
-        self._searches = searches
-        self._grid_boxes = [grid.boxes for grid in grids]
-        self._boxes = np.concatenate(self._grid_boxes)
-        self._shares = np.repeat(
-            np.array([grid.share for grid in grids], np.float32), [len(grid) for grid in grids]
-        )
+        search_grid = dense_search if _is_dense(settings.search, model.features) else PatchSearch
+        self.grids = grids
+        self._sets = [_WindowSet(grid, search_grid(model, grid)) for grid in grids]
+        self._turns = min(settings.search.alternate, len(grids))
         self._least = settings.search.probability
         self._regression = model.boxes
-        top, bottom = self._boxes[:, 1].min(), (self._boxes[:, 1] + self._boxes[:, 3]).max()
-        self._rows = int(top) // _MULTIPLE * _MULTIPLE, int(bottom)
-        self._margin = -(int(self._boxes[:, 0].min()) // _MULTIPLE * _MULTIPLE)
 
-    def search(self, image: Image) -> Windows:
-        frame = FramePyramid(image, *self._rows, margin=self._margin)
-        found = [search.search(frame) for search in self._searches]
-        vehicles = [self._vehicles(*each) for each in zip(found, self._grid_boxes, strict=True)]
-        probabilities = np.concatenate([scored.probabilities for scored in found])
-        return Windows(self._boxes, probabilities, self._shares, np.concatenate(vehicles))
+    def sets_of(self, index: int) -> range:
+        """Return the numbers of the sets that are searched in a video's frame `index`."""
+        return range(index % self._turns, len(self._sets), self._turns)
 
-    def _vehicles(self, scored: Scored, boxes: Boxes) -> Float32Array:
-        """Return the windows themselves, detections replaced by the vehicles that they show."""
+    def search(self, image: Image, sets: Sequence[int] | None = None) -> list[Windows]:
+        """Score the windows of some sets in a frame, BGR uint8 `(H, W, 3)`; None for all sets."""
+        chosen = self._sets if sets is None else [self._sets[number] for number in sets]
+        top = min(each.top for each in chosen) // _MULTIPLE * _MULTIPLE
+        margin = -(min(each.left for each in chosen) // _MULTIPLE * _MULTIPLE)
+        frame = FramePyramid(image, top, max(each.bottom for each in chosen), margin=margin)
+        return [self._windows(each, each.search.search(frame)) for each in chosen]
+
+    def _windows(self, window_set: "_WindowSet", scored: Scored) -> Windows:
+        boxes = window_set.boxes
         vehicles = boxes.astype(np.float32)
         (hits,) = np.nonzero(scored.probabilities >= self._least)
         if self._regression is not None and len(hits):
             sides = self._regression.sides(scored.hogs(hits))
             vehicles[hits] = _placed(vehicles[hits], sides)
-        return vehicles
+        return Windows(boxes, scored.probabilities, window_set.shares, vehicles)
+
+
+class _WindowSet:
+    """A grid, its search, and what of its windows is the same in every frame."""
+
+    def __init__(self, grid: WindowGrid, search: GridSearch) -> None:
+        self.search = search
+        self.boxes = grid.boxes
+        self.shares = np.full(len(grid), grid.share, np.float32)
+        self.left, self.top = self.boxes[:, :2].min(axis=0).tolist()
+        self.bottom = int((self.boxes[:, 1] + self.boxes[:, 3]).max())
 
 
 def _placed(windows: Float32Array, sides: Float32Array) -> Float32Array:
@@ -158,7 +139,7 @@ _LEAST = 0.2
 
 
 def lay_grids(
-    settings: Settings,
+    settings: SvmSettings,
     features: FeatureSettings,
     width: int,
     height: int,

@@ -1,67 +1,51 @@
 """A picture of every stage of the detection, as the original's report shows them."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.detector import Detection
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.patch_sheet import patch_sheet
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
-from vdet.files import check_output, make_folder
 from vdet.geometry import Box
-from vdet.media.images import Image, write_image
-
-LAST_STAGE = "5-boxes"
-
-LabelledBox = tuple[Box, str]
+from vdet.media.images import Image
 
 
-def check_stages(folder: Path, *, overwrite: bool) -> None:
-    """Make the folder, and refuse to write over earlier stages. Raises `OutputError`."""
-    make_folder(folder)
-    check_output(folder / f"{LAST_STAGE}.png", overwrite=overwrite)
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What the pictures show of the detection in one frame.
+
+    `windows` are the searched ones, `hits` those of at least `search.probability`, `grids` the
+    window sets.
+    """
+
+    windows: Windows
+    hits: Windows
+    heat: Heat
+    grids: tuple[WindowGrid, ...]
 
 
-def write_stages(
-    folder: Path,
-    image: Image,
-    detection: Detection,
-    boxes: Sequence[LabelledBox],
-    *,
-    features: FeatureSettings,
-) -> None:
-    """Write `1-patches.png` … `5-boxes.png` into `folder`, which is made where it is missing.
+def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dict[str, Image]:
+    """Return pictures of a patch's features, the windows, the hits and the heat, by name.
 
     Parameters
     ----------
     image
         The frame searched, BGR uint8 `(H, W, 3)`.
-    boxes
-        The final boxes with their labels, full-frame pixels.
     features
         Those of the model.
     """
-    pictures = {
-        "1-patches": patch_sheet(_examples(image, detection.windows), features),
-        "2-windows": _draw_window_sets(image, detection.grids),
-        "3-hits": _draw_hits(image, detection.hits),
-        "4-heat": _draw_heat(image, detection),
-        LAST_STAGE: _draw_boxes(image, detection, boxes),
+    return {
+        "patches": patch_sheet(_examples(image, trace.windows), features),
+        "windows": _draw_window_sets(image, trace.grids),
+        "hits": _draw_hits(image, trace.hits),
+        "heat": _draw_heat(image, trace.heat),
     }
-    write_pictures(folder, pictures)
-
-
-def write_pictures(folder: Path, pictures: dict[str, Image]) -> None:
-    """Write each picture as `name.png` into `folder`, which is made where it is missing."""
-    make_folder(folder)
-    for name, picture in pictures.items():
-        write_image(folder / f"{name}.png", picture)
 
 
 def _examples(image: Image, windows: Windows) -> dict[str, Image]:
@@ -99,20 +83,9 @@ def _draw_hits(image: Image, hits: Windows) -> Image:
     return picture
 
 
-def _draw_heat(image: Image, detection: Detection) -> Image:
-    picture = blend_heat(image, detection.heat)
-    draw_label(picture, f"peak {detection.heat.peak:.1f}", (0, 0), WHITE)
-    return picture
-
-
-def _draw_boxes(image: Image, detection: Detection, boxes: Sequence[LabelledBox]) -> Image:
-    """Draw the regions thin and white with their peak, the final boxes over them."""
-    picture = image.copy()
-    for region in detection.regions:
-        draw_box(picture, region.box, WHITE)
-        draw_label(picture, f"heat {region.peak:.1f}", (region.box.x, region.box.bottom), WHITE)
-    for number, (box, label) in enumerate(boxes, start=1):
-        draw_box(picture, box, color_of(number), label)
+def _draw_heat(image: Image, heat: Heat) -> Image:
+    picture = blend_heat(image, heat)
+    draw_label(picture, f"peak {heat.peak:.1f}", (0, 0), WHITE)
     return picture
 
 

@@ -4,6 +4,7 @@ Source of the overlap rule: seed section 2, "Sliding Windows"; the counts 423 + 
 1280×720 frame are the original's.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -43,6 +44,18 @@ class Windows:
         return Windows(
             self.boxes[keep], self.probabilities[keep], self.shares[keep], self.vehicles[keep]
         )
+
+
+def join_windows(parts: Sequence[Windows]) -> Windows:
+    """Return the windows of several sets as one; parts in the order given."""
+    if not parts:
+        return NO_WINDOWS
+    return Windows(
+        np.concatenate([part.boxes for part in parts]),
+        np.concatenate([part.probabilities for part in parts]),
+        np.concatenate([part.shares for part in parts]),
+        np.concatenate([part.vehicles for part in parts]),
+    )
 
 
 NO_WINDOWS = Windows(

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import MiningSettings
+from vdet.detect.detections import Detections
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.geometry import Box, coverage
@@ -68,6 +69,26 @@ def choose(
         yield Choice("false alarm", _box(boxes[row]), None)
     for row in _some(parts, settings.parts, rng):
         yield Choice("part", _box(boxes[row]), None)
+
+
+def scored_windows(
+    boxes: npt.NDArray[np.int32], detections: Detections, frame_width: int
+) -> Windows:
+    """Return windows with the highest score of the detections that each fits; 0 where none fits.
+
+    Parameters
+    ----------
+    boxes
+        int32 `(n, 4)`: x, y, width, height of square windows, frame pixels.
+    """
+    scores = np.zeros(len(boxes), np.float32)
+    squares = boxes.astype(np.float64)
+    corners = detections.boxes.astype(np.float64)
+    found = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+    for box, score in zip(found, detections.scores.tolist(), strict=True):
+        fits = place(squares, box, frame_width).fits
+        scores[fits] = np.maximum(scores[fits], score)
+    return Windows(boxes, scores, np.ones_like(scores), boxes.astype(np.float32))
 
 
 def _owners(placings: list[Placing], count: int) -> npt.NDArray[np.intp]:

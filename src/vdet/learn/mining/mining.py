@@ -7,20 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.config.schema import Settings
+from vdet.config.schema import Settings, SvmSettings
+from vdet.detect.factory import load_detector
+from vdet.detect.protocol import DetectorModel
+from vdet.detect.svm.detector import SvmDetector, horizon_of
 from vdet.detect.svm.features import to_patch
-from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.search import lay_grids
 from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, ImageError, TruthError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.truth import read_truth
 from vdet.learn.mining.archive import PatchArchive, patch_archive
-from vdet.learn.mining.choosing import Choice, Kind, choose
+from vdet.learn.mining.choosing import Choice, Kind, choose, scored_windows
 from vdet.learn.mining.placing import cut_sides
 from vdet.media import Frame, VideoInfo, VideoReader
-from vdet.pipeline.following import seek_horizon
+from vdet.media.images import Image
+from vdet.pipeline.loop import peek
 
 PATCH = 64
 """Side of the patches, pixels, as in the Udacity set."""
@@ -62,8 +65,8 @@ class Mined:
 
 def mine(
     job: MiningJob,
-    model: LinearModel,
     settings: Settings,
+    model: Path | None = None,
     *,
     progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
 ) -> Mined:
@@ -75,6 +78,8 @@ def mine(
 
     Parameters
     ----------
+    model
+        Model file of the detector whose false alarms are looked for; None for the shipped one.
     progress
         Called with the number of frames to read; what it returns is called with the number of
         frames read since the last call.
@@ -90,6 +95,7 @@ def mine(
     OutputError
         The zip file cannot be written.
     """
+    detector = load_detector(settings.detector, model)
     truth = read_truth(job.truth)
     last = min(job.last or truth.last_frame, truth.last_frame)
     if last < job.first:
@@ -100,15 +106,15 @@ def mine(
     counts: Counter[Kind] = Counter()
     with VideoReader(job.video, frames=last) as reader, patch_archive(job.output) as archive:
         advance = progress(last)
-        frames, horizon = seek_horizon(reader, settings)
-        search = _search(job, model, settings, reader.info, horizon)
+        images, frames = peek(reader)
+        windows_of = _search(job, detector, reader.info, images)
         for frame in frames:
             number = frame.index + 1
             labelled = truth.frame(number)
             regular = (number - job.first) % job.every == 0
             if number >= job.first and (regular or _comes_in(labelled, reader.info.width)):
                 looked += 1
-                choices = _choices(search.search(frame.image), labelled, frame, settings)
+                choices = _choices(windows_of(frame.image), labelled, frame, settings)
                 _add(archive, frame, choices, job.video.stem)
                 counts.update(choice.kind for choice in choices)
             advance(1)
@@ -122,12 +128,33 @@ def mine(
 
 
 def _search(
-    job: MiningJob, model: LinearModel, settings: Settings, info: VideoInfo, horizon: float
-) -> FrameSearch:
+    job: MiningJob,
+    model: DetectorModel,
+    info: VideoInfo,
+    images: Sequence[Image],
+) -> Callable[[Image], Windows]:
+    """Return what gives the windows of a frame, with the probability of each.
+
+    Those of the linear model are its own. For another detector they are laid as the linear model's
+    settings say, and a window has the score of the detection that it fits.
+    """
+    size = info.width, info.height
     try:
-        return FrameSearch(model, settings, info.width, info.height, horizon=horizon)
+        detector = model.for_video(*size, images)
+        if isinstance(detector, SvmDetector):
+            return lambda image: detector.search(image, None).windows
+        svm = SvmSettings()
+        horizon = horizon_of(svm, images)
+        grids = lay_grids(svm, svm.features, *size, horizon=horizon)
     except ImageError as error:
         raise VideoError(f"{job.video}: {error}") from error
+    boxes = np.concatenate([grid.boxes for grid in grids])
+
+    def search(image: Image) -> Windows:
+        detections = detector.detect(detector.search(image, None))
+        return scored_windows(boxes, detections, info.width)
+
+    return search
 
 
 def _comes_in(truth: LabelledVideo, width: int) -> bool:

@@ -49,7 +49,7 @@ def evaluate_splits(
         Too many patches are unreadable, or too few are there for a split.
     """
     look = partial(views_of, settings=settings.training.views)
-    data = _extract(files, settings, settings.features, jobs, progress(len(files)), look=look)
+    data = _extract(files, settings, settings.svm.features, jobs, progress(len(files)), look=look)
     plans = [(split, holdouts(data, settings, split)) for split in splits]
     advance = progress(sum(len(parts) for _, parts in plans))
     trials = [run_trial(split, data, settings, parts, advance) for split, parts in plans]

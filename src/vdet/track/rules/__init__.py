@@ -1,10 +1,8 @@
-"""Regions of the heatmap become vehicles, followed from frame to frame.
+"""The tracker of the original system: regions of the heatmap become cars, by these rules.
 
-There are two trackers, and `choice` gives the one that `tracker.method` names: that of `motion`,
-which its docstring explains, and the original's rules, by which `cars.Cars` follows cars.
-
-The rules, as the code and the tests number them, with the original's constants (`tracker` in the
-settings has them all). Source: seed section 3, "Video pipeline".
+The code and the tests number the rules so; the constants are the original's (the settings have
+them all, under `tracker` with `method: rules`). A region is a detection, its peak the detection's
+strength. Source: seed section 3, "Video pipeline".
 
 1.  Regions narrower or lower than 50 px are ignored.
 2.  A region's cars are those whose centroid it contains.

@@ -1,25 +1,25 @@
-"""Which region of a frame belongs to which car, and which regions make cars (rules 2 to 11).
+"""Which region of a frame belongs to which car, and which regions become cars (rules 2 to 11).
 
 Source: seed section 3, "Video pipeline". Where it can be read in two ways, this is the choice:
 
 * A car is in a region if its average centroid lies in the region's bounding box. A car has at most
   one place in a frame; regions are taken in the order given.
-* Regions with cars in them are dealt with first, then those without, so that no car is lost from
-  its own region to a neighbour. All positions are those before this frame.
+* Regions with cars in them come first, then those without, so that no car is lost from its own
+  region to a neighbour. All positions are those before this frame.
 * Of several cars in a region only those count that the template match confirms. If that leaves
-  one, the region is treated as that car's alone; if it leaves none, as the car's whose centroid is
+  one, the region belongs to that car alone; if it leaves none, to the car whose centroid is
   nearest.
-* If any two of the confirmed cars overlap, all of them become one, for the new car takes the whole
+* If any two of the confirmed cars overlap, all become one, because the new car takes the whole
   region. Cars that stay apart also take their rectangle from the match, at their old size, and
-  count as detected by region, for there is heat where they are.
+  count as detected by region, because the heat covers their places.
 * One car and a region that is not of good size: the region is not added, and the car is left
   without one (it may yet be found by match). Such a region is a piece of that car: it makes no new
   car, but may be combined with another one.
 * The distance of a car and a region is the gap between the car's average rectangle and the
   region's. Of several near cars, one without a place goes first, then the nearest.
 * Combined regions that are not about the car's size are not parts of it: the region is judged
-  alone. A near region which is not of good size is ignored, unless the car has a region of its own
-  already: then it is another car's, and makes one.
+  alone. A near region that is not of good size is ignored, unless the car has a region of its own
+  already: then it belongs to another car, and becomes a new one.
 * A car made of others keeps the lowest id that was shown among them. Of the two cars that one
   becomes, the one nearer to its centroid keeps the id.
 """
@@ -27,24 +27,23 @@ Source: seed section 3, "Video pipeline". Where it can be read in two ways, this
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import combinations
 
-from vdet.config.schema import TrackerSettings
-from vdet.detect.svm.heat import Region
+from vdet.config.schema import RulesTrackerSettings
 from vdet.geometry import Box
-from vdet.track.rules.car import Car
-from vdet.track.rules.regions import any_overlap, combine, is_about_size, is_good_size
-from vdet.track.rules.template import Image
+from vdet.media.images import Image
+from vdet.track.rules.car import Car, Region
 
 
 class Association:
-    """Deals one frame's regions out to cars. Cars get new ids and counts, but no detections yet.
+    """Assigns the regions of one frame to cars, which get ids and counts, but no detections yet.
 
     Parameters
     ----------
     cars
         The cars known so far, each detected at least once.
     regions
-        Regions of the frame, inside it and large enough.
+        Regions of the frame, inside the frame and large enough.
     image
         The frame, BGR uint8 `(H, W, 3)`.
     settings
@@ -61,7 +60,7 @@ class Association:
         cars: Sequence[Car],
         regions: Sequence[Region],
         image: Image,
-        settings: TrackerSettings,
+        settings: RulesTrackerSettings,
     ) -> None:
         self.places: dict[Car, Region] = {}
         self._known = list(cars)
@@ -100,7 +99,7 @@ class Association:
             self._place_alone(region, _nearest(region, matches or inside))
 
     def _confirm(self, cars: Iterable[Car]) -> dict[Car, Box]:
-        """Rule 3: the cars that their latest image is found for, and where."""
+        """Rule 3: the cars whose latest image is found, and where."""
         found = {car: car.find_in(self._image, self._settings) for car in cars}
         return {car: box for car, box in found.items() if box is not None}
 
@@ -149,7 +148,7 @@ class Association:
             self._place(car, region)
 
     def _place_combined(self, region: Region, car: Car) -> bool:
-        """Rules 9 and 10; False where the car has no other region that makes it up with this."""
+        """Rules 9 and 10; False where no other region makes up the car together with this one."""
         other = self._other_region(region, car)
         if other is None:
             return False
@@ -173,7 +172,7 @@ class Association:
         return min(others, key=lambda r: math.dist(r.centroid, car.centroid), default=None)
 
     def _split(self, car: Car, *regions: Region) -> None:
-        """Rule 10: the car becomes one a region, both shown at once."""
+        """Rule 10: each of the two regions becomes a car, both shown at once."""
         self._forget([car])
         near, far = sorted(regions, key=lambda r: math.dist(r.centroid, car.centroid))
         self._create_vouched(near, car.id)
@@ -213,3 +212,28 @@ class Association:
 
 def _nearest(region: Region, cars: Iterable[Car]) -> Car:
     return min(cars, key=lambda car: math.dist(car.centroid, region.centroid))
+
+
+def is_good_size(region: Box, car: Box, settings: RulesTrackerSettings) -> bool:
+    """Tell whether a region is wide enough to be all of the car (rules 7 and 8)."""
+    return region.width > settings.wide or region.width > settings.good_fraction * car.width
+
+
+def is_about_size(combined: Box, car: Box, settings: RulesTrackerSettings) -> bool:
+    """Tell whether two regions, combined, are about as wide as the car (rules 9 and 10)."""
+    return abs(combined.width - car.width) <= settings.combined_tolerance * car.width
+
+
+def combine(first: Region, second: Region) -> Region:
+    """Return the two as one: box around both, centroids weighted by box area, the higher peak."""
+    one, two = first.box.area, second.box.area
+    (x1, y1), (x2, y2) = first.centroid, second.centroid
+    centroid = (x1 * one + x2 * two) / (one + two), (y1 * one + y2 * two) / (one + two)
+    higher = max(first, second, key=lambda region: region.peak)
+    return replace(higher, box=first.box.union(second.box), centroid=centroid)
+
+
+def any_overlap(boxes: Sequence[Box], pixels: int) -> bool:
+    """Tell whether two of the boxes overlap by more than `pixels`, across and down (rule 4)."""
+    common = (a.intersection(b) for a, b in combinations(boxes, 2))
+    return any(box.width > pixels and box.height > pixels for box in common)

@@ -1,26 +1,54 @@
-"""One car: where it was seen lately, and how sure of it we are.
+"""One car: where it was detected lately, and for how long.
 
 Source: seed section 3, "Define a Car class".
 """
 
 from collections import deque
 from dataclasses import InitVar, dataclass, field
-from statistics import fmean
+from statistics import fmean, multimode
+from typing import Literal
 
-from vdet.config.schema import TrackerSettings
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from vdet.config.schema import RulesTrackerSettings
 from vdet.geometry import Box
-from vdet.track.rules.template import Image, find
+from vdet.media.images import Image
 
 Point = tuple[float, float]
+MatchMethod = Literal["ccoeff_normed", "ccorr_normed", "sqdiff_normed"]
+
+_METHODS: dict[MatchMethod, int] = {
+    "ccoeff_normed": cv2.TM_CCOEFF_NORMED,
+    "ccorr_normed": cv2.TM_CCORR_NORMED,
+    "sqdiff_normed": cv2.TM_SQDIFF_NORMED,
+}
 
 
 @dataclass(frozen=True, slots=True)
-class Sighting:
-    """A car in one frame: its rectangle and centroid in full-frame pixels, and that cut-out."""
+class Region:
+    """A detection inside the frame; `peak` is its strength."""
+
+    box: Box
+    centroid: Point
+    peak: float
+    score: float = 1.0
+    class_id: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CarDetection:
+    """A car in one frame: its rectangle and centroid in full-frame pixels, and that cut-out.
+
+    A detection by match has the score and the class of the one before it.
+    """
 
     box: Box
     centroid: Point
     image: Image
+    score: float
+    class_id: int | None
 
 
 @dataclass(eq=False, slots=True)
@@ -28,26 +56,28 @@ class Car:
     """What is remembered of a car.
 
     Every detection, by region or by match, adds a rectangle, a centroid and the image cut from
-    that frame at the rectangle; the last `history` of each are kept. `box` and `centroid` are
-    their averages, so they exist from the first detection on.
+    that frame at the rectangle; the last `history` of each are kept. `box`, `centroid` and `score`
+    are their averages, so they exist from the first detection on.
 
     Attributes
     ----------
     needed
         Detections in a row before the car is shown.
     id
-        Given when the car is first shown; None tells that it never was.
+        Given when the car is first shown; None before.
     detected
         Whether it was detected in the latest frame.
     in_a_row
         Detections in a row up to the latest frame.
-    detections
+    count
         Detections so far.
     matches
         How many of the latest detections, in a row, were template matches. Misses in between do
         not end the row, a region does.
     misses
         Frames in a row without a detection.
+    detections
+        The last `history` detections.
     """
 
     needed: int
@@ -55,18 +85,18 @@ class Car:
     id: int | None = None
     detected: bool = False
     in_a_row: int = 0
-    detections: int = 0
+    count: int = 0
     matches: int = 0
     misses: int = 0
-    sightings: deque[Sighting] = field(init=False)
+    detections: deque[CarDetection] = field(init=False)
 
     def __post_init__(self, history: int) -> None:
-        self.sightings = deque(maxlen=history)
+        self.detections = deque(maxlen=history)
 
     @property
     def box(self) -> Box:
         """Average rectangle, rounded to whole pixels."""
-        boxes = [sighting.box for sighting in self.sightings]
+        boxes = [detection.box for detection in self.detections]
         return Box(
             round(fmean(box.x for box in boxes)),
             round(fmean(box.y for box in boxes)),
@@ -77,23 +107,34 @@ class Car:
     @property
     def centroid(self) -> Point:
         """Average centroid, `(x, y)`."""
-        xs, ys = zip(*(sighting.centroid for sighting in self.sightings), strict=True)
+        xs, ys = zip(*(detection.centroid for detection in self.detections), strict=True)
         return fmean(xs), fmean(ys)
+
+    @property
+    def score(self) -> float:
+        """Average score, 0 to 1."""
+        return fmean(detection.score for detection in self.detections)
+
+    @property
+    def class_id(self) -> int | None:
+        """The most frequent class of the detections, the earliest one among equals."""
+        return multimode(detection.class_id for detection in self.detections)[0]
 
     @property
     def is_shown(self) -> bool:
         """Whether it is detected in the latest frame and for enough frames in a row (rule 14)."""
         return self.detected and self.in_a_row >= self.needed
 
-    def see(self, box: Box, centroid: Point, image: Image) -> None:
-        """Add a detection by a region of the frame `image`; `box` lies in it."""
+    def see(self, region: Region, image: Image) -> None:
+        """Add a detection by a region of the frame `image`; the region lies in it."""
         self.matches = 0
-        self._add(box, centroid, image)
+        self._add(region, image)
 
     def see_match(self, box: Box, image: Image) -> None:
         """Add a detection by template match alone, in the frame `image`."""
+        last = self.detections[-1]
         self.matches += 1
-        self._add(box, self.centroid_at(box), image)
+        self._add(Region(box, self.centroid_at(box), 0.0, last.score, last.class_id), image)
 
     def miss(self) -> None:
         """Note a frame without a detection."""
@@ -102,18 +143,18 @@ class Car:
         self.misses += 1
 
     def need(self, detections: int) -> None:
-        """Show the car after so many detections in a row, if that is sooner."""
+        """Show the car after this number of detections in a row, if that is sooner."""
         self.needed = min(self.needed, detections)
 
     def vouch(self, detections: int) -> None:
         """Count the car as detected at least so often already, and in a row."""
         self.in_a_row = max(self.in_a_row, detections)
-        self.detections = max(self.detections, detections)
+        self.count = max(self.count, detections)
 
-    def find_in(self, image: Image, settings: TrackerSettings) -> Box | None:
-        """Look for the latest cut-out around the latest rectangle of the frame `image`."""
-        last = self.sightings[-1]
-        return find(
+    def find_in(self, image: Image, settings: RulesTrackerSettings) -> Box | None:
+        """Search the latest cut-out around the latest rectangle of the frame `image`."""
+        last = self.detections[-1]
+        return find_template(
             image,
             last.image,
             last.box,
@@ -124,14 +165,71 @@ class Car:
 
     def centroid_at(self, box: Box) -> Point:
         """Return the latest centroid, moved as the latest rectangle moved to `box`."""
-        last = self.sightings[-1]
+        last = self.detections[-1]
         x, y = last.centroid
         return x + box.x - last.box.x, y + box.y - last.box.y
 
-    def _add(self, box: Box, centroid: Point, image: Image) -> None:
+    def _add(self, region: Region, image: Image) -> None:
+        box = region.box
         cutout = image[box.y : box.bottom, box.x : box.right].copy()
-        self.sightings.append(Sighting(box, centroid, cutout))
+        self.detections.append(
+            CarDetection(box, region.centroid, cutout, region.score, region.class_id)
+        )
         self.detected = True
         self.in_a_row += 1
-        self.detections += 1
+        self.count += 1
         self.misses = 0
+
+
+def find_template(
+    image: Image,
+    template: Image,
+    near: Box,
+    *,
+    distance: int,
+    method: MatchMethod,
+    min_score: float,
+) -> Box | None:
+    """Return where `template` fits `image` best, if it fits well enough.
+
+    Parameters
+    ----------
+    image, template
+        BGR uint8 `(H, W, 3)`.
+    near
+        Where the template was in its own frame, full-frame pixels.
+    distance
+        How far its top left corner may have moved, pixels, in a straight line. Nothing outside
+        `near` grown by this distance is searched.
+    method
+        As `cv2.matchTemplate` names it.
+    min_score
+        0 to 1; 1 is a perfect fit by every method (`sqdiff_normed` is inverted).
+
+    Returns
+    -------
+    The place, of the template's size and inside the image. None where nothing scores `min_score`,
+    where the template does not fit into the searched area, and for a template of one colour,
+    which fits anything flat.
+    """
+    height, width = template.shape[:2]
+    grown = Box(near.x - distance, near.y - distance, width + 2 * distance, height + 2 * distance)
+    area = grown.clipped(image.shape[1], image.shape[0])
+    if area.width < width or area.height < height or _is_flat(template):
+        return None
+    scores = _match_scores(image[area.y : area.bottom, area.x : area.right], template, method)
+    dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
+    scores[np.hypot(area.x + dx - near.x, area.y + dy - near.y) > distance] = -1
+    y, x = np.unravel_index(int(scores.argmax()), scores.shape)
+    if round(float(scores[y, x]), 4) < min_score:  # a perfect fit may score 0.9999998
+        return None
+    return Box(area.x + int(x), area.y + int(y), width, height)
+
+
+def _is_flat(image: Image) -> bool:
+    return image.size == 0 or bool((image == image[0, 0]).all())
+
+
+def _match_scores(area: Image, template: Image, method: MatchMethod) -> npt.NDArray[np.float32]:
+    scores = np.asarray(cv2.matchTemplate(area, template, _METHODS[method]), np.float32)
+    return 1 - scores if method == "sqdiff_normed" else scores

@@ -1,7 +1,7 @@
-"""The tracker: which cars there are, frame after frame.
+"""The rules tracker: which cars there are, frame after frame.
 
-Source: seed section 3, "Video pipeline". Where it can be read in two ways (`association` has the
-choices for the regions), this is the choice:
+Source: seed section 3, "Video pipeline". Where it can be read in two ways, this is the choice
+(`association` has those for the regions):
 
 * A car counts as shown before if it ever was, not only in the frame before.
 * "In a row" is up to this frame: a car that is missed once is counted from the start again.
@@ -12,19 +12,18 @@ choices for the regions), this is the choice:
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import count
 
-from vdet.config.schema import TrackerSettings
-from vdet.detect.svm.heat import Region
+from vdet.config.schema import RulesTrackerSettings
+from vdet.detect.detections import Detections
+from vdet.media.images import Image
 from vdet.track.rules.association import Association
-from vdet.track.rules.car import Car
-from vdet.track.rules.regions import large_enough
-from vdet.track.rules.template import Image
+from vdet.track.rules.car import Car, Region
 from vdet.track.track import Track
 
 
-class Cars:
+class RulesTracker:
     """The cars of one video; make a new one for every video, ids start at 1 in each.
 
     Parameters
@@ -33,32 +32,27 @@ class Cars:
         Lengths already scaled to the frame.
     """
 
-    def __init__(self, settings: TrackerSettings) -> None:
+    def __init__(self, settings: RulesTrackerSettings) -> None:
         self._settings = settings
         self._cars: list[Car] = []
         self._ids = count(1)
 
-    def update(self, image: Image, regions: Sequence[Region]) -> list[Track]:
-        """Follow the cars into the next frame.
-
-        Parameters
-        ----------
-        image
-            The frame, BGR uint8 `(H, W, 3)`; every frame of a video has the same size.
-        regions
-            Its hot regions, in full-frame pixels.
-
-        Returns
-        -------
-        The cars shown in this frame, by id.
-        """
+    def update(
+        self,
+        detections: Detections,
+        time: float,  # noqa: ARG002 - the rules count frames
+        image: Image | None = None,
+    ) -> list[Track]:
+        """Follow the cars into the next frame; as `VideoTracker.update`, but `image` is needed."""
+        if image is None:
+            raise ValueError("image: the rules tracker needs the frame; give it")
         height, width = image.shape[:2]
-        regions = large_enough(regions, width, height, self._settings)
+        regions = large_enough(detections, width, height, self._settings)
         association = Association(self._cars, regions, image, self._settings)
         self._cars = association.cars
         placed = association.places
         for car, place in placed.items():
-            car.see(place.box, place.centroid, image)
+            car.see(place, image)
         for car in [car for car in self._cars if car not in placed]:
             if not self._absorb(car, placed):
                 self._search(car, image)
@@ -78,7 +72,7 @@ class Cars:
         return True
 
     def _search(self, car: Car, image: Image) -> None:
-        """Rule 13: a shown car is looked for by its image."""
+        """Rule 13: the image of a shown car is searched in the frame."""
         box = None if car.id is None else car.find_in(image, self._settings)
         if box is None:
             car.miss()
@@ -87,7 +81,7 @@ class Cars:
 
     def _is_over(self, car: Car) -> bool:
         """Rules 15, 16 and 17: the reasons to delete a car."""
-        young_and_missed = not car.detected and car.detections < self._settings.young
+        young_and_missed = not car.detected and car.count < self._settings.young
         only_matched = car.matches >= self._settings.max_matches
         gone = car.misses >= self._settings.max_misses
         return young_and_missed or only_matched or gone
@@ -98,5 +92,34 @@ class Cars:
         for car in self._cars:
             if car.is_shown:
                 car.id = next(self._ids) if car.id is None else car.id
-                tracks.append(Track(car.id, car.box, from_match=car.matches > 0))
+                tracks.append(Track(car.id, car.box, car.score, car.matches > 0, car.class_id))
         return sorted(tracks, key=lambda track: track.id)
+
+
+def large_enough(
+    detections: Detections, frame_width: int, frame_height: int, settings: RulesTrackerSettings
+) -> list[Region]:
+    """Return the regions, clipped to the frame, that are not narrower or lower than allowed.
+
+    Rule 1. The part of a region outside the frame does not count.
+    """
+    least = max(1, settings.min_region)
+    classes = [None] * len(detections) if detections.classes is None else detections.classes
+    regions = [
+        Region(
+            box.clipped(frame_width, frame_height),
+            (float(x), float(y)),
+            float(strength),
+            float(score),
+            None if class_id is None else int(class_id),
+        )
+        for box, (x, y), strength, score, class_id in zip(
+            detections.rounded,
+            detections.centroids,
+            detections.strengths,
+            detections.scores,
+            classes,
+            strict=True,
+        )
+    ]
+    return [r for r in regions if r.box.width >= least and r.box.height >= least]

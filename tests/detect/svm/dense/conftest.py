@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from vdet.pipeline.threads import quiet_libraries
+from vdet.pipeline.threads import single_threaded_libraries
 
 
 @pytest.fixture(scope="module", autouse=True)
 def one_thread() -> Iterator[None]:
-    with quiet_libraries():
+    with single_threaded_libraries():
         yield

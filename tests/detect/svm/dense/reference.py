@@ -15,7 +15,7 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.geometry import Float32Array
 from vdet.media.images import Image
-from vdet.synthetic import background_patches, default_clip, render, vehicle_patches
+from vdet.synthetic import background_patches, demo_scene, render, vehicle_patches
 
 Exact = npt.NDArray[np.float64]
 
@@ -116,7 +116,7 @@ def _patches() -> tuple[list[Image], Float32Array]:
 @functools.cache
 def road(width: int = 1280, height: int = 720) -> Image:
     """Give a frame of the demo's clip: cars of a 17th, an 11th and an 8th of its width."""
-    return render(default_clip(1, width=width, height=height), 200)
+    return render(demo_scene(1, width=width, height=height), 200)
 
 
 def cars() -> Image:

@@ -1,0 +1,125 @@
+"""What holds for the rules tracker whatever it is given."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from seed import tracker_but
+from vdet.config.schema import RulesTrackerSettings
+from vdet.detect.detections import Detections
+from vdet.geometry import Box
+from vdet.media.images import Image
+from vdet.track.rules.tracker import RulesTracker
+from vdet.track.track import Track
+
+WIDTH, HEIGHT = 320, 180
+TEXTURED = np.random.default_rng(0).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+PICTURES = [TEXTURED, np.roll(TEXTURED, 9, axis=1), np.full_like(TEXTURED, 128)]
+
+# Small lengths, so that every rule is applied in a small frame.
+EAGER = tracker_but(
+    min_region=10,
+    near=15,
+    wide=60,
+    max_combined=80,
+    merge_overlap=5,
+    match_distance=15,
+    detections_needed=3,
+    confident_detections_needed=2,
+    young=2,
+    max_matches=4,
+    max_misses=2,
+)
+
+
+@st.composite
+def regions(draw: st.DrawFn) -> tuple[Box, float]:
+    """A region anywhere in the frame or across its border."""
+    x = draw(st.integers(-30, WIDTH))
+    y = draw(st.integers(-30, HEIGHT))
+    box = Box(x, y, draw(st.integers(1, 120)), draw(st.integers(1, 90)))
+    return box, draw(st.floats(1.4, 9))
+
+
+pictures = st.sampled_from(PICTURES)
+frames = st.tuples(pictures, st.lists(regions(), max_size=4))
+# A few regions that come back make cars live longer than fresh ones in each frame would.
+lasting = st.lists(regions(), min_size=1, max_size=4).flatmap(
+    lambda pool: st.lists(
+        st.tuples(pictures, st.lists(st.sampled_from(pool), max_size=4)), max_size=20
+    )
+)
+clips = st.lists(frames, max_size=12) | lasting
+Clip = list[tuple[Image, list[tuple[Box, float]]]]
+
+
+def run(clip: Clip, tracker: RulesTrackerSettings) -> list[list[Track]]:
+    cars = RulesTracker(tracker)
+    return [cars.update(_detections(found), n / 25, image) for n, (image, found) in enumerate(clip)]
+
+
+def _detections(found: list[tuple[Box, float]]) -> Detections:
+    corners = [(box.x, box.y, box.right, box.bottom) for box, _ in found]
+    return Detections(corners, [1.0] * len(found), strengths=[peak for _, peak in found])
+
+
+@settings(deadline=None)
+@given(clips)
+def test_ids_are_unique_and_ordered_in_a_frame(clip: Clip) -> None:
+    for tracks in run(clip, EAGER):
+        ids = [track.id for track in tracks]
+        assert ids == sorted(set(ids))
+
+
+@settings(deadline=None)
+@given(clips)
+def test_ids_are_given_without_gaps_from_1_on(clip: Clip) -> None:
+    shown = [track.id for tracks in run(clip, EAGER) for track in tracks]
+    assert list(dict.fromkeys(shown)) == list(range(1, len(set(shown)) + 1))
+
+
+@settings(deadline=None)
+@given(clips)
+def test_the_id_of_a_deleted_car_never_comes_back(clip: Clip) -> None:
+    # Every detection is shown, so a car that was not shown for this long has been deleted.
+    tracker = EAGER.model_copy(update={"detections_needed": 1, "max_misses": 2})
+    last_shown: dict[int, int] = {}
+    for index, tracks in enumerate(run(clip, tracker)):
+        for track in tracks:
+            assert index - last_shown.get(track.id, index) <= tracker.max_misses
+            last_shown[track.id] = index
+
+
+@settings(deadline=None)
+@given(clips)
+def test_boxes_lie_in_the_frame_and_are_not_too_small(clip: Clip) -> None:
+    for tracks in run(clip, EAGER):
+        for track in tracks:
+            assert min(track.box.x, track.box.y) >= 0
+            assert track.box.right <= WIDTH + 1  # place and size are rounded each for itself
+            assert track.box.bottom <= HEIGHT + 1
+            assert min(track.box.width, track.box.height) >= EAGER.min_region
+
+
+@settings(deadline=None)
+@given(clips)
+def test_the_same_clip_gives_the_same_tracks(clip: Clip) -> None:
+    assert run(clip, EAGER) == run(clip, EAGER)
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(pictures, st.lists(regions(), max_size=1)), max_size=12))
+def test_without_merging_no_car_is_shown_before_it_was_detected_often_enough(clip: Clip) -> None:
+    tracker = EAGER.model_copy(update={"merge_overlap": 1000, "confident_peak": 100.0})
+    in_a_row, ids_so_far = 0, 0
+    for (_, found), tracks in zip(clip, run(clip, tracker), strict=True):
+        in_a_row = in_a_row + 1 if found else 0
+        if any(track.id > ids_so_far for track in tracks):
+            assert in_a_row >= tracker.detections_needed
+            ids_so_far += 1
+
+
+@settings(deadline=None)
+@given(clips)
+def test_a_frame_without_regions_and_without_texture_shows_nothing(clip: Clip) -> None:
+    assert run([*clip, (PICTURES[2], [])], EAGER)[-1] == []

@@ -1,0 +1,353 @@
+"""Rules 1 and 12 to 17, and ids, through the tracker; rules 2 to 11 are in test_association."""
+
+import numpy as np
+import pytest
+
+from seed import SEED_TRACKER, tracker_but
+from textured_road import textured_road
+from track.rules.scenes import detections
+from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.geometry import Box
+from vdet.media.images import Image
+from vdet.track.rules.car import Region
+from vdet.track.rules.tracker import RulesTracker, large_enough
+from vdet.track.track import Track
+
+SEDAN, VAN = Box(100, 200, 100, 80), Box(400, 200, 120, 100)
+GREY = np.full((360, 640, 3), 90, np.uint8)
+
+
+def road(*boxes: Box | None) -> Image:
+    return textured_road(640, 360, *boxes)
+
+
+def update(cars: RulesTracker, image: Image, *boxes: Box, peak: float = 2.0) -> list[Track]:
+    return cars.update(detections(boxes, peak), 0.0, image)
+
+
+def see(cars: RulesTracker, *boxes: Box, frames: int = 1, peak: float = 2.0) -> list[list[Track]]:
+    """Give the tracker regions at `boxes` of a grey picture, in which nothing matches."""
+    return [update(cars, GREY, *boxes, peak=peak) for _ in range(frames)]
+
+
+def show(cars: RulesTracker, box: Box, times: int = 10) -> None:
+    """Make the first car known, with its texture, until it is shown."""
+    for _ in range(times):
+        tracks = update(cars, road(box), box)
+    assert [track.box for track in tracks] == [box]
+
+
+def ids(tracks: list[Track]) -> list[int]:
+    return [track.id for track in tracks]
+
+
+# Rule 1
+
+
+def test_regions_that_are_too_small_are_ignored() -> None:
+    settings = tracker_but(detections_needed=1)
+    assert see(RulesTracker(settings), Box(100, 200, 49, 80), Box(300, 200, 80, 49)) == [[]]
+    assert len(see(RulesTracker(settings), Box(100, 200, 50, 50))[0]) == 1
+
+
+def kept(*boxes: Box, **changes: object) -> list[Box]:
+    return [r.box for r in large_enough(detections(boxes), 640, 360, tracker_but(**changes))]
+
+
+@pytest.mark.parametrize(("width", "height"), [(49, 80), (80, 49), (1, 1)])
+def test_a_region_narrower_or_lower_than_50_pixels_is_ignored(width: int, height: int) -> None:
+    assert kept(Box(10, 10, width, height)) == []
+
+
+def test_a_region_of_50_by_50_pixels_is_kept() -> None:
+    assert kept(Box(10, 10, 50, 50)) == [Box(10, 10, 50, 50)]
+
+
+def test_the_least_size_is_a_setting() -> None:
+    small = Box(10, 10, 30, 30)
+    assert kept(small, min_region=30) == [small]
+    assert kept(small, min_region=31) == []
+
+
+def test_what_lies_outside_the_frame_does_not_count() -> None:
+    regions = Box(-20, 10, 90, 60), Box(600, 10, 80, 60), Box(900, 10, 80, 60)
+    assert kept(*regions) == [Box(0, 10, 70, 60)]
+
+
+def test_a_region_outside_the_frame_is_ignored_whatever_the_setting() -> None:
+    assert kept(Box(700, 10, 60, 60), min_region=0) == []
+
+
+def test_a_region_has_the_strength_of_its_detection_as_its_peak() -> None:
+    found = Detections([[10, 20, 90.4, 99.6]], [0.5], centroids=[[44, 55]], strengths=[3.5])
+    (region,) = large_enough(found, 640, 360, SEED_TRACKER)
+    assert region == Region(Box(10, 20, 80, 80), (44, 55), 3.5, 0.5)
+
+
+# Rule 12
+
+ONE_PLACE = tracker_but(history=1)  # so that a car's rectangle is its latest one
+BUS = Box(230, 200, 120, 100)
+BOTH = Box(90, 190, 270, 120)
+
+
+def see_side_by_side(cars: RulesTracker, frames: int) -> None:
+    for _ in range(frames):
+        update(cars, road(SEDAN, BUS), SEDAN, BUS)
+
+
+def hide_sedan_behind_bus(cars: RulesTracker) -> list[Track]:
+    """One region over both places, of which only the bus is to be seen."""
+    return update(cars, road(None, BUS), BOTH)
+
+
+def test_a_shown_car_left_inside_another_is_absorbed_which_is_shown_at_once() -> None:
+    cars = RulesTracker(ONE_PLACE)
+    show(cars, SEDAN)
+    see_side_by_side(cars, frames=2)
+    (track,) = hide_sedan_behind_bus(cars)
+    assert track.box == BOTH
+
+
+def test_the_absorbing_car_takes_over_the_id_if_it_was_never_shown() -> None:
+    cars = RulesTracker(ONE_PLACE)
+    show(cars, SEDAN)
+    see_side_by_side(cars, frames=2)
+    assert ids(hide_sedan_behind_bus(cars)) == [1]
+
+
+def test_the_absorbing_car_keeps_its_own_id_if_it_was_shown_and_the_other_ends() -> None:
+    cars = RulesTracker(tracker_but(history=1, detections_needed=1))
+    see_side_by_side(cars, frames=8)
+    assert ids(hide_sedan_behind_bus(cars)) == [2]
+    assert update(cars, road(SEDAN)) == []  # its image is not searched either
+
+
+def test_of_two_cars_around_a_lost_one_the_nearer_absorbs_it() -> None:
+    cars = RulesTracker(ONE_PLACE)
+    lost, left, right = SEDAN.moved_to(250, 200), Box(100, 200, 120, 80), Box(400, 200, 120, 80)
+    show(cars, lost)
+    for _ in range(2):
+        update(cars, road(lost, left, right), lost, left, right)
+    around_left, around_right = Box(60, 190, 300, 100), Box(240, 190, 260, 100)
+    tracks = update(cars, road(None, left, right), around_left, around_right)
+    assert tracks == [Track(1, around_right, 1.0, predicted=False)]
+
+
+def test_a_car_that_was_never_shown_is_not_absorbed() -> None:
+    cars = RulesTracker(ONE_PLACE)
+    for _ in range(7):
+        update(cars, road(SEDAN), SEDAN)
+    see_side_by_side(cars, frames=2)
+    assert hide_sedan_behind_bus(cars) == []
+
+
+def test_a_car_beside_the_other_ones_rectangle_is_not_absorbed() -> None:
+    cars = RulesTracker(ONE_PLACE)
+    show(cars, SEDAN)
+    see_side_by_side(cars, frames=2)
+    assert update(cars, road(None, BUS), BUS) == []
+
+
+# Rule 13
+
+
+def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
+    cars = RulesTracker(tracker_but(history=1))
+    show(cars, SEDAN)
+    moved = SEDAN.moved_to(130, 240)
+    assert update(cars, road(moved)) == [Track(1, moved, 1.0, predicted=True)]
+    assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, predicted=False)]
+
+
+def test_a_match_counts_in_the_average_box() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    show(cars, SEDAN)
+    (track,) = update(cars, road(SEDAN.moved_to(140, 200)))
+    assert track.box == SEDAN.moved_to(104, 200)
+
+
+@pytest.mark.parametrize(("distance", "found"), [(50, 1), (49, 0)])
+def test_the_match_is_searched_within_the_distance(distance: int, found: int) -> None:
+    cars = RulesTracker(tracker_but(match_distance=distance))
+    show(cars, SEDAN)
+    assert len(update(cars, road(SEDAN.moved_to(150, 200)))) == found
+
+
+def test_the_least_score_of_a_match_is_a_setting() -> None:
+    noisy = road(SEDAN) // 2 + road(None, SEDAN) // 2
+    for least, found in ((0.5, 1), (0.9, 0)):
+        cars = RulesTracker(tracker_but(match_score=least))
+        show(cars, SEDAN)
+        assert len(update(cars, noisy)) == found
+
+
+def test_the_method_of_the_match_is_a_setting() -> None:
+    darker = road(SEDAN) // 3
+    for method, found in (("ccoeff_normed", 1), ("sqdiff_normed", 0)):
+        cars = RulesTracker(tracker_but(match_method=method, match_score=0.8))
+        show(cars, SEDAN)
+        assert len(update(cars, darker)) == found
+
+
+def test_a_car_that_was_never_shown_is_not_searched() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    for _ in range(8):
+        update(cars, road(SEDAN), SEDAN)
+    assert update(cars, road(SEDAN)) == []
+    assert update(cars, road(SEDAN), SEDAN) == []
+
+
+def test_a_car_shown_before_is_still_searched_after_a_miss() -> None:
+    cars = RulesTracker(tracker_but(detections_needed=1, young=0))
+    show(cars, SEDAN, times=1)
+    assert see(cars) == [[]]
+    assert [track.predicted for track in update(cars, road(SEDAN))] == [True]
+
+
+# Rule 14
+
+
+@pytest.mark.parametrize(("peak", "first_shown"), [(2.0, 10), (5.0, 3)])
+def test_a_car_is_shown_after_ten_detections_in_a_row_or_three_confident_ones(
+    peak: float, first_shown: int
+) -> None:
+    shown = see(RulesTracker(SEED_TRACKER), SEDAN, frames=12, peak=peak)
+    assert [bool(tracks) for tracks in shown].index(True) == first_shown - 1
+    assert all(shown[first_shown - 1 :])
+
+
+def test_how_many_detections_are_enough_is_a_setting() -> None:
+    settings = tracker_but(detections_needed=4, confident_detections_needed=2)
+    assert [len(tracks) for tracks in see(RulesTracker(settings), SEDAN, frames=4)] == [0, 0, 0, 1]
+    assert [len(tracks) for tracks in see(RulesTracker(settings), SEDAN, frames=2, peak=5)] == [
+        0,
+        1,
+    ]
+
+
+def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    show(cars, SEDAN)
+    assert see(cars) == [[]]
+    shown = see(cars, SEDAN, frames=10)
+    assert shown[:9] == [[]] * 9
+    assert ids(shown[9]) == [1]
+
+
+# Rules 15 to 17. A car that comes back under its old id was not deleted.
+
+
+@pytest.mark.parametrize(
+    ("detections", "young", "id_after"), [(6, 7, 2), (7, 7, 1), (7, 8, 2), (1, 0, 1)]
+)
+def test_a_car_with_fewer_detections_than_seven_is_deleted_at_its_first_miss(
+    detections: int, young: int, id_after: int
+) -> None:
+    cars = RulesTracker(tracker_but(young=young, detections_needed=1))
+    see(cars, SEDAN, frames=detections)
+    see(cars)
+    assert ids(see(cars, SEDAN)[0]) == [id_after]
+
+
+@pytest.mark.parametrize("max_matches", [12, 4])
+def test_a_car_whose_last_detections_all_were_matches_is_deleted(max_matches: int) -> None:
+    cars = RulesTracker(tracker_but(max_matches=max_matches))
+    show(cars, SEDAN)
+    matched = [update(cars, road(SEDAN)) for _ in range(max_matches)]
+    assert [ids(tracks) for tracks in matched] == [[1]] * (max_matches - 1) + [[]]
+    assert see(cars, SEDAN, frames=9) == [[]] * 9
+    assert ids(see(cars, SEDAN)[0]) == [2]
+
+
+def test_a_region_in_between_ends_the_row_of_matches() -> None:
+    cars = RulesTracker(tracker_but(max_matches=3))
+    show(cars, SEDAN)
+    for boxes in ([], [], [SEDAN], [], []):
+        assert ids(update(cars, road(SEDAN), *boxes)) == [1]
+
+
+@pytest.mark.parametrize(
+    ("misses", "max_misses", "id_after"), [(4, 5, 1), (5, 5, 2), (2, 2, 2), (1, 2, 1)]
+)
+def test_a_car_missed_five_frames_in_a_row_is_deleted(
+    misses: int, max_misses: int, id_after: int
+) -> None:
+    cars = RulesTracker(tracker_but(max_misses=max_misses, detections_needed=1))
+    see(cars, SEDAN, frames=7)
+    assert see(cars, frames=misses) == [[]] * misses
+    assert ids(see(cars, SEDAN)[0]) == [id_after]
+
+
+# Ids and boxes
+
+
+def test_ids_start_at_1_in_every_video() -> None:
+    for _ in range(2):
+        shown = see(RulesTracker(SEED_TRACKER), SEDAN, VAN, frames=10)
+        assert ids(shown[-1]) == [1, 2]
+
+
+def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    see(cars, SEDAN, frames=5)
+    see(cars, SEDAN, VAN, frames=5)
+    shown = see(cars, VAN, SEDAN, frames=5)
+    assert [(track.id, track.box) for track in shown[-1]] == [(1, SEDAN), (2, VAN)]
+
+
+def test_a_shown_box_is_the_average_of_the_last_ten() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    for x in range(100, 124, 2):
+        tracks = update(cars, road(), SEDAN.moved_to(x, 200))
+    assert tracks == [Track(1, SEDAN.moved_to(113, 200), 1.0, predicted=False)]
+
+
+def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    see(cars, Box(100, 200, 260, 100), frames=10)
+    (tracks,) = see(cars, Box(70, 200, 120, 100), Box(250, 200, 110, 100))
+    assert [(track.id, track.box.x) for track in tracks] == [(1, 250), (2, 70)]
+
+
+def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    behind = Box(150, 200, 100, 80)
+    frame = road(SEDAN, behind)
+    for _ in range(10):
+        update(cars, frame, SEDAN, behind, VAN)
+    around = Box(95, 195, 160, 90)
+    tracks = update(cars, frame, around, VAN)
+    assert [(track.id, track.box) for track in tracks] == [(1, around), (3, VAN)]
+
+
+# Scores, classes, and the frame
+
+
+def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> None:
+    cars = RulesTracker(SEED_TRACKER)
+    shown = [cars.update(detections([SEDAN], score=0.05 * n), 0.0, GREY) for n in range(12)]
+    assert [track.score for track in shown[-1]] == pytest.approx([0.05 * 6.5])
+
+
+def test_a_match_keeps_the_score_of_the_detection_before_it() -> None:
+    cars = RulesTracker(tracker_but(history=2, detections_needed=1))
+    cars.update(detections([SEDAN], score=0.4), 0.0, road(SEDAN))
+    for _ in range(3):
+        (track,) = update(cars, road(SEDAN))
+    assert track.score == pytest.approx(0.4)
+
+
+def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
+    cars = RulesTracker(tracker_but(detections_needed=1))
+    corners = [[SEDAN.x, SEDAN.y, SEDAN.right, SEDAN.bottom]]
+    for class_id in (0, 1, 1):
+        found = Detections(corners, [0.9], classes=[class_id], names=("car", "van"))
+        (track,) = cars.update(found, 0.0, GREY)
+    assert track.class_id == 1
+    assert see(RulesTracker(tracker_but(detections_needed=1)), SEDAN)[0][0].class_id is None
+
+
+def test_without_the_frame_it_says_that_it_needs_it() -> None:
+    with pytest.raises(ValueError, match="needs the frame"):
+        RulesTracker(SEED_TRACKER).update(NO_DETECTIONS, 0.0)
