@@ -108,7 +108,7 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
 def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path)
     with pytest.raises(VideoError, match=r"pipe\.ts: nothing could be read or written for 1 s"):
-        run_video(stalling, red_finder(), SETTINGS, patience=1)
+        run_video(stalling, red_finder(), SETTINGS, timeout=1)
     assert names(tmp_path / "out") == []
     pipe.close()
     until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))
