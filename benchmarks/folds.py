@@ -22,8 +22,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Detector
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.scores import score
 from vdet.evaluate.truth import read_truth
 from vdet.learn.augmentation import views_of
@@ -35,6 +34,7 @@ from vdet.learn.training_set import lesson_of
 from vdet.media import VideoReader
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import Follow, tracker_of
+from vdet.workers import make_workers
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
@@ -88,14 +88,16 @@ def _frames_of(files: Sequence[PatchFile]) -> Numbers:
 def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
     files, boxed = find_patches(sources), find_boxed(sources)
     training = settings.training
+    workers = make_workers()
     data = extract(
         files,
         settings.features,
         max_broken=0,
+        workers=workers,
         look=partial(views_of, settings=training.views),
         seed=training.seed,
     )
-    boxes = describe_boxes(files, boxed, settings, jobs=-1, progress=lambda _: None)
+    boxes = describe_boxes(files, boxed, settings, workers=workers, progress=lambda _: None)
     assert boxes is not None
     boxed_data = boxes.boxed
     assert boxed_data is not None
@@ -166,7 +168,7 @@ def _tracks(detector: Detector, track: Follow, searched: Sequence[Windows]) -> L
         for each in track(blank, detector.accumulate(windows).regions):
             box = each.box
             rows.append(Row(0, number, each.id, box.x, box.y, box.width, box.height))
-    return in_memory(rows, frame_count=len(searched), rate=25.0)
+    return LabelledVideo.from_rows(rows, frame_count=len(searched), rate=25.0)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

@@ -16,11 +16,9 @@ from vdet.pipeline.following import follow, seek_horizon
 from vdet.config.schema import Settings
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.comparison import Comparison, compare
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.matching import match
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.rows import Row, in_memory
 from vdet.evaluate.scores import score, score_comparison
 from vdet.geometry import Box, Float64Array
 from vdet.media import Frame
@@ -74,7 +72,7 @@ def model() -> LinearModel:
 def shown(model: LinearModel, camera: PinholeCamera, clip: Iterable[Frame]) -> LabelledVideo:
     """Find and follow the vehicles of a clip; give the boxes shown in the judged frames."""
     with single_threaded_libraries():
-        return in_memory(
+        return LabelledVideo.from_rows(
             row(result.frame.index, track.id, track.box)
             for result in follow(clip, model, DEFAULT, camera.width, camera.height)
             for track in result.tracks
@@ -84,7 +82,7 @@ def shown(model: LinearModel, camera: PinholeCamera, clip: Iterable[Frame]) -> L
 
 def to_be_shown(scene: Scene) -> LabelledVideo:
     """Give the true boxes of the judged frames; vehicles that do not count are to be ignored."""
-    return in_memory(
+    return LabelledVideo.from_rows(
         row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
         for index in JUDGED
         for each in true_boxes(scene, index)

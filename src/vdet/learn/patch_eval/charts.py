@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vdet.evaluate.report.drawing import COLORS, INK, SOFT, draw, unit_axis
-from vdet.evaluate.table import share
+from vdet.evaluate.output import share
+from vdet.evaluate.report.page import COLORS, INK, SOFT, draw, unit_axis
 from vdet.learn.patch_eval.results import PatchReport, TrialReport
 
 if TYPE_CHECKING:

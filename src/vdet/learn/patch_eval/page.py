@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import cv2
 import numpy as np
 
+from vdet.evaluate.output import share
 from vdet.evaluate.report.page import (
     Picture,
     cards,
@@ -15,7 +16,6 @@ from vdet.evaluate.report.page import (
     paragraph,
     section,
 )
-from vdet.evaluate.table import share
 from vdet.learn.dataset import read_patches
 from vdet.learn.patch_eval.charts import confusion_chart, patch_charts
 from vdet.learn.patch_eval.results import Mistake, PatchReport, TrialReport

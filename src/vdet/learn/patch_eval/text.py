@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from vdet.evaluate.table import ABSENT, share, table
+from vdet.evaluate.output import ABSENT, share, table
 from vdet.learn.patch_eval.measures import MEASURES
 from vdet.learn.patch_eval.results import PatchReport, PatchScores
 

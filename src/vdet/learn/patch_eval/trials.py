@@ -11,8 +11,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.features import Vectors
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.evaluate.labelled_video import Integers
-from vdet.geometry import Float64Array
+from vdet.geometry import Float64Array, Int64Array
 from vdet.learn.extraction import LabelledVectors
 from vdet.learn.fitting import fit
 from vdet.learn.splits import Held, hold_out
@@ -33,7 +32,7 @@ class Trial:
     """
 
     name: str
-    rows: Integers
+    rows: Int64Array
     probabilities: Float64Array
     fits: int
 
