@@ -1,4 +1,4 @@
-"""`make soak`: one run over 20,000 frames, watched for what creeps up: memory, files, time."""
+"""`make soak`: does memory, the number of files or the time a frame grow over 20,000 frames?"""
 
 import argparse
 import sys
@@ -10,22 +10,29 @@ from itertools import pairwise
 from pathlib import Path
 
 from benchmarks.looping import loop_video
-from benchmarks.material import config, video
+from benchmarks.material import video
+from vdet.config.loading import find_config, load_settings
+from vdet.detect.factory import load_detector
 from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.sinks.protocol import Output
 
 FRAMES = 20_000
-FEWEST = 1000
-WARM = 500  # frames after which nothing should grow any more
-ENDING = 50  # last frames, in which the reader has read all and gone
-EVERY = 50  # frames between samples
-MEMORY_GROWTH = 0.10
-LEAST_SPEED = 0.85  # of the last tenth, against the first
-ROWS = 11
+MIN_FRAMES = 1000
+WARM_UP = 500  # frames; nothing should grow after them
+END = 50  # last frames; the reader has ended when they are processed
+SAMPLE_INTERVAL = 50  # frames
+MAX_MEMORY_GROWTH = 0.10
+MIN_SPEED = 0.85  # of the last tenth, as a share of that of the first
+TABLE_ROWS = 11
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The state of the process after so many frames: memory in MB now and at most so far."""
+    """The state of this process after a number of frames.
+
+    `memory` and `peak` are MB: now, and the highest so far. `files` and `threads` are how many are
+    open, and running.
+    """
 
     frames: int
     seconds: float
@@ -35,8 +42,8 @@ class Sample:
     threads: int
 
 
-class Watch:
-    """Takes a sample every `EVERY` frames."""
+class Sampler:
+    """Takes a sample every `SAMPLE_INTERVAL` frames."""
 
     def __init__(self) -> None:
         self.samples: list[Sample] = []
@@ -44,7 +51,7 @@ class Watch:
         self._began = time.perf_counter()
 
     def __call__(self, _: int | None) -> Callable[[int], None]:
-        """Be the `progress` of a run."""
+        """Take the first sample; this is the `progress` of a run."""
         self._began = time.perf_counter()
         self.samples.append(self._sample())
         return self._advance
@@ -52,9 +59,9 @@ class Watch:
     def _advance(self, frames: int) -> None:
         before = self._frames
         self._frames += frames
-        if self._frames // EVERY > before // EVERY:
+        if self._frames // SAMPLE_INTERVAL > before // SAMPLE_INTERVAL:
             self.samples.append(self._sample())
-            if self._frames % 1000 < EVERY:
+            if self._frames % 1000 < SAMPLE_INTERVAL:
                 print(f"\r{self._frames} frames", end="", file=sys.stderr, flush=True)
 
     def _sample(self) -> Sample:
@@ -71,29 +78,29 @@ def _megabytes(status: str, field: str) -> float:
     return int(status.partition(field)[2].split()[0]) / 1024
 
 
-def complaints(samples: Sequence[Sample]) -> list[str]:
-    """Return what crept up, or nothing; `samples` begin with the run and end with it."""
-    warm = next(sample for sample in samples if sample.frames >= WARM)
-    later = [sample for sample in samples if sample.frames >= WARM]
+def find_growth(samples: Sequence[Sample]) -> list[str]:
+    """Return a line about each thing that grew; `samples` are of a whole run."""
+    warm = next(sample for sample in samples if sample.frames >= WARM_UP)
+    later = [sample for sample in samples if sample.frames >= WARM_UP]
     found = []
-    if (grown := later[-1].peak / warm.peak - 1) > MEMORY_GROWTH:
+    if (grown := later[-1].peak / warm.peak - 1) > MAX_MEMORY_GROWTH:
         found.append(
-            f"peak memory grew by {grown:.1%} after the first {WARM} frames, from {warm.peak:.0f} "
-            f"to {later[-1].peak:.0f} MB"
+            f"peak memory grew by {grown:.1%} after the first {WARM_UP} frames, "
+            f"from {warm.peak:.0f} to {later[-1].peak:.0f} MB"
         )
-    running = [s for s in later if s.frames <= later[-1].frames - ENDING]
+    before_end = [s for s in later if s.frames <= later[-1].frames - END]
     for name in ("files", "threads"):
-        counts = sorted({getattr(sample, name) for sample in running})
+        counts = sorted({getattr(sample, name) for sample in before_end})
         if len(counts) > 1:
             found.append(f"the number of {name} went from {counts[0]} to {counts[-1]}")
-    first, last = tenths(samples)
-    if last < LEAST_SPEED * first:
+    first, last = speeds(samples)
+    if last < MIN_SPEED * first:
         found.append(f"the last tenth ran at {last:.1f} frames/s, the first at {first:.1f}")
     return found
 
 
-def tenths(samples: Sequence[Sample]) -> tuple[float, float]:
-    """Return frames/s over the first and the last tenth of the run."""
+def speeds(samples: Sequence[Sample]) -> tuple[float, float]:
+    """Return the frames/s of the first and of the last tenth of the run."""
     tenth = samples[-1].frames / 10
     first = next(sample for sample in samples if sample.frames >= tenth)
     last = next(sample for sample in samples if sample.frames >= 9 * tenth)
@@ -105,8 +112,8 @@ def _speed(start: Sample, end: Sample) -> float:
 
 
 def table(samples: Sequence[Sample]) -> list[str]:
-    """Return a few of the samples as lines, with the speed since the one before."""
-    step = max(1, (len(samples) - 1) // (ROWS - 1))
+    """Return some of the samples as lines, each with the speed since the one before."""
+    step = max(1, (len(samples) - 1) // (TABLE_ROWS - 1))
     shown = [*samples[:-1:step], samples[-1]]
     lines = ["frames  frames/s  memory MB  peak MB  files  threads"]
     for before, now in pairwise(shown):
@@ -118,28 +125,28 @@ def table(samples: Sequence[Sample]) -> list[str]:
 
 
 def main() -> None:
-    """Run, print the table and the verdict; the exit code is 1 where something crept up."""
+    """Run, and print a table and what grew; the exit code is 1 if anything did."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=main.__doc__)
     parser.add_argument("--frames", type=int, default=FRAMES, help="at least 1000")
     frames = parser.parse_args().frames
-    if frames < FEWEST:
-        parser.error(f"--frames must be at least {FEWEST}")
-    watch = Watch()
+    if frames < MIN_FRAMES:
+        parser.error(f"--frames must be at least {MIN_FRAMES}")
+    sampler = Sampler()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         loop_video(video(folder), folder / "long.mp4", frames)
-        job = VideoJob(
-            folder / "long.mp4", folder / "out.mp4", tracks=folder / "out.jsonl", frames=frames
-        )
-        default = config("default")
-        summary = run_video(job, default.model, default.settings, progress=watch)
+        outputs = Output("video", folder / "out.mp4"), Output("tracks", folder / "out.jsonl")
+        job = VideoJob(folder / "long.mp4", outputs, frames=frames)
+        settings = load_settings(find_config("default"))
+        model = load_detector(settings.detector)
+        summary = run_video(job, model, settings, progress=sampler)
     print(file=sys.stderr)
-    print("\n".join(table(watch.samples)))
-    first, last = tenths(watch.samples)
+    print("\n".join(table(sampler.samples)))
+    first, last = speeds(sampler.samples)
     print(f"\n{summary.frames} frames in {summary.seconds:.0f} s, {summary.tracks} tracks")
     print(f"first tenth {first:.1f} frames/s, last tenth {last:.1f}")
-    found = complaints(watch.samples)
-    print("\n".join(found) or "nothing crept up")
+    found = find_growth(sampler.samples)
+    print("\n".join(found) or "nothing grew")
     sys.exit(1 if found else 0)
 
 

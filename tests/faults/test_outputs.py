@@ -8,15 +8,12 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from faults.conftest import Start
-from red_cars import SETTINGS, red_finder
+from faults.conftest import Start, job_of
 from running import names, write_drive
-from vdet.batch.task import process_file
+from vdet.batch.task import Work, process_file
 from vdet.media import Frame
 from vdet.media.encoder import Encoder
 from vdet.pipeline.loop import VideoJob
-from vdet.track.motion import MotionTracker
-from vdet.track.rules.tracker import Cars
 
 LIMIT = 5_000  # bytes: the short clip is smaller, the others are not
 CAP_DAC_OVERRIDE = 1
@@ -57,11 +54,11 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
 @pytest.fixture
 def job(tmp_path: Path) -> VideoJob:
     source = write_drive(tmp_path / "clip.mp4", 150)
-    return VideoJob(source, tmp_path / "out" / "clip.mp4", tmp_path / "out" / "clip.csv")
+    return job_of(source, tmp_path / "out")
 
 
 def test_a_writer_that_fails_at_the_100th_frame(
-    job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    job: VideoJob, work: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write = Encoder.write
     written: list[int] = []
@@ -73,21 +70,21 @@ def test_a_writer_that_fails_at_the_100th_frame(
         write(encoder, frame)
 
     monkeypatch.setattr(Encoder, "write", write_99)
-    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
-    assert record.error == f"{job.video}: cannot be written: Input/output error"
+    record = process_file(job, work=work)
+    assert record.error == f"{job.outputs[0].path}: cannot be written: Input/output error"
     assert written == list(range(99))
     assert names(tmp_path / "out") == []
 
 
 def test_a_tracker_that_raises(
-    run: Run, job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run, job: VideoJob, work: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def update(*_: object) -> None:
-        raise ZeroDivisionError("no\nscale")
+    class FailingTracker:
+        def update(self, *_: object) -> None:
+            raise ZeroDivisionError("no\nscale")
 
-    for tracker in (Cars, MotionTracker):
-        monkeypatch.setattr(tracker, "update", update)
-    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
+    monkeypatch.setattr("vdet.pipeline.loop.make_tracker", lambda *_: FailingTracker())
+    record = process_file(job, work=work)
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
     result = run("detect-video", job.source, tmp_path / "out" / "single.mp4")
