@@ -12,8 +12,8 @@ import pytest
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.geometry import Box
 
-BOXES = [[10, 20, 40, 60], [0.5, 1.5, 3.25, 4.75], [-5, -6, 7, 8]]
-SCORES = [0.9, 0.5, 0.125]
+BOXES: list[list[float]] = [[10, 20, 40, 60], [0.5, 1.5, 3.25, 4.75], [-5, -6, 7, 8]]
+SCORES: list[float] = [0.9, 0.5, 0.125]
 TYPED = Detections(BOXES, SCORES, classes=[1, 0, 1], names=("car", "lorry"))
 
 
@@ -105,8 +105,9 @@ class TestValidation:
         "box", [[5, 5, 5, 9], [5, 5, 9, 5], [9, 5, 5, 9], [5, 9, 9, 5], [5, 5, 5, 5]]
     )
     def test_a_box_without_an_area_is_refused(self, box: list[float]) -> None:
+        boxes: list[list[float]] = [[0, 0, 1, 1], box]
         with pytest.raises(ValueError, match=r"^boxes: .* no area; give x1 < x2 and y1 < y2"):
-            Detections([[0, 0, 1, 1], box], [0.5, 0.5])
+            Detections(boxes, [0.5, 0.5])
 
     @pytest.mark.parametrize("score", [-0.01, 1.01, 100])
     def test_a_score_outside_0_to_1_is_refused(self, score: float) -> None:
@@ -141,7 +142,7 @@ class TestImmutability:
         assert detections.centroids[0].tolist() == [10, 20]
 
 
-class TestSlicing:
+class TestRows:
     DETECTIONS = Detections(
         BOXES,
         SCORES,
