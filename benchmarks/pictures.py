@@ -1,7 +1,7 @@
 """How well vehicles are found in labelled pictures of many roads: `python -m benchmarks.pictures`.
 
-A folder holds pictures and `annotations.json` in COCO form. `iscrowd: 1` marks an ignore region. Each
-picture is searched for itself, as `vdet detect-image` does.
+A folder holds pictures and `annotations.json` in COCO form; `iscrowd: 1` marks an ignore region.
+Each picture is searched for itself, as `vdet detect-image` does.
 """
 
 import argparse

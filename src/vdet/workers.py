@@ -105,7 +105,10 @@ class LocalProcesses:
         from joblib.externals.loky import ProcessPoolExecutor
 
         executor = ProcessPoolExecutor(
-            self.count, initializer=_initialize_worker, initargs=(os.getpid(),), env=ENVIRONMENT
+            max(1, min(self.count, len(items))),
+            initializer=_initialize_worker,
+            initargs=(os.getpid(),),
+            env=ENVIRONMENT,
         )
         waiting = iter(enumerate(items))
         in_work: dict[Future[R], int] = {}
