@@ -34,6 +34,7 @@ from vdet.learn.training_set import lesson_of
 from vdet.media import VideoReader
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import Follow, tracker_of
+from vdet.workers import make_workers
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
@@ -87,14 +88,16 @@ def _frames_of(files: Sequence[PatchFile]) -> Numbers:
 def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
     files, boxed = find_patches(sources), find_boxed(sources)
     training = settings.training
+    workers = make_workers()
     data = extract(
         files,
         settings.features,
         max_broken=0,
+        workers=workers,
         look=partial(views_of, settings=training.views),
         seed=training.seed,
     )
-    boxes = describe_boxes(files, boxed, settings, jobs=-1, progress=lambda _: None)
+    boxes = describe_boxes(files, boxed, settings, workers=workers, progress=lambda _: None)
     assert boxes is not None
     boxed_data = boxes.boxed
     assert boxed_data is not None

@@ -1,4 +1,4 @@
-"""Outputs that cannot be written, and the part of the program that breaks."""
+"""Outputs that cannot be written, and an error inside the program."""
 
 import ctypes
 import json
@@ -36,7 +36,7 @@ def test_a_full_disk_fails_what_does_not_fit(launch: Start, clips: Path, tmp_pat
         assert f"failed: {errors[name]}\n" in result.err
 
 
-def _without_the_powers_of_root() -> None:
+def _give_up_root_access_to_files() -> None:
     if os.geteuid() == 0:
         ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, 0, 0, 0)
 
@@ -46,7 +46,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
 ) -> None:
     tmp_path.chmod(0o555)
     arguments = ("detect-video", clips, "-d", tmp_path / "out")
-    result = launch(*arguments, before=_without_the_powers_of_root).finish()
+    result = launch(*arguments, before=_give_up_root_access_to_files).finish()
     assert result.code == 1
     assert f"the folder {tmp_path} cannot be written to" in result.err
     assert result.err.count("\n") == 1

@@ -31,6 +31,7 @@ from vdet.learn.fitting import fit
 from vdet.learn.splits import hold_out
 from vdet.learn.training import train
 from vdet.media.images import Image, read_image, write_image
+from vdet.workers import LocalProcesses, ThisProcess
 
 SIZE = 16
 GROUPS = {
@@ -117,7 +118,7 @@ def tolerant(share: float) -> Settings:
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
-    vectors = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    vectors = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess())
     assert vectors.groups.tolist() == [file.group for file in files]
     assert vectors.vehicle.tolist() == [file.vehicle for file in files]
     assert vectors.vehicle.sum() == 32
@@ -132,7 +133,7 @@ def test_patches_are_described_in_order_with_their_class_and_group(files: list[P
 
 def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
     larger = SETTINGS.features.model_copy(update={"patch": 32})
-    vectors = extract(files, larger, max_broken=0, jobs=1).vectors
+    vectors = extract(files, larger, max_broken=0, workers=ThisProcess()).vectors
     np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
 
 
@@ -140,8 +141,8 @@ def test_several_processes_give_the_same_as_one(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
-    one = extract(files, SETTINGS.features, max_broken=0, look=LOOK, jobs=1)
-    two = extract(files, SETTINGS.features, max_broken=0, look=LOOK, jobs=2)
+    one = extract(files, SETTINGS.features, max_broken=0, look=LOOK, workers=ThisProcess())
+    two = extract(files, SETTINGS.features, max_broken=0, look=LOOK, workers=LocalProcesses(2))
     np.testing.assert_array_equal(one.vectors, two.vectors)
     np.testing.assert_array_equal(one.groups, two.groups)
     assert one.digest == two.digest
@@ -156,7 +157,9 @@ def test_views_are_described_with_the_row_of_their_patch(
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
     mirror = partial(views_of, settings=ViewSettings(mirror=True, cut=0, parts=0))
-    views = extract(files, SETTINGS.features, max_broken=0, look=mirror, jobs=1).views
+    views = extract(
+        files, SETTINGS.features, max_broken=0, look=mirror, workers=ThisProcess()
+    ).views
     assert views is not None
     assert views.origins.tolist() == list(range(57))
     assert views.vehicle.tolist() == [file.vehicle for file in files]
@@ -167,7 +170,9 @@ def test_views_are_described_with_the_row_of_their_patch(
 
 def test_a_patch_has_the_same_views_in_whatever_set_it_is(files: list[PatchFile]) -> None:
     whole, one = (
-        extract(some, SETTINGS.features, max_broken=0, look=LOOK, seed=7, jobs=1).views
+        extract(
+            some, SETTINGS.features, max_broken=0, look=LOOK, seed=7, workers=ThisProcess()
+        ).views
         for some in (files, files[40:41])
     )
     assert whole is not None
@@ -179,12 +184,12 @@ def test_a_patch_has_the_same_views_in_whatever_set_it_is(files: list[PatchFile]
 def test_a_process_that_is_killed_is_an_error(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def be_killed(*_: object) -> None:
+    def be_killed(*_: object, **__: object) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
     monkeypatch.setattr("vdet.learn.extraction._describe_chunk", be_killed)
     with pytest.raises(DataError, match="a process that described patches was killed"):
-        extract(files, SETTINGS.features, max_broken=0, jobs=2)
+        extract(files, SETTINGS.features, max_broken=0, workers=LocalProcesses(2))
 
 
 def test_progress_adds_up_to_the_number_of_patches(
@@ -192,13 +197,13 @@ def test_progress_adds_up_to_the_number_of_patches(
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
     steps: list[int] = []
-    extract(files, SETTINGS.features, max_broken=0, jobs=1, progress=steps.append)
+    extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess(), progress=steps.append)
     assert steps == [10, 10, 10, 10, 10, 7]
 
 
 def test_the_digest_tells_data_sets_apart(files: list[PatchFile]) -> None:
     whole, same, fewer, renamed = (
-        extract(some, SETTINGS.features, max_broken=0, jobs=1).digest
+        extract(some, SETTINGS.features, max_broken=0, workers=ThisProcess()).digest
         for some in (
             files,
             files,
@@ -219,7 +224,7 @@ def test_a_file_whose_name_is_no_text_is_part_of_the_digest(tmp_path: Path) -> N
         path.parent.mkdir(parents=True)
         write_image(path, picture)
         odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
-        digests.add(extract([odd], SETTINGS.features, max_broken=0, jobs=1).digest)
+        digests.add(extract([odd], SETTINGS.features, max_broken=0, workers=ThisProcess()).digest)
     assert len(digests) == 2
 
 
@@ -228,10 +233,10 @@ def test_broken_patches_are_named_skipped_and_counted(
 ) -> None:
     mixed = with_broken(files, tmp_path, 2)
     with caplog.at_level(logging.WARNING, "vdet"):
-        vectors = extract(mixed, SETTINGS.features, max_broken=0.1, jobs=1)
+        vectors = extract(mixed, SETTINGS.features, max_broken=0.1, workers=ThisProcess())
     assert vectors.broken == 2
     assert vectors.groups.tolist() == [file.group for file in files]
-    whole = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    whole = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess())
     np.testing.assert_array_equal(vectors.vectors, whole.vectors)
     assert [record.message for record in caplog.records] == [
         f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(2)
@@ -243,7 +248,7 @@ def test_of_many_broken_patches_the_first_are_named(
 ) -> None:
     mixed = with_broken(files, tmp_path, MAX_NAMED + 3)
     with caplog.at_level(logging.WARNING, "vdet"):
-        extract(mixed, SETTINGS.features, max_broken=0.5, jobs=1)
+        extract(mixed, SETTINGS.features, max_broken=0.5, workers=ThisProcess())
     assert len(caplog.records) == MAX_NAMED + 1
     assert caplog.records[-1].message == "… and 3 more"
 
@@ -309,7 +314,7 @@ def test_without_views_the_model_is_fitted_to_the_patches_that_are_not_held_out(
 ) -> None:
     settings = but(split=name, views=NO_VIEWS)
     model, report = train(files, settings, jobs=1)
-    data = extract(files, SETTINGS.features, max_broken=0, jobs=1)
+    data = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess())
     kept = ~hold_out(data.groups, name, settings.training.test_fraction, settings.training.seed)
     expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.features, settings.training)
     np.testing.assert_array_equal(model.weights, expected.weights)
@@ -348,7 +353,7 @@ def test_the_model_is_that_of_the_configured_split_which_comes_first(
     settings = but(split=split)
     model, report = train(files, settings, jobs=1)
     assert [part.split for part in report.splits] == order.split()
-    vectors = extract(files, settings.features, max_broken=0, jobs=1)
+    vectors = extract(files, settings.features, max_broken=0, workers=ThisProcess())
     right = (model.probabilities(vectors.vectors) >= 0.5) == vectors.vehicle
     first = report.splits[0]
     accuracy = first.train_patches * first.train_accuracy + first.test_patches * first.test_accuracy
@@ -376,7 +381,7 @@ def test_a_trained_model_says_where_it_is_from_and_can_be_kept(
     assert provenance["program"] == f"vdet {vdet.__version__}"
     assert provenance["training"] == SETTINGS.training.model_dump(mode="json")
     assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
-    digest = extract(files, SETTINGS.features, max_broken=0, jobs=1).digest
+    digest = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess()).digest
     assert provenance["data_sha256"] == digest
     np.testing.assert_array_equal(loaded.weights, model.weights)
 
@@ -445,7 +450,7 @@ def test_vehicles_from_sets_without_boxes_are_taken_to_fill_their_patch(
     model, _ = train(files, settings, jobs=1)
     assert model.boxes is not None
     vehicles = [file for file in files if file.vehicle]
-    described = extract(vehicles, SETTINGS.features, max_broken=0, jobs=1).vectors
+    described = extract(vehicles, SETTINGS.features, max_broken=0, workers=ThisProcess()).vectors
     hogs = described[:, : Layout.of(SETTINGS.features).hog_length]
     left, top, right, bottom = model.boxes.sides(hogs).mean(axis=0).tolist()
     if assumed:
@@ -467,6 +472,7 @@ def test_the_digest_tells_boxes_apart(mined: Path) -> None:
     boxed = find_boxed([mined])
     moved = [replace(boxed[0], sides=(None, 0.0, None, 0.1)), *boxed[1:]]
     one, other = (
-        extract(some, SETTINGS.features, max_broken=0, jobs=1).digest for some in (boxed, moved)
+        extract(some, SETTINGS.features, max_broken=0, workers=ThisProcess()).digest
+        for some in (boxed, moved)
     )
     assert one != other

@@ -12,7 +12,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from vdet.pipeline.threads import (
-    Stalled,
+    StalledError,
     map_ordered,
     prefetch,
     run_in_thread,
@@ -44,7 +44,7 @@ def ctrl_c() -> Iterator[Callable[[], None]]:
 def hang(no_thread_is_left: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """What a thread can wait for as if for ever: the end of the test."""
     assert no_thread_is_left is None
-    monkeypatch.setattr("vdet.pipeline.threads._MOMENT", 0.1)
+    monkeypatch.setattr("vdet.pipeline.threads.JOIN_TIMEOUT", 0.1)
     event = threading.Event()
     yield event
     event.set()
@@ -159,7 +159,7 @@ class TestAhead:
             hang.wait()
 
         read: list[int] = []
-        with pytest.raises(Stalled), prefetch(items(), patience=0.2) as given:
+        with pytest.raises(StalledError), prefetch(items(), timeout=0.2) as given:
             read.extend(given)
         assert read == [1]
 
@@ -186,8 +186,8 @@ class TestAside:
         assert caught.value is error
 
     def test_a_call_that_hangs_is_given_up(self, hang: threading.Event) -> None:
-        with pytest.raises(Stalled):
-            run_in_thread(hang.wait, patience=0.1)
+        with pytest.raises(StalledError):
+            run_in_thread(hang.wait, timeout=0.1)
 
 
 class TestBehind:
@@ -311,13 +311,13 @@ class TestBehind:
                 raise
 
         with (
-            pytest.raises(Stalled),
-            write_async(lambda _: hang.wait(), 1, within=within(), patience=0.2) as hand_over,
+            pytest.raises(StalledError),
+            write_async(lambda _: hang.wait(), 1, within=within(), timeout=0.2) as hand_over,
         ):
             hand_all(range(10), hand_over)
         assert left == [], "the thread hangs: what it has open is not touched"
         hang.set()
-        until(lambda: left == ["_Over"])
+        until(lambda: left == ["_ClosedError"])
 
     @Errors
     def test_after_an_error_of_the_giver_what_was_given_is_still_taken(

@@ -16,6 +16,7 @@ from vdet.learn.regression import Weights, fit_boxes
 from vdet.learn.report import BoxError
 from vdet.learn.splits import Held, SplitName, hold_out
 from vdet.learn.training_set import Lesson, lesson_of
+from vdet.workers import Workers
 
 _FILLED: Sides = (-0.47, -0.40, 0.47, 0.42)
 """Where a vehicle is in a patch of the Udacity set, as a rule."""
@@ -37,7 +38,7 @@ def describe_boxes(
     boxed: Sequence[PatchFile],
     settings: Settings,
     *,
-    jobs: int,
+    workers: Workers,
     progress: Callable[[int], object],
 ) -> BoxPatches | None:
     """Describe what the regression learns from besides `files`; None where no box is known.
@@ -54,7 +55,7 @@ def describe_boxes(
         return None
     training = settings.training
     describe = partial(
-        extract, settings=settings.svm.features, max_broken=training.max_broken, jobs=jobs
+        extract, settings=settings.svm.features, max_broken=training.max_broken, workers=workers
     )
     whole = training.views.model_copy(update={"parts": 0.0})  # parts have no box
     look = partial(views_of, settings=whole)

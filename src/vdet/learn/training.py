@@ -3,7 +3,6 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -11,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 import vdet
-from vdet.cluster import on_cluster
 from vdet.config.schema import Settings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import LinearModel
@@ -24,6 +22,7 @@ from vdet.learn.fitting import fit
 from vdet.learn.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
 from vdet.learn.splits import SplitName, hold_out
 from vdet.learn.training_set import lesson_of
+from vdet.workers import make_workers
 
 _TIMED_PATCHES = 200
 
@@ -33,7 +32,7 @@ def train(
     settings: Settings,
     *,
     boxed: Sequence[PatchFile] = (),
-    jobs: int = -1,
+    jobs: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> tuple[LinearModel, TrainingReport]:
@@ -45,7 +44,7 @@ def train(
         Patches of neither class that tell where a vehicle is. With them, or with `files` that
         tell it, the model learns to find the sides of vehicles.
     jobs
-        Processes, as joblib counts them: -1 for one a core.
+        Processes that describe the patches; None for one for each core.
     scheduler
         Address of a Dask scheduler whose workers describe the patches instead.
     progress
@@ -65,17 +64,17 @@ def train(
     """
     began = time.perf_counter()
     training = settings.training
-    with on_cluster(scheduler) if scheduler else nullcontext():
-        data = extract(
-            files,
-            settings.svm.features,
-            max_broken=training.max_broken,
-            look=partial(views_of, settings=training.views),
-            seed=training.seed,
-            jobs=jobs,
-            progress=progress,
-        )
-        boxes = describe_boxes(files, boxed, settings, jobs=jobs, progress=progress)
+    workers = make_workers(jobs, scheduler)
+    data = extract(
+        files,
+        settings.svm.features,
+        max_broken=training.max_broken,
+        look=partial(views_of, settings=training.views),
+        seed=training.seed,
+        workers=workers,
+        progress=progress,
+    )
+    boxes = describe_boxes(files, boxed, settings, workers=workers, progress=progress)
     extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != training.split)

@@ -13,6 +13,7 @@ from vdet.learn.extraction import LabelledVectors, extract
 from vdet.learn.patch_eval.results import PatchReport
 from vdet.learn.patch_eval.summary import sum_up
 from vdet.learn.patch_eval.trials import SplitName, Trial, holdouts, model_trial, run_trial
+from vdet.workers import make_workers
 
 Advance = Callable[[int], object]
 Progress = Callable[[int | None], Advance]
@@ -29,7 +30,7 @@ def evaluate_splits(
     settings: Settings,
     splits: Sequence[SplitName],
     *,
-    jobs: int = -1,
+    jobs: int | None = None,
     progress: Progress = lambda _: lambda _: None,
 ) -> PatchReport:
     """Train afresh for each split, and test on what was held out.
@@ -37,7 +38,7 @@ def evaluate_splits(
     Parameters
     ----------
     jobs
-        Processes that describe patches, as joblib counts them: -1 for one a core.
+        Processes that describe patches; None for one for each core.
     progress
         Called with the number of patches to describe, then with that of fits to make; what it
         returns is called with the number done since the last call.
@@ -60,7 +61,7 @@ def evaluate_model(
     model: LinearModel,
     settings: Settings,
     *,
-    jobs: int = -1,
+    jobs: int | None = None,
     progress: Progress = lambda _: lambda _: None,
 ) -> PatchReport:
     """Test a ready model on all patches; parameters and errors as in `evaluate_splits`."""
@@ -72,7 +73,7 @@ def _extract(
     files: Sequence[PatchFile],
     settings: Settings,
     features: FeatureSettings,
-    jobs: int,
+    jobs: int | None,
     advance: Advance,
     *,
     look: Look | None = None,
@@ -83,7 +84,7 @@ def _extract(
         max_broken=settings.training.max_broken,
         look=look,
         seed=settings.training.seed,
-        jobs=jobs,
+        workers=make_workers(jobs),
         progress=advance,
     )
 

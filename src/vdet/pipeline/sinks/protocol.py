@@ -53,7 +53,7 @@ class SinkContext:
         Time of the moment that is asked for (`--at`), seconds from the first frame.
     codec_threads
         Threads of an encoder; None lets it choose.
-    patience
+    timeout
         Seconds after which a write that does not end is given up.
     """
 
@@ -63,7 +63,7 @@ class SinkContext:
     is_part: bool = False
     at: Fraction = Fraction(0)
     codec_threads: int | None = None
-    patience: float | None = None
+    timeout: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
