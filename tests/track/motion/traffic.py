@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from vdet.evaluate.rows import NO_ID, Row, in_memory
 
 from track.motion.scenes import HEIGHT, WIDTH
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.evaluate.rows import NO_ID, Row, in_memory
 from vdet.evaluate.scores import Scores, score
 from vdet.geometry import Float64Array, coverage
 from vdet.track.motion.tracker import MotionTracker
