@@ -1,4 +1,4 @@
-"""`make soak`: does memory, the number of files or the time a frame grow over 20,000 frames?"""
+"""`make soak`: one run over 20,000 frames; memory, open files, threads and time must not grow."""
 
 import argparse
 import sys
@@ -6,32 +6,32 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
-from benchmarks.looping import loop_video
-from benchmarks.material import video
-from vdet.config.loading import find_config, load_settings
-from vdet.detect.factory import load_detector
+import av
+
+from benchmarks.material import find_video, shipped_config
 from vdet.pipeline.loop import VideoJob, run_video
 from vdet.pipeline.sinks.protocol import Output
 
 FRAMES = 20_000
-MIN_FRAMES = 1000
-WARM_UP = 500  # frames; nothing should grow after them
-END = 50  # last frames; the reader has ended when they are processed
-SAMPLE_INTERVAL = 50  # frames
-MAX_MEMORY_GROWTH = 0.10
-MIN_SPEED = 0.85  # of the last tenth, as a share of that of the first
-TABLE_ROWS = 11
+FEWEST = 1000
+WARM = 500  # frames after which nothing may grow
+ENDING = 50  # last frames, in which the reader may have closed its files and threads
+EVERY = 50  # frames between samples
+MEMORY_GROWTH = 0.10
+LEAST_SPEED = 0.85  # of the last tenth, against the first
+ROWS = 11
 
 
 @dataclass(frozen=True)
 class Sample:
-    """The state of this process after a number of frames.
+    """The state of the process after `frames` frames.
 
-    `memory` and `peak` are MB: now, and the highest so far. `files` and `threads` are how many are
-    open, and running.
+    `seconds` since the first frame; `memory` and `peak` in MB, now and at most so far; counts of
+    open files and of threads.
     """
 
     frames: int
@@ -42,8 +42,8 @@ class Sample:
     threads: int
 
 
-class Sampler:
-    """Takes a sample every `SAMPLE_INTERVAL` frames."""
+class ResourceMonitor:
+    """Takes a sample every `EVERY` frames; it is the `progress` of a run."""
 
     def __init__(self) -> None:
         self.samples: list[Sample] = []
@@ -51,7 +51,7 @@ class Sampler:
         self._began = time.perf_counter()
 
     def __call__(self, _: int | None) -> Callable[[int], None]:
-        """Take the first sample; this is the `progress` of a run."""
+        """Take the first sample; return what is called with the number of frames done."""
         self._began = time.perf_counter()
         self.samples.append(self._sample())
         return self._advance
@@ -59,9 +59,9 @@ class Sampler:
     def _advance(self, frames: int) -> None:
         before = self._frames
         self._frames += frames
-        if self._frames // SAMPLE_INTERVAL > before // SAMPLE_INTERVAL:
+        if self._frames // EVERY > before // EVERY:
             self.samples.append(self._sample())
-            if self._frames % 1000 < SAMPLE_INTERVAL:
+            if self._frames % 1000 < EVERY:
                 print(f"\r{self._frames} frames", end="", file=sys.stderr, flush=True)
 
     def _sample(self) -> Sample:
@@ -79,27 +79,27 @@ def _megabytes(status: str, field: str) -> float:
 
 
 def find_growth(samples: Sequence[Sample]) -> list[str]:
-    """Return a line about each thing that grew; `samples` are of a whole run."""
-    warm = next(sample for sample in samples if sample.frames >= WARM_UP)
-    later = [sample for sample in samples if sample.frames >= WARM_UP]
+    """Say what grew in a run, a line each; the first and last sample are its start and its end."""
+    warm = next(sample for sample in samples if sample.frames >= WARM)
+    later = [sample for sample in samples if sample.frames >= WARM]
     found = []
-    if (grown := later[-1].peak / warm.peak - 1) > MAX_MEMORY_GROWTH:
+    if (growth := later[-1].peak / warm.peak - 1) > MEMORY_GROWTH:
         found.append(
-            f"peak memory grew by {grown:.1%} after the first {WARM_UP} frames, "
-            f"from {warm.peak:.0f} to {later[-1].peak:.0f} MB"
+            f"peak memory grew by {growth:.1%} after the first {WARM} frames, from {warm.peak:.0f} "
+            f"to {later[-1].peak:.0f} MB"
         )
-    before_end = [s for s in later if s.frames <= later[-1].frames - END]
+    running = [s for s in later if s.frames <= later[-1].frames - ENDING]
     for name in ("files", "threads"):
-        counts = sorted({getattr(sample, name) for sample in before_end})
+        counts = sorted({getattr(sample, name) for sample in running})
         if len(counts) > 1:
             found.append(f"the number of {name} went from {counts[0]} to {counts[-1]}")
-    first, last = speeds(samples)
-    if last < MIN_SPEED * first:
+    first, last = tenths(samples)
+    if last < LEAST_SPEED * first:
         found.append(f"the last tenth ran at {last:.1f} frames/s, the first at {first:.1f}")
     return found
 
 
-def speeds(samples: Sequence[Sample]) -> tuple[float, float]:
+def tenths(samples: Sequence[Sample]) -> tuple[float, float]:
     """Return the frames/s of the first and of the last tenth of the run."""
     tenth = samples[-1].frames / 10
     first = next(sample for sample in samples if sample.frames >= tenth)
@@ -112,8 +112,8 @@ def _speed(start: Sample, end: Sample) -> float:
 
 
 def table(samples: Sequence[Sample]) -> list[str]:
-    """Return some of the samples as lines, each with the speed since the one before."""
-    step = max(1, (len(samples) - 1) // (TABLE_ROWS - 1))
+    """Return some of the samples as lines, each with the speed since the line before."""
+    step = max(1, (len(samples) - 1) // (ROWS - 1))
     shown = [*samples[:-1:step], samples[-1]]
     lines = ["frames  frames/s  memory MB  peak MB  files  threads"]
     for before, now in pairwise(shown):
@@ -124,30 +124,59 @@ def table(samples: Sequence[Sample]) -> list[str]:
     return lines
 
 
+def loop_video(source: Path, target: Path, frames: int) -> None:
+    """Repeat the packets of a video until it has at least `frames` frames; sound is left out."""
+    written, offset = 0, 0
+    with av.open(str(target), "w") as output:
+        stream: av.VideoStream | None = None
+        while written < frames:
+            with av.open(str(source)) as reader:
+                video = reader.streams.video[0]
+                stream = stream or output.add_stream_from_template(video)
+                length = 0
+                for packet in reader.demux(video):
+                    if packet.dts is None or packet.pts is None:
+                        continue
+                    length = max(length, packet.pts + _duration(packet, video))
+                    packet.pts += offset
+                    packet.dts += offset
+                    packet.stream = stream
+                    output.mux(packet)
+                    written += 1
+            offset += length
+
+
+def _duration(packet: "av.Packet[av.VideoStream]", video: av.VideoStream) -> int:
+    rate, base = video.average_rate or Fraction(25), packet.time_base or Fraction(1, 25)
+    return packet.duration or round(1 / (rate * base))
+
+
 def main() -> None:
-    """Run, and print a table and what grew; the exit code is 1 if anything did."""
+    """Run, print the samples and what grew; the exit code is 1 where something grew."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=main.__doc__)
     parser.add_argument("--frames", type=int, default=FRAMES, help="at least 1000")
     frames = parser.parse_args().frames
-    if frames < MIN_FRAMES:
-        parser.error(f"--frames must be at least {MIN_FRAMES}")
-    sampler = Sampler()
+    if frames < FEWEST:
+        parser.error(f"--frames must be at least {FEWEST}")
+    monitor = ResourceMonitor()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        loop_video(video(folder), folder / "long.mp4", frames)
-        outputs = Output("video", folder / "out.mp4"), Output("tracks", folder / "out.jsonl")
+        loop_video(find_video(folder), folder / "long.mp4", frames)
+        outputs = (
+            Output("video", folder / "out.mp4"),
+            Output("tracks", folder / "out.jsonl"),
+        )
         job = VideoJob(folder / "long.mp4", outputs, frames=frames)
-        settings = load_settings(find_config("default"))
-        model = load_detector(settings.detector)
-        summary = run_video(job, model, settings, progress=sampler)
+        default = shipped_config("default")
+        summary = run_video(job, default.detector, default.settings, progress=monitor)
     print(file=sys.stderr)
-    print("\n".join(table(sampler.samples)))
-    first, last = speeds(sampler.samples)
+    print("\n".join(table(monitor.samples)))
+    first, last = tenths(monitor.samples)
     print(f"\n{summary.frames} frames in {summary.seconds:.0f} s, {summary.tracks} tracks")
     print(f"first tenth {first:.1f} frames/s, last tenth {last:.1f}")
-    found = find_growth(sampler.samples)
-    print("\n".join(found) or "nothing grew")
-    sys.exit(1 if found else 0)
+    grown = find_growth(monitor.samples)
+    print("\n".join(grown) or "nothing grew")
+    sys.exit(1 if grown else 0)
 
 
 if __name__ == "__main__":

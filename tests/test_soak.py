@@ -1,10 +1,10 @@
-"""What `make soak` reports about a run."""
+"""The report of `make soak`."""
 
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from benchmarks.soak import Sample, find_growth, speeds, table
+from benchmarks.soak import Sample, find_growth, table, tenths
 
 STEADY = [
     Sample(frames, frames / 100, 290 + frames % 7, min(300, 200 + frames), 20, 12)
@@ -13,16 +13,16 @@ STEADY = [
 
 
 def ending_with(**changes: Any) -> list[Sample]:
-    """Return the samples of a run that is steady except for its last 100 frames."""
+    """Return a run that is steady but for its last 100 frames."""
     return [*STEADY[:-2], *(replace(sample, **changes) for sample in STEADY[-2:])]
 
 
-def test_in_a_steady_run_nothing_grows() -> None:
+def test_nothing_grows_in_a_steady_run() -> None:
     assert find_growth(STEADY) == []
-    assert speeds(STEADY) == pytest.approx((100, 100))
+    assert tenths(STEADY) == pytest.approx((100, 100))
 
 
-def test_the_first_500_frames_do_not_count() -> None:
+def test_growth_before_the_500th_frame_does_not_count() -> None:
     cold = [replace(s, files=3, threads=1) if s.frames < 500 else s for s in STEADY]
     assert find_growth(cold) == []
 
@@ -43,7 +43,7 @@ def test_what_grows_is_named(changes: dict[str, Any], words: list[str]) -> None:
     assert find_growth(ending_with(**changes)) == words
 
 
-def test_the_reader_may_end_before_the_last_frames() -> None:
+def test_the_reader_may_close_its_files_and_threads_at_the_end() -> None:
     assert find_growth([*STEADY[:-1], replace(STEADY[-1], files=19, threads=11)]) == []
 
 
@@ -57,7 +57,7 @@ def test_a_run_that_gets_slower_is_named(speed: float, slow: bool) -> None:
     assert find_growth(slowing) == (words if slow else [])
 
 
-def test_the_table_has_a_line_a_tenth() -> None:
+def test_the_table_has_a_line_for_each_tenth() -> None:
     lines = table(STEADY)
     assert len(lines) == 11
     assert lines[-1].split() == ["20000", "100.0", "291", "300", "20", "12"]

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vdet.config.loading import format_key, load_settings
+from vdet.config.loading import find_config, format_key, load_settings
 from vdet.config.schema import (
     HeatSettings,
     SearchSettings,
@@ -351,3 +351,30 @@ def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> 
     file = tmp_path / "my.yaml"
     file.write_text("detector:\n  # kind: svm\n  heat:\n    # threshold: 2\ntracker:\n")
     assert load_settings(file) == load_settings()
+
+
+@pytest.fixture
+def _in_an_empty_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("_in_an_empty_folder")
+class TestFindConfig:
+    def test_shipped_configs_are_found_by_their_names(self) -> None:
+        assert load_settings(find_config("default")) == Settings()
+        assert load_settings(find_config("seed")).svm.features.patch == 64
+
+    def test_a_path_is_taken_as_it_is(self, tmp_path: Path) -> None:
+        (tmp_path / "my.yaml").touch()
+        assert find_config("my.yaml") == Path("my.yaml")
+        assert find_config(str(tmp_path / "my.yaml")) == tmp_path / "my.yaml"
+
+    def test_a_file_of_the_name_goes_before_the_shipped_config(self, tmp_path: Path) -> None:
+        (tmp_path / "seed").touch()
+        assert find_config("seed") == Path("seed")
+
+    @pytest.mark.parametrize("name", ["no", "seed.yaml", "../configs/seed"])
+    def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:
+        with pytest.raises(ConfigError) as error:
+            find_config(name)
+        assert str(error.value) == f"{name}: no such file; shipped configs are: default, seed"

@@ -5,12 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from red_cars import SETTINGS, red_finder
 from running import Gate, Running, start, write_drive
-from vdet.batch.task import Work
-from vdet.detect.svm.model import save_model
-from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output
 
 Start = Callable[..., Running]
 
@@ -33,20 +28,6 @@ def launch() -> Iterator[Start]:
 def gate(tmp_path_factory: pytest.TempPathFactory) -> Gate:
     """A gate that is closed."""
     return Gate(tmp_path_factory.mktemp("gate"))
-
-
-def job_of(source: Path, folder: Path) -> VideoJob:
-    """Return a job that writes a video and tracks into a folder."""
-    video, tracks = (folder / f"{source.stem}{suffix}" for suffix in (".mp4", ".csv"))
-    return VideoJob(source, (Output("video", video), Output("tracks", tracks)))
-
-
-@pytest.fixture(scope="session")
-def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
-    """What a file of a batch is processed with: the model that finds red cars."""
-    path = tmp_path_factory.mktemp("model") / "red.npz"
-    save_model(red_finder(), path)
-    return Work(SETTINGS, path, threads=1)
 
 
 @pytest.fixture(scope="session")

@@ -10,12 +10,13 @@ from pathlib import Path
 import av
 import pytest
 
-from faults.conftest import Start, job_of
-from red_cars import SETTINGS, red_model
+from faults.conftest import Start
+from red_cars import SETTINGS, red_model, red_work
 from running import frames_of, names, until, write_drive
-from vdet.batch.task import Work, process_file
+from vdet.batch.task import process_file
 from vdet.errors import VideoError
 from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.sinks.protocol import Output
 
 COUNT = 60
 
@@ -30,7 +31,10 @@ def clip(tmp_path: Path) -> Path:
 @pytest.fixture
 def job(clip: Path, tmp_path: Path) -> VideoJob:
     (tmp_path / "out").mkdir()
-    return job_of(clip, tmp_path / "out")
+    outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
+    return VideoJob(
+        clip, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
+    )
 
 
 def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Callable[[int], None]]:
@@ -49,9 +53,9 @@ def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: VideoJo
     assert frames_of(job.outputs[0].path) == COUNT
 
 
-def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob, work: Work) -> None:
+def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob, tmp_path: Path) -> None:
     job.source.unlink()
-    record = process_file(job, work=work)
+    record = process_file(job, work=red_work(tmp_path))
     assert record.error == f"{job.source}: there is no such file; check the name"
     assert record.frames is None
 

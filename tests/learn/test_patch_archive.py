@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from vdet.errors import OutputError
-from vdet.learn.dataset import Sides, find_boxed, find_patches, read_patches
-from vdet.learn.mining.archive import patch_archive
+from vdet.learn.dataset import Sides, find_boxed, find_patches, patch_archive, read_patches
 from vdet.media.images import Image
 
 NAMES = ("vehicles/a/1.png", "boxes/a/2.png", "non-vehicles/a/3.png")
