@@ -101,7 +101,7 @@ def test_an_error_of_the_function_is_raised(
 def test_when_a_worker_is_killed_the_other_items_have_their_results(address: str) -> None:
     """An item that waited at that worker may be lost too."""
     items = ["10", "__import__('os')._exit(1)", *(str(number) for number in range(12, 20))]
-    results = {}
+    results: dict[int, int] = {}
     with pytest.raises(WorkerKilledError) as caught:
         results.update(pair for pair in DaskCluster(address).map(eval, items))
     lost = caught.value.lost
