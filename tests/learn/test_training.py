@@ -32,6 +32,7 @@ from vdet.learn.fitting import fit
 from vdet.learn.training import train
 from vdet.learn.training_set import hold_out
 from vdet.media.images import Image, read_image, write_image
+from vdet.workers import LocalProcesses, ThisProcess
 
 SIZE = 16
 GROUPS = {
@@ -122,7 +123,7 @@ def tolerant(share: float) -> Settings:
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
-    vectors = extract(files, SETTINGS.svm.features, max_broken=0, jobs=1)
+    vectors = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
     assert vectors.groups.tolist() == [file.group for file in files]
     assert vectors.vehicle.tolist() == [file.vehicle for file in files]
     assert vectors.vehicle.sum() == 32
@@ -137,7 +138,7 @@ def test_patches_are_described_in_order_with_their_class_and_group(files: list[P
 
 def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
     larger = SETTINGS.svm.features.model_copy(update={"patch": 32})
-    vectors = extract(files, larger, max_broken=0, jobs=1).vectors
+    vectors = extract(files, larger, max_broken=0, workers=ThisProcess()).vectors
     np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
 
 
@@ -145,8 +146,12 @@ def test_several_processes_give_the_same_as_one(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
-    one = extract(files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, jobs=1)
-    two = extract(files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, jobs=2)
+    one = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=ThisProcess()
+    )
+    two = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=LocalProcesses(2)
+    )
     np.testing.assert_array_equal(one.vectors, two.vectors)
     np.testing.assert_array_equal(one.groups, two.groups)
     assert one.digest == two.digest
@@ -162,7 +167,7 @@ def test_augmented_samples_have_the_row_of_their_patch(
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
     mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
     augmented = extract(
-        files, SETTINGS.svm.features, max_broken=0, augmenter=mirror, jobs=1
+        files, SETTINGS.svm.features, max_broken=0, augmenter=mirror, workers=ThisProcess()
     ).augmented
     assert augmented is not None
     assert augmented.origins.tolist() == list(range(57))
@@ -175,7 +180,12 @@ def test_augmented_samples_have_the_row_of_their_patch(
 def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile]) -> None:
     whole, one = (
         extract(
-            some, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, seed=7, jobs=1
+            some,
+            SETTINGS.svm.features,
+            max_broken=0,
+            augmenter=AUGMENTER,
+            seed=7,
+            workers=ThisProcess(),
         ).augmented
         for some in (files, files[40:41])
     )
@@ -188,12 +198,12 @@ def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile])
 def test_a_process_that_is_killed_is_an_error(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def be_killed(*_: object) -> None:
+    def be_killed(*_: object, **__: object) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
     monkeypatch.setattr("vdet.learn.extraction._describe_chunk", be_killed)
     with pytest.raises(DataError, match="a process that described patches was killed"):
-        extract(files, SETTINGS.svm.features, max_broken=0, jobs=2)
+        extract(files, SETTINGS.svm.features, max_broken=0, workers=LocalProcesses(2))
 
 
 def test_progress_adds_up_to_the_number_of_patches(
@@ -201,13 +211,15 @@ def test_progress_adds_up_to_the_number_of_patches(
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
     steps: list[int] = []
-    extract(files, SETTINGS.svm.features, max_broken=0, jobs=1, progress=steps.append)
+    extract(
+        files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess(), progress=steps.append
+    )
     assert steps == [10, 10, 10, 10, 10, 7]
 
 
 def test_different_data_sets_have_different_digests(files: list[PatchFile]) -> None:
     whole, same, fewer, renamed = (
-        extract(some, SETTINGS.svm.features, max_broken=0, jobs=1).digest
+        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
         for some in (
             files,
             files,
@@ -228,7 +240,9 @@ def test_a_file_name_that_is_no_text_is_part_of_the_digest(tmp_path: Path) -> No
         path.parent.mkdir(parents=True)
         write_image(path, picture)
         odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
-        digests.add(extract([odd], SETTINGS.svm.features, max_broken=0, jobs=1).digest)
+        digests.add(
+            extract([odd], SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+        )
     assert len(digests) == 2
 
 
@@ -237,10 +251,10 @@ def test_broken_patches_are_named_skipped_and_counted(
 ) -> None:
     mixed = with_broken(files, tmp_path, 2)
     with caplog.at_level(logging.WARNING, "vdet"):
-        vectors = extract(mixed, SETTINGS.svm.features, max_broken=0.1, jobs=1)
+        vectors = extract(mixed, SETTINGS.svm.features, max_broken=0.1, workers=ThisProcess())
     assert vectors.broken == 2
     assert vectors.groups.tolist() == [file.group for file in files]
-    whole = extract(files, SETTINGS.svm.features, max_broken=0, jobs=1)
+    whole = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
     np.testing.assert_array_equal(vectors.vectors, whole.vectors)
     assert [record.message for record in caplog.records] == [
         f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(2)
@@ -252,7 +266,7 @@ def test_only_the_first_broken_patches_are_named(
 ) -> None:
     mixed = with_broken(files, tmp_path, MAX_NAMED + 3)
     with caplog.at_level(logging.WARNING, "vdet"):
-        extract(mixed, SETTINGS.svm.features, max_broken=0.5, jobs=1)
+        extract(mixed, SETTINGS.svm.features, max_broken=0.5, workers=ThisProcess())
     assert len(caplog.records) == MAX_NAMED + 1
     assert caplog.records[-1].message == "… and 3 more"
 
@@ -318,7 +332,7 @@ def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_he
 ) -> None:
     settings = but(split=name, augmentation=NO_AUGMENTATION)
     model, report = train(files, settings, jobs=1)
-    data = extract(files, SETTINGS.svm.features, max_broken=0, jobs=1)
+    data = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
     kept = ~hold_out(data.groups, name, settings.training.test_fraction, settings.training.seed)
     expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.svm.features, settings.training)
     np.testing.assert_array_equal(model.weights, expected.weights)
@@ -357,7 +371,7 @@ def test_the_model_is_that_of_the_configured_split_which_comes_first(
     settings = but(split=split)
     model, report = train(files, settings, jobs=1)
     assert [part.split for part in report.splits] == order.split()
-    vectors = extract(files, settings.svm.features, max_broken=0, jobs=1)
+    vectors = extract(files, settings.svm.features, max_broken=0, workers=ThisProcess())
     right = (model.probabilities(vectors.vectors) >= 0.5) == vectors.vehicle
     first = report.splits[0]
     accuracy = first.train_patches * first.train_accuracy + first.test_patches * first.test_accuracy
@@ -385,7 +399,7 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
     assert provenance["program"] == f"vdet {vdet.__version__}"
     assert provenance["training"] == SETTINGS.training.model_dump(mode="json")
     assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
-    digest = extract(files, SETTINGS.svm.features, max_broken=0, jobs=1).digest
+    digest = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
     assert provenance["data_sha256"] == digest
     np.testing.assert_array_equal(loaded.weights, model.weights)
 
@@ -454,7 +468,9 @@ def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     model, _ = train(files, settings, jobs=1)
     assert model.boxes is not None
     vehicles = [file for file in files if file.vehicle]
-    described = extract(vehicles, SETTINGS.svm.features, max_broken=0, jobs=1).vectors
+    described = extract(
+        vehicles, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()
+    ).vectors
     hogs = described[:, : Layout.of(SETTINGS.svm.features).hog_length]
     left, top, right, bottom = model.boxes.sides(hogs).mean(axis=0).tolist()
     if assumed:
@@ -476,6 +492,7 @@ def test_different_boxes_have_different_digests(mined: Path) -> None:
     boxed = find_boxed([mined])
     moved = [replace(boxed[0], sides=(None, 0.0, None, 0.1)), *boxed[1:]]
     one, other = (
-        extract(some, SETTINGS.svm.features, max_broken=0, jobs=1).digest for some in (boxed, moved)
+        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+        for some in (boxed, moved)
     )
     assert one != other

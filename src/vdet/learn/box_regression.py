@@ -15,6 +15,7 @@ from vdet.learn.dataset import PatchFile, Sides
 from vdet.learn.extraction import LabelledVectors, SampleVectors, extract
 from vdet.learn.report import BoxError
 from vdet.learn.training_set import SplitName, hold_out, training_set
+from vdet.workers import Workers
 
 _ASSUMED_SIDES: Sides = (-0.47, -0.40, 0.47, 0.42)
 """Typical sides of the vehicle in a patch of the Udacity set."""
@@ -40,7 +41,7 @@ def extract_box_patches(
     boxed: Sequence[PatchFile],
     settings: Settings,
     *,
-    jobs: int,
+    workers: Workers,
     progress: Callable[[int], object],
 ) -> BoxPatches | None:
     """Describe the patches that the regression uses besides `files`.
@@ -64,7 +65,7 @@ def extract_box_patches(
         settings=settings.svm.features,
         max_broken=training.max_broken,
         seed=training.seed,
-        jobs=jobs,
+        workers=workers,
     )
     without_parts = training.augmentation.model_copy(update={"parts": 0.0})  # parts have no box
     augmenter = partial(augment, settings=without_parts)

@@ -1,13 +1,12 @@
-"""Patch files and their augmented samples → feature vectors, on all cores."""
+"""Patch files and their augmented samples → feature vectors, in parallel."""
 
 import hashlib
 import logging
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 
-import joblib
 import numpy as np
 import numpy.typing as npt
 
@@ -18,7 +17,7 @@ from vdet.geometry import BoolArray, Float32Array
 from vdet.learn.augmentation import UNKNOWN_SIDES, Augmenter, Sample
 from vdet.learn.dataset import PatchFile, read_patches
 from vdet.media.images import Image
-from vdet.workers import end_with, ignore_sigint
+from vdet.workers import WorkerKilledError, Workers
 
 log = logging.getLogger("vdet")
 
@@ -92,63 +91,69 @@ def extract(
     settings: FeatureSettings,
     *,
     max_broken: float,
+    workers: Workers,
     augmenter: Augmenter | None = None,
     seed: int = 0,
-    jobs: int = -1,
     progress: Callable[[int], object] = lambda _: None,
 ) -> LabelledVectors:
-    """Describe all patches, in parallel processes, in the order given.
+    """Describe all patches; the result has the order of `files`.
 
     Parameters
     ----------
     max_broken
         Tolerated share of unreadable patches; they are named in warnings and skipped.
+    workers
+        They describe the patches, `CHUNK` at a time.
     augmenter
         Makes further samples of each patch, which are described too; None for none.
     seed
         Seed of the augmenter. The samples of a patch depend on it and on the patch, not on the
         other patches.
-    jobs
-        Processes, as joblib counts them: -1 for one a core.
     progress
         Called with the number of patches done since the last call.
 
     Raises
     ------
     DataError
-        More patches than `max_broken` are unreadable, or a process was killed.
+        More patches than `max_broken` are unreadable, or a worker process was killed.
+    ClusterError
+        The cluster of `workers` cannot be used.
     """
     chunks = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)]
-    work = joblib.Parallel(
-        n_jobs=jobs, return_as="generator", initializer=end_with, initargs=(os.getpid(),)
+    describe = partial(_describe_chunk, settings=settings, augmenter=augmenter, seed=seed)
+    parts = _describe_chunks(describe, chunks, workers, progress)
+    good = np.concatenate([part.good for part in parts])
+    _check_broken([file for file, ok in zip(files, good, strict=True) if not ok], files, max_broken)
+    kept = [file for file, ok in zip(files, good, strict=True) if ok]
+    return LabelledVectors(
+        np.concatenate([part.vectors for part in parts]),
+        np.array([file.vehicle for file in kept], bool),
+        np.array([file.group for file in kept], str),
+        _digest(files, [checksum for part in parts for checksum in part.checksums]),
+        len(files) - len(kept),
+        np.array([file.sides or UNKNOWN_SIDES for file in kept], np.float32),
+        _all_augmented(parts),
     )
-    done: list[_Chunk] = []
+
+
+def _describe_chunks(
+    describe: Callable[[Sequence[PatchFile]], "_Chunk"],
+    chunks: Sequence[Sequence[PatchFile]],
+    workers: Workers,
+    progress: Callable[[int], object],
+) -> list["_Chunk"]:
+    parts: dict[int, _Chunk] = {}
     try:
-        with ignore_sigint():
-            described: Iterator[_Chunk] = work(
-                joblib.delayed(_describe_chunk)(chunk, settings, augmenter, seed)
-                for chunk in chunks
-            )
-        for chunk, part in zip(chunks, described, strict=True):
-            done.append(part)
-            progress(len(chunk))
-    except BrokenExecutor as error:
+        with closing(workers.map(describe, chunks)) as results:
+            for number, part in results:
+                parts[number] = part
+                progress(len(chunks[number]))
+    except WorkerKilledError as error:
         raise DataError(
             "a process that described patches was killed; there may be too little memory: try "
             "fewer --jobs"
         ) from error
-    good = np.concatenate([part.good for part in done])
-    _check_broken([file for file, ok in zip(files, good, strict=True) if not ok], files, max_broken)
-    kept = [file for file, ok in zip(files, good, strict=True) if ok]
-    return LabelledVectors(
-        np.concatenate([part.vectors for part in done]),
-        np.array([file.vehicle for file in kept], bool),
-        np.array([file.group for file in kept], str),
-        _digest(files, [checksum for part in done for checksum in part.checksums]),
-        len(files) - len(kept),
-        np.array([file.sides or UNKNOWN_SIDES for file in kept], np.float32),
-        _all_augmented(done),
-    )
+    return [parts[number] for number in range(len(chunks))]
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -11,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 import vdet
-from vdet.cluster import on_cluster
 from vdet.config.schema import Settings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import LinearModel
@@ -24,6 +22,7 @@ from vdet.learn.extraction import LabelledVectors, extract
 from vdet.learn.fitting import fit
 from vdet.learn.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
 from vdet.learn.training_set import SplitName, hold_out, training_set
+from vdet.workers import make_workers
 
 _TIMED_PATCHES = 200
 
@@ -33,7 +32,7 @@ def train(
     settings: Settings,
     *,
     boxed: Sequence[PatchFile] = (),
-    jobs: int = -1,
+    jobs: int | None = None,
     scheduler: str | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> tuple[LinearModel, TrainingReport]:
@@ -65,17 +64,17 @@ def train(
     """
     began = time.perf_counter()
     training = settings.training
-    with on_cluster(scheduler) if scheduler else nullcontext():
-        data = extract(
-            files,
-            settings.svm.features,
-            max_broken=training.max_broken,
-            augmenter=partial(augment, settings=training.augmentation),
-            seed=training.seed,
-            jobs=jobs,
-            progress=progress,
-        )
-        boxes = extract_box_patches(files, boxed, settings, jobs=jobs, progress=progress)
+    workers = make_workers(jobs, scheduler)
+    data = extract(
+        files,
+        settings.svm.features,
+        max_broken=training.max_broken,
+        workers=workers,
+        augmenter=partial(augment, settings=training.augmentation),
+        seed=training.seed,
+        progress=progress,
+    )
+    boxes = extract_box_patches(files, boxed, settings, workers=workers, progress=progress)
     extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != training.split)

@@ -226,7 +226,7 @@ def _check_array(array: Float32Array, shape: tuple[int, ...], name: str, path: P
 
 def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:
     return ", ".join(
-        f"features.{name}: {getattr(ours, name)}, asked for {getattr(asked, name)}"
+        f"detector.features.{name}: {getattr(ours, name)}, asked for {getattr(asked, name)}"
         for name in type(ours).model_fields
         if getattr(ours, name) != getattr(asked, name)
     )

@@ -22,6 +22,7 @@ from vdet.learn.patch_eval.metrics import (
     reliability,
 )
 from vdet.learn.patch_eval.trials import Trial, TrialSplit, holdouts, model_trial, run_trial
+from vdet.workers import make_workers
 
 MOST_MISTAKES = 24
 """Most mistakes of either kind in a report."""
@@ -83,7 +84,7 @@ def evaluate_splits(
     settings: Settings,
     splits: Sequence[TrialSplit],
     *,
-    jobs: int = -1,
+    jobs: int | None = None,
     progress: Progress = lambda _: lambda _: None,
 ) -> PatchReport:
     """Train for each split, and test on the patches that were held out.
@@ -115,7 +116,7 @@ def evaluate_model(
     model: LinearModel,
     settings: Settings,
     *,
-    jobs: int = -1,
+    jobs: int | None = None,
     progress: Progress = lambda _: lambda _: None,
 ) -> PatchReport:
     """Test a ready model on all patches; parameters and errors as in `evaluate_splits`."""
@@ -127,7 +128,7 @@ def _extract(
     files: Sequence[PatchFile],
     settings: Settings,
     features: FeatureSettings,
-    jobs: int,
+    jobs: int | None,
     advance: Advance,
     *,
     augmenter: Augmenter | None = None,
@@ -138,7 +139,7 @@ def _extract(
         max_broken=settings.training.max_broken,
         augmenter=augmenter,
         seed=settings.training.seed,
-        jobs=jobs,
+        workers=make_workers(jobs),
         progress=advance,
     )
 

@@ -25,7 +25,7 @@ from vdet.config.schema import (
     HistogramSettings,
     HogSettings,
     SearchSettings,
-    Settings,
+    SvmSettings,
 )
 from vdet.detect.svm.dense import dense_search
 from vdet.detect.svm.dense.aligned import AlignedSearch, PhasedSearch
@@ -38,11 +38,11 @@ from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import FrameSearch, lay_grids
-from vdet.detect.svm.windows import WindowGrid, Windows, every_nth
+from vdet.detect.svm.windows import WindowGrid, Windows, every_nth, join_windows
 from vdet.geometry import iou_matrix
 from vdet.media.images import Image
 
-SHIPPED = {"seed": SEED, "default": Settings()}
+SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
 GRIDS = {
     "a cell": (AlignedSearch, grid_of(64, step=1)),
     "two cells": (AlignedSearch, grid_of(96, step=2)),
@@ -123,7 +123,7 @@ def _right_of_the_middle(grids: list[WindowGrid]) -> list[WindowGrid]:
 @pytest.mark.parametrize(("width", "height"), [(640, 360), (960, 540), (1920, 1080), (1277, 719)])
 def test_they_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
     model = fitted(SEED_FEATURES)
-    grids = _right_of_the_middle(lay_grids(SEED, model.features, width, height))
+    grids = _right_of_the_middle(lay_grids(SEED.svm, model.features, width, height))
     assert_agree(compare(model, grids, road(width, height)))
 
 
@@ -131,7 +131,7 @@ def test_they_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
 def test_the_default_sets_agree_in_frames_of_any_size(width: int, height: int) -> None:
     # Their strips are halved as the windows would be, whatever the size of the frame.
     model = fitted(FeatureSettings())
-    grids = lay_grids(Settings(), model.features, width, height, horizon=HORIZON)
+    grids = lay_grids(SvmSettings(), model.features, width, height, horizon=HORIZON)
     assert_agree(compare(model, grids, road(width, height)), correlation=0.999)
 
 
@@ -163,7 +163,7 @@ def real_frames(real_data: Path) -> list[Image]:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image]) -> None:
     settings = SHIPPED[name]
-    model = load_model(shipped_model(settings.features))
+    model = load_model(shipped_model(settings))
     grids = lay_grids(settings, model.features, 1280, 720, horizon=find_horizon(real_frames))
     scores = [compare(model, grids, image) for image in real_frames]
     dense, patch = (np.concatenate([getattr(s, e) for s in scores]) for e in ("dense", "patch"))
@@ -173,11 +173,12 @@ def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image])
 def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -> Windows:
     """Search a frame by one set of windows, that of the grid."""
     search = SearchSettings.model_validate({"engine": engine, "probability": PROBABILITY})
-    settings = Settings(search=search)
+    settings = SvmSettings(search=search)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("vdet.detect.svm.search.lay_grids", lambda *_, **__: [grid])
         height, width = image.shape[:2]
-        return FrameSearch(model, settings, width, height).search(image)
+        (windows,) = FrameSearch(model, settings, width, height).search(image)
+        return windows
 
 
 def _without_edges(model: LinearModel) -> LinearModel:
@@ -259,9 +260,9 @@ def test_blocks_away_from_the_edge_of_a_patch_are_the_same(
 
 def test_a_frame_is_searched_at_all_windows_of_all_sets_in_order() -> None:
     model, image = fitted(FeatureSettings()), road()
-    search = FrameSearch(model, Settings(), 1280, 720, horizon=HORIZON)
-    found = search.search(image)
-    grids = lay_grids(Settings(), model.features, 1280, 720, horizon=HORIZON)
+    search = FrameSearch(model, SvmSettings(), 1280, 720, horizon=HORIZON)
+    found = join_windows(search.search(image))
+    grids = lay_grids(SvmSettings(), model.features, 1280, 720, horizon=HORIZON)
     assert list(search.grids) == grids
     np.testing.assert_array_equal(found.boxes, np.concatenate([grid.boxes for grid in grids]))
     one_by_one = compare(model, grids, image)

@@ -10,8 +10,8 @@ from vdet.config.schema import (
     HistogramSettings,
     HogSettings,
     SearchSettings,
-    Settings,
     SpatialSettings,
+    SvmSettings,
     WindowSettings,
 )
 from vdet.detect.svm.dense import why_not_dense
@@ -35,7 +35,7 @@ def model_of(features: FeatureSettings) -> LinearModel:
     return LinearModel(features, weights, zero, -one, zero)
 
 
-def settings(engine: str) -> Settings:
+def settings(engine: str) -> SvmSettings:
     search = SearchSettings.model_validate(
         {
             "engine": engine,
@@ -43,11 +43,12 @@ def settings(engine: str) -> Settings:
             "perspective": {"sizes": []},
         }
     )
-    return Settings(reference_height=90, search=search)
+    return SvmSettings(reference_height=90, search=search)
 
 
 def searched(features: FeatureSettings, engine: str) -> np.ndarray:
-    return FrameSearch(model_of(features), settings(engine), 160, 90).search(FRAME).probabilities
+    (windows,) = FrameSearch(model_of(features), settings(engine), 160, 90).search(FRAME)
+    return windows.probabilities
 
 
 def by_patch(features: FeatureSettings) -> np.ndarray:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from vdet.pipeline.following import follow
 
-from red_cars import HEIGHT, SETTINGS, WIDTH, drive, red_finder
+from pipeline.red_runs import follow
+from red_cars import HEIGHT, WIDTH, drive
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.road import LaneRequest, RoadFinder
@@ -22,8 +22,8 @@ def road_finder() -> RoadFinder:
 
 
 def test_vehicles_are_searched_in_the_original_frame() -> None:
-    with_lanes = follow(drive(15), red_finder(), SETTINGS, WIDTH, HEIGHT, watch=road_finder())
-    without = follow(drive(15), red_finder(), SETTINGS, WIDTH, HEIGHT)
+    with_lanes = follow(drive(15), roads=road_finder())
+    without = follow(drive(15))
     for one, other in zip(with_lanes, without, strict=True):
         assert one.tracks == other.tracks
         assert (one.frame.image == other.frame.image).all()
@@ -31,9 +31,7 @@ def test_vehicles_are_searched_in_the_original_frame() -> None:
 
 def test_every_frame_is_undistorted() -> None:
     undistorter = Undistorter(LENS, WIDTH, HEIGHT)
-    for result in follow(
-        drive(5), red_finder(), SETTINGS, WIDTH, HEIGHT, watch=road_finder(), threads=2
-    ):
+    for result in follow(drive(5), roads=road_finder(), threads=2):
         assert result.road is not None
         np.testing.assert_array_equal(result.road.image, undistorter.image(result.frame.image))
 
@@ -53,9 +51,8 @@ def test_few_undistorted_frames_are_in_memory_at_a_time(
         return image
 
     monkeypatch.setattr(Undistorter, "image", watched(Undistorter.image))
-    stream = drive(COUNT), red_finder(), SETTINGS, WIDTH, HEIGHT
     most = 0
-    for _ in follow(*stream, threads=threads, watch=road_finder()):
+    for _ in follow(drive(COUNT), threads=threads, roads=road_finder()):
         most = max(most, sum(image() is not None for image in made))
     assert len(made) == COUNT
     assert 0 < most <= threads + 3
