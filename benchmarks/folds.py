@@ -21,27 +21,27 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.scores import score
 from vdet.evaluate.truth import read_truth
-from vdet.learn.augmentation import views_of
-from vdet.learn.boxes import describe_boxes, learn_boxes
+from vdet.learn.augmentation import augment
+from vdet.learn.box_regression import extract_box_patches, fit_boxes
 from vdet.learn.dataset import PatchFile, find_boxed, find_patches
 from vdet.learn.extraction import extract
 from vdet.learn.fitting import fit
-from vdet.learn.training_set import lesson_of
+from vdet.learn.training_set import training_set
 from vdet.media import VideoReader
 from vdet.pipeline.loop import peek
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import make_tracker
+from vdet.workers import make_workers
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
 SETTINGS = (
     f"detector.search.probability={LEAST}",
     "training.calibration.folds=2",
-    "training.views.mirror=false",  # half the memory and a third of the time of the shipped model
+    "training.augmentation.mirror=false",  # half the memory, a third of the time
 )
 SWEEPS = {
     "detector.search.probability": (0.2, 0.3, 0.4, 0.5),
@@ -95,27 +95,31 @@ def _frames_of(files: Sequence[PatchFile]) -> Numbers:
 def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
     files, boxed = find_patches(sources), find_boxed(sources)
     training = settings.training
+    workers = make_workers()
     data = extract(
         files,
         settings.svm.features,
         max_broken=0,
-        look=partial(views_of, settings=training.views),
+        workers=workers,
+        augmenter=partial(augment, settings=training.augmentation),
         seed=training.seed,
     )
-    boxes = describe_boxes(files, boxed, settings, jobs=-1, progress=lambda _: None)
+    boxes = extract_box_patches(files, boxed, settings, workers=workers, progress=lambda _: None)
     assert boxes is not None
     boxed_data = boxes.boxed
     assert boxed_data is not None
-    assert boxes.filled is not None
-    filled = lesson_of(boxes.filled, np.ones(len(boxes.filled.vectors), bool))
+    assert boxes.assumed is not None
+    assumed = training_set(boxes.assumed, np.ones(len(boxes.assumed.vectors), bool))
     blocks = _block_of(_frames_of(files), last), _block_of(_frames_of(boxed), last)
 
     def without(block: int) -> LinearModel:
         kept, kept_boxed = (each != block for each in blocks)
-        lesson = lesson_of(data, kept)
-        model = fit(lesson.vectors, lesson.vehicle, settings.svm.features, training, lesson.origins)
-        told = [lesson, lesson_of(boxed_data, kept_boxed)]
-        return replace(model, boxes=learn_boxes(told, filled, settings))
+        samples = training_set(data, kept)
+        model = fit(
+            samples.vectors, samples.vehicle, settings.svm.features, training, samples.origins
+        )
+        told = [samples, training_set(boxed_data, kept_boxed)]
+        return replace(model, boxes=fit_boxes(told, assumed, settings))
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))
@@ -175,7 +179,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
         for track in tracker.update(detections, number / searched.rate):
             box = track.box
             rows.append(Row(0, number, track.id, box.x, box.y, box.width, box.height))
-    return in_memory(rows, frame_count=len(searched.windows), rate=searched.rate)
+    return LabelledVideo.from_rows(rows, frame_count=len(searched.windows), rate=searched.rate)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

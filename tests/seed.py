@@ -9,3 +9,6 @@ SEED = load_settings(find_config("seed"))
 def tracker_but(**changes: object) -> RulesTrackerSettings:
     """Return the original's tracker with some settings replaced."""
     return RulesTrackerSettings.model_validate(SEED.tracker.model_dump() | changes)
+
+
+SEED_TRACKER = tracker_but()

@@ -18,15 +18,13 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import horizon_of
-from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.comparison import Comparison, compare
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.matching import match
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.rows import Row, in_memory
 from vdet.evaluate.scores import score, score_comparison
 from vdet.geometry import Box, Float64Array
 from vdet.media import Frame, VideoInfo
-from vdet.pipeline.loop import follow, peek
+from vdet.pipeline.loop import follow_frames, peek
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
@@ -81,9 +79,9 @@ def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) ->
     images, clip = peek(clip)
     with single_threaded_libraries():
         detector = model.for_video(camera.width, camera.height, images)
-        return in_memory(
+        return LabelledVideo.from_rows(
             row(result.frame.index, track.id, track.box)
-            for result in follow(clip, detector, DEFAULT, video)
+            for result in follow_frames(clip, detector, DEFAULT, video)
             for track in result.tracks
             if result.frame.index in SCORED
         )
@@ -91,7 +89,7 @@ def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) ->
 
 def to_be_shown(scene: Scene) -> LabelledVideo:
     """Give the true boxes of the scored frames; vehicles that do not count are to be ignored."""
-    return in_memory(
+    return LabelledVideo.from_rows(
         row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
         for index in SCORED
         for each in true_boxes(scene, index)

@@ -9,6 +9,7 @@ from pkgutil import resolve_name
 from typing import Any
 
 from vdet.errors import ConfigError
+from vdet.files import printable
 
 DETECTORS = "vdet.detectors"
 TRACKERS = "vdet.trackers"
@@ -52,4 +53,4 @@ def load_plugin(group: str, name: str) -> Any:
                 "mend or reinstall that package"
             ) from error
     known = ", ".join(plugin_names(group))
-    raise ConfigError(f"{name}: is not known; known are {known}")
+    raise ConfigError(f"{printable(name)}: is not known; known are {known}")

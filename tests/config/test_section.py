@@ -3,13 +3,24 @@ from typing import Any
 import pytest
 
 from seed import SEED
-from vdet.config.schema import HeatSettings, SearchSettings, Settings, WindowSettings
+from vdet.config.schema import (
+    HeatSettings,
+    RulesTrackerSettings,
+    SearchSettings,
+    Settings,
+    SvmSettings,
+    WindowSettings,
+)
 from vdet.config.section import scale_lengths
 
-SETS = range(len(Settings().search.windows))
+WINDOWS = (WindowSettings(size=64, step=1, top=400, bottom=500),)
+BOTH = Settings(
+    detector=SvmSettings(search=SearchSettings(windows=WINDOWS)), tracker=RulesTrackerSettings()
+)
+"""Settings with every frame length: window sets over fixed rows, and the rules."""
 LENGTHS = {
-    *(f"search.windows.{i}.{key}" for i in SETS for key in ("size", "top", "bottom")),
-    "heat.blur",
+    *(f"detector.search.windows.0.{key}" for key in ("size", "top", "bottom")),
+    "detector.heat.blur",
     "tracker.min_region",
     "tracker.near",
     "tracker.wide",
@@ -29,16 +40,16 @@ def leaves(value: Any, key: str = "") -> dict[str, Any]:
     return {k: v for n, item in items for k, v in leaves(item, f"{key}.{n}".lstrip(".")).items()}
 
 
-def scaled(rows: int, settings: Settings | None = None) -> Settings:
-    return scale_lengths(settings or Settings(), rows / 720)
+def scaled(rows: int, settings: Settings = BOTH) -> Settings:
+    return scale_lengths(settings, rows / 720)
 
 
 def test_at_the_reference_height_nothing_changes() -> None:
-    assert scaled(720) == Settings()
+    assert scaled(720) == BOTH
 
 
 def test_every_frame_length_is_scaled_and_nothing_else() -> None:
-    before, after = leaves(Settings().model_dump()), leaves(scaled(1440).model_dump())
+    before, after = leaves(BOTH.model_dump()), leaves(scaled(1440).model_dump())
     assert {key for key in before if before[key] != after[key]} == LENGTHS
     for key in LENGTHS:
         assert after[key] == 2 * before[key]
@@ -56,7 +67,7 @@ def test_every_frame_length_is_scaled_and_nothing_else() -> None:
 def test_windows_keep_their_place_in_a_frame_of_another_height(
     rows: int, large: tuple[int, ...], small: tuple[int, ...]
 ) -> None:
-    windows = scaled(rows, SEED).search.windows
+    windows = scaled(rows, SEED).svm.search.windows
     assert [(w.size, w.top, w.bottom) for w in windows] == [large, small]
     assert [w.overlap for w in windows] == [0.8, 0.8]
 

@@ -14,7 +14,6 @@ import click
 import vdet
 from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, Plan, make_plan
-from vdet.batch.pools import Cluster, Pool, Processes
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
 from vdet.cli.options import PathOf, scheduler_option
@@ -24,6 +23,7 @@ from vdet.detect.factory import model_file
 from vdet.errors import SOME_FAILED, VdetError
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import Output
+from vdet.workers import DaskCluster, LocalProcesses, Workers
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -119,9 +119,9 @@ def do_batch(
     if not plan.jobs:
         click.echo(f"all of {len(plan.skipped)} files are there already", err=True)
         return 0
-    pool, share = _pool(options, len(plan.jobs))
+    workers, share = _workers(options, len(plan.jobs))
     work = Work(settings, model, threads or share)
-    failed = _run(plan, work, pool, quiet=quiet)
+    failed = _run(plan, work, workers, quiet=quiet)
     if not failed:
         return 0
     return SOME_FAILED if plan.skipped or len(failed) < len(plan.jobs) else VdetError.exit_code
@@ -139,9 +139,9 @@ def _names(job: VideoJob) -> str:
     return ", ".join(str(output.path) for output in job.outputs)
 
 
-def _run(plan: Plan, work: Work, pool: Pool, *, quiet: bool) -> list[Record]:
+def _run(plan: Plan, work: Work, workers: Workers, *, quiet: bool) -> list[Record]:
     """Run the batch, tell of it on standard error, and return what failed."""
-    results = run_batch(plan, work, _origin(work), pool=pool)
+    results = run_batch(plan, work, _origin(work), workers=workers)
     failed = []
     with files_bar(len(plan.jobs), quiet=quiet) as advance, closing(results):
         for job, record in results:
@@ -166,15 +166,15 @@ def _origin(work: Work) -> Origin:
     return Origin(program, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
-def _pool(options: BatchOptions, files: int) -> tuple[Pool, int]:
+def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
     """Return where to work, and how many threads the search of each file has there."""
     if options.scheduler:
-        return Cluster(options.scheduler), 1
+        return DaskCluster(options.scheduler), 1
     from joblib import cpu_count
 
     cores = cpu_count()
     jobs = min(options.jobs or cores, files)
-    return Processes(jobs), max(1, cores // jobs)
+    return LocalProcesses(jobs), max(1, cores // jobs)
 
 
 def _tell(job: VideoJob, record: Record, *, quiet: bool) -> None:

@@ -61,9 +61,9 @@ def patches(
     with progress_bar("", quiet=quiet) as progress:
         if model is None:
             chosen = [split for split in SPLITS if split in (splits or SPLITS)]
-            result = evaluate_splits(files, settings, chosen, jobs=jobs or -1, progress=progress)
+            result = evaluate_splits(files, settings, chosen, jobs=jobs, progress=progress)
         else:
-            result = evaluate_model(files, model, settings, jobs=jobs or -1, progress=progress)
+            result = evaluate_model(files, model, settings, jobs=jobs, progress=progress)
     give_results(
         lines(result),
         plain(result),

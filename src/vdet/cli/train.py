@@ -61,7 +61,7 @@ def train(
             files,
             settings,
             boxed=boxed,
-            jobs=jobs or -1,
+            jobs=jobs,
             scheduler=scheduler,
             progress=start(len(files) + len(boxed)),
         )

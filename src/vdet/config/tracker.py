@@ -60,7 +60,7 @@ class MotionTrackerSettings(TrackerSettings):
         0.5, description="a vehicle is hidden where a nearer one covers more than this share of it"
     )
     carried: Seconds = Field(
-        0.32, description="a vehicle that is not detected is shown by prediction for this long"
+        0.35, description="a vehicle that is not detected is shown by prediction for this long"
     )
     remembered: Seconds = Field(
         1.0, description="a vehicle that is not detected keeps its id for this long"

@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet import MAX_PICTURE_PIXELS, MAX_PICTURE_SIDE
 from vdet.errors import ImageError
 from vdet.files import read_whole, replacing
 from vdet.media.captured import capture_stderr
@@ -16,6 +15,10 @@ from vdet.media.captured import capture_stderr
 Image = npt.NDArray[np.uint8]
 
 log = logging.getLogger("vdet")
+
+MAX_PICTURE_PIXELS = 2**25
+"""A picture of more pixels is not read: an 8K frame has fewer."""
+MAX_PICTURE_SIDE = 2**15
 
 MAX_BYTES = 256_000_000
 """Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits, not compressed at all."""

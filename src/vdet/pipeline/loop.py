@@ -22,7 +22,7 @@ from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sink, open_sink
 from vdet.pipeline.threads import (
-    Stalled,
+    StalledError,
     map_ordered,
     prefetch,
     run_in_thread,
@@ -35,7 +35,7 @@ log = logging.getLogger("vdet")
 FIRST_FRAMES = 5
 """Frames that a detector is made with."""
 
-PATIENCE = 120.0  # seconds
+IO_TIMEOUT = 120.0  # seconds
 
 Advance = Callable[[int], object]
 Progress = Callable[[int | None], Advance]
@@ -93,7 +93,7 @@ def run_video(
     *,
     threads: int | None = None,
     codec_threads: int | None = None,
-    patience: float = PATIENCE,
+    timeout: float = IO_TIMEOUT,
     progress: Progress = no_progress,
 ) -> Summary:
     """Run a job; its outputs appear under their names together, when all is done.
@@ -106,7 +106,7 @@ def run_video(
         Threads of the search; None for one a core.
     codec_threads
         Threads of the decoder, and of the encoder; None lets them choose.
-    patience
+    timeout
         Seconds in which the next frame must be read or written, else the job is given up: a disk
         or a network that hangs must not stop a batch. What lies before `job.start` has as long
         again as it lasts.
@@ -123,15 +123,15 @@ def run_video(
     began = time.perf_counter()
     ids: set[int] = set()
     frames = 0
-    patience += float(job.start or 0)
+    timeout += float(job.start or 0)
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles())
-        stack.enter_context(_stalls_named(job, patience))
+        stack.enter_context(_stalls_named(job, timeout))
         stack.enter_context(single_threaded_libraries())
-        reader = run_in_thread(lambda: _open(job, settings, codec_threads), patience=patience)
+        reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)
         info = reader.info
-        read = stack.enter_context(prefetch(_frames(reader), patience=patience))
-        context = SinkContext(files, settings, info, job.is_part, job.at, codec_threads, patience)
+        read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
+        context = SinkContext(files, settings, info, job.is_part, job.at, codec_threads, timeout)
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         advance = progress(reader.expected)
         threads = threads or os.cpu_count() or 1
@@ -147,7 +147,7 @@ def run_video(
     return Summary(info.width, info.height, frames, len(ids), time.perf_counter() - began)
 
 
-def follow(
+def follow_frames(
     frames: Iterable[Frame],
     detector: VideoDetector,
     settings: Settings,
@@ -212,7 +212,7 @@ def _results(
     try:
         roads = RoadFinder(job.lanes, settings.lanes, *size) if job.lanes else None
         detector = _detector(images, job.source, model, size)
-        yield from follow(frames, detector, settings, video, threads=threads, roads=roads)
+        yield from follow_frames(frames, detector, settings, video, threads=threads, roads=roads)
     except (ConfigError, ImageError) as error:
         raise VideoError(f"{job.source}: {error}") from error
 
@@ -245,11 +245,11 @@ def _frames(reader: VideoReader) -> Generator[Frame]:
 
 
 @contextmanager
-def _stalls_named(job: VideoJob, patience: float) -> Iterator[None]:
+def _stalls_named(job: VideoJob, timeout: float) -> Iterator[None]:
     try:
         yield
-    except Stalled as error:
+    except StalledError as error:
         raise VideoError(
-            f"{job.source}: nothing could be read or written for {patience:g} s; given up; look at "
+            f"{job.source}: nothing could be read or written for {timeout:g} s; given up; look at "
             "the disk or network"
         ) from error

@@ -4,7 +4,7 @@ from vdet.errors import ConfigError
 from vdet.evaluate.clips.sweep import grid
 
 
-def test_nothing_swept_is_one_setting() -> None:
+def test_without_sweeps_there_is_one_setting() -> None:
     assert grid(()) == [()]
 
 
@@ -36,7 +36,7 @@ def test_a_value_given_twice_is_run_once() -> None:
 
 
 @pytest.mark.parametrize("text", ["heat.threshold", "=1,2", "a=", "a=1,,2", "a=1,"])
-def test_what_is_no_sweep_is_refused(text: str) -> None:
+def test_other_text_than_a_sweep_is_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="expected KEY=VALUE,VALUE"):
         grid((text,))
 

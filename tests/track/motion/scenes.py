@@ -1,25 +1,28 @@
-"""Small scenes for the motion tracker: rectangles in a frame, and what is shown of them."""
+"""Small scenes for the motion tracker: boxes in a frame, and what is shown of them."""
 
 from collections.abc import Iterable, Sequence
 
-from vdet.config.schema import MotionSettings
-from vdet.detect.svm.heat import Region
+from vdet.config.schema import MotionTrackerSettings
+from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.geometry import Box
-from vdet.track.motion import MotionTracker
+from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
 
 WIDTH, HEIGHT = 1280, 720
-_STRONG = MotionSettings().strong
-CLEAR, WEAK, GLIMMER = 1.5 * _STRONG, 0.5 * _STRONG, 0.1 * _STRONG
-"""Peaks of a vehicle that is seen clearly, of one that is hardly seen, and of next to nothing."""
+RATE = 25
+CLEAR, WEAK, FAINT = 1.0, 0.5, 0.1
+"""Scores of a vehicle that is seen clearly, of one that is hardly seen, and of next to nothing."""
+
+Scored = tuple[Box, float]
 
 
-def region(box: Box, peak: float = CLEAR) -> Region:
-    return Region(box, box.center, peak)
+def frames(seconds: float, rate: int = RATE) -> int:
+    """Return how many whole frames there are in this time."""
+    return int(seconds * rate + 1e-6)
 
 
 def moving(box: Box, dx: float = 0, dy: float = 0, frames: int = 30) -> list[Box]:
-    """Give the places of a box that moves steadily."""
+    """Give the places of a box that moves steadily, so many pixels a frame."""
     return [box.moved_to(round(box.x + n * dx), round(box.y + n * dy)) for n in range(frames)]
 
 
@@ -27,13 +30,22 @@ def inside(box: Box) -> Box:
     return box.clipped(WIDTH, HEIGHT)
 
 
-def follow(frames: Iterable[Sequence[Region | Box]], **settings: float) -> list[list[Track]]:
-    """Track regions (a box stands for one that is seen clearly); give what is shown in each."""
-    tracker = MotionTracker(MotionSettings.model_validate(settings), WIDTH, HEIGHT)
-    return [
-        tracker.update([each if isinstance(each, Region) else region(each) for each in frame])
-        for frame in frames
-    ]
+def detections(found: Sequence[Scored | Box]) -> Detections:
+    """Give the detections at these places; a box without a score is seen clearly."""
+    scored = [(each, CLEAR) if isinstance(each, Box) else each for each in found]
+    scored = [(box, score) for box, score in scored if box.area]
+    if not scored:
+        return NO_DETECTIONS
+    corners = [(box.x, box.y, box.right, box.bottom) for box, _ in scored]
+    return Detections(corners, [score for _, score in scored])
+
+
+def follow(
+    clip: Iterable[Sequence[Scored | Box]], rate: float = RATE, **settings: float
+) -> list[list[Track]]:
+    """Track the detections of each frame; give the tracks shown in each."""
+    tracker = MotionTracker(MotionTrackerSettings.model_validate(settings), WIDTH, HEIGHT)
+    return [tracker.update(detections(found), n / rate) for n, found in enumerate(clip)]
 
 
 def ids(shown: Iterable[Sequence[Track]]) -> set[int]:
@@ -41,7 +53,7 @@ def ids(shown: Iterable[Sequence[Track]]) -> set[int]:
 
 
 def first_shown(shown: Sequence[Sequence[Track]]) -> int:
-    """Return how many frames went by before the first that shows something."""
+    """Return the number of frames before the first one that shows something."""
     return next(number for number, tracks in enumerate(shown) if tracks)
 
 

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.geometry import Float64Array
-from vdet.track.motion.state import MotionState, measurement_of
+from vdet.track.motion.state import MotionState, measure, measurement_of
 
+FRAME = 0.04
 BOX = np.array([100.0, 50.0, 40.0, 20.0])
 ALL = np.ones(4)
 
@@ -16,21 +17,21 @@ def offset(*by: float) -> Float64Array:
     return np.asarray(BOX + np.array(by))
 
 
-def still(box: Float64Array = BOX, noise: float = 0.1, velocity: float = 0.1) -> MotionState:
+def still(box: Float64Array = BOX, noise: float = 0.1, velocity: float = 2.5) -> MotionState:
     return MotionState.at_rest(box, noise, velocity)
 
 
 def after(boxes: list[Float64Array], noise: float = 0.1) -> MotionState:
-    """Follow boxes, one a frame; the state expects the next."""
+    """Follow boxes, one a frame; the state is that expected for the next."""
     state = still(boxes[0], noise)
     for box in boxes[1:]:
-        state = state.predicted(0.01).corrected(measurement_of(box), noise, ALL)
-    return state.predicted(0.01)
+        state = state.predicted(FRAME, 1.25).corrected(measurement_of(box), noise, ALL)
+    return state.predicted(FRAME, 1.25)
 
 
 def test_a_new_state_is_its_box_and_stands_still() -> None:
     assert still().box == pytest.approx(BOX)
-    assert still().predicted(0.01).box == pytest.approx(BOX)
+    assert still().predicted(FRAME, 1.25).box == pytest.approx(BOX)
 
 
 def test_a_steady_motion_is_predicted_without_lag() -> None:
@@ -45,7 +46,7 @@ def test_steady_growth_is_predicted_without_lag() -> None:
 
 def test_the_uncertainty_grows_with_prediction_and_falls_with_measurement() -> None:
     variance = still().covariance[:, 0, 0]
-    predicted = still().predicted(0.01)
+    predicted = still().predicted(FRAME, 1.25)
     corrected = predicted.corrected(measurement_of(BOX), 0.1, ALL)
     assert (predicted.covariance[:, 0, 0] > variance).all()
     assert (corrected.covariance[:, 0, 0] < variance).all()
@@ -60,7 +61,7 @@ def test_a_measurement_counts_as_much_as_it_is_surer_than_the_state(
 
 
 def test_what_was_not_seen_is_not_corrected() -> None:
-    before = still().predicted(0.01)
+    before = still().predicted(FRAME, 1.25)
     state = before.corrected(measurement_of(BOX * 2), 0.1, np.array([1.0, 1.0, 0.0, 1.0]))
     assert (state.mean[2] == before.mean[2]).all()
     assert (state.covariance[2] == before.covariance[2]).all()
@@ -80,3 +81,70 @@ def test_near_and_far_vehicles_are_followed_alike(scale: float, x: float, y: flo
     boxes = [offset(4 * n + n % 3, n % 2, n, n % 4) for n in range(8)]
     moved = [box * scale + [x, y, 0, 0] for box in boxes]
     assert after(moved).box == pytest.approx(after(boxes).box * scale + [x, y, 0, 0], abs=1e-6)
+
+
+# Boxes that the frame's sides cut off
+
+SIZE = (1000, 500)
+
+
+def expecting(*box: float) -> MotionState:
+    return MotionState.at_rest(np.array(box, np.float64), 0.1, 2.5)
+
+
+def corrected(state: MotionState, *box: float) -> Float64Array:
+    """Return the box after a measurement without noise."""
+    seen = measure(state, np.array(box, np.float64), SIZE)
+    return seen.state.corrected(seen.measured, 1e-6, seen.seen).box
+
+
+def test_a_whole_box_is_measured_as_it_is() -> None:
+    box = np.array([410.0, 210.0, 90.0, 60.0])
+    seen = measure(expecting(400, 200, 100, 50), box, SIZE)
+    assert (seen.measured == measurement_of(box)).all()
+    assert (seen.seen == 1).all()
+
+
+@pytest.mark.parametrize(
+    ("before", "cut", "after"),
+    [
+        ((850, 200, 100, 50), (930, 200, 70, 50), (930, 200, 100, 50)),
+        ((50, 200, 100, 50), (0, 200, 70, 50), (-30, 200, 100, 50)),
+        ((400, 420, 60, 60), (400, 460, 60, 40), (400, 460, 60, 60)),
+        ((400, 20, 60, 60), (400, 0, 60, 40), (400, -20, 60, 60)),
+    ],
+    ids=["right", "left", "below", "above"],
+)
+def test_a_leaving_vehicle_keeps_its_size(
+    before: tuple[float, ...], cut: tuple[float, ...], after: tuple[float, ...]
+) -> None:
+    assert corrected(expecting(*before), *cut) == pytest.approx(after, abs=0.01)
+
+
+def test_an_entering_vehicle_is_as_wide_as_what_is_seen_of_it() -> None:
+    box = corrected(expecting(960, 200, 40, 50), 940, 200, 60, 50)
+    assert box == pytest.approx([940, 200, 60, 50], abs=0.01)
+
+
+def test_entering_gives_the_velocity_of_the_inner_edge_and_no_growth() -> None:
+    state = expecting(960, 200, 40, 50)
+    for left in range(955, 900, -5):
+        seen = measure(state.predicted(FRAME, 1.25), np.array([left, 200, 1000 - left, 50.0]), SIZE)
+        state = seen.state.corrected(seen.measured, 0.1, seen.seen)
+    assert state.mean[0, 1] == pytest.approx(-5 / FRAME, abs=0.5 / FRAME)
+    assert state.mean[2, 1] == 0
+
+
+def test_a_growing_vehicle_that_is_cut_off_stops_growing() -> None:
+    growing = expecting(850, 200, 100, 50).mean.copy()
+    growing[2:, 1] = 0.5
+    state = MotionState(growing, expecting(850, 200, 100, 50).covariance)
+    assert measure(state, np.array([930, 200, 70, 50.0]), SIZE).state.mean[2:, 1].tolist() == [
+        0,
+        0.5,
+    ]
+
+
+def test_a_box_cut_off_on_both_sides_is_measured_as_it_is() -> None:
+    box = np.array([0.0, 200.0, 1000.0, 250.0])
+    assert (measure(expecting(0, 200, 900, 250), box, SIZE).seen == 1).all()

@@ -1,73 +1,134 @@
 import numpy as np
 import pytest
 
-from vdet.config.schema import MotionSettings
-from vdet.track.motion.vehicle import Sighting, Vehicle
+from vdet.config.schema import MotionTrackerSettings
+from vdet.track.motion.vehicle import LONGEST_LOOK, SCORE_TIME, Observation, Vehicle
 
-SETTINGS = MotionSettings(leak=0.2, needed=3.0, carried=5, remembered=10, remembered_hidden=50)
+SETTINGS = MotionTrackerSettings(
+    leak=0.2, needed=0.12, carried=0.22, remembered=0.42, remembered_hidden=2.02
+)
 SIZE = (1000, 500)
+FRAME = 0.04
 
 
-def sighting(x: float = 400, width: float = 100, clearness: float = 1.0) -> Sighting:
-    return Sighting(np.array([x, 200, width, width / 2]), clearness)
+def observation(
+    x: float = 400, width: float = 100, score: float = 1.0, class_id: int | None = None
+) -> Observation:
+    return Observation(np.array([x, 200, width, width / 2]), score, class_id)
 
 
-def seen(frames: int, *, dx: float = 0, growth: float = 1, clearness: float = 1.0) -> Vehicle:
-    """Give a vehicle after so many frames with a region."""
-    vehicle = Vehicle.new(sighting(clearness=clearness), SETTINGS)
+def seen(
+    frames: int, *, dx: float = 0, growth: float = 1, score: float = 1.0, seconds: float = FRAME
+) -> Vehicle:
+    """Give a vehicle after so many frames with a detection."""
+    vehicle = Vehicle.new(observation(score=score), seconds, SETTINGS)
     for n in range(1, frames):
-        vehicle.predict(SETTINGS)
-        vehicle.see(sighting(400 + n * dx, 100 * growth**n, clearness), SIZE, SETTINGS)
+        vehicle.predict(seconds, SETTINGS)
+        found = observation(400 + n * dx, 100 * growth**n, score)
+        vehicle.see(found, seconds, SIZE, SETTINGS)
     return vehicle
 
 
-def missed(vehicle: Vehicle, frames: int) -> Vehicle:
+def missed(vehicle: Vehicle, frames: int, seconds: float = FRAME) -> Vehicle:
     for _ in range(frames):
-        vehicle.predict(SETTINGS)
-        vehicle.miss(SETTINGS)
+        vehicle.predict(seconds, SETTINGS)
+        vehicle.miss(seconds, SETTINGS)
     return vehicle
+
+
+# Evidence
 
 
 def test_a_vehicle_is_confirmed_by_evidence_above_the_leak() -> None:
     assert [seen(frames).confirmed for frames in (3, 4)] == [False, True]
-    assert [seen(frames, clearness=0.5).confirmed for frames in (9, 11)] == [False, True]
+    assert [seen(frames, score=0.5).confirmed for frames in (9, 11)] == [False, True]
+
+
+@pytest.mark.parametrize("rate", [10, 25, 50, 100])
+def test_a_vehicle_is_confirmed_after_the_same_time_at_any_frame_rate(rate: int) -> None:
+    frames = next(n for n in range(1, 100) if seen(n, seconds=1 / rate).confirmed)
+    assert frames / rate == pytest.approx(0.15, abs=0.5 / rate + 0.02)
+
+
+def test_a_single_frame_does_not_confirm_a_vehicle_however_long_it_lasts() -> None:
+    assert [seen(frames, seconds=0.5).confirmed for frames in (1, 2)] == [False, True]
+    assert SETTINGS.needed > LONGEST_LOOK
 
 
 def test_an_unconfirmed_vehicle_is_over_when_its_evidence_has_leaked_away() -> None:
     assert [missed(seen(1), frames).is_over(SETTINGS) for frames in (3, 5)] == [False, True]
 
 
-def test_a_confirmed_one_is_over_when_it_is_no_longer_remembered() -> None:
+# Time without a detection
+
+
+def test_a_confirmed_vehicle_is_over_when_it_is_no_longer_remembered() -> None:
     assert [missed(seen(9), frames).is_over(SETTINGS) for frames in (10, 11)] == [False, True]
 
 
-def test_frames_behind_another_vehicle_are_counted_by_themselves() -> None:
+def test_time_behind_another_vehicle_is_counted_by_itself() -> None:
     vehicle = missed(seen(9), 40)
-    vehicle.hidden_misses = 30
+    vehicle.hidden = 30 * FRAME
     assert not vehicle.is_over(SETTINGS)
-    vehicle.hidden_misses = 29
+    vehicle.hidden = 29 * FRAME
     assert vehicle.is_over(SETTINGS)
 
 
-def test_a_vehicle_is_present_as_long_as_it_is_carried() -> None:
-    assert [missed(seen(9), n).is_present(SETTINGS) for n in (0, 5, 6)] == [True, True, False]
+@pytest.mark.parametrize(("seconds", "frames"), [(0.04, 5), (0.1, 2), (0.2, 1)])
+def test_a_vehicle_is_present_as_long_as_it_is_carried(seconds: float, frames: int) -> None:
+    vehicle = seen(9, seconds=seconds)
+    assert missed(vehicle, frames, seconds).is_present(SETTINGS)
+    assert not missed(vehicle, 1, seconds).is_present(SETTINGS)
 
 
-def test_a_region_ends_the_misses() -> None:
+def test_a_detection_ends_the_time_without_one() -> None:
     vehicle = missed(seen(9), 8)
-    vehicle.see(sighting(), SIZE, SETTINGS)
-    assert (vehicle.misses, vehicle.is_present(SETTINGS)) == (0, True)
+    vehicle.see(observation(), FRAME, SIZE, SETTINGS)
+    assert (vehicle.unseen, vehicle.is_present(SETTINGS)) == (0, True)
 
 
 def test_a_carried_vehicle_keeps_its_velocity_and_a_lost_one_comes_to_rest() -> None:
     vehicle = seen(40, dx=5)
     velocity = vehicle.state.mean[0, 1]
-    assert velocity == pytest.approx(5, abs=0.1)
-    assert missed(vehicle, 5).state.mean[0, 1] == velocity
-    assert abs(missed(vehicle, 60).state.mean[0, 1]) < 0.5
+    assert velocity == pytest.approx(5 / FRAME, abs=2.5)
+    assert missed(vehicle, 5).state.mean[0, 1] == pytest.approx(velocity)
+    assert abs(missed(vehicle, 60).state.mean[0, 1]) < 0.1 * velocity
 
 
 def test_an_unseen_vehicle_soon_stops_growing() -> None:
     vehicle = seen(40, growth=1.02)
     width = vehicle.state.box[2]
     assert width < missed(vehicle, 100).state.box[2] < 1.25 * width
+
+
+# Score and class
+
+
+def test_the_score_is_the_mean_of_the_detections() -> None:
+    vehicle = Vehicle.new(observation(score=0.4), FRAME, SETTINGS)
+    assert vehicle.score == pytest.approx(0.4)
+    vehicle.see(observation(score=0.8), FRAME, SIZE, SETTINGS)
+    assert vehicle.score == pytest.approx(0.6, abs=0.02)
+
+
+@pytest.mark.parametrize("rate", [5, 10, 25, 50])
+def test_older_detections_count_less_at_the_same_pace_at_any_frame_rate(rate: int) -> None:
+    vehicle = seen(10 * rate, score=1.0, seconds=1 / rate)
+    for _ in range(rate):
+        vehicle.see(observation(score=0.5), 1 / rate, SIZE, SETTINGS)
+    assert vehicle.score == pytest.approx(0.5 + 0.5 * np.exp(-1 / SCORE_TIME), abs=1e-3)
+
+
+def test_the_score_falls_while_a_vehicle_is_not_seen() -> None:
+    scores = [missed(seen(40), frames).score for frames in (0, 1, 4, 8)]
+    assert scores == sorted(scores, reverse=True)
+    assert scores[-1] == pytest.approx(np.exp(-8 * FRAME / SCORE_TIME), abs=0.05)
+
+
+def test_the_class_is_the_one_with_the_highest_sum_of_scores() -> None:
+    vehicle = Vehicle.new(observation(score=0.9, class_id=2), FRAME, SETTINGS)
+    assert vehicle.class_id == 2
+    for _ in range(2):
+        vehicle.see(observation(score=0.6, class_id=0), FRAME, SIZE, SETTINGS)
+    assert vehicle.class_id == 0
+    assert seen(3).class_id is None

@@ -8,8 +8,7 @@ from pathlib import Path
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.evaluate.clips.following import follow_under_all
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.truth import read_truth
 from vdet.files import OutputFiles
 from vdet.media import VideoReader
@@ -98,7 +97,7 @@ def detect(
         rate = float(reader.info.rate)
     if clip.until is not None and frames < clip.until:
         read_truth(clip.truth_path, frame_count=frames)  # refuses it, and names the line
-    return [in_memory(each, frame_count=frames, rate=rate) for each in rows]
+    return [LabelledVideo.from_rows(each, frame_count=frames, rate=rate) for each in rows]
 
 
 def _row(number: int, track: Track) -> Row:

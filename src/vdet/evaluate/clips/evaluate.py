@@ -8,14 +8,12 @@ from pathlib import Path
 from vdet.config.schema import Settings
 from vdet.evaluate.clips.clip import Clip, Progress, detect
 from vdet.evaluate.clips.losses import Loss, losses
-from vdet.evaluate.clips.timeline import Timeline, timelines
-from vdet.evaluate.comparison import Comparison
+from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
-from vdet.evaluate.pooling import pool
 from vdet.evaluate.predictions import read_predictions
-from vdet.evaluate.preprocessing import compare
 from vdet.evaluate.scores import Scores, score_comparison
+from vdet.evaluate.timelines import Timeline, timelines
 from vdet.evaluate.truth import read_truth
 from vdet.pipeline.sinks.protocol import Output
 

@@ -23,7 +23,7 @@ def follow_under_all(
     """Give for each frame a result for each of the settings, in their order.
 
     What is given for one of the settings does not depend on the others, and is what
-    `vdet.pipeline.loop.follow` gives for it.
+    `vdet.pipeline.loop.follow_frames` gives for it.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ class SinkContext:
         Time of the moment that is asked for (`--at`), seconds from the first frame.
     codec_threads
         Threads of an encoder; None lets it choose.
-    patience
+    timeout
         Seconds after which a write that does not end is given up.
     """
 
@@ -63,7 +63,7 @@ class SinkContext:
     is_part: bool = False
     at: Fraction = Fraction(0)
     codec_threads: int | None = None
-    patience: float | None = None
+    timeout: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,10 +115,7 @@ def check_sink(
     ConfigError
         There is no sink of that name.
     """
-    kind, path = sink_kind(output.sink), output.path
-    if kind.suffixes and path.suffix.lower() not in kind.suffixes:
-        names = ", ".join(kind.suffixes)
-        raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
+    kind, path = _kind_for(output), output.path
     if kind.marker:
         make_folder(path)
         path = next(path.glob(kind.marker), path / kind.marker)
@@ -127,4 +124,13 @@ def check_sink(
 
 def open_sink(output: Output, context: SinkContext) -> Sink:
     """Open the sink of an output. Raises `ConfigError`, `OutputError`, `VideoError`."""
-    return sink_kind(output.sink).open(output.path, context)
+    return _kind_for(output).open(output.path, context)
+
+
+def _kind_for(output: Output) -> SinkKind:
+    """Return the kind of an output's sink; refuse a suffix that is not one of the sink's."""
+    kind, path = sink_kind(output.sink), output.path
+    if kind.suffixes and path.suffix.lower() not in kind.suffixes:
+        names = ", ".join(kind.suffixes)
+        raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
+    return kind

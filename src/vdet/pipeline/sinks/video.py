@@ -40,7 +40,7 @@ class VideoSink:
         )
         with ExitStack() as stack:
             self._encode = stack.enter_context(
-                write_async(writer.write, within=writer, patience=context.patience)
+                write_async(writer.write, within=writer, timeout=context.timeout)
             )
             self._stack = stack.pop_all()
         return self

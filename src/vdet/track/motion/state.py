@@ -2,11 +2,11 @@
 
 Source: Kalman, "A New Approach to Linear Filtering and Prediction Problems", 1960; the model of
 nearly constant velocity is that of Bar-Shalom, Li and Kirubarajan, "Estimation with Applications
-to Tracking and Navigation", 2001, section 6.3.2.
+to Tracking and Navigation", 2001, section 6.2.2 (white noise acceleration in continuous time).
 
-The centre's x and y and the logarithms of width and height are four filters of their own. All
+The centre's x and y and the logarithms of width and height are four independent filters. All
 uncertainty is in shares of the vehicle's size, so that near and far vehicles, and small and large
-frames, are treated alike.
+frames, are treated alike; times are seconds.
 """
 
 from dataclasses import dataclass, replace
@@ -16,8 +16,8 @@ import numpy as np
 
 from vdet.geometry import Float64Array
 
-_STEP = np.array([[1.0, 1.0], [0.0, 1.0]])
-_JERK = np.array([[0.25, 0.5], [0.5, 1.0]])  # of one acceleration, constant for a frame
+BORDER = 0.005
+"""A box that ends this near to the frame's side, as a share of the frame, touches it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class MotionState:
     ----------
     mean
         float64 `(4, 2)`: centre x and y in full-frame pixels, log width and log height of the
-        whole vehicle in pixels; each with its change a frame.
+        whole vehicle in pixels; each with its change a second.
     covariance
         float64 `(4, 2, 2)`: of each of the four and its change; lengths in shares of the vehicle's
         width (x) and height (y).
@@ -39,7 +39,7 @@ class MotionState:
 
     @classmethod
     def at_rest(cls, box: Float64Array, noise: float, velocity: float) -> Self:
-        """Start at `box`, known to `noise`; its velocity is 0, give or take `velocity`."""
+        """Start at `box` with velocity 0; `noise` and `velocity` are their standard deviations."""
         mean = np.zeros((4, 2))
         mean[:, 0] = measurement_of(box)
         return cls(mean, np.tile(np.diag([noise**2, velocity**2]), (4, 1, 1)))
@@ -50,10 +50,17 @@ class MotionState:
         size = np.exp(self.mean[2:, 0])
         return np.concatenate([self.mean[:2, 0] - size / 2, size])
 
-    def predicted(self, acceleration: float) -> "MotionState":
-        """Go one frame on; `acceleration` is the deviation of the velocity's change in it."""
-        covariance = _STEP @ self.covariance @ _STEP.T + acceleration**2 * _JERK
-        return MotionState(self.mean @ _STEP.T, covariance)
+    @property
+    def deviation(self) -> Float64Array:
+        """Standard deviation of the centre's x and y, `(2,)`, shares of width and height."""
+        return np.sqrt(self.covariance[:2, 0, 0])
+
+    def predicted(self, seconds: float, acceleration: float) -> "MotionState":
+        """Go on by `seconds`; `acceleration` is the deviation of the velocity after one second."""
+        step = np.array([[1.0, seconds], [0.0, 1.0]])
+        drift = np.array([[seconds**3 / 3, seconds**2 / 2], [seconds**2 / 2, seconds]])
+        covariance = step @ self.covariance @ step.T + acceleration**2 * drift
+        return MotionState(self.mean @ step.T, covariance)
 
     def corrected(self, measured: Float64Array, noise: float, seen: Float64Array) -> "MotionState":
         """Take in a measurement.
@@ -89,3 +96,50 @@ class MotionState:
 def measurement_of(box: Float64Array) -> Float64Array:
     """Return centre x and y and log width and height, `(4,)`, of an x, y, width, height box."""
     return np.concatenate([box[:2] + box[2:] / 2, np.log(box[2:])])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EdgeMeasurement:
+    """What a box tells of a vehicle that the frame's sides may cut off.
+
+    `state` is the state that it is to correct, `measured` and `seen` are as
+    `MotionState.corrected` takes them.
+    """
+
+    state: MotionState
+    measured: Float64Array
+    seen: Float64Array
+
+
+def measure(state: MotionState, box: Float64Array, size: tuple[int, int]) -> EdgeMeasurement:
+    """Compare the detected `box` with the predicted `state`.
+
+    The box of a vehicle that comes in at a side grows with every frame though the vehicle does
+    not, and its centre moves at half the vehicle's speed. So only the inner edge of a cut-off box
+    counts; the width is what it was, or the visible part if that is more, and does not change by
+    itself. Above and below it is the same with the height.
+
+    Parameters
+    ----------
+    box
+        x, y, width, height in full-frame pixels, inside the frame, with an area.
+    size
+        Width and height of the frame, pixels.
+    """
+    mean, covariance = state.mean.copy(), state.covariance.copy()
+    measured, seen = measurement_of(box), np.ones(4)
+    for axis, span in enumerate(size):
+        first, last = box[axis], box[axis] + box[axis + 2]
+        cut_before, cut_behind = first <= BORDER * span, last >= span - BORDER * span
+        if cut_before == cut_behind:
+            continue
+        outward = 1 if cut_behind else -1
+        length = np.exp(mean[axis + 2, 0])
+        if last - first > length:
+            mean[axis, 0] += outward * (last - first - length) / 2  # the inner edge stays
+            mean[axis + 2, 0] = measured[axis + 2]
+            length = last - first
+        mean[axis + 2, 1] = 0
+        measured[axis] = (first if cut_behind else last) + outward * length / 2
+        seen[axis + 2] = 0
+    return EdgeMeasurement(MotionState(mean, covariance), measured, seen)

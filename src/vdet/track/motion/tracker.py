@@ -7,20 +7,18 @@ import numpy as np
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.geometry import Box, Float64Array, iou_matrix, visible
+from vdet.geometry import Box, Float64Array, visible
 from vdet.media.images import Image
-from vdet.track.motion.identity import take_over_ids, without_duplicates
-from vdet.track.motion.overlapping import (
-    are_hidden,
-    around,
-    shows_both,
-    stretched,
-)
-from vdet.track.motion.pairing import pair
-from vdet.track.motion.vehicle import Sighting, Vehicle
+from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
+from vdet.track.motion.overlapping import are_hidden, around, shows_both, stretched
+from vdet.track.motion.vehicle import Observation, Vehicle
 from vdet.track.track import Track
 
-Found = dict[int, Sighting]
+FIRST_STEP = 0.04
+"""Seconds that the first frame counts for."""
+
+SHORTEST_STEP = 0.001
+"""Seconds between frames at least, also where two have the same time or the clock goes back."""
 
 
 class MotionTracker:
@@ -39,41 +37,59 @@ class MotionTracker:
         self._size = width, height
         self._vehicles: list[Vehicle] = []
         self._ids = count(1)
+        self._time: float | None = None
 
     def update(
         self,
         detections: Detections,
-        time: float,  # noqa: ARG002
+        time: float,
         image: Image | None = None,  # noqa: ARG002 - boxes are enough
     ) -> list[Track]:
-        """Follow the vehicles into the next frame; as `VideoTracker.update`."""
-        sightings = self._sightings(detections)
-        for vehicle in self._vehicles:
-            vehicle.predict(self._settings)
-        self._vehicles = self._staying()
+        """Follow the vehicles into the next frame; as `VideoTracker.update`.
+
+        The part of a detection outside the frame does not count.
+        """
+        seconds = self._step_to(time)
+        observations = self._observations(detections)
+        self._predict(seconds)
         expected = self._boxes()
-        pairs = self._pair(expected, sightings)
-        found = {row: sightings[number] for row, number in pairs.items()}
+        pairs = self._pair(expected, observations)
+        found = {row: observations[number] for row, number in pairs.items()}
         found |= self._seen_as_one(expected, found)
         for row, vehicle in enumerate(self._vehicles):
             if row in found:
-                vehicle.see(found[row], self._size, self._settings)
+                vehicle.see(found[row], seconds, self._size, self._settings)
             else:
-                vehicle.miss(self._settings)
-        left = [s for number, s in enumerate(sightings) if number not in pairs.values()]
-        new = [Vehicle.new(s, self._settings) for s in left if self._is_telling(s)]
-        self._vehicles = self._staying() + new
-        self._vehicles = take_over_ids(self._vehicles)
+                vehicle.miss(seconds, self._settings)
+        left = [o for number, o in enumerate(observations) if number not in pairs.values()]
+        new = [Vehicle.new(o, seconds, self._settings) for o in left if self._adds_evidence(o)]
+        self._vehicles = take_over_ids(self._staying() + new)
         self._vehicles = without_duplicates(self._vehicles, self._size, self._settings)
-        return self._tracks()
+        return self._tracks(seconds)
 
-    def _sightings(self, detections: Detections) -> list[Sighting]:
-        clipped = [box.clipped(*self._size) for box in detections.rounded]
+    def _step_to(self, time: float) -> float:
+        """Return the seconds since the frame before."""
+        step = FIRST_STEP if self._time is None else max(time - self._time, SHORTEST_STEP)
+        self._time = time
+        return step
+
+    def _observations(self, detections: Detections) -> list[Observation]:
+        corners = detections.boxes.astype(np.float64)
+        boxes = visible(np.hstack([corners[:, :2], corners[:, 2:] - corners[:, :2]]), self._size)
+        classes = [None] * len(boxes) if detections.classes is None else detections.classes.tolist()
         return [
-            Sighting(np.array([box.x, box.y, box.width, box.height], np.float64), float(score))
-            for box, score in zip(clipped, detections.scores, strict=True)
-            if box.area
+            Observation(box, score, class_id)
+            for box, score, class_id in zip(boxes, detections.scores.tolist(), classes, strict=True)
+            if min(box[2:]) >= 1
         ]
+
+    def _predict(self, seconds: float) -> None:
+        """Move all vehicles on; forget those not seen for too long, and those out of the frame."""
+        longest = self._settings.remembered + self._settings.remembered_hidden
+        self._vehicles = [v for v in self._vehicles if v.unseen + seconds <= longest]
+        for vehicle in self._vehicles:
+            vehicle.predict(seconds, self._settings)
+        self._vehicles = self._staying()
 
     def _boxes(self) -> Float64Array:
         """Return the visible parts of all vehicles, `(n, 4)`."""
@@ -88,8 +104,8 @@ class MotionTracker:
             if min(width, height) >= 1 and not vehicle.is_over(self._settings)
         ]
 
-    def _pair(self, expected: Float64Array, sightings: Sequence[Sighting]) -> dict[int, int]:
-        """Pair rows of vehicles with numbers of sightings; those present choose first."""
+    def _pair(self, expected: Float64Array, observations: Sequence[Observation]) -> dict[int, int]:
+        """Pair rows of vehicles with numbers of observations; present vehicles choose first."""
         present: list[int] = []
         lost: list[int] = []
         new: list[int] = []
@@ -98,50 +114,53 @@ class MotionTracker:
                 present.append(row)
             else:
                 (lost if vehicle.confirmed else new).append(row)
-        boxes = np.reshape([sighting.box for sighting in sightings], (-1, 4))
-        scores = iou_matrix(expected, boxes)
-        scores[scores < self._settings.overlap] = 0
-        faint = [number for number, s in enumerate(sightings) if not self._is_telling(s)]
-        scores[np.ix_(lost, faint)] = 0  # a stray glimmer would lead them away
-        return pair(scores, [present, lost, new])
+        boxes = np.reshape([observation.box for observation in observations], (-1, 4))
+        buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
+        values = buffered_iou(expected, buffers, boxes)
+        values[values < self._settings.overlap] = 0
+        weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
+        values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
+        return pair(values, [present, lost, new])
 
-    def _is_telling(self, sighting: Sighting) -> bool:
-        """Tell whether such a region, lasting, would make a vehicle."""
-        return sighting.clearness > self._settings.leak
+    def _adds_evidence(self, observation: Observation) -> bool:
+        """Tell whether such a detection, repeated in each frame, would make a vehicle."""
+        return observation.score > self._settings.leak
 
     def _hidden(self, boxes: Float64Array) -> list[bool]:
         present = [vehicle.is_present(self._settings) for vehicle in self._vehicles]
         return are_hidden(boxes, np.array(present, bool), self._settings.hidden)
 
-    def _seen_as_one(self, expected: Float64Array, found: Found) -> Found:
-        """Share a region among two vehicles that it shows as one."""
-        shared: Found = {}
+    def _seen_as_one(
+        self, expected: Float64Array, found: dict[int, Observation]
+    ) -> dict[int, Observation]:
+        """Share a detection among two vehicles that it shows as one."""
+        shared: dict[int, Observation] = {}
         hidden = self._hidden(expected)
         missed = [row for row in range(len(expected)) if row not in found and not hidden[row]]
         for row, other in product(self._confirmed(found), self._confirmed(missed)):
-            region, both = found[row], expected[[row, other]]
-            if other in shared or not shows_both(region.box, both, self._settings.part):
+            observation, both = found[row], expected[[row, other]]
+            if other in shared or not shows_both(observation.box, both, self._settings.part):
                 continue
             for each in (row, other):
-                box = stretched(expected[each], around(both), region.box)
-                shared[each] = Sighting(box, region.clearness)
+                box = stretched(expected[each], around(both), observation.box)
+                shared[each] = Observation(box, observation.score, observation.class_id)
         return shared
 
     def _confirmed(self, rows: Iterable[int]) -> list[int]:
         return [row for row in rows if self._vehicles[row].confirmed]
 
-    def _tracks(self) -> list[Track]:
+    def _tracks(self, seconds: float) -> list[Track]:
         boxes = self._boxes()
         tracks = []
         for vehicle, box, hidden in zip(self._vehicles, boxes, self._hidden(boxes), strict=True):
-            vehicle.hidden_misses += hidden and vehicle.misses > 0
+            predicted = vehicle.unseen > 0
+            vehicle.hidden += seconds * (hidden and predicted)
             wide_enough = box[2] >= self._settings.smallest * self._size[0]
-            gone = hidden and vehicle.misses
+            gone = hidden and predicted
             if vehicle.is_present(self._settings) and wide_enough and not gone:
                 vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
-                tracks.append(
-                    Track(vehicle.id, _rounded(box), score=1.0, predicted=vehicle.misses > 0)
-                )
+                track = Track(vehicle.id, _rounded(box), vehicle.score, predicted, vehicle.class_id)
+                tracks.append(track)
         return sorted(tracks, key=lambda track: track.id)
 
 

@@ -1,35 +1,40 @@
-"""One vehicle: its motion, and how sure of it we are.
+"""One vehicle: its motion, the evidence for it, and its score.
 
 The evidence for a vehicle is a running sum that leaks, as in Page, "Continuous Inspection
-Schemes", 1954: what is weaker than the leak never adds up, however long it lasts.
+Schemes", 1954: detections whose score is below the leak never add up, however long they last.
+It is measured in seconds of detections with score 1, so that it does not depend on the frame rate.
 """
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import Float64Array
-from vdet.track.motion.state import MotionState
-from vdet.track.motion.views import view
+from vdet.track.motion.state import MotionState, measure
 
-_SLOWING = 0.95
-"""What is left, a frame, of the velocity of a vehicle unseen for longer than it is carried."""
+LONGEST_LOOK = 0.1
+"""Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
 
-_SETTLING = 0.9
-"""The same of the change of its size, from the first frame on: growth adds up to a lot soon."""
+SCORE_TIME = 0.5
+"""Seconds over which the scores of detections are averaged."""
 
-_FAINTEST = 0.05
-"""Clearness below which a region's box is not thought to be any worse."""
+_SLOWING_TIME = 0.8
+"""Seconds in which the velocity of a vehicle unseen for longer than it is carried falls to 1/e."""
+
+_SETTLING_TIME = 0.4
+"""The same of the change of its size, from the first miss on: growth soon adds up to a lot."""
+
+_LEAST_SCORE = 0.05
+"""Below this score the box of a detection is not taken to be any less exact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
-    """A region: `box` is x, y, width, height in full-frame pixels, float64 `(4,)`, in the frame.
-
-    `clearness` is its evidence, 0 to 1, 1 for a vehicle that is seen clearly.
-    """
+class Observation:
+    """A detection inside the frame: `box` is x, y, width, height in pixels, float64 `(4,)`."""
 
     box: Float64Array
-    clearness: float
+    score: float
+    class_id: int | None = None
 
 
 @dataclass(eq=False, slots=True)
@@ -41,72 +46,103 @@ class Vehicle:
     state
         Its motion up to the latest frame.
     evidence
-        What speaks for it, in frames of clear sight; at most `needed`.
+        Seconds of detections with score 1, less the leak; from 0 to `needed`.
     confirmed
-        Whether there was enough of it once; only then it is shown.
+        Whether the evidence was enough once; only then it is shown.
     id
         Given when it is first shown.
-    misses
-        Frames in a row without a region, up to the latest one.
-    hidden_misses
-        How many of them it was hidden in by a nearer vehicle.
+    unseen
+        Seconds without a detection, up to the latest frame.
+    hidden
+        How many of them it was hidden by a nearer vehicle.
     """
 
     state: MotionState
-    evidence: float
+    evidence: float = 0.0
     confirmed: bool = False
     id: int | None = None
-    misses: int = 0
-    hidden_misses: int = 0
+    unseen: float = 0.0
+    hidden: float = 0.0
+    _score_sum: float = 0.0
+    _score_weight: float = 0.0
+    _class_scores: dict[int, float] = field(default_factory=dict)
 
     @classmethod
-    def new(cls, sighting: Sighting, settings: MotionTrackerSettings) -> "Vehicle":
-        """Make a vehicle of its first region."""
-        noise = _noise(sighting, settings)
-        return cls(
-            MotionState.at_rest(sighting.box, noise, settings.velocity / 25),
-            sighting.clearness - settings.leak,
+    def new(
+        cls, observation: Observation, seconds: float, settings: MotionTrackerSettings
+    ) -> "Vehicle":
+        """Make a vehicle of its first detection, `seconds` after the frame before."""
+        state = MotionState.at_rest(
+            observation.box, _noise(observation, settings), settings.velocity
         )
+        vehicle = cls(state)
+        vehicle._add(observation, seconds, settings)
+        return vehicle
 
-    def predict(self, settings: MotionTrackerSettings) -> None:
-        """Move on to the next frame."""
-        self.state = self.state.predicted(settings.acceleration / 125)
+    @property
+    def score(self) -> float:
+        """Mean score of the latest detections, 0 to 1; a frame without one counts as 0."""
+        return self._score_sum / self._score_weight
+
+    @property
+    def class_id(self) -> int | None:
+        """The class with the highest sum of scores."""
+        return max(self._class_scores, key=self._class_scores.__getitem__, default=None)
+
+    def predict(self, seconds: float, settings: MotionTrackerSettings) -> None:
+        """Move on to the next frame, `seconds` later."""
+        self.state = self.state.predicted(seconds, settings.acceleration)
 
     def see(
-        self, sighting: Sighting, size: tuple[int, int], settings: MotionTrackerSettings
+        self,
+        observation: Observation,
+        seconds: float,
+        size: tuple[int, int],
+        settings: MotionTrackerSettings,
     ) -> None:
-        """Take in its region in this frame of `size`, width and height in pixels."""
-        seen = view(self.state, sighting.box, size)
-        self.state = seen.state.corrected(seen.measured, _noise(sighting, settings), seen.seen)
-        self.misses = self.hidden_misses = 0
-        self._weigh(sighting.clearness - settings.leak, settings)
+        """Take in its detection in this frame of `size`, width and height in pixels."""
+        edge = measure(self.state, observation.box, size)
+        noise = _noise(observation, settings)
+        self.state = edge.state.corrected(edge.measured, noise, edge.seen)
+        self.unseen = self.hidden = 0.0
+        self._add(observation, seconds, settings)
 
-    def miss(self, settings: MotionTrackerSettings) -> None:
-        """Note a frame without a region for it."""
-        self.misses += 1
-        motion = _SLOWING if self.misses > settings.carried * 25 else 1.0
-        self.state = self.state.slowed(motion, _SETTLING)
-        self._weigh(-settings.leak, settings)
+    def miss(self, seconds: float, settings: MotionTrackerSettings) -> None:
+        """Note a frame without a detection of it."""
+        self.unseen += seconds
+        lost = self.unseen > settings.carried
+        motion = math.exp(-seconds / _SLOWING_TIME) if lost else 1.0
+        self.state = self.state.slowed(motion, math.exp(-seconds / _SETTLING_TIME))
+        self._weigh(0.0, seconds, settings)
 
     def is_present(self, settings: MotionTrackerSettings) -> bool:
         """Tell whether it is known and was seen lately."""
-        return self.confirmed and self.evidence > 0 and self.misses <= settings.carried * 25
+        return self.confirmed and self.evidence > 0 and self.unseen <= settings.carried
 
     def is_over(self, settings: MotionTrackerSettings) -> bool:
         """Tell whether to forget it."""
         if not self.confirmed:
             return self.evidence <= 0
-        in_the_open = self.misses - self.hidden_misses
-        return (
-            in_the_open > settings.remembered * 25
-            or self.hidden_misses > settings.remembered_hidden * 25
-        )
+        in_the_open = self.unseen - self.hidden
+        return in_the_open > settings.remembered or self.hidden > settings.remembered_hidden
 
-    def _weigh(self, evidence: float, settings: MotionTrackerSettings) -> None:
-        self.evidence = min(max(self.evidence + evidence, 0.0), settings.needed * 25)
-        self.confirmed |= self.evidence >= settings.needed * 25
+    def _add(
+        self, observation: Observation, seconds: float, settings: MotionTrackerSettings
+    ) -> None:
+        self._weigh(observation.score, seconds, settings)
+        if observation.class_id is not None:
+            sums = self._class_scores
+            sums[observation.class_id] = sums.get(observation.class_id, 0.0) + observation.score
+
+    def _weigh(self, score: float, seconds: float, settings: MotionTrackerSettings) -> None:
+        gained = (score - settings.leak) * min(seconds, LONGEST_LOOK)
+        self.evidence = min(max(self.evidence + gained, 0.0), settings.needed)
+        self.confirmed |= self.evidence >= settings.needed
+        kept = math.exp(-seconds / SCORE_TIME)
+        self._score_sum = kept * self._score_sum + (1 - kept) * score
+        self._score_weight = kept * self._score_weight + (1 - kept)
 
 
-def _noise(sighting: Sighting, settings: MotionTrackerSettings) -> float:
-    """Return the deviation of a region's box: its variance grows as its votes become fewer."""
-    return float(settings.noise / max(sighting.clearness, _FAINTEST) ** 0.5)
+def _noise(observation: Observation, settings: MotionTrackerSettings) -> float:
+    """Return the deviation of a detection's box: its variance grows as the score falls."""
+    return float(settings.noise / max(observation.score, _LEAST_SCORE) ** 0.5)

@@ -1,0 +1,128 @@
+"""Which detection belongs to which vehicle, and which vehicles are the same one.
+
+Source: Kuhn, "The Hungarian Method for the Assignment Problem", 1955; the order of the rounds is
+the matching cascade of Wojke, Bewley and Paulus, "Simple Online and Realtime Tracking with a Deep
+Association Metric", 2017; the buffered intersection over union is that of Yang et al., "Hard to
+Track Objects with Irregular Motions and Similar Appearances? Make It Easier by Buffering the
+Matching Space", 2023.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
+
+from vdet.config.schema import MotionTrackerSettings
+from vdet.geometry import Float64Array, iou_matrix, visible
+from vdet.track.motion.overlapping import is_part, is_same
+from vdet.track.motion.vehicle import Vehicle
+
+Pairs = dict[int, int]
+
+WIDEST_BUFFER = 0.5
+"""Most that a box is widened by on each side, shares of its size."""
+
+_REACH = 1.5
+"""How far from its expected place a lost vehicle may turn up, in sizes of the vehicle."""
+
+_GROWTH = 3.0
+"""How much larger or smaller its box may be then, as an area."""
+
+
+def buffered_iou(
+    expected: Float64Array, buffers: Float64Array, found: Float64Array
+) -> Float64Array:
+    """Return how well each expected box fits each found one, 0 to 1, `(n, m)`.
+
+    Both boxes are widened by the buffer of the expected one, in shares of their own sizes. So two
+    boxes that do not touch may still belong together where little is known of the motion.
+
+    Parameters
+    ----------
+    expected, found
+        Shapes `(n, 4)` and `(m, 4)`: x, y, width, height in pixels, each with an area.
+    buffers
+        Shape `(n, 2)`: shares of width and height by which a box is widened on each side.
+    """
+    rows = [
+        iou_matrix(_widened(box[np.newaxis], buffer), _widened(found, buffer))
+        for box, buffer in zip(expected, np.minimum(buffers, WIDEST_BUFFER), strict=True)
+    ]
+    return np.concatenate([np.zeros((0, len(found))), *rows])
+
+
+def _widened(boxes: Float64Array, buffer: Float64Array) -> Float64Array:
+    margin = boxes[:, 2:] * buffer
+    return np.concatenate([boxes[:, :2] - margin, boxes[:, 2:] + 2 * margin], axis=1)
+
+
+def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> Pairs:
+    """Pair rows with columns, each at most once.
+
+    Parameters
+    ----------
+    values
+        Shape `(n, m)`: what a pair is worth; 0 where it must not be.
+    rounds
+        Rows: those of a later round may only have what the earlier ones left.
+
+    Returns
+    -------
+    The column of each paired row: in each round the pairs with the largest sum of values.
+    """
+    left = values.copy()
+    pairs: Pairs = {}
+    for rows in rounds:
+        pairs |= {rows[row]: column for row, column in _assign(left[list(rows)])}
+        left[:, list(pairs.values())] = 0
+    return pairs
+
+
+def _assign(values: Float64Array) -> list[tuple[int, int]]:
+    rows, columns = linear_sum_assignment(values, maximize=True)
+    kept = values[rows, columns] > 0
+    return list(zip(rows[kept].tolist(), columns[kept].tolist(), strict=True))
+
+
+def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
+    """Give the ids of lost vehicles to those newly confirmed near by; return the others.
+
+    Behind another vehicle a prediction goes astray, and the vehicle that appears beside it is
+    followed as a new one at first.
+    """
+    left = list(vehicles)
+    for new in vehicles:
+        if not new.confirmed or new.id is not None or new.unseen:
+            continue
+        lost = [v for v in left if v.id is not None and v.unseen and _distance(v, new) < _REACH]
+        if lost:
+            nearest = min(lost, key=lambda vehicle: _distance(vehicle, new))
+            new.id = nearest.id
+            left.remove(nearest)
+    return left
+
+
+def without_duplicates(
+    vehicles: Sequence[Vehicle], size: tuple[int, int], settings: MotionTrackerSettings
+) -> list[Vehicle]:
+    """Drop tracks of a vehicle that has another one with more evidence, or else an older one."""
+    kept: list[Vehicle] = []
+    for vehicle in sorted(vehicles, key=lambda v: (not v.confirmed, -v.evidence)):
+        seen = [v.state.box for v in kept if v.confirmed and not v.unseen]
+        if vehicle.unseen == 0 and seen:
+            box, *others = visible(np.stack([vehicle.state.box, *seen]), size)
+            inside = not vehicle.confirmed and is_part(box, np.stack(others), settings.part)
+            if inside or is_same(box, np.stack(others)):
+                continue
+        kept.append(vehicle)
+    return [vehicle for vehicle in vehicles if vehicle in kept]
+
+
+def _distance(one: Vehicle, other: Vehicle) -> float:
+    """Return the distance of the centres in mean sizes; infinite where the sizes do not agree."""
+    a, b = one.state.box, other.state.box
+    if abs(math.log(a[2] * a[3] / (b[2] * b[3]))) > math.log(_GROWTH):
+        return math.inf
+    offset = (a[:2] + a[2:] / 2 - b[:2] - b[2:] / 2) / ((a[2:] + b[2:]) / 2)
+    return math.hypot(*offset)

@@ -1,0 +1,309 @@
+"""Scenes of rectangles with known places: what the tracker shows of them, and under which id."""
+
+import pytest
+
+from track.motion.scenes import (
+    CLEAR,
+    FAINT,
+    HEIGHT,
+    WEAK,
+    WIDTH,
+    detections,
+    first_shown,
+    follow,
+    frames,
+    id_at,
+    ids,
+    inside,
+    moving,
+)
+from vdet.config.schema import MotionTrackerSettings
+from vdet.geometry import Box
+from vdet.track.motion.tracker import MotionTracker
+
+CAR = Box(400, 400, 100, 70)
+DEFAULTS = MotionTrackerSettings()
+CARRIED = frames(DEFAULTS.carried)
+REMEMBERED = frames(DEFAULTS.remembered)
+
+# Showing
+
+
+def test_a_clearly_seen_vehicle_is_shown_within_five_frames() -> None:
+    assert first_shown(follow([[CAR]] * 10)) < 5
+
+
+def test_a_weakly_seen_one_is_shown_later() -> None:
+    weak = follow([[(CAR, WEAK)]] * 30)
+    assert first_shown(follow([[CAR]] * 30)) < first_shown(weak) < 12
+
+
+def test_evidence_weaker_than_the_leak_never_adds_up() -> None:
+    faint = (CAR, DEFAULTS.leak)
+    assert ids(follow([[faint]] * 300)) == set()
+
+
+def test_flicker_is_never_shown() -> None:
+    places = [CAR.moved_to(x, 400) for x in (50, 300, 550, 800, 1050)]
+    flicker = [[places[n % 5]] if n % 2 else [] for n in range(200)]
+    assert ids(follow(flicker)) == set()
+
+
+def test_a_single_clear_false_alarm_is_not_shown() -> None:
+    assert ids(follow([[(CAR, CLEAR)], *[[]] * 20])) == set()
+
+
+def test_a_vehicle_is_shown_once_it_is_wide_enough() -> None:
+    least = DEFAULTS.smallest * WIDTH
+    places = [Box(600 - n // 2, 400, 20 + n, 14 + n) for n in range(60)]
+    shown = follow([place] for place in places)
+    assert ids(shown) == {1}
+    assert all(track.box.width >= least - 1 for tracks in shown for track in tracks)
+    assert places[first_shown(shown)].width == pytest.approx(least, abs=2)
+
+
+# Place
+
+
+@pytest.mark.parametrize(("dx", "dy"), [(0, 0), (4, 0), (-4, 1), (15, 3)])
+def test_a_steadily_moving_vehicle_is_shown_where_it_is(dx: float, dy: float) -> None:
+    places = moving(CAR, dx, dy, frames=40)
+    shown = follow([place] for place in places)
+    assert ids(shown) == {1}
+    for place, tracks in list(zip(places, shown, strict=True))[20:]:
+        assert tracks[0].box.iou(place) > 0.97
+
+
+def test_a_fast_vehicle_is_not_lost() -> None:
+    places = moving(Box(0, 400, 200, 100).moved_to(20, 400), dx=50, frames=20)
+    assert ids(follow([inside(place)] for place in places)) == {1}
+
+
+def test_a_jittering_region_is_shown_steadier_than_it_is() -> None:
+    places = [CAR.moved_to(400 + (8 if n % 2 else -8), 400) for n in range(40)]
+    shown = follow([place] for place in places)[20:]
+    lefts = [tracks[0].box.x for tracks in shown]
+    assert max(lefts) - min(lefts) < 12
+    assert sum(lefts) / len(lefts) == pytest.approx(400, abs=2)
+
+
+def test_weak_evidence_moves_a_vehicle_less() -> None:
+    aside = CAR.moved_to(430, 400)
+    strong = follow([*[[CAR]] * 20, [(aside, CLEAR)]])[-1]
+    weak = follow([*[[CAR]] * 20, [(aside, WEAK / 5)]])[-1]
+    assert CAR.x < weak[0].box.x < strong[0].box.x < aside.x
+
+
+# Missed frames
+
+
+def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> None:
+    places = moving(CAR, dx=5, frames=40)
+    clip = [[] if 30 <= n < 36 else [place] for n, place in enumerate(places)]
+    shown = follow(clip)
+    assert [track.predicted for tracks in shown[28:38] for track in tracks] == (
+        [False] * 2 + [True] * 6 + [False] * 2
+    )
+    for place, tracks in list(zip(places, shown, strict=True))[30:]:
+        assert id_at(tracks, place) == 1
+        assert tracks[0].box.iou(place) > 0.9
+
+
+def test_after_that_it_is_not_shown_but_keeps_its_id() -> None:
+    gone = CARRIED + 5
+    shown = follow([*[[CAR]] * 20, *[[]] * gone, *[[CAR]] * 5])
+    assert [len(tracks) for tracks in shown[20 : 20 + gone]] == [1] * CARRIED + [0] * 5
+    assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
+
+
+def test_in_the_end_it_is_forgotten() -> None:
+    shown = follow([*[[CAR]] * 20, *[[]] * (REMEMBERED + 1), *[[CAR]] * 10])
+    assert ids(shown[-1:]) == {2}
+
+
+def test_weak_detections_do_not_re_identify_a_lost_vehicle() -> None:
+    faint = [(place, FAINT) for place in moving(CAR, dx=6, frames=15)]
+    missed: list[list[Box]] = [[]] * (CARRIED + 1)
+    shown = follow([*[[CAR]] * 20, *missed, *[[place] for place in faint], *[[CAR]] * 5])
+    assert [id_at(tracks, CAR) for tracks in shown[-5:]] == [1] * 5
+
+
+def test_a_vehicle_with_only_faint_detections_is_not_shown_for_ever() -> None:
+    shown = follow([*[[CAR]] * 200, *[[(CAR, FAINT)]] * 100])
+    assert len(shown[205]) == 1
+    assert shown[-1] == []
+
+
+def test_a_shown_vehicle_has_its_region_before_a_new_one() -> None:
+    aside, between = Box(455, 380, 100, 70), Box(430, 390, 100, 70)
+    shown = follow([*[[CAR]] * 20, [CAR, aside], [between]])
+    assert between.iou(aside) > between.iou(CAR)
+    assert [(track.id, track.predicted) for track in shown[-1]] == [(1, False)]
+
+
+# One vehicle behind another
+
+VAN = Box(100, 390, 180, 130)
+
+
+def test_a_vehicle_hidden_by_a_nearer_one_is_not_shown_and_keeps_its_id() -> None:
+    vans = moving(VAN, dx=4, frames=160)
+    clip = []
+    for van in vans:
+        covered = CAR.intersection(van).area / CAR.area
+        clip.append([van] if covered > 0.5 else [van, CAR])
+    shown = follow(clip)
+    hidden = [len(frame) == 1 for frame in clip]
+    assert sum(hidden) > 3 * CARRIED
+    assert ids(shown) == {1, 2}
+    car, van_id = id_at(shown[20], CAR), id_at(shown[20], vans[20])
+    for n, tracks in enumerate(shown[20:], start=20):
+        assert id_at(tracks, vans[n]) == van_id
+        assert hidden[n] or id_at(tracks, CAR) == car
+        assert not hidden[n] or [track.id for track in tracks] == [van_id]
+
+
+def test_two_vehicles_that_cross_keep_their_ids() -> None:
+    vans, cars = moving(VAN, dx=6, frames=150), moving(CAR.moved_to(800, 400), dx=-2, frames=150)
+    clip = [
+        [van] if car.intersection(van).area > car.area / 2 else [car, van]
+        for car, van in zip(cars, vans, strict=True)
+    ]
+    shown = follow(clip)
+    assert ids(shown) == {1, 2}
+    for n in (10, 149):
+        assert id_at(shown[n], cars[n]) == id_at(shown[10], cars[10])
+        assert id_at(shown[n], vans[n]) == id_at(shown[10], vans[10])
+
+
+def test_a_vehicle_that_comes_out_displaced_is_the_same_one() -> None:
+    hiding = VAN.moved_to(370, 390)
+    beside = Box(530, 400, 110, 75)  # it went on behind the van
+    clip = [
+        *[[CAR, van] for van in moving(VAN, dx=6, frames=46)],
+        *[[hiding]] * 40,
+        *[[hiding, beside]] * 12,
+    ]
+    shown = follow(clip)
+    assert id_at(shown[-1], beside) == id_at(shown[10], CAR)
+    assert len(ids(shown)) == 2
+
+
+def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:
+    van = VAN.moved_to(370, 390)
+    clip = [
+        *[[CAR]] * 10,
+        *[[CAR, each] for each in moving(VAN.moved_to(200, 390), dx=10, frames=10)],
+        *[[van]] * (frames(DEFAULTS.remembered_hidden) + 30),
+        *[[VAN.moved_to(800, 390), CAR]] * 8,
+    ]
+    shown = follow(clip)
+    assert id_at(shown[-1], CAR) not in ids(shown[:20])
+
+
+def test_two_vehicles_seen_as_one_are_both_shown_and_keep_their_places() -> None:
+    truck = Box(490, 380, 160, 120)
+    clip = [*[[CAR, truck]] * 20, *[[CAR.union(truck)]] * 20, *[[CAR, truck]] * 5]
+    shown = follow(clip)
+    assert ids(shown) == {1, 2}
+    for tracks in shown[10:]:
+        assert id_at(tracks, CAR) == id_at(shown[10], CAR)
+        assert id_at(tracks, truck) == id_at(shown[10], truck)
+
+
+# The frame's sides
+
+
+def test_a_vehicle_that_comes_in_at_the_side_is_shown_as_far_as_it_is_seen() -> None:
+    places = moving(Box(WIDTH - 40, 400, 260, 160), dx=-6, frames=70)
+    shown = follow([inside(place)] for place in places)
+    assert ids(shown) == {1}
+    assert first_shown(shown) < 5
+    for place, tracks in list(zip(places, shown, strict=True))[5:]:
+        assert tracks[0].box.iou(inside(place)) > 0.9
+
+
+@pytest.mark.parametrize("dx", [-10, 10])
+def test_a_vehicle_that_leaves_is_followed_to_the_side_and_dropped_there(dx: int) -> None:
+    places = moving(Box(WIDTH // 2 - 100, 400, 200, 120), dx, frames=90)
+    seen = [inside(place) for place in places]
+    shown = follow([place] if place.width > 20 else [] for place in seen)
+    assert ids(shown) == {1}
+    for place, tracks in list(zip(seen, shown, strict=True))[5:]:
+        if place.width > 30:
+            assert tracks[0].box.iou(place) > 0.85
+    assert shown[-1] == []
+
+
+def test_the_next_vehicle_at_that_side_is_another_one() -> None:
+    leaving = [inside(place) for place in moving(Box(900, 400, 200, 120), dx=10, frames=38)]
+    shown = follow([*[[place] for place in leaving], *[[]] * 8, *[[Box(1180, 400, 100, 120)]] * 8])
+    assert id_at(shown[-1], Box(1180, 400, 100, 120)) == 2
+
+
+# One vehicle, one track
+
+
+def test_a_region_inside_a_shown_vehicle_is_no_vehicle() -> None:
+    part = Box(430, 405, 60, 40)
+    assert ids(follow([*[[CAR]] * 6, *[[CAR, part]] * 30])) == {1}
+
+
+def test_two_boxes_that_overlap_and_stand_level_are_one_vehicle() -> None:
+    rear, side = Box(400, 400, 120, 80), Box(470, 398, 130, 84)
+    assert ids(follow([[rear, side]] * 30)) == {1}
+
+
+def test_a_vehicle_behind_another_one_is_a_vehicle() -> None:
+    behind = Box(480, 395, 90, 45)
+    assert ids(follow([[CAR, behind]] * 10)) == {1, 2}
+
+
+def test_two_tracks_that_come_together_become_the_older_one() -> None:
+    other = [CAR.moved_to(max(400, 600 - 10 * n), 400) for n in range(60)]
+    clip = [[CAR], [CAR], *[[CAR, place] for place in other]]
+    shown = follow(clip)
+    assert ids(shown[:12]) == {1, 2}
+    assert ids(shown[-10:]) == {1}
+
+
+def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:
+    truck = Box(300, 250, 300, 200)
+    cars = moving(Box(150, 400, 110, 80), dx=5, frames=60)
+    shown = follow([truck, car] for car in cars)
+    assert ids(shown) == {1, 2}
+    assert [len(tracks) for tracks in shown[5:]] == [2] * 55
+
+
+# Ids
+
+
+def test_ids_count_up_in_the_order_of_showing() -> None:
+    first, second, third = CAR, CAR.moved_to(100, 400), CAR.moved_to(800, 400)
+    later = [(first), (third, WEAK), (second)]
+    shown = follow([*[[(first)]] * 5, *[later] * 20])
+    assert [id_at(shown[-1], box) for box in (first, second, third)] == [1, 2, 3]
+    assert [track.id for track in shown[-1]] == [1, 2, 3]
+
+
+def test_every_tracker_counts_its_own() -> None:
+    assert ids(follow([[CAR]] * 5)) == ids(follow([[CAR]] * 5)) == {1}
+
+
+def test_regions_outside_the_frame_do_not_count() -> None:
+    outside = [Box(-200, 400, 100, 70), Box(WIDTH, 400, 90, 70), Box(10, HEIGHT + 5, 90, 70)]
+    assert ids(follow([outside] * 10)) == set()
+
+
+def test_the_size_of_the_frame_does_not_matter() -> None:
+    def doubled(box: Box) -> Box:
+        return Box(2 * box.x, 2 * box.y, 2 * box.width, 2 * box.height)
+
+    places = [inside(place) for place in moving(Box(900, 400, 120, 80), dx=8, frames=60)]
+    large = MotionTracker(DEFAULTS, 2 * WIDTH, 2 * HEIGHT)
+    shown = follow([place] for place in places)
+    for n, (place, tracks) in enumerate(zip(places, shown, strict=True)):
+        twice = large.update(detections([doubled(place)]), n / 25)
+        assert [track.id for track in twice] == [track.id for track in tracks]
+        for one, other in zip(tracks, twice, strict=True):
+            assert doubled(one.box).iou(other.box) > 0.95
