@@ -18,7 +18,7 @@ from track.motion.traffic import (
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
 from vdet.geometry import Box
-from vdet.synthetic import default_clip
+from vdet.synthetic import demo_scene
 from vdet.synthetic.truth import truth
 from vdet.track.motion.tracker import MotionTracker
 
@@ -136,7 +136,7 @@ def test_traffic_with_real_differences_of_speed_is_followed_alike(seed: int, rat
 
 @cache
 def drawn_clip() -> list[list[TrueVehicle]]:
-    scene = default_clip(1, width=1280, height=720)
+    scene = demo_scene(1, width=1280, height=720)
     return [
         [
             TrueVehicle(
