@@ -79,8 +79,8 @@ def plan_pictures(
         picture = out if is_file or out is None else out / source.name
         folder = stages / source.stem if stages and len(sources) > 1 else stages
         named = {"picture": picture, "stages": folder}
-        outputs = (Output(sink, path) for sink, path in named.items() if path is not None)
-        jobs.append(PictureJob(source, tuple(outputs)))
+        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
+        jobs.append(PictureJob(source, own))
     outputs = [output for job in jobs for output in job.outputs]
     for output, count in Counter(outputs).items():
         if count > 1:

@@ -19,7 +19,7 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
 from vdet.geometry import Box
 from vdet.synthetic import demo_scene
-from vdet.synthetic.truth import truth
+from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker
 
 RATES = (5, 10, 25, 50)
@@ -144,7 +144,7 @@ def drawn_clip() -> list[list[TrueVehicle]]:
                 np.array([each.box.x, each.box.y, each.box.width, each.box.height], np.float64),
                 each.hidden,
             )
-            for each in truth(scene, index)
+            for each in true_boxes(scene, index)
         ]
         for index in range(scene.frames)
     ]
