@@ -7,36 +7,44 @@ DATA ?= $(or $(VDET_DATA),data)
 TRUTH ?= $(DATA)/project_video_0001-0880.txt
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
-.PHONY: demo test lint types tests bench soak folds data model clean
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint types tests bench soak folds data model picture clean
 
-demo: $(READY)  ## make a small data set and a road clip, train, detect, compare with the truth
+help:  ## print this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+
+demo: $(READY)  ## draw patches and a road, train, detect, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
 
 test: lint types tests  ## everything that CI checks
 
-lint: $(READY)
+lint: $(READY)  ## check style and format
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(READY)
+types: $(READY)  ## check types
 	$(BIN)/mypy
 
-tests: $(READY)
+tests: $(READY)  ## run all tests
 	$(BIN)/pytest -n 2
 
-bench: $(READY)  ## how fast it is, as ratios measured in one run
+bench: $(READY)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks
 
-soak: $(READY)  ## one run over 20,000 frames: does anything creep up? (some minutes, 1 GB in $$TMPDIR)
+soak: $(READY)  ## check that nothing grows in a run of 20,000 frames (some minutes, 1 GB in TMPDIR)
 	$(BIN)/python -m benchmarks.soak
 
-data:  ## fetch the data set (125 MB) into data/; data/README.md tells what it is
+folds: $(READY)  ## check every threshold on frames that the model has not seen (after make model)
+	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \
+		$(PATCHES) build/model/mined.zip
+
+data:  ## fetch the patch set (125 MB) into data/; data/README.md says what it is
 	cd data && for name in vehicles non-vehicles; do \
 		curl --fail --location --continue-at - --output $$name.zip \
 			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
 	done
 
-model: $(READY)  ## train the shipped models anew: patches and video in $(DATA), truth in $(TRUTH)
+model: $(READY)  ## train the shipped models again: patches and video in DATA, truth in TRUTH
 	mkdir -p build/model
 	$(BIN)/vdet train $(PATCHES) -o build/model/start.npz --overwrite
 	$(BIN)/vdet mine $(DATA)/project_video.mp4 --truth $(TRUTH) --model build/model/start.npz \
@@ -45,9 +53,8 @@ model: $(READY)  ## train the shipped models anew: patches and video in $(DATA),
 	$(BIN)/vdet train $(PATCHES) -c seed -o build/model/seed.npz --overwrite
 	cp build/model/default.npz build/model/seed.npz src/vdet/models/
 
-folds: $(READY)  ## the five-fold check of every threshold, on frames that the model has not seen
-	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \
-		$(PATCHES) build/model/mined.zip
+picture: $(READY)  ## draw the picture of the README
+	$(BIN)/python docs/make_picture.py
 
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt
@@ -58,5 +65,5 @@ $(READY): pyproject.toml constraints.txt
 		--editable '.[dev]' --constraint constraints.txt
 	touch $@
 
-clean:
+clean:  ## remove everything that the other targets made, except data/
 	rm -rf $(VENV) demo bench.json dist build .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import settings
 
 from vdet.cli import main
-from vdet.config.schema import Settings, TrainingSettings, ViewSettings
+from vdet.config.schema import AugmentationSettings, Settings, TrainingSettings
 from vdet.detect.svm.model import save_model
 from vdet.learn.dataset import find_patches
 from vdet.learn.training import train
-from vdet.synthetic import default_clip, write_clip, write_patches
+from vdet.synthetic import demo_scene, write_clip, write_patches
 from vdet.synthetic.scene import Scene
 
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.
@@ -61,7 +61,7 @@ def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model with the default features, trained on generated patches and nothing made of them."""
     path = tmp_path_factory.mktemp("model") / "model.npz"
-    plain = TrainingSettings(views=ViewSettings(mirror=False, cut=0, parts=0))
+    plain = TrainingSettings(augmentation=AugmentationSettings(mirror=False, cut=0, parts=0))
     model, _ = train(find_patches([patches_path]), Settings(training=plain), jobs=1)
     save_model(model, path)
     return path
@@ -70,7 +70,7 @@ def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> 
 @pytest.fixture(scope="session")
 def scene() -> Scene:
     """A second and a bit of the demo's road, 320×180 pixels."""
-    return replace(default_clip(1, width=320, height=180), frames=30)
+    return replace(demo_scene(1, width=320, height=180), frames=30)
 
 
 @pytest.fixture(scope="session")

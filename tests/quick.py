@@ -6,11 +6,15 @@ region, and less of it a confident one.
 """
 
 QUICK = (
-    "search.probability=0.5",
-    "search.windows=[{size: 80, step: 1, top: 380, bottom: 520}]",
-    "search.perspective.sizes=[]",
-    "search.alternate=1",
-    "heat={frames: 4, weight: coverage, shrink: 4, blur: 15, threshold: 0.1, regions: outline}",
+    "detector.search.probability=0.5",
+    "detector.search.windows=[{size: 80, step: 1, top: 380, bottom: 520}]",
+    "detector.search.perspective.sizes=[]",
+    "detector.search.alternate=1",
+    "detector.heat={frames: 4, weight: coverage, shrink: 4, blur: 15}",
+    "detector.heat.threshold=0.1",
+    "detector.heat.regions=outline",
+    "detector.score.middle=0.1",
+    "detector.stills={strength: 0, width: 0.04, height: 0.07}",
     "tracker.method=rules",
     "tracker.confident_peak=0.3",
     "tracker.confident_detections_needed=2",
@@ -20,14 +24,14 @@ QUICK_OPTIONS = tuple(word for assignment in QUICK for word in ("--set", assignm
 
 def only_windows(settings: str) -> tuple[str, ...]:
     """Give the options for one set of windows, and no others."""
-    none = "search.perspective.sizes=[]"
-    return ("--set", f"search.windows=[{{{settings}}}]", "--set", none)
+    none = "detector.search.perspective.sizes=[]"
+    return ("--set", f"detector.search.windows=[{{{settings}}}]", "--set", none)
 
 
 FEW_OPTIONS = (
     *only_windows("size: 160, step: 8, top: 300, bottom: 620"),
     "--set",
-    "search.probability=1",
+    "detector.search.probability=1",
     "--set",
     "output.preset=ultrafast",
 )

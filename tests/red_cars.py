@@ -2,23 +2,28 @@
 
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 
+from vdet.batch.task import Work
 from vdet.config.schema import (
     FeatureSettings,
     HeatSettings,
     HistogramSettings,
     HogSettings,
-    MotionSettings,
     PerspectiveSettings,
+    RulesTrackerSettings,
+    ScoreSettings,
     SearchSettings,
     Settings,
-    TrackerSettings,
+    StillSettings,
+    SvmSettings,
     VoteSettings,
     WindowSettings,
 )
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.model import LinearModel, save_model
 from vdet.geometry import Box
 from vdet.media import Frame
 from vdet.media.images import Image
@@ -30,16 +35,22 @@ COLOUR = FeatureSettings(
     color_space="RGB", hog=HogSettings(channels=()), histogram=HistogramSettings(bins=BINS)
 )
 SETTINGS = Settings(
-    reference_height=HEIGHT,
-    features=COLOUR,
-    search=SearchSettings(
-        probability=0.5,
-        windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),),
-        perspective=PerspectiveSettings(sizes=()),
-        alternate=1,
+    detector=SvmSettings(
+        reference_height=HEIGHT,
+        features=COLOUR,
+        search=SearchSettings(
+            probability=0.5,
+            windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),),
+            perspective=PerspectiveSettings(sizes=()),
+            alternate=1,
+        ),
+        heat=HeatSettings(
+            frames=2, weight="none", shrink=1, blur=5, threshold=1.4, regions="outline"
+        ),
+        score=ScoreSettings(middle=1.4),
+        stills=StillSettings(strength=0, width=30 / WIDTH, height=30 / HEIGHT),
     ),
-    heat=HeatSettings(frames=2, weight="none", shrink=1, blur=5, threshold=1.4, regions="outline"),
-    tracker=TrackerSettings(method="rules", min_region=30, confident_peak=4),
+    tracker=RulesTrackerSettings(reference_height=HEIGHT, min_region=30, confident_peak=4),
 )
 """The original's way: sets over fixed rows, outlines, rules."""
 
@@ -53,10 +64,13 @@ def by_perspective(horizon: float) -> Settings:
         sizes=(0.15, 0.2), horizon=horizon, highest=0.9, lowest=2.1, step=2
     )
     return Settings(
-        features=COLOUR,
-        search=SearchSettings(probability=0.5, perspective=perspective),
-        heat=HeatSettings(votes=VoteSettings(least=0.25)),
-        tracker=TrackerSettings(motion=MotionSettings(strong=0.25)),
+        detector=SvmSettings(
+            features=COLOUR,
+            search=SearchSettings(probability=0.5, perspective=perspective),
+            heat=HeatSettings(votes=VoteSettings(least=0.25)),
+            score=ScoreSettings(middle=0.1, slope=4),
+            stills=StillSettings(strength=0.15),
+        )
     )
 
 
@@ -74,6 +88,17 @@ def red_finder() -> LinearModel:
         slopes=np.array([-20], np.float32),
         offsets=np.zeros(1, np.float32),
     )
+
+
+def red_model() -> SvmModel:
+    """Give the detector that finds red cars the original's way."""
+    return SvmModel(red_finder(), SETTINGS.svm)
+
+
+def red_work(folder: Path) -> Work:
+    """Give the same for a worker, which reads the model from a file in `folder`."""
+    save_model(red_finder(), folder / "red.npz")
+    return Work(SETTINGS, folder / "red.npz", threads=1)
 
 
 def road(*boxes: Box) -> Image:

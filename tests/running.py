@@ -1,4 +1,4 @@
-"""The program as a process of its own, that can be watched, signalled and killed."""
+"""The program as a separate process, that tests can watch, signal and kill."""
 
 import os
 import resource
@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,7 +20,26 @@ from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 
-SOON = 60.0  # seconds; a limit for what comes at once, on a very busy machine
+SOON = 60.0  # seconds; a limit for what takes a moment, on a very busy machine
+
+HOLDS_VIDEOS = """
+import os, time
+from pathlib import Path
+from vdet.media.reader import VideoReader
+
+folder = Path(__file__).parent
+frames = VideoReader.__iter__
+
+def held(reader):
+    for frame in frames(reader):
+        if frame.index == 100:
+            (folder / "held" / str(os.getpid())).touch()
+            while not (folder / "open").exists():
+                time.sleep(0.02)
+        yield frame
+
+VideoReader.__iter__ = held
+"""
 
 
 def write_drive(path: Path, frames: int, *, noise: bool = False) -> Path:
@@ -37,61 +56,79 @@ def write_drive(path: Path, frames: int, *, noise: bool = False) -> Path:
 
 
 def frames_of(path: Path | None) -> int:
-    """Play a video to its end, and count."""
+    """Read a video to its end, and count its frames."""
     assert path is not None
     with VideoReader(path) as reader:
         return sum(1 for _ in reader)
 
 
 def until(condition: Callable[[], bool], seconds: float = SOON) -> None:
-    """Wait for another process."""
+    """Wait for another process or thread."""
     end = time.monotonic() + seconds
     while not condition():
         if time.monotonic() > end:
-            pytest.fail("it never came to that")
+            pytest.fail("waited for nothing")
         time.sleep(0.02)
 
 
 def names(folder: Path) -> list[str]:
-    """Give all files in a folder and below it."""
+    """Return the names of all files in a folder and below it."""
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def unfinished(folder: Path) -> list[Path]:
-    """Give the videos of which a beginning has been written."""
-    return [path for path in folder.rglob(".*.vdet-*.mp4") if path.stat().st_size]
+@dataclass(frozen=True)
+class Gate:
+    """Holds videos at their hundredth frame until it is opened, however slow the machine.
+
+    It works in programs that are started with its `folder` on `PYTHONPATH`.
+    """
+
+    folder: Path
+
+    def __post_init__(self) -> None:
+        (self.folder / "held").mkdir()
+        (self.folder / "sitecustomize.py").write_text(HOLDS_VIDEOS)
+
+    def held(self) -> list[int]:
+        """Return the processes in which a video has come to its hundredth frame."""
+        return [int(path.name) for path in (self.folder / "held").iterdir()]
+
+    def open(self) -> None:
+        """Let all videos go on."""
+        (self.folder / "open").touch()
+
+
+def with_modules(folder: Path) -> dict[str, str]:
+    """Return an environment in which `folder` comes first on the path of modules."""
+    path = os.environ.get("PYTHONPATH")
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), *([path] if path else [])])}
 
 
 @dataclass
 class Running:
-    """A process of the program, leader of a session of its own."""
+    """A process of the program; it leads its own session."""
 
     process: "subprocess.Popen[str]"
 
     def children(self) -> list[int]:
-        """Give the processes that work for it."""
+        """Return the processes that it started."""
         return [pid for pid in _session(self.process.pid) if pid != self.process.pid]
 
     def is_alone(self) -> bool:
-        """Tell whether nothing works for it any more, nor goes on after it."""
+        """Return whether none of the processes that it started is left."""
         return not self.children()
 
-    def workers(self) -> list[int]:
-        """Give the processes that files are given to."""
-        marks = b"loky.backend.popen_loky"
-        return [pid for pid in self.children() if marks in _command(pid)]
-
     def send(self, number: signal.Signals, *, to_all: bool = False) -> None:
-        """Send a signal; `to_all` as a terminal does, to every process."""
+        """Send a signal; `to_all`: to every process of the session, as a terminal does."""
         (os.killpg if to_all else os.kill)(self.process.pid, number)
 
     def finish(self, seconds: float = SOON) -> Outcome:
-        """Wait for its end, and say how that was."""
+        """Wait for its end, and return its exit code and output."""
         out, err = self.process.communicate(timeout=seconds)
         return Outcome(self.process.returncode, out, err)
 
     def stop(self) -> None:
-        """Leave nothing of it behind."""
+        """Kill it and all processes that it started."""
         with suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()
@@ -100,17 +137,25 @@ class Running:
 def start(
     arguments: Iterable[str | Path],
     *,
-    environment: Mapping[str, str] | None = None,
+    modules: Path | None = None,
     largest_file: int | None = None,
     before: Callable[[], object] = lambda: None,
 ) -> Running:
-    """Start the program, after the call of `before` in its process.
+    """Start the program.
 
-    No file may become larger than `largest_file` bytes.
+    Parameters
+    ----------
+    modules
+        A folder that comes first on the path of modules; a `sitecustomize.py` in it is run before
+        the program, and in its worker processes.
+    largest_file
+        Limit for the size of a file, bytes.
+    before
+        Called in the new process before the program.
     """
 
     def prepare() -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job may ignore it
         if largest_file is not None:
             resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
         before()
@@ -120,7 +165,7 @@ def start(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | dict(environment or {}),
+        env=with_modules(modules) if modules else None,
         start_new_session=True,
         preexec_fn=prepare,  # noqa: PLW1509
     )
@@ -138,10 +183,3 @@ def _is_in(pid: int, session: int) -> bool:
         return state != "Z" and os.getsid(pid) == session
     except (FileNotFoundError, ProcessLookupError):
         return False
-
-
-def _command(pid: int) -> bytes:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except (FileNotFoundError, ProcessLookupError):
-        return b""

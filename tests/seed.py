@@ -1,12 +1,14 @@
 """The original's settings, as they ship, for tests of its numbers."""
 
-from vdet.config.loading import load_settings
+from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import RulesTrackerSettings
-from vdet.resources import find_config
 
-SEED = load_settings(find_config("seed")).settings
+SEED = load_settings(find_config("seed"))
 
 
 def tracker_but(**changes: object) -> RulesTrackerSettings:
-    """Give the original's tracker with some settings replaced."""
+    """Return the original's tracker with some settings replaced."""
     return RulesTrackerSettings.model_validate(SEED.tracker.model_dump() | changes)
+
+
+SEED_TRACKER = tracker_but()

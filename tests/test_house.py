@@ -13,18 +13,24 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "vdet"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-LONGEST = 250
+LONGEST = 400
 
 ROOMS = (
-    "__main__", "cli", "demo", "batch", "learn", "evaluate", "pipeline", "lanes", "resources",
-    "track", "detect", "synthetic", "draw", "media", "config", "cluster", "workers", "archives",
+    "__main__", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "pipeline", "lanes",
+    "track", "detect", "synthetic", "draw", "media", "config", "plugins", "workers", "archives",
     "files", "geometry", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 
+RE_EXPORT = ("__init__", "api")
+"""`import vdet` gives the names of the API, loaded when they are first used."""
+
 TEXTS = sorted(
     path
-    for pattern in ("src/**/*", "tests/**/*", "configs/*", "benchmarks/**/*", "data/README.md", "*")
+    for pattern in (
+        *("src/**/*", "tests/**/*", "configs/*", "benchmarks/**/*"),
+        *("docs/*", "data/README.md", "*"),
+    )
     for path in ROOT.glob(pattern)
     if path.is_file()
     and path.suffix in {".py", ".md", ".yaml", ".toml", ".txt", ".json"}
@@ -85,7 +91,7 @@ def test_a_module_imports_only_what_stands_below_its_room() -> None:
         f"{module} imports {used}"
         for module, path in NAMES.items()
         for used in imports_of(path)
-        if ROOMS.index(room_of(used)) < ROOMS.index(room_of(module))
+        if ROOMS.index(room_of(used)) < ROOMS.index(room_of(module)) and (module, used) != RE_EXPORT
     ]
     assert upward == []
 

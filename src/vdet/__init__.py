@@ -1,14 +1,70 @@
-"""Find and follow vehicles in road video on an ordinary CPU."""
+"""Find and follow vehicles in road video on an ordinary CPU.
 
-import os
+The names below are the public API; `docs/api.md` shows them in use. They are loaded when they are
+first used: importing vdet itself does nothing else.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vdet.api import (
+        Box,
+        Detections,
+        Detector,
+        DetectorKind,
+        DetectorModel,
+        DetectorSettings,
+        Frame,
+        FrameResult,
+        Settings,
+        SinkContext,
+        SinkKind,
+        Summary,
+        Track,
+        Tracker,
+        TrackerKind,
+        TrackerSettings,
+        VdetError,
+        VideoDetector,
+        VideoTracker,
+        detect_image,
+        detect_video,
+        follow,
+        load_settings,
+    )
 
 __version__ = "0.1.0"
 
-MAX_PICTURE_PIXELS = 2**25
-"""A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb many more."""
-MAX_PICTURE_SIDE = 2**15
+__all__ = [
+    "Box",
+    "Detections",
+    "Detector",
+    "DetectorKind",
+    "DetectorModel",
+    "DetectorSettings",
+    "Frame",
+    "FrameResult",
+    "Settings",
+    "SinkContext",
+    "SinkKind",
+    "Summary",
+    "Track",
+    "Tracker",
+    "TrackerKind",
+    "TrackerSettings",
+    "VdetError",
+    "VideoDetector",
+    "VideoTracker",
+    "detect_image",
+    "detect_video",
+    "follow",
+    "load_settings",
+]
 
-# OpenCV takes its limits from here, and only when it is first imported: before any module of ours.
-os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MAX_PICTURE_PIXELS))
-os.environ.setdefault("OPENCV_IO_MAX_IMAGE_WIDTH", str(MAX_PICTURE_SIDE))
-os.environ.setdefault("OPENCV_IO_MAX_IMAGE_HEIGHT", str(MAX_PICTURE_SIDE))
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'vdet' has no attribute {name!r}")
+    from vdet import api
+
+    return getattr(api, name)

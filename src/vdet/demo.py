@@ -1,10 +1,11 @@
 """The whole system on a made-up road: patches, training, detection, comparison with the truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.scores import Scores, score
@@ -13,10 +14,11 @@ from vdet.files import check_output, make_folder
 from vdet.learn.dataset import find_patches
 from vdet.learn.report import TrainingReport
 from vdet.learn.training import train
-from vdet.pipeline.run import VideoJob, process_video
+from vdet.pipeline.loop import Progress, VideoJob, check_job, no_progress, run_video
+from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic.clip import write_clip, write_truth
 from vdet.synthetic.patches import write_patches
-from vdet.synthetic.worlds import default_clip
+from vdet.synthetic.random_scenes import demo_scene
 
 PATCHES = 1200
 """Of each class."""
@@ -68,6 +70,12 @@ class DemoFiles:
         """Folder of pictures of every stage at one moment."""
         return self.folder / "stages"
 
+    @property
+    def job(self) -> VideoJob:
+        """What is made of the road."""
+        outputs = {"video": self.result, "tracks": self.tracks, "stages": self.stages}
+        return VideoJob(self.clip, tuple(Output(sink, path) for sink, path in outputs.items()))
+
 
 @dataclass(frozen=True, slots=True)
 class DemoResult:
@@ -82,9 +90,9 @@ class DemoResult:
 def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
     """Make the folder, and refuse to write over an earlier demo. Raises `OutputError`."""
     make_folder(files.folder)
-    outputs = (files.clip, files.truth, files.model, files.report, files.result, files.tracks)
-    for path in outputs:
+    for path in (files.clip, files.truth, files.model, files.report):
         check_output(path, overwrite=overwrite)
+    check_job(files.job, overwrite=overwrite)
 
 
 def run_demo(
@@ -93,7 +101,7 @@ def run_demo(
     *,
     seed: int = 1,
     say: Callable[[str], object] = lambda _: None,
-    progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
+    progress: Progress = no_progress,
 ) -> DemoResult:
     """Make the data, train on them, detect in the clip, and compare with the truth.
 
@@ -104,11 +112,11 @@ def run_demo(
     say
         Told what comes next, a line a step.
     progress
-        As `process_video` takes it, for the longer steps.
+        As `run_video` takes it, for the longer steps.
     """
     say(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
     write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
-    scene = default_clip(seed)
+    scene = demo_scene(seed)
     write_clip(files.clip, scene)
     write_truth(files.truth, scene)
     say("2/4 training …")
@@ -117,9 +125,9 @@ def run_demo(
     save_model(model, files.model)
     report.write(files.report)
     say("3/4 finding the vehicles …")
-    middle = scene.frames / scene.rate / 2
-    job = VideoJob(files.clip, files.result, files.tracks, stages=files.stages, at=middle)
-    summary = process_video(job, model, settings, progress=progress)
+    job = replace(files.job, at=scene.frames / scene.rate / 2)
+    detector = load_detector(settings.detector, files.model)
+    summary = run_video(job, detector, settings, progress=progress)
     say("4/4 comparing with the truth …")
     scores = score(read_predictions(files.tracks), read_truth(files.truth), rate=float(scene.rate))
     return DemoResult(report, scores, summary.frames, summary.seconds)

@@ -32,6 +32,10 @@ class ImageError(VdetError, ValueError):
     """A picture cannot be read, or searched."""
 
 
+class FrameSizeError(ImageError):
+    """Frames or pictures of this size are too small to be searched."""
+
+
 class VideoError(VdetError, OSError):
     """A video cannot be read or written."""
 

@@ -14,7 +14,7 @@ import secrets
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Self
 
 from vdet.errors import OutputError, VdetError
 
@@ -72,29 +72,78 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
 
 
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary file beside `path`, renamed to `path` at the end, removed on an error.
+class OutputFiles:
+    """The output files of one run, which appear under their names together; a context manager.
 
-    The temporary file keeps the suffix of `path`, for writers that choose a format by it. It is on
-    the disk before it is renamed. Those that killed runs left in the folder are removed.
+    `stage` gives temporary files. When the block ends well, they are brought to the disk and then
+    renamed, in the order in which they were staged; when it ends with an error they are removed.
+    If one cannot be renamed, those that have appeared and that replaced nothing are removed again.
 
     Raises
     ------
     OutputError
-        The file cannot be made or renamed, or an `OSError` that is not a `VdetError` already
-        came out of the block.
+        A file cannot be made, brought to the disk or renamed, or an `OSError` that is not a
+        `VdetError` already came out of the block.
     """
-    remove_stale(path.parent)
+
+    def __init__(self) -> None:
+        self._staged: list[tuple[Path, Path]] = []
+        self._stack = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def stage(self, path: Path) -> Path:
+        """Return a new, empty temporary file beside `path`, of the same suffix."""
+        remove_stale(path.parent)
+        with _named(path):
+            temporary = self._stack.enter_context(temporary_beside(path))
+        self._staged.append((temporary, path))
+        return temporary
+
+    def __exit__(self, kind: type[BaseException] | None, error: Any, _: object) -> None:
+        with self._stack:
+            if kind is None:
+                self._publish()
+        if isinstance(error, OSError) and not isinstance(error, VdetError) and self._staged:
+            path = self._staged[0][1]
+            raise _unwritable(path, error) from error
+
+    def _publish(self) -> None:
+        appeared: list[Path] = []
+        try:
+            for temporary, path in self._staged:
+                with _named(path):
+                    bring_to_disk(temporary)
+            for temporary, path in self._staged:
+                is_new = not path.exists()
+                with _named(path):
+                    temporary.replace(path)
+                if is_new:
+                    appeared.append(path)
+        except BaseException:
+            for path in appeared:
+                path.unlink(missing_ok=True)
+            raise
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[None]:
     try:
-        with temporary_beside(path) as temporary:
-            yield temporary
-            bring_to_disk(temporary)
-            temporary.replace(path)
-    except VdetError:
-        raise
+        yield
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
+        raise _unwritable(path, error) from error
+
+
+def _unwritable(path: Path, error: OSError) -> OutputError:
+    return OutputError(f"{path}: cannot be written: {error.strerror or error}")
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a temporary file beside `path`, renamed to `path` at the end: `OutputFiles` for one."""
+    with OutputFiles() as files:
+        yield files.stage(path)
 
 
 def write_json(values: Any, target: str) -> None:

@@ -1,61 +1,288 @@
-"""Worker processes of this machine: they end in order on SIGTERM, and after their parent."""
+"""Call a function for many items in parallel: in processes of this machine, or on a Dask cluster.
 
+Worker processes of this machine end in order on SIGTERM, ignore Ctrl-C in a terminal (their parent
+ends them), and end when their parent has ended.
+"""
+
+import contextlib
+import itertools
+import logging
 import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import TypeVar
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Future,
+    wait,
+)
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from vdet.errors import INTERRUPTED
+import vdet
+from vdet.errors import INTERRUPTED, ClusterError
+
+if TYPE_CHECKING:
+    import distributed
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-_LOOK_EVERY = 0.5  # seconds
-_LONGEST = 5.0  # seconds that an end in order may take
+PARENT_CHECK_INTERVAL = 0.5  # seconds
+CLEANUP_TIMEOUT = 5.0  # seconds between SIGTERM and a forced exit
+SAFE_PATH = "PYTHONSAFEPATH"  # if set, Python imports no module from the current folder
+ENVIRONMENT = {
+    SAFE_PATH: "1",
+    # A process for each core is enough: no further threads for linear algebra.
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+}
+
+TASKS_PER_MESSAGE = 1000  # to the scheduler; it begins while the next ones are on their way
 
 
-@contextmanager
-def ignore_sigint() -> Iterator[None]:
-    """Start processes that Ctrl-C in a terminal does not reach: their parent ends them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+class WorkerKilledError(BrokenExecutor):
+    """A worker process was killed or crashed; the items numbered `lost` have no result."""
+
+    def __init__(self, lost: Iterable[int]) -> None:
+        super().__init__("a worker process was killed, or crashed")
+        self.lost = frozenset(lost)
+
+
+class Workers(Protocol):
+    """Processes that work in parallel."""
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
+        """Call `function` for each item; yield the item's number and the result as they end.
+
+        Work begins in the order of the items. When the generator is closed, no further item is
+        begun. An error that `function` raises is raised here.
+
+        Raises
+        ------
+        WorkerKilledError
+            A worker process was killed. The items that were in work are lost. Other items without
+            a result were not begun.
+        """
+
+
+def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:
+    """Return the cluster of `scheduler` if given, else `jobs` processes; None: one for each core.
+
+    For a single job no further process is started.
+    """
+    if scheduler:
+        return DaskCluster(scheduler)
+    from joblib import cpu_count
+
+    count = jobs or cpu_count()
+    return ThisProcess() if count == 1 else LocalProcesses(count)
+
+
+@dataclass(frozen=True, slots=True)
+class ThisProcess:
+    """Works in this process, one item after the other."""
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
+        """Yield each item's number and result; see `Workers`."""
+        for number, item in enumerate(items):
+            yield number, function(item)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalProcesses:
+    """`count` processes of this machine; even a `count` of 1 is a process of its own."""
+
+    count: int
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
+        """Yield each item's number and result; see `Workers`."""
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        executor = ProcessPoolExecutor(
+            max(1, min(self.count, len(items))),
+            initializer=_initialize_worker,
+            initargs=(os.getpid(),),
+            env=ENVIRONMENT,
+        )
+        waiting = iter(enumerate(items))
+        in_work: dict[Future[R], int] = {}
+
+        def begin(most: int) -> None:
+            for number, item in itertools.islice(waiting, most):
+                in_work[executor.submit(_run_task, function, item)] = number
+
+        try:
+            with _worker_start():
+                begin(self.count)
+            while in_work:
+                for future in wait(in_work, return_when=FIRST_COMPLETED).done:
+                    result = future.result()
+                    yield in_work.pop(future), result
+                    begin(1)
+        except BrokenExecutor as error:
+            raise WorkerKilledError(in_work.values()) from error
+        finally:
+            while not all(future.running() or future.done() for future in in_work):
+                time.sleep(0.001)  # loky cannot end while an item is on its way to a process
+            executor.shutdown(kill_workers=bool(in_work))
+
+
+@contextlib.contextmanager
+def _worker_start() -> Iterator[None]:
+    """Let processes start that ignore Ctrl-C and import no module from the current folder."""
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main_thread else None
+    safe_path = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        if safe_path is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = safe_path
+        if in_main_thread:
+            signal.signal(signal.SIGINT, handler)
 
 
-def end_with(parent: int) -> None:
-    """Watch, in a thread, whether the process `parent` is there; without it, end this one."""
-    threading.Thread(target=_watch, args=(parent,), name="vdet-watch", daemon=True).start()
+def _initialize_worker(parent: int) -> None:
+    """Run in a new worker process: ignore Ctrl-C, and end when the process `parent` has ended."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_after, args=(parent,), name="vdet-watch", daemon=True).start()
 
 
-def work(function: Callable[[T], R], item: T) -> R:
-    """Call `function`; on SIGTERM let it clean up, and end the process."""
-    try:
-        with _sigterm_interrupts():
-            return function(item)
-    except KeyboardInterrupt:
-        os._exit(INTERRUPTED)
-
-
-def _watch(parent: int) -> None:
+def _end_after(parent: int) -> None:
     while os.getppid() == parent:
-        time.sleep(_LOOK_EVERY)
+        time.sleep(PARENT_CHECK_INTERVAL)
     os.kill(os.getpid(), signal.SIGTERM)
-    time.sleep(_LONGEST)
+    time.sleep(CLEANUP_TIMEOUT)
     os._exit(INTERRUPTED)
 
 
-@contextmanager
-def _sigterm_interrupts() -> Iterator[None]:
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+def _run_task(function: Callable[[T], R], item: T) -> R:
+    """Run in a worker process: on SIGTERM, let `function` clean up, and end the process."""
+    handler = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        return function(item)
+    except KeyboardInterrupt:
+        os._exit(INTERRUPTED)
+    finally:
+        signal.signal(signal.SIGTERM, handler)
+
+
+@dataclass(frozen=True, slots=True)
+class DaskCluster:
+    """All workers of the Dask scheduler at `address`; they find inputs and outputs by their paths.
+
+    The scheduler has `connect_timeout` seconds to answer, and then `worker_timeout` seconds to have
+    a worker.
+    """
+
+    address: str
+    connect_timeout: float = 10.0
+    worker_timeout: float = 10.0
+
+    def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
+        """Yield each item's number and result; see `Workers`.
+
+        Items that are in work when the generator is closed are finished, their results dropped.
+
+        Raises
+        ------
+        WorkerKilledError
+            After all other items have ended: Dask gave up some, because it lost the workers that
+            had them (`distributed.scheduler.allowed-failures`).
+        ClusterError
+            Dask is not installed, the scheduler does not answer, it has no worker, a worker has not
+            this version of vdet, or the scheduler ends while there is work.
+        """
+        with _connection(self.address, self.connect_timeout) as client:
+            _check_workers(client, self.address, self.worker_timeout)
+            from distributed import KilledWorker, as_completed
+
+            futures = client.map(function, items, pure=False, batch_size=TASKS_PER_MESSAGE)
+            numbers = {future.key: number for number, future in enumerate(futures)}
+            lost = []
+            ended = as_completed(futures, loop=client.loop)  # type: ignore[no-untyped-call]
+            del futures  # so that the workers drop each result once it was read
+            for future in ended:
+                number = numbers[future.key]
+                try:
+                    result = self._result(future)
+                except KilledWorker:
+                    lost.append(number)
+                else:
+                    yield number, result
+            if lost:
+                raise WorkerKilledError(lost)
+
+    def _result(self, future: "distributed.Future[R]") -> R:
+        try:
+            return future.result()
+        except (CancelledError, OSError) as error:
+            if future.status == "error":
+                raise  # an OSError of the function
+            raise ClusterError(
+                f"{self.address}: the scheduler has ended; start it again, and run this again"
+            ) from error
+
+
+@contextlib.contextmanager
+def _connection(address: str, timeout: float) -> "Iterator[distributed.Client]":
+    try:
+        from distributed import Client
+        from distributed.versions import VersionMismatchWarning
+    except ImportError as error:
+        raise ClusterError(
+            '--scheduler needs Dask, which is not installed; pip install "vdet[dask]"'
+        ) from error
+    with _without_logs("distributed", "distributed.client"):  # errors are raised
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", VersionMismatchWarning)  # see `_check_workers`
+            try:
+                client = Client(address, timeout=timeout, set_as_default=False)  # type: ignore[no-untyped-call]
+            except (OSError, ValueError) as error:  # ValueError: not the form of an address
+                raise ClusterError(
+                    f"{address}: no Dask scheduler answers there; start one with `dask scheduler`"
+                ) from error
+        with client:
+            yield client
+
+
+@contextlib.contextmanager
+def _without_logs(*names: str) -> Iterator[None]:
+    loggers = [logging.getLogger(name) for name in names]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+def _check_workers(client: "distributed.Client", address: str, timeout: float) -> None:
+    try:
+        client.wait_for_workers(1, timeout=timeout)
+    except TimeoutError as error:
+        raise ClusterError(
+            f"{address}: the scheduler has no worker; start some with `dask worker {address}`"
+        ) from error
+    for worker, version in client.run(_version, on_error="return").items():
+        if version != vdet.__version__:
+            has = f"vdet {version}" if isinstance(version, str) else f"no vdet ({version})"
+            raise ClusterError(
+                f"{worker}: this worker has {has}, here is vdet {vdet.__version__}; install the "
+                "same version everywhere"
+            )
+
+
+def _version() -> str:
+    return vdet.__version__

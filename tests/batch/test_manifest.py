@@ -9,7 +9,8 @@ from vdet.batch.manifest import Origin, Record, appending
 from vdet.errors import OutputError
 
 ORIGIN = Origin("vdet 1.2", "m.npz", "ab" * 32)
-RECORD = Record("/in/a.mp4", "/out/a.mp4", None, "2026-01-02T03:04:05+00:00", 1.5, 4, 3, 2, 1)
+OUTPUTS = {"video": "/out/a.mp4", "tracks": "/out/a.csv"}
+RECORD = Record("/in/a.mp4", OUTPUTS, "2026-01-02T03:04:05+00:00", 1.5, 4, 3, 2, 1)
 
 
 def lines(path: Path) -> list[str]:
@@ -24,8 +25,7 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
         add(RECORD)
     assert json.loads(line) == {
         "input": "/in/a.mp4",
-        "output": "/out/a.mp4",
-        "tracks_output": None,
+        "outputs": {"video": "/out/a.mp4", "tracks": "/out/a.csv"},
         "started": "2026-01-02T03:04:05+00:00",
         "seconds": 1.5,
         "width": 4,
@@ -62,7 +62,7 @@ def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None
 
 def test_names_of_any_kind_can_be_told(tmp_path: Path) -> None:
     path = tmp_path / "m.jsonl"
-    odd = Record("/in/\udcff \n\U0001f697.mp4", None, None, "now", 0.0, error="\udcff: bad")
+    odd = Record("/in/\udcff \n\U0001f697.mp4", {}, "now", 0.0, error="\udcff: bad")
     with appending(path, ORIGIN) as add:
         add(odd)
     (line,) = lines(path)

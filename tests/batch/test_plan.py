@@ -1,18 +1,18 @@
 """What a batch will do, and what it refuses before any work."""
 
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from vdet.batch.plan import Plan, Wishes, make_plan
-from vdet.errors import BatchError, OutputError
-from vdet.pipeline.run import VideoJob
+from vdet.batch.plan import OutputOptions, Plan, make_plan
+from vdet.errors import BatchError, ConfigError, OutputError
+from vdet.pipeline.loop import VideoJob
+from vdet.pipeline.sinks.protocol import Output
 
 COMMON = VideoJob(Path(), frames=7)
-Make = Callable[..., Plan]
+VIDEO: dict[str, str | None] = {"video": None}
 
 
 @pytest.fixture
@@ -25,12 +25,22 @@ def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "clips"
 
 
-def plan(*inputs: str, folder: str = "out", **wishes: object) -> Plan:
-    return make_plan([Path(p) for p in inputs], Path(folder), COMMON, Wishes(**wishes))  # type: ignore[arg-type]
+def plan(*inputs: str, folder: str = "out", tracks: str | None = None, **options: bool) -> Plan:
+    """Plan a video for each input, and tracks of the suffix `tracks` where it is given."""
+    suffixes = VIDEO | ({"tracks": tracks} if tracks else {})
+    return plan_outputs(*inputs, folder=folder, suffixes=suffixes, **options)
+
+
+def plan_outputs(
+    *inputs: str, suffixes: dict[str, str | None], folder: str = "out", **options: bool
+) -> Plan:
+    return make_plan(
+        [Path(p) for p in inputs], Path(folder), COMMON, OutputOptions(suffixes, **options)
+    )
 
 
 def outputs(jobs: tuple[VideoJob, ...]) -> list[list[str]]:
-    return [[str(path) for path in job.outputs] for job in jobs]
+    return [[str(output.path) for output in job.outputs] for job in jobs]
 
 
 @pytest.mark.usefixtures("clips")
@@ -51,11 +61,17 @@ class TestJobs:
 
     def test_all_have_what_is_common(self) -> None:
         (job,) = plan("clips/a.mp4").jobs
-        assert job == replace(COMMON, source=Path("clips/a.mp4"), video=Path("out/a.mp4"))
+        video = Output("video", Path("out/a.mp4"))
+        assert job == replace(COMMON, source=Path("clips/a.mp4"), outputs=(video,))
 
     def test_tracks_lie_beside_the_video_or_alone(self) -> None:
         assert outputs(plan("clips/a.mp4", tracks=".csv").jobs) == [["out/a.mp4", "out/a.csv"]]
-        assert outputs(plan("clips/a.mp4", video=False, tracks=".csv").jobs) == [["out/a.csv"]]
+        alone = plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"})
+        assert outputs(alone.jobs) == [["out/a.csv"]]
+
+    def test_a_suffix_for_the_video_chooses_its_container(self) -> None:
+        made = plan_outputs("clips/a.mp4", "clips/c.avi", suffixes={"video": ".mkv"})
+        assert outputs(made.jobs) == [["out/a.mkv"], ["out/c.mkv"]]
 
     def test_what_is_done_is_skipped_and_what_is_half_done_is_not(self) -> None:
         Path("out").mkdir()
@@ -97,6 +113,19 @@ class TestRefused:
         assert len(plan("clips").jobs) == 5
         with pytest.raises(BatchError, match=r"both would become out/a\.txt"):
             plan("clips", tracks=".txt")
+
+    def test_two_outputs_of_one_input_with_one_name(self) -> None:
+        two: dict[str, str | None] = {"tracks": ".txt", "json": ".txt"}
+        with pytest.raises(BatchError, match=r"^out/a\.txt: two outputs of clips/a\.mp4 would"):
+            plan_outputs("clips/a.mp4", suffixes=two)
+
+    def test_a_suffix_that_the_sink_cannot_write(self) -> None:
+        with pytest.raises(OutputError, match=r"out/a\.xml: tracks are written as \.txt, \.csv"):
+            plan("clips/a.mp4", tracks=".xml")
+
+    def test_a_sink_that_is_not_known(self) -> None:
+        with pytest.raises(ConfigError, match=r"^nothing: is not known; known are video, tracks"):
+            plan_outputs("clips/a.mp4", suffixes={"nothing": ".txt"})
 
     def test_tracks_that_would_be_the_manifest(self) -> None:
         Path("clips/a.mp4").rename("clips/manifest.mp4")

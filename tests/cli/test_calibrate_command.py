@@ -7,7 +7,7 @@ import pytest
 
 from conftest import Run
 from lanes.chessboards import photographs
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.camera_file import load_camera
 from vdet.media.images import read_image, write_image
 
@@ -16,7 +16,7 @@ from vdet.media.images import read_image, write_image
 def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of six photographs of a board and one of a wall."""
     folder = tmp_path_factory.mktemp("boards")
-    camera = Camera(640, 480, (560, 558), (322, 236), (-0.25, 0.06, 0, 0, 0), 0)
+    camera = CalibratedCamera(640, 480, (560, 558), (322, 236), (-0.25, 0.06, 0, 0, 0), 0)
     for number, image in enumerate(photographs(camera, 6)):
         write_image(folder / f"board{number}.png", image)
     write_image(folder / "wall.png", np.full((480, 640, 3), 99, np.uint8))

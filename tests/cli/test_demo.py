@@ -14,7 +14,7 @@ from vdet.errors import OutputError
 from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.truth import read_truth
 from vdet.media import VideoReader
-from vdet.synthetic import default_clip
+from vdet.synthetic import demo_scene
 from vdet.synthetic.scene import Scene
 
 PATCHES = 400
@@ -22,7 +22,7 @@ FRAMES = 30
 
 
 def short_clip(seed: int) -> Scene:
-    return replace(default_clip(seed, width=320, height=180), frames=FRAMES)
+    return replace(demo_scene(seed, width=320, height=180), frames=FRAMES)
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(demo, "PATCHES", PATCHES)
-        patch.setattr(demo, "default_clip", short_clip)
-        settings = load_settings(None, QUICK).settings
+        patch.setattr(demo, "demo_scene", short_clip)
+        settings = load_settings(None, QUICK)
         result = run_demo(files, settings, say=said.append, progress=progress)
     return Demo(files, result, said, totals)
 
@@ -88,7 +88,7 @@ def test_the_model_has_learnt_the_patches(done: Demo) -> None:
     assert {split.split for split in done.result.training.splits} == {"random", "tail"}
     for split in done.result.training.splits:
         assert 0.85 < split.test_accuracy <= 1
-    assert load_model(done.files.model).features == Settings().features
+    assert load_model(done.files.model).features == Settings().svm.features
 
 
 def test_tracks_and_truth_can_be_scored_again(done: Demo) -> None:
@@ -108,6 +108,14 @@ def test_each_step_is_told(done: Demo) -> None:
 def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     with pytest.raises(OutputError, match=f"{name}: is there already; give --overwrite"):
+        check_demo(DemoFiles(tmp_path), overwrite=False)
+    check_demo(DemoFiles(tmp_path), overwrite=True)
+
+
+def test_earlier_stage_pictures_are_not_written_over_either(tmp_path: Path) -> None:
+    (tmp_path / "stages").mkdir()
+    (tmp_path / "stages" / "5-boxes.png").touch()
+    with pytest.raises(OutputError, match=r"5-boxes\.png: is there already; give --overwrite"):
         check_demo(DemoFiles(tmp_path), overwrite=False)
     check_demo(DemoFiles(tmp_path), overwrite=True)
 

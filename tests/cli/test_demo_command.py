@@ -9,7 +9,7 @@ import pytest
 from conftest import Run
 from quick import only_windows
 from vdet import demo
-from vdet.synthetic import default_clip
+from vdet.synthetic import demo_scene
 from vdet.synthetic.scene import Scene
 
 FEW_WINDOWS = only_windows("size: 128, overlap: 0.7, top: 370, bottom: 600")
@@ -17,13 +17,13 @@ FRAMES = 12
 
 
 def _short_clip(seed: int) -> Scene:
-    return replace(default_clip(seed, width=320, height=180), frames=FRAMES)
+    return replace(demo_scene(seed, width=320, height=180), frames=FRAMES)
 
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "PATCHES", 60)
-    monkeypatch.setattr(demo, "default_clip", _short_clip)
+    monkeypatch.setattr(demo, "demo_scene", _short_clip)
 
 
 @pytest.mark.usefixtures("small")
@@ -58,9 +58,9 @@ def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_wrong_setting_is_refused_before_anything_is_drawn(run: Run, tmp_path: Path) -> None:
-    result = run("demo", tmp_path / "demo", "--set", "heat.treshold=2")
+    result = run("demo", tmp_path / "demo", "--set", "detector.heat.treshold=2")
     assert result.code == 1
-    assert "heat.treshold" in result.err
+    assert "detector.heat.treshold" in result.err
     assert list(tmp_path.iterdir()) == []
 
 

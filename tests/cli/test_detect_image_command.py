@@ -10,7 +10,7 @@ import pytest
 from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
 from vdet.media.images import read_image, write_image
-from vdet.synthetic import render, truth
+from vdet.synthetic import render, true_boxes
 from vdet.synthetic.scene import Scene
 
 FEW_WINDOWS = only_windows("size: 160, overlap: 0.7, top: 380, bottom: 600")
@@ -40,9 +40,10 @@ def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Sc
     assert (item["image"], item["width"], item["height"]) == (str(picture), 320, 180)
     assert item["boxes"]
     for box in item["boxes"]:
-        assert set(box) == {"x", "y", "width", "height", "peak"}
+        assert set(box) == {"x", "y", "width", "height", "score"}
+        assert 0 < box["score"] <= 1
         assert 0 <= box["x"] < box["x"] + box["width"] <= 320
-    near = [true.box for true in truth(scene, 10) if true.box.width > 20]
+    near = [true.box for true in true_boxes(scene, 10) if true.box.width > 20]
     assert any(
         abs(box["x"] + box["width"] / 2 - true.center[0]) < true.width
         for box in item["boxes"]
@@ -171,7 +172,11 @@ def test_boxes_lie_in_the_picture_whatever_its_size(
 ) -> None:
     path = tmp_path / "odd.png"
     write_image(path, render(scene, 10)[:179, :318])
-    loose = ("heat.threshold=0.01", "search.probability=0.05", "tracker.motion.strong=0.01")
+    loose = (
+        "detector.heat.threshold=0.01",
+        "detector.search.probability=0.05",
+        "detector.stills={strength: 0.01, width: 0}",
+    )
     options = [word for assignment in loose for word in ("--set", assignment)]
     result = run("detect-image", path, "--json", "-", "--model", model_path, *options)
     (item,) = json.loads(result.out)

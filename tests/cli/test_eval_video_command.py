@@ -11,8 +11,8 @@ from quick import QUICK_OPTIONS
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
-TWO_SHIPPED = "features={patch: 32, hog: {cell: 4}},{patch: 64, hog: {cell: 8}}"
-"""Features of two shipped models; all settings of a sweep are compared under one."""
+TWO_SHIPPED = "detector.features={patch: 32, hog: {cell: 4}},{patch: 64, hog: {cell: 8}}"
+"""Features of two shipped models."""
 
 
 @pytest.fixture
@@ -46,16 +46,21 @@ def test_several_videos_and_a_sweep(
     run: Run, clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
     videos = (clip_path, clip_path, "--truth", truth_path, "--truth", truth_path, "--until", "4")
-    sweeps = ("--sweep", "heat.threshold=1,5000", "--sweep", "tracker.history=5,10")
+    sweeps = ("--sweep", "detector.heat.threshold=1,5000", "--sweep", "tracker.history=5,10")
     target, folder = tmp_path / "s.json", tmp_path / "report"
     results = ("--json", target, "--report", folder)
     result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     runs = json.loads(target.read_text())["sweep"]
-    assert [each["settings"]["heat.threshold"] for each in runs] == ["1", "1", "5000", "5000"]
+    assert [each["settings"]["detector.heat.threshold"] for each in runs] == [
+        "1",
+        "1",
+        "5000",
+        "5000",
+    ]
     assert [len(each["videos"]) for each in runs] == [2] * 4
     assert runs[2]["total"]["track_boxes"] == 0, "nothing is as hot as that"
-    assert "heat.threshold=5000 tracker.history=10" in result.out
+    assert "detector.heat.threshold=5000 tracker.history=10" in result.out
     assert "best F1: " in result.out
     assert "Settings compared" in (folder / "report.html").read_text()
 
@@ -66,11 +71,22 @@ def test_several_videos_and_a_sweep(
         ((), 2, "Missing option '--truth'"),
         (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "1 videos, 2 --truth"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
-        (("--truth", "gt.txt", "--sweep", "heat.threshold"), 1, "expected KEY=VALUE,VALUE"),
-        (("--truth", "gt.txt", "--sweep", "heat.treshold=1,2"), 1, "did you mean threshold?"),
-        (("--truth", "gt.txt", "--sweep", "features.hog.cell=8,16"), 1, "no shipped model"),
-        (("--truth", "gt.txt", "--sweep", "features.hog.cell=4,8"), 1, "other features"),
-        (("--truth", "gt.txt", "--sweep", TWO_SHIPPED), 1, "other features"),
+        (
+            ("--truth", "gt.txt", "--sweep", "detector.heat.threshold"),
+            1,
+            "expected KEY=VALUE,VALUE",
+        ),
+        (
+            ("--truth", "gt.txt", "--sweep", "detector.heat.treshold=1,2"),
+            1,
+            "did you mean threshold?",
+        ),
+        (
+            ("--truth", "gt.txt", "--sweep", "detector.features.hog.cell=8,16"),
+            1,
+            "no shipped model",
+        ),
+        (("--truth", "gt.txt", "--sweep", "detector.features.hog.cell=4,8"), 1, "no shipped model"),
     ],
 )
 def test_what_cannot_be_is_said_before_any_work(
@@ -80,6 +96,26 @@ def test_what_cannot_be_is_said_before_any_work(
     result = run("eval", "video", clip_path, *named)
     assert (result.code, result.out) == (code, "")
     assert words in result.err
+
+
+@pytest.mark.parametrize("sweep", [TWO_SHIPPED, "detector.features.color_space=YCrCb,HSV"])
+def test_a_model_that_is_given_must_fit_all_settings(
+    run: Run, clip_path: Path, truth_path: Path, model_path: Path, sweep: str
+) -> None:
+    options = ("--truth", truth_path, "--model", model_path, "--sweep", sweep)
+    result = run("eval", "video", clip_path, *options)
+    assert (result.code, result.out) == (1, "")
+    assert "was trained with other features" in result.err
+
+
+def test_without_a_model_each_setting_has_the_shipped_one_that_fits_it(
+    run: Run, clip_path: Path, truth_path: Path
+) -> None:
+    options = ("--truth", truth_path, "--until", "2", "--sweep", TWO_SHIPPED, "--json", "-")
+    result = run("eval", "video", clip_path, *options)
+    assert result.code == 0, result.err
+    features = [each["settings"]["detector.features"] for each in json.loads(result.out)["sweep"]]
+    assert features == ["{patch: 32, hog: {cell: 4}}", "{patch: 64, hog: {cell: 8}}"]
 
 
 def test_truth_of_a_longer_video(

@@ -32,7 +32,7 @@ def test_learns_the_same_from_a_zip_file(run: Run, patches_path: Path, tmp_path:
     with zipfile.ZipFile(tmp_path / "set.zip", "w") as archive:
         for file in data.rglob("*.png"):
             archive.write(file, file.relative_to(data))
-    options = (*QUICK, "--set", "features.hog.channels=[0]")
+    options = (*QUICK, "--set", "detector.features.hog.channels=[0]")
     assert run("train", data, "-o", tmp_path / "a.npz", *options).code == 0
     assert run("train", tmp_path / "set.zip", "-o", tmp_path / "b.npz", *options).code == 0
     first, second = load_model(tmp_path / "a.npz"), load_model(tmp_path / "b.npz")

@@ -224,6 +224,7 @@ def test_a_huge_file_is_refused_unparsed(tmp_path: Path) -> None:
         ("tracker.history=12", {"tracker": {"history": 12}}),
         (" heat.blur = 3 # px", {"heat": {"blur": 3}}),
         ("search.windows.1.overlap=0.5", {"search": {"windows": {1: {"overlap": 0.5}}}}),
+        ("detector.heat.frames=3", {"detector": {"heat": {"frames": 3}}}),
         ("training.C=1e-3", {"training": {"C": 0.001}}),
         ("a=b=c", {"a": "b=c"}),
         ("heat={frames: 3, blur: 0}", {"heat": {"frames": 3, "blur": 0}}),
@@ -239,7 +240,7 @@ def test_an_assignment_is_a_document_of_one_key(text: str, values: object) -> No
 def test_an_assignment_without_a_whole_key_or_value_says_what_is_expected(text: str) -> None:
     with pytest.raises(ConfigError) as error:
         parse_assignment(text)
-    assert str(error.value) == (f"--set {text}: expected KEY=VALUE, as in tracker.history=12")
+    assert str(error.value) == f"--set {text}: expected KEY=VALUE, as in output.crf=18"
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,23 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vdet.config.loading import LoadedSettings, format_key, load_settings
-from vdet.config.schema import FeatureSettings, Settings, WindowSettings
+from vdet.config.loading import find_config, format_key, load_settings
+from vdet.config.schema import (
+    HeatSettings,
+    SearchSettings,
+    Settings,
+    SvmSettings,
+    TrainingSettings,
+    WindowSettings,
+)
 from vdet.errors import ConfigError
 
 WINDOWS = """\
-search:
-  windows:
-  - {size: 64, step: 1, top: 0, bottom: 100}
-  - {size: 96, step: 1, top: 0, bottom: 200}
+detector:
+  search:
+    windows:
+    - {size: 64, step: 1, top: 0, bottom: 100}
+    - {size: 96, step: 1, top: 0, bottom: 200}
 """
 FIRST = WindowSettings(size=64, step=1, top=0, bottom=100)
 SECOND = WindowSettings(size=96, step=1, top=0, bottom=200)
@@ -23,7 +31,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "my.yaml"
 
 
-def load(path: Path, text: str, *assignments: str) -> LoadedSettings:
+def load(path: Path, text: str, *assignments: str) -> Settings:
     path.write_text(text, encoding="utf-8")
     return load_settings(path, assignments)
 
@@ -36,150 +44,158 @@ def refusal(path: Path, text: str, *assignments: str) -> list[str]:
 
 
 def test_without_file_and_assignments_the_settings_are_the_defaults() -> None:
-    assert load_settings() == LoadedSettings(Settings(), None)
+    assert load_settings() == Settings()
 
 
 def test_an_empty_file_changes_nothing(path: Path) -> None:
-    assert load(path, "") == LoadedSettings(Settings(), None)
+    assert load(path, "") == Settings()
 
 
 def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
-    loaded = load(path, "heat:\n  frames: 5\ntraining: {C: 1e-3}\n").settings
-    expected = Settings.model_validate({"heat": {"frames": 5}, "training": {"C": 0.001}})
+    loaded = load(path, "detector:\n  heat:\n    frames: 5\ntraining: {C: 1e-3}\n")
+    heat = HeatSettings(frames=5)
+    expected = Settings(detector=SvmSettings(heat=heat), training=TrainingSettings(C=0.001))
     assert loaded == expected
-    assert loaded.heat.threshold == Settings().heat.threshold
+    assert loaded.svm.heat.threshold == Settings().svm.heat.threshold
 
 
 def test_assignments_lie_over_the_file_and_later_ones_over_earlier_ones(path: Path) -> None:
     heat = load(
-        path, "heat: {frames: 5, blur: 7, threshold: 2}", "heat.frames=6", "heat.blur=8",
-        "heat.frames=7",
-    ).settings.heat  # fmt: skip
+        path,
+        "detector: {heat: {frames: 5, blur: 7, threshold: 2}}",
+        *("detector.heat.frames=6", "detector.heat.blur=8", "detector.heat.frames=7"),
+    ).svm.heat
     assert (heat.frames, heat.blur, heat.threshold) == (7, 8, 2.0)
 
 
 def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
-    search = load(path, "search: {perspective: {sizes: [0.5]}}").settings.search
-    assert len(Settings().search.perspective.sizes) > 1
+    search = load(path, "detector: {search: {perspective: {sizes: [0.5]}}}").svm.search
+    assert len(SearchSettings().perspective.sizes) > 1
     assert search.perspective.sizes == (0.5,)
 
 
 def test_a_list_in_an_assignment_replaces_the_whole_list_in_the_file(path: Path) -> None:
     window = "{size: 32, step: 2, top: 0, bottom: 50}"
-    windows = load(path, WINDOWS, f"search.windows=[{window}]").settings.search.windows
+    windows = load(path, WINDOWS, f"detector.search.windows=[{window}]").svm.search.windows
     assert windows == (WindowSettings(size=32, step=2, top=0, bottom=50),)
 
 
 def test_an_assignment_may_name_one_item_of_a_list() -> None:
-    sizes = load_settings(None, ["search.perspective.sizes.1=0.07"]).settings
-    first, _, *others = Settings().search.perspective.sizes
-    assert sizes.search.perspective.sizes == (first, 0.07, *others)
+    loaded = load_settings(None, ["detector.search.perspective.sizes.1=0.07"])
+    first, _, *others = SearchSettings().perspective.sizes
+    assert loaded.svm.search.perspective.sizes == (first, 0.07, *others)
 
 
 def test_an_assignment_may_name_one_setting_of_an_item(path: Path) -> None:
-    windows = load(path, WINDOWS, "search.windows.1.step=2").settings.search.windows
+    windows = load(path, WINDOWS, "detector.search.windows.1.step=2").svm.search.windows
     assert windows == (FIRST, SECOND.model_copy(update={"step": 2}))
 
 
 def test_an_assignment_may_give_overlap_in_place_of_step(path: Path) -> None:
-    assignments = ["search.windows.0.overlap=0.5", "search.windows.0.step=null"]
-    window = load(path, WINDOWS, *assignments).settings.search.windows[0]
+    assignments = ["detector.search.windows.0.overlap=0.5", "detector.search.windows.0.step=null"]
+    window = load(path, WINDOWS, *assignments).svm.search.windows[0]
     assert (window.overlap, window.step) == (0.5, None)
 
 
 def test_an_assignment_may_replace_a_whole_item(path: Path) -> None:
     item = "{size: 64, step: 3, top: 0, bottom: 70}"
-    windows = load(path, WINDOWS, f"search.windows.0={item}").settings.search.windows
+    windows = load(path, WINDOWS, f"detector.search.windows.0={item}").svm.search.windows
     assert windows == (WindowSettings(size=64, step=3, top=0, bottom=70), SECOND)
 
 
-@pytest.mark.parametrize(
-    ("text", "assignments"),
-    [("features: {color_space: HSV}", []), ("", ["features.color_space=HSV"])],
-)
-def test_features_are_told_apart_where_they_are_asked_for(
-    path: Path, text: str, assignments: list[str]
-) -> None:
-    assert load(path, text, *assignments).features == FeatureSettings(color_space="HSV")
-
-
-def test_features_asked_for_as_they_are_by_default_are_asked_for(path: Path) -> None:
-    assert load(path, "features: {patch: 32}").features == FeatureSettings()
-
-
-def test_features_are_not_asked_for_by_other_settings(path: Path) -> None:
-    assert load(path, "heat: {frames: 3}", "tracker.history=3").features is None
-
-
 def test_an_error_names_file_line_column_key_and_what_was_expected(path: Path) -> None:
-    text = "search:\n  windows:\n    - {size: 64, overlap: 1.2, top: 0, bottom: 100}\n"
-    assert refusal(path, text) == [
-        "my.yaml:3:18: search.windows[0].overlap: should be less than 1 (got 1.2)"
+    text = "  windows:\n    - {size: 64, overlap: 1.2, top: 0, bottom: 100}\n"
+    assert refusal(path, f"detector:\n search:\n{text}") == [
+        "my.yaml:4:18: detector.search.windows[0].overlap: should be less than 1 (got 1.2)"
     ]
 
 
 def test_all_errors_are_given_at_once(path: Path) -> None:
-    text = "heat: {frames: 0, blur: -1}\ntraining:\n  C: -1\ntrakcer: {}\n"
+    text = "detector: {heat: {frames: 0, blur: -1}}\ntraining:\n  C: -1\ntrakcer: {}\n"
     assert sorted(refusal(path, text, "output.crf=99", "nonsense")) == [
-        "--set nonsense: expected KEY=VALUE, as in tracker.history=12",
+        "--set nonsense: expected KEY=VALUE, as in output.crf=18",
         "--set: output.crf: should be less than or equal to 51 (got 99)",
-        "my.yaml:1:19: heat.blur: should be greater than or equal to 0 (got -1)",
-        "my.yaml:1:8: heat.frames: should be greater than or equal to 1 (got 0)",
+        "my.yaml:1:19: detector.heat.frames: should be greater than or equal to 1 (got 0)",
+        "my.yaml:1:30: detector.heat.blur: should be greater than or equal to 0 (got -1)",
         "my.yaml:3:3: training.C: should be greater than 0 (got -1)",
         "my.yaml:4:1: trakcer: is no setting; did you mean tracker?",
     ]
 
 
 @pytest.mark.parametrize(
-    ("text", "message"),
+    ("text", "column", "message"),
     [
-        ("tracker: {histroy: 3}", "1:11: tracker.histroy: is no setting; did you mean history?"),
-        ("heat: {x: 3}", "1:8: heat.x: is no setting; known here: frames, weight, shrink, "),
-        ("features: {hog: {cel: 3}}", "1:18: features.hog.cel: is no setting; did you mean cell?"),
-        ("heat: 3", "1:1: heat: should be a section, key: value (got 3)"),
-        ("heat: {frames: 2001-01-01}", "1:8: heat.frames: should be a valid integer (got datetime"),
-        ("heat: {threshold: .nan}", "1:8: heat.threshold: should be a finite number (got nan)"),
-        ("heat: {threshold: 1e999}", "1:8: heat.threshold: should be a finite number (got inf)"),
-        ("heat: {threshold: -.inf}", "1:8: heat.threshold: should be a finite number (got -inf)"),
-        ("heat: {frames: 2.5}", "1:8: heat.frames: should be a valid integer, got a number with a"),
-        ("features: {color_space: BGR}", "1:12: features.color_space: should be 'YCrCb', 'HSV', "),
-        ("features: {patch: 62}", "1:1: features: patch must be a multiple of hog.cell (4)"),
-        ("features: {hog: {block: 8, cell: 16}}", "1:1: features: hog.block × hog.cell must not"),
-        ("features: {hog: {channels: [0, 0]}}", "1:12: features.hog: channels must differ"),
+        ("heat: {x: 3}", 19, "heat.x: is no setting; known here: frames, weight, shrink, "),
+        ("features: {hog: {cel: 3}}", 29, "features.hog.cel: is no setting; did you mean cell?"),
+        ("heat: 3", 12, "heat: should be a section, key: value (got 3)"),
+        ("heat: {frames: 2001-01-01}", 19, "heat.frames: should be a valid integer (got datetime"),
+        ("heat: {threshold: .nan}", 19, "heat.threshold: should be a finite number (got nan)"),
+        ("heat: {threshold: 1e999}", 19, "heat.threshold: should be a finite number (got inf)"),
+        ("heat: {threshold: -.inf}", 19, "heat.threshold: should be a finite number (got -inf)"),
+        ("heat: {frames: 2.5}", 19, "heat.frames: should be a valid integer, got a number with a"),
+        ("features: {color_space: BGR}", 23, "features.color_space: should be 'YCrCb', 'HSV', "),
+        ("features: {patch: 62}", 12, "features: patch must be a multiple of hog.cell (4)"),
+        ("features: {hog: {block: 8, cell: 16}}", 12, "features: hog.block × hog.cell must not"),
+        ("features: {hog: {channels: [0, 0]}}", 23, "features.hog: channels must differ"),
         (
             "features: {hog: {channels: []}, histogram: {bins: 0}}",
-            "1:1: features: at least one of hog, histogram and spatial must be on",
+            12,
+            "features: at least one of hog, histogram and spatial must be on",
         ),
         (
             "search: {windows: [], perspective: {sizes: []}}",
-            "1:1: search: windows or perspective.sizes must be given",
+            12,
+            "search: windows or perspective.sizes must be given",
         ),
-        ("search: {windows: [5]}", "1:20: search.windows[0]: should be a section, key: value"),
-        ("search: {windows: 5}", "1:10: search.windows: should be a list"),
+        ("search: {windows: [5]}", 31, "search.windows[0]: should be a section, key: value"),
+        ("search: {windows: 5}", 21, "search.windows: should be a list"),
         (
             "search: {windows: [{size: 64, overlap: 0.8, top: 0, bottom: 63}]}",
-            "1:20: search.windows[0]: bottom must be at least top + size",
+            31,
+            "search.windows[0]: bottom must be at least top + size",
         ),
         (
             "search: {windows: [{size: 64, overlap: 0.99, top: 0, bottom: 64}]}",
-            "1:20: search.windows[0]: overlap leaves a step of less than a pixel",
+            31,
+            "search.windows[0]: overlap leaves a step of less than a pixel",
         ),
         (
             "search: {windows: [{size: 64, top: 0, bottom: 64}]}",
-            "1:20: search.windows[0]: one of overlap and step must be given, the other left out",
+            31,
+            "search.windows[0]: one of overlap and step must be given, the other left out",
         ),
         (
             "search: {windows: [{size: 64, overlap: 0.5, step: 1, top: 0, bottom: 64}]}",
-            "1:20: search.windows[0]: one of overlap and step must be given, the other left out",
+            31,
+            "search.windows[0]: one of overlap and step must be given, the other left out",
         ),
         (
             "search: {windows: [{size: 64, step: 0, top: 0, bottom: 64}]}",
-            "1:31: search.windows[0].step: should be greater than or equal to 1 (got 0)",
+            42,
+            "search.windows[0].step: should be greater than or equal to 1 (got 0)",
         ),
-        ("heat: {shrink: 3}", "1:8: heat.shrink: should be 1, 2, 4 or 8 (got 3)"),
-        ("heat: {weight: some}", "1:8: heat.weight: should be 'none' or 'coverage' (got 'some')"),
-        ("search: {engine: fast}", "1:10: search.engine: should be 'auto', 'dense' or 'patch' (go"),
-        ("'': 1", "1:1: : is no setting; known here: reference_height, features, "),
+        ("heat: {shrink: 3}", 19, "heat.shrink: should be 1, 2, 4 or 8 (got 3)"),
+        ("heat: {weight: some}", 19, "heat.weight: should be 'none' or 'coverage' (got 'some')"),
+        ("search: {engine: fast}", 21, "search.engine: should be 'auto', 'dense' or 'patch' (go"),
+    ],
+)
+def test_a_mistake_in_the_detector_is_explained_in_one_line(
+    path: Path, text: str, column: int, message: str
+) -> None:
+    (line,) = refusal(path, f"detector: {{{text}}}")
+    assert line.startswith(f"my.yaml:1:{column}: detector.{message}")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("tracker: {neded: 3}", "1:11: tracker.neded: is no setting; did you mean needed?"),
+        (
+            "tracker: {method: rules, histroy: 3}",
+            "1:26: tracker.histroy: is no setting; did you mean history?",
+        ),
+        ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, lanes, "),
+        ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
     ],
 )
 def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str) -> None:
@@ -188,9 +204,9 @@ def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str)
 
 
 def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
-    assert refusal(path, "search: {windows: [{size: 64, step: 1}]}") == [
-        "my.yaml:1:20: search.windows[0].top: is missing",
-        "my.yaml:1:20: search.windows[0].bottom: is missing",
+    assert refusal(path, "detector: {search: {windows: [{size: 64, step: 1}]}}") == [
+        "my.yaml:1:31: detector.search.windows[0].top: is missing",
+        "my.yaml:1:31: detector.search.windows[0].bottom: is missing",
     ]
 
 
@@ -199,15 +215,44 @@ def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
     [
         ("heat.frames=x", "heat.frames: should be a valid integer"),
         ("heat.frames.0=5", "heat.frames: should be a valid integer"),
-        ("search.perspective.sizes.7=0.3", "search.perspective.sizes: should be a list, or in"),
-        ("search.perspective.sizes.-1=0.3", "search.perspective.sizes: should be a list, or in"),
-        ("search.perspective.sizes.x=0.3", "search.perspective.sizes: should be a list, or in"),
-        ("search.perspective.sizes.0=3", "search.perspective.sizes[0]: should be less than or equ"),
-        ("search.windows.0.size=64", "search.windows: should be a list, or in --set the number of"),
-        ("tracker.0=3", "tracker[0]: is no setting; known here: method, history, "),
-        ("0=3", "[0]: is no setting; known here: reference_height, "),
-        ("9" * 5000 + "=3", "9999"),
         ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: should be a valid integer"),
+        (
+            "search.perspective.sizes.7=0.3",
+            "search.perspective.sizes: should be a list, or in",
+        ),
+        (
+            "search.perspective.sizes.-1=0.3",
+            "search.perspective.sizes: should be a list, or in",
+        ),
+        (
+            "search.perspective.sizes.x=0.3",
+            "search.perspective.sizes: should be a list, or in",
+        ),
+        (
+            "search.perspective.sizes.0=3",
+            "search.perspective.sizes[0]: should be less than or equ",
+        ),
+        (
+            "search.windows.0.size=64",
+            "search.windows: should be a list, or in --set the number of",
+        ),
+    ],
+)
+def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
+    assignment: str, message: str
+) -> None:
+    with pytest.raises(ConfigError) as error:
+        load_settings(None, [f"detector.{assignment}"])
+    (line,) = str(error.value).split("\n")
+    assert line.startswith(f"--set: detector.{message}")
+
+
+@pytest.mark.parametrize(
+    ("assignment", "message"),
+    [
+        ("tracker.0=3", "tracker[0]: is no setting; known here: method, smallest, "),
+        ("0=3", "[0]: is no setting; known here: detector, tracker, "),
+        ("9" * 5000 + "=3", "9999"),
     ],
 )
 def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, message: str) -> None:
@@ -220,33 +265,41 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, me
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("search.windows.1.sise=3", "search.windows[1].sise: is no setting; did you mean size?"),
-        ("search.windows.0.0=3", "search.windows[0][0]: is no setting; known here: size, "),
+        ("1.sise=3", "windows[1].sise: is no setting; did you mean size?"),
+        ("0.0=3", "windows[0][0]: is no setting; known here: size, "),
     ],
 )
 def test_so_is_one_in_an_assignment_to_an_item_of_the_file(
     path: Path, assignment: str, message: str
 ) -> None:
-    (line,) = refusal(path, WINDOWS, assignment)
-    assert line.startswith(f"--set: {message}")
+    (line,) = refusal(path, WINDOWS, f"detector.search.windows.{assignment}")
+    assert line.startswith(f"--set: detector.search.{message}")
 
 
 def test_a_value_that_an_assignment_mends_is_no_error(path: Path) -> None:
-    assert load(path, "heat: {frames: 0}", "heat.frames=3").settings.heat.frames == 3
+    assert (
+        load(path, "detector: {heat: {frames: 0}}", "detector.heat.frames=3").svm.heat.frames == 3
+    )
 
 
 @pytest.mark.parametrize("value", ["[" * 200 + "]" * 200, "9" * 300, "x" * 5000])
 def test_a_long_value_is_shortened_in_the_message(path: Path, value: str) -> None:
-    (line,) = refusal(path, f"heat: {{frames: {value}}}")
+    (line,) = refusal(path, f"detector: {{heat: {{frames: {value}}}}}")
     assert len(line) < 200
 
 
 def test_keys_are_written_as_a_user_would() -> None:
-    assert format_key(("search", "windows", 0, "size")) == "search.windows[0].size"
+    assert (
+        format_key(("detector", "search", "windows", 0, "size"))
+        == "detector.search.windows[0].size"
+    )
 
 
 _NAMES = st.sampled_from(
-    ["features", "hog", "channels", "search", "windows", "size", "heat", "frames", "tracker", "x"]
+    [
+        *("detector", "kind", "features", "hog", "channels", "search", "windows", "size", "heat"),
+        *("frames", "tracker", "method", "x"),
+    ]
 )
 _SCALARS = st.one_of(
     st.sampled_from(
@@ -280,7 +333,7 @@ def test_any_text_gives_settings_or_a_config_error(path: Path, text: str) -> Non
     except ConfigError as error:
         assert str(error).startswith(str(path))  # noqa: PT017
     else:
-        assert isinstance(loaded.settings, Settings)
+        assert isinstance(loaded, Settings)
 
 
 @given(st.one_of(st.text(), st.tuples(st.lists(_NAMES).map(".".join), _YAML).map("=".join)))
@@ -291,10 +344,37 @@ def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
     except ConfigError as error:
         assert str(error).startswith("--set")  # noqa: PT017
     else:
-        assert isinstance(loaded.settings, Settings)
+        assert isinstance(loaded, Settings)
 
 
 def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> None:
     file = tmp_path / "my.yaml"
-    file.write_text("heat:\n  # threshold: 2\n")
-    assert load_settings(file).settings == load_settings().settings
+    file.write_text("detector:\n  # kind: svm\n  heat:\n    # threshold: 2\ntracker:\n")
+    assert load_settings(file) == load_settings()
+
+
+@pytest.fixture
+def _in_an_empty_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("_in_an_empty_folder")
+class TestFindConfig:
+    def test_shipped_configs_are_found_by_their_names(self) -> None:
+        assert load_settings(find_config("default")) == Settings()
+        assert load_settings(find_config("seed")).svm.features.patch == 64
+
+    def test_a_path_is_taken_as_it_is(self, tmp_path: Path) -> None:
+        (tmp_path / "my.yaml").touch()
+        assert find_config("my.yaml") == Path("my.yaml")
+        assert find_config(str(tmp_path / "my.yaml")) == tmp_path / "my.yaml"
+
+    def test_a_file_of_the_name_goes_before_the_shipped_config(self, tmp_path: Path) -> None:
+        (tmp_path / "seed").touch()
+        assert find_config("seed") == Path("seed")
+
+    @pytest.mark.parametrize("name", ["no", "seed.yaml", "../configs/seed"])
+    def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:
+        with pytest.raises(ConfigError) as error:
+            find_config(name)
+        assert str(error.value) == f"{name}: no such file; shipped configs are: default, seed"

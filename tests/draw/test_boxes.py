@@ -6,19 +6,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.detect.svm.heat import Heat
-from vdet.detect.svm.stages import blend_heat
 from vdet.draw.boxes import (
+    BLACK,
     GREEN,
+    WHITE,
+    Color,
     color_of,
     draw_box,
     draw_label,
     line_width,
+    text_color,
 )
 from vdet.geometry import Box
 from vdet.media.images import Image
-from vdet.pipeline.annotation import draw_tracks
-from vdet.track.track import Track
 
 HEIGHTS = [180, 240, 360, 480, 540, 720, 1080, 2160]
 
@@ -61,8 +61,8 @@ class TestBox:
     @given(
         x=st.integers(-100, 340),
         y=st.integers(-100, 260),
-        width=st.integers(10, 400),
-        height=st.integers(10, 300),
+        width=st.integers(1, 400),
+        height=st.integers(1, 300),
         rows=st.sampled_from([180, 540, 720]),
     )
     def test_nothing_outside_the_box_is_touched_wherever_it_lies(
@@ -93,11 +93,66 @@ class TestBox:
         assert min(widths) == 1
 
 
-def flat(value: float) -> Heat:
-    return Heat(np.full((24, 32), value, np.float32))
-
-
 CORNERS = [(x, y) for x in (-50, 0, 160, 319, 400) for y in (-50, 0, 120, 239, 300)]
+
+
+def runs(line: npt.NDArray[np.bool_]) -> list[int]:
+    """Return the lengths of the runs of drawn pixels along a line."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], line, [False]])))
+    return [int(length) for length in edges[1::2] - edges[::2]]
+
+
+class TestDashedBox:
+    @pytest.mark.parametrize("height", HEIGHTS)
+    def test_has_several_dashes_and_gaps_on_each_side_at_any_frame_height(
+        self, height: int
+    ) -> None:
+        image = blank(2 * height, height)
+        box = Box(height // 4, height // 4, height // 5, height // 6)
+        draw_box(image, box, BLACK, dashed=True)
+        top = touched(image)[box.y, box.x : box.right]
+        left = touched(image)[box.y : box.bottom, box.x]
+        for side in (top, left):
+            assert len(runs(side)) >= 3
+            assert 0.4 < side.mean() < 0.75
+            assert side[0]
+            assert side[-1]
+
+    @pytest.mark.parametrize("height", HEIGHTS)
+    def test_dashes_and_gaps_are_longer_than_the_line_is_wide(self, height: int) -> None:
+        image = blank(height, height)
+        draw_box(image, Box(0, 0, height, height), BLACK, dashed=True)
+        line = touched(image)[0]
+        width = line_width(image)
+        assert min(runs(line)) >= 2 * width
+        assert min(runs(~line)) >= 2 * width
+
+    @given(
+        x=st.integers(-100, 340),
+        y=st.integers(-100, 260),
+        width=st.integers(1, 400),
+        height=st.integers(1, 300),
+        rows=st.sampled_from([180, 540, 720]),
+    )
+    def test_lies_on_the_solid_outline_of_the_same_box(
+        self, x: int, y: int, width: int, height: int, rows: int
+    ) -> None:
+        solid, dashed = blank(height=rows), blank(height=rows)
+        draw_box(solid, Box(x, y, width, height), BLACK)
+        draw_box(dashed, Box(x, y, width, height), BLACK, dashed=True)
+        assert not (touched(dashed) & ~touched(solid)).any()
+
+
+def contrast(one: Color, other: Color) -> float:
+    """Return the contrast ratio of two colours, 1 to 21, as WCAG 2.1 defines it."""
+
+    def luminance(color: Color) -> float:
+        shares = [value / 255 for value in reversed(color)]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in shares]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted([luminance(one), luminance(other)])
+    return (high + 0.05) / (low + 0.05)
 
 
 class TestLabel:
@@ -123,6 +178,41 @@ class TestLabel:
         draw_label(image, "a very long label indeed", (50, 120), GREEN)
         assert touched(image)[:, 0].any()
         assert letters(image) > 10
+
+    def test_a_text_that_is_a_little_too_wide_becomes_smaller_and_fits(self) -> None:
+        image = blank(width=160, height=720)
+        draw_label(image, "heat 12.3 and more", (0, 400), GREEN)
+        assert not (image[:, -2:].max(axis=2) < 110).any()
+
+    @pytest.mark.parametrize("height", HEIGHTS)
+    def test_digits_are_at_least_seven_pixels_high_and_about_a_fiftieth_of_the_frame(
+        self, height: int
+    ) -> None:
+        image = blank(2 * height, height)
+        draw_label(image, "0", (height, height // 2), WHITE)
+        rows, _ = np.nonzero(touched(image))
+        letter = int(rows.max() - rows.min() + 1)
+        assert max(7, 0.016 * height) <= letter <= max(12, 0.024 * height)
+
+    @pytest.mark.parametrize("height", HEIGHTS)
+    def test_a_margin_of_the_tag_surrounds_the_text(self, height: int) -> None:
+        image = np.zeros((height, 2 * height, 3), np.uint8)
+        draw_label(image, "#3 0.97", (height // 2, height // 2), WHITE)
+        rows, columns = np.nonzero(image.max(axis=2))
+        tag = image[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+        for side in (tag[0], tag[-1], tag[:, 0], tag[:, -1]):
+            assert side.min() == 255
+        assert letters(tag) > 10
+
+    @pytest.mark.parametrize("number", range(30))
+    def test_text_has_a_contrast_ratio_of_at_least_four_and_a_half(self, number: int) -> None:
+        color = color_of(number)
+        assert contrast(color, text_color(color)) >= 4.5
+
+    def test_is_white_on_dark_tags_and_black_on_bright_ones(self) -> None:
+        assert text_color((120, 0, 0)) == WHITE
+        assert text_color(WHITE) == BLACK
+        assert text_color(GREEN) == BLACK
 
     @pytest.mark.parametrize("x", [-30, 0, 250, 300])
     @pytest.mark.parametrize("y", [-30, 0, 200, 230])
@@ -150,71 +240,3 @@ class TestColor:
         for number in range(50):
             assert max(color_of(number)) == 255
             assert color_of(number) == color_of(number)
-
-
-class TestTracks:
-    def test_only_boxes_and_their_labels_are_drawn_on(self) -> None:
-        image = blank(1280, 720)
-        boxes = [Box(200, 400, 120, 90), Box(800, 420, 240, 150)]
-        draw_tracks(image, [Track(n, box, False) for n, box in enumerate(boxes, start=1)])
-        allowed = np.zeros(image.shape[:2], bool)
-        for box in boxes:
-            allowed |= covered(Box(box.x, box.y - 32, box.width, box.height + 32), image)
-        assert touched(image).any()
-        assert not (touched(image) & ~allowed).any()
-        for box in boxes:
-            assert not (touched(image) & covered(shrunk(box, 5), image)).any()
-
-    def test_each_id_has_its_own_color(self) -> None:
-        image = blank()
-        draw_tracks(image, [Track(3, Box(20, 100, 50, 50), False)])
-        draw_tracks(image, [Track(4, Box(200, 100, 50, 50), False)])
-        assert tuple(image[149, 45]) == color_of(3)
-        assert tuple(image[149, 225]) == color_of(4)
-
-    def test_no_tracks_leave_the_picture_as_it_was(self) -> None:
-        image = blank()
-        draw_tracks(image, [])
-        assert not touched(image).any()
-
-
-class TestHeat:
-    def test_without_heat_the_picture_is_only_darker(self) -> None:
-        image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), np.uint8)
-        blended = blend_heat(image, flat(0))
-        np.testing.assert_allclose(blended, image / 2, atol=1)
-
-    def test_is_white_at_its_peak_and_red_below(self) -> None:
-        heat = flat(0)
-        heat.values[5, 7], heat.values[9, 9] = 8.0, 2.0
-        blended = blend_heat(np.zeros((24, 32, 3), np.uint8), heat)
-        assert blended[5, 7].min() > 190
-        blue, green, red = blended[9, 9].tolist()
-        assert red > 100 > green == blue == 0
-        assert blended[0, 0].max() < 12
-
-    def test_does_not_depend_on_the_unit_of_heat(self) -> None:
-        rng = np.random.default_rng(0)
-        image = rng.integers(0, 256, (24, 32, 3), np.uint8)
-        values = rng.integers(0, 9, (24, 32)).astype(np.float32)
-        np.testing.assert_array_equal(
-            blend_heat(image, Heat(values)), blend_heat(image, Heat(values * 4))
-        )
-
-    def test_flat_heat_is_all_peak(self) -> None:
-        assert blend_heat(np.zeros((24, 32, 3), np.uint8), flat(3)).min() > 190
-
-    @pytest.mark.parametrize("shrink", [2, 4, 8])
-    def test_of_a_shrunk_map_lies_where_it_belongs(self, shrink: int) -> None:
-        values = np.zeros((-(-21 // shrink), -(-30 // shrink)), np.float32)
-        values[1, 2] = 5
-        blended = blend_heat(np.zeros((21, 30, 3), np.uint8), Heat(values, shrink))
-        assert blended.shape == (21, 30, 3)
-        rows, columns = np.nonzero(blended.min(axis=2) > 190)
-        assert set(rows.tolist()) == set(range(shrink, min(21, 2 * shrink)))
-        assert set(columns.tolist()) == set(range(2 * shrink, min(30, 3 * shrink)))
-
-    def test_the_picture_itself_is_not_changed(self) -> None:
-        image = blank(32, 24)
-        blend_heat(image, flat(1))
-        assert not touched(image).any()

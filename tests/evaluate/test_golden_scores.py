@@ -7,10 +7,8 @@ from typing import Any
 
 import pytest
 
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.pooling import pool
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.rows import Row, collect
+from vdet.evaluate.comparison import compare, pool
+from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
 from vdet.evaluate.scores import score, score_comparison
 
 CASES = sorted(Path(__file__).parent.glob("golden/*.json"))
@@ -26,11 +24,11 @@ def truth_of(case: dict[str, Any]) -> LabelledVideo:
         Row(0, frame, id_, x, y, width, height, ignored=ignored == 1)
         for frame, id_, x, y, width, height, ignored in case["truth"]
     ]
-    return collect(Path(case["name"]), rows)
+    return checked_video(Path(case["name"]), rows)
 
 
 def prediction_of(case: dict[str, Any]) -> LabelledVideo:
-    return collect(Path(case["name"]), [Row(0, *row) for row in case["prediction"]])
+    return checked_video(Path(case["name"]), [Row(0, *row) for row in case["prediction"]])
 
 
 def test_all_the_cases_are_there() -> None:

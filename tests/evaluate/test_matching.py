@@ -1,18 +1,7 @@
-from pathlib import Path
-
+from evaluate.scenes import drive, video
+from vdet.evaluate.comparison import compare
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.rows import Row, collect
-
-
-def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
-    """Return a box of 100 pixels height that stands at `x` in these frames."""
-    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
-
-
-def video(*tracks: list[Row]) -> LabelledVideo:
-    return collect(Path("scene"), [row for track in tracks for row in track])
 
 
 def partners(prediction: LabelledVideo, truth: LabelledVideo) -> list[dict[int, int]]:
@@ -36,22 +25,22 @@ def test_an_overlap_of_a_half_finds_a_vehicle_and_less_does_not() -> None:
     assert partners(video(drive(5, range(1, 2), width=49)), truth) == [{}]
 
 
-def test_of_two_predictions_the_closer_finds_the_vehicle() -> None:
+def test_of_two_predictions_the_closer_one_finds_the_vehicle() -> None:
     found = video(drive(5, range(1, 2), x=20), drive(6, range(1, 2), x=10))
     assert partners(found, video(drive(1, range(1, 2)))) == [{1: 6}]
 
 
-def test_a_pair_stays_together_though_another_track_comes_closer() -> None:
+def test_a_pair_is_kept_even_if_another_track_comes_closer() -> None:
     found = video(drive(5, range(1, 3), x=20), drive(6, range(2, 3), x=0))
     assert partners(found, video(drive(1, range(1, 3)))) == [{1: 5}, {1: 5}]
 
 
-def test_a_pair_that_overlaps_too_little_now_is_parted() -> None:
+def test_a_pair_that_overlaps_too_little_is_split() -> None:
     found = video(drive(5, range(1, 2)) + drive(5, range(2, 3), x=60), drive(6, range(2, 3), x=20))
     assert partners(found, video(drive(1, range(1, 3)))) == [{1: 5}, {1: 6}]
 
 
-def test_a_pair_parted_for_a_frame_has_no_claim_on_each_other_after() -> None:
+def test_a_pair_split_for_a_frame_is_not_preferred_afterwards() -> None:
     # In frame 2 something is predicted, but not on the vehicle.
     found = video(
         drive(5, range(1, 2)) + drive(5, range(3, 4), x=20),
@@ -61,7 +50,7 @@ def test_a_pair_parted_for_a_frame_has_no_claim_on_each_other_after() -> None:
     assert partners(found, video(drive(1, range(1, 4)))) == [{1: 5}, {}, {1: 6}]
 
 
-def test_a_frame_without_predictions_does_not_part_a_pair() -> None:
+def test_a_frame_without_predictions_does_not_split_a_pair() -> None:
     found = video(drive(5, range(1, 2)) + drive(5, range(3, 4), x=20), drive(6, range(3, 4), x=10))
     assert partners(found, video(drive(1, range(1, 4)))) == [{1: 5}, {}, {1: 5}]
 

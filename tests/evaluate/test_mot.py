@@ -3,8 +3,8 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import TruthError
+from vdet.evaluate.labelled_video import Row
 from vdet.evaluate.mot import result_rows, truth_rows
-from vdet.evaluate.rows import Row
 
 FILE = Path("gt.txt")
 
@@ -13,12 +13,12 @@ def test_pixels_count_from_1_in_the_file_and_from_0_in_memory() -> None:
     assert list(truth_rows(FILE, "1,7,1,1,20,10,1,3,1")) == [Row(1, 1, 7, 0, 0, 20, 10)]
 
 
-def test_flag_0_makes_an_ignore_region() -> None:
+def test_flag_0_marks_an_ignore_region() -> None:
     text = "1,7,1,1,20,10,0,3,1\n1,8,1,1,20,10,1,3,1\n"
     assert [row.ignored for row in truth_rows(FILE, text)] == [True, False]
 
 
-def test_the_older_form_with_ten_columns_is_read_alike() -> None:
+def test_the_older_form_with_ten_columns_is_read_too() -> None:
     assert list(truth_rows(FILE, "4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1")) == [
         Row(1, 4, 7, 10.5, 20, 20, 10)
     ]
@@ -45,7 +45,7 @@ def test_tracks_have_a_confidence() -> None:
         ("2,7,1,1,20,10,1,Car,1", "'Car' is not a number"),
     ],
 )
-def test_a_wrong_line_is_refused_by_its_number(second: str, message: str) -> None:
+def test_a_wrong_line_is_refused_with_its_number(second: str, message: str) -> None:
     with pytest.raises(TruthError) as caught:
         list(truth_rows(FILE, f"1,7,1,1,20,10,1,3,1\n\n{second}\n"))
     assert str(caught.value).startswith(f"gt.txt:3: {message}")

@@ -5,11 +5,27 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import OutputError
-from vdet.evaluate.output import check_outputs, write_page
+from vdet.evaluate.output import check_outputs, share, table, write_page
 from vdet.files import write_json
 
 
-def test_the_folder_of_a_report_is_made(tmp_path: Path) -> None:
+def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
+    assert table(("name", "n"), [["a", "100"], ["longer", "1"]]) == [
+        "name      n",
+        "a       100",
+        "longer    1",
+    ]
+
+
+def test_a_table_without_rows_is_its_headings() -> None:
+    assert table(("name", "n"), []) == ["name  n"]
+
+
+def test_a_missing_share_is_a_dash() -> None:
+    assert (share(0.12345), share(None), share(0.5, 1)) == ("0.123", "–", "0.5")
+
+
+def test_the_folder_of_a_report_is_created(tmp_path: Path) -> None:
     check_outputs(None, tmp_path / "a" / "b", overwrite=False, inputs=[])
     assert write_page("<p>", tmp_path / "a" / "b").read_text() == "<p>"
 
@@ -29,7 +45,7 @@ def test_earlier_numbers_are_kept(tmp_path: Path) -> None:
         check_outputs(target, None, overwrite=False, inputs=[])
 
 
-def test_a_file_is_no_folder_for_a_report(tmp_path: Path) -> None:
+def test_a_file_cannot_be_the_folder_of_a_report(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be made a folder"):
         check_outputs(None, tmp_path / "file", overwrite=True, inputs=[])
@@ -45,7 +61,7 @@ def test_without_matplotlib_the_error_says_how_to_get_it(
     check_outputs("-", None, overwrite=False, inputs=[])
 
 
-def test_numbers_never_go_over_what_is_read(tmp_path: Path) -> None:
+def test_numbers_never_replace_an_input(tmp_path: Path) -> None:
     truth = tmp_path / "gt.txt"
     truth.write_text("precious")
     with pytest.raises(OutputError, match="is the input itself"):

@@ -2,27 +2,14 @@
 
 import json
 from dataclasses import asdict
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, collect
+from evaluate.scenes import TEN, drive, video
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.scores import score
-
-
-def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
-    """Return a box of 100 pixels height that stands at `x` in these frames."""
-    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
-
-
-def video(*tracks: list[Row]) -> LabelledVideo:
-    return collect(Path("scene"), [row for track in tracks for row in track])
-
-
-TEN = range(1, 11)
 
 
 def test_predictions_equal_to_the_truth_are_perfect() -> None:
@@ -79,12 +66,12 @@ def test_a_swap_of_two_vehicles_is_two_switches() -> None:
     assert (scores.f1, scores.deta) == (1, 1)
 
 
-def test_a_switch_counts_though_the_vehicle_was_missed_in_between() -> None:
+def test_a_switch_counts_even_if_the_vehicle_was_missed_in_between() -> None:
     found = video(drive(1, range(1, 4)), drive(2, range(7, 11)))
     assert score(found, video(drive(1, TEN))).id_switches == 1
 
 
-def test_a_gap_is_a_fragmentation_where_other_things_are_predicted_meanwhile() -> None:
+def test_a_gap_is_a_fragmentation_if_something_else_is_predicted_in_it() -> None:
     found = drive(1, range(1, 4)) + drive(1, range(6, 11))
     truth = video(drive(1, TEN), drive(2, TEN, x=300))
     assert score(video(found, drive(2, TEN, x=300)), truth).fragmentations == 1
@@ -109,14 +96,14 @@ def test_a_vehicle_is_mostly_tracked_above_80_percent_and_mostly_lost_below_20(
     assert [name for name in kinds if getattr(scores, name)] == [kind]
 
 
-def test_nothing_predicted_is_all_missed() -> None:
+def test_without_predictions_all_vehicles_are_missed() -> None:
     scores = score(video(), video(drive(1, TEN)))
     assert (scores.misses, scores.recall, scores.precision, scores.f1) == (10, 0, 0, 0)
     assert (scores.mota, scores.idf1, scores.hota, scores.ap50) == (0, 0, 0, 0)
     assert (scores.mostly_lost, scores.never_found, scores.mean_delay) == (1, 1, None)
 
 
-def test_without_vehicles_all_is_false_alarm() -> None:
+def test_without_vehicles_all_predictions_are_false_alarms() -> None:
     scores = score(video(drive(1, TEN)), video())
     assert (scores.false_positives, scores.precision, scores.recall) == (10, 0, 0)
     assert (scores.false_tracks, scores.first_detections) == (1, ())
@@ -127,8 +114,8 @@ def test_two_empty_videos_have_scores_too() -> None:
     assert (scores.vehicles, scores.tracks, scores.f1, scores.hota) == (0, 0, 0, 0)
 
 
-def test_ignore_regions_alone_swallow_everything() -> None:
-    truth = collect(Path("scene"), [Row(0, f, 9, 0, 0, 999, 999, ignored=True) for f in TEN])
+def test_with_ignore_regions_alone_nothing_counts() -> None:
+    truth = video([Row(0, f, 9, 0, 0, 999, 999, ignored=True) for f in TEN])
     scores = score(video(drive(1, TEN)), truth)
     counted = (scores.vehicles, scores.tracks, scores.false_positives, scores.misses)
     assert counted == (0, 0, 0, 0)
@@ -147,7 +134,7 @@ SCENES = st.dictionaries(st.tuples(st.integers(1, 6), st.integers(1, 4)), PLACES
 
 
 @given(SCENES, SCENES)
-def test_ratios_keep_within_their_bounds(found: LabelledVideo, truth: LabelledVideo) -> None:
+def test_ratios_are_within_their_bounds(found: LabelledVideo, truth: LabelledVideo) -> None:
     scores = asdict(score(found, truth))
     ratios = ("precision", "recall", "f1", "ap50", "ap50_95", "idf1", "hota", "deta", "assa")
     assert all(0 <= scores[name] <= 1 + 1e-9 for name in ratios)

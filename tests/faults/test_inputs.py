@@ -11,18 +11,19 @@ import av
 import pytest
 
 from faults.conftest import Start
-from red_cars import SETTINGS, red_finder
-from running import frames_of, names, unfinished, until, write_drive
+from red_cars import SETTINGS, red_model, red_work
+from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
-from vdet.pipeline.run import VideoJob, process_video
+from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.sinks.protocol import Output
 
 COUNT = 60
 
 
 @pytest.fixture
 def clip(tmp_path: Path) -> Path:
-    """A clip that no reader has in memory as a whole."""
+    """A clip too large for a reader to have all of it in memory."""
     (tmp_path / "in").mkdir()
     return write_drive(tmp_path / "in" / "clip.mp4", COUNT, noise=True)
 
@@ -30,11 +31,14 @@ def clip(tmp_path: Path) -> Path:
 @pytest.fixture
 def job(clip: Path, tmp_path: Path) -> VideoJob:
     (tmp_path / "out").mkdir()
-    return VideoJob(clip, tmp_path / "out" / "clip.mp4", tmp_path / "out" / "clip.csv")
+    outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
+    return VideoJob(
+        clip, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
+    )
 
 
 def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Callable[[int], None]]:
-    """Let something happen when so many frames are done."""
+    """Return a `progress` that calls `happens` when `frames` frames are done."""
     left = iter(range(frames))
 
     def advance(_: int) -> None:
@@ -44,31 +48,31 @@ def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Call
     return lambda _: advance
 
 
-def test_one_that_is_removed_is_read_to_its_end(job: VideoJob) -> None:
-    process_video(job, red_finder(), SETTINGS, progress=after(5, job.source.unlink))
-    assert frames_of(job.video) == COUNT
+def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: VideoJob) -> None:
+    run_video(job, red_model(), SETTINGS, progress=after(5, job.source.unlink))
+    assert frames_of(job.outputs[0].path) == COUNT
 
 
-def test_one_that_is_removed_before_its_turn_is_recorded(job: VideoJob) -> None:
+def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob, tmp_path: Path) -> None:
     job.source.unlink()
-    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
+    record = process_file(job, work=red_work(tmp_path))
     assert record.error == f"{job.source}: there is no such file; check the name"
     assert record.frames is None
 
 
-def test_one_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
+def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
     job: VideoJob, caplog: pytest.LogCaptureFixture
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    summary = process_video(job, red_finder(), SETTINGS, progress=shrink)
+    summary = run_video(job, red_model(), SETTINGS, progress=shrink)
     assert COUNT // 4 < summary.frames < COUNT * 3 // 4
-    assert frames_of(job.video) == summary.frames
+    assert frames_of(job.outputs[0].path) == summary.frames
     assert f"ends early: {summary.frames} of {COUNT} frames could be read" in caplog.text
 
 
 class Pipe:
-    """A pipe in place of a file, into which a part of a clip goes, and then nothing."""
+    """A named pipe through which `content` comes, and then neither more data nor an end."""
 
     def __init__(self, path: Path, content: bytes) -> None:
         self.path = path
@@ -85,13 +89,13 @@ class Pipe:
 
     def close(self) -> None:
         self._end.set()
-        os.close(os.open(self.path, os.O_RDWR | os.O_NONBLOCK))  # if nobody ever came to read
+        os.close(os.open(self.path, os.O_RDWR | os.O_NONBLOCK))  # where no reader has come
         self._thread.join()
 
 
 @pytest.fixture
 def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
-    """Two thirds of the clip, as a stream that can be read from any place on."""
+    """A pipe that gives two thirds of the clip, as a transport stream."""
     stream = tmp_path / "in" / "clip.ts"
     with av.open(str(clip)) as source, av.open(str(stream), "w") as target:
         video = target.add_stream_from_template(source.streams.video[0])
@@ -105,28 +109,30 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
     pipe.close()
 
 
-def test_one_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
+def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path)
     with pytest.raises(VideoError, match=r"pipe\.ts: nothing could be read or written for 1 s"):
-        process_video(stalling, red_finder(), SETTINGS, patience=1)
+        run_video(stalling, red_model(), SETTINGS, timeout=1)
     assert names(tmp_path / "out") == []
     pipe.close()
-    until(lambda: not any(thread.name == "vdet-ahead" for thread in threading.enumerate()))
+    until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))
 
 
-def test_ctrl_c_ends_the_wait_for_one_that_stalls(
+def test_ctrl_c_ends_the_wait_for_an_input_that_stalls(
     launch: Start, pipe: Pipe, tmp_path: Path
 ) -> None:
     (tmp_path / "out").mkdir()
     running = launch("detect-video", pipe.path, tmp_path / "out" / "out.mp4")
-    until(lambda: bool(unfinished(tmp_path / "out")))
+    until(lambda: bool(names(tmp_path / "out")))
     running.send(signal.SIGINT)
     result = running.finish()
     assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
     assert names(tmp_path / "out") == []
 
 
-def test_ctrl_c_ends_the_wait_for_one_that_cannot_be_opened(launch: Start, tmp_path: Path) -> None:
+def test_ctrl_c_ends_the_wait_for_an_input_that_does_not_open(
+    launch: Start, tmp_path: Path
+) -> None:
     os.mkfifo(tmp_path / "pipe.ts")
     running = launch("detect-video", tmp_path / "pipe.ts", tmp_path / "out.mp4")
     with (tmp_path / "pipe.ts").open("wb"):  # returns when the program has opened it too

@@ -1,12 +1,12 @@
-"""kill -9, of the program and of its workers, in the middle."""
+"""SIGKILL for the program, or for one of its worker processes, in the middle of a video."""
 
 import json
 import os
 import signal
 from pathlib import Path
 
-from faults.conftest import Gate, Start
-from running import frames_of, names, unfinished, until
+from faults.conftest import Start
+from running import Gate, frames_of, names, until
 
 KILL = signal.SIGKILL
 
@@ -20,11 +20,11 @@ def test_after_a_kill_the_next_run_needs_no_cleaning_up(
     launch: Start, gate: Gate, long_clip: Path, tmp_path: Path
 ) -> None:
     arguments = ("detect-video", long_clip, tmp_path / "out.mp4", "--tracks", tmp_path / "out.csv")
-    running = launch(*arguments, environment=gate.environment)
-    until(lambda: bool(unfinished(tmp_path)))
+    running = launch(*arguments, modules=gate.folder)
+    until(lambda: bool(gate.held()))
     running.send(KILL)
     assert running.finish().code == -KILL
-    assert len(names(tmp_path)) == 2, "it was not in the middle, or something has its final name"
+    assert len(names(tmp_path)) == 2, "an output has its final name, or none was begun"
     assert launch(*arguments, "--frames", "20").finish().code == 0
     assert names(tmp_path) == ["out.csv", "out.mp4"]
     assert frames_of(tmp_path / "out.mp4") == 20
@@ -34,8 +34,8 @@ def test_when_a_batch_is_killed_its_workers_end_and_clean_up(
     launch: Start, gate: Gate, clips: Path, tmp_path: Path
 ) -> None:
     arguments = ("detect-video", clips, "-d", tmp_path / "out", "--jobs", "2", "--skip-existing")
-    running = launch(*arguments, environment=gate.environment)
-    until(lambda: len(unfinished(tmp_path)) == 2)
+    running = launch(*arguments, modules=gate.folder)
+    until(lambda: len(gate.held()) == 2)
     running.send(KILL)
     until(running.is_alone)
     assert names(tmp_path) == ["out/manifest.jsonl"]
@@ -49,9 +49,9 @@ def test_when_a_worker_is_killed_its_file_is_done_again(
     launch: Start, gate: Gate, clips: Path, tmp_path: Path
 ) -> None:
     arguments = ("detect-video", clips, "-d", tmp_path, "--jobs", "2")
-    running = launch(*arguments, environment=gate.environment)
-    until(lambda: len(unfinished(tmp_path)) == 2)
-    os.kill(running.workers()[0], KILL)
+    running = launch(*arguments, modules=gate.folder)
+    until(lambda: len(gate.held()) == 2)
+    os.kill(gate.held()[0], KILL)
     gate.open()
     result = running.finish()
     assert result.code == 0, result.err
@@ -65,18 +65,18 @@ def test_when_a_worker_is_killed_its_file_is_done_again(
     assert "Traceback" not in result.err
 
 
-BREAKS_INSIDE = """
+KILLS_ITS_PROCESS = """
 import os, signal
 from vdet.batch import task
 
-process = task.process_video
+process = task.run_video
 
-def breaking(job, *arguments, **options):
+def killing(job, *arguments, **options):
     if job.source.name == "kills.mp4":
         os.kill(os.getpid(), signal.SIGKILL)
     return process(job, *arguments, **options)
 
-task.process_video = breaking
+task.run_video = killing
 """
 
 
@@ -84,16 +84,16 @@ def test_a_file_that_always_kills_its_process_is_the_only_one_that_fails(
     launch: Start, clips: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "in").mkdir()
-    (tmp_path / "sitecustomize.py").write_text(BREAKS_INSIDE)
-    for name in ("kills", "sound"):
+    (tmp_path / "sitecustomize.py").write_text(KILLS_ITS_PROCESS)
+    for name in ("kills", "intact"):
         os.link(clips / "short.mp4", tmp_path / "in" / f"{name}.mp4")
     running = launch(
         *("detect-video", tmp_path / "in", "-d", tmp_path / "out", "--jobs", "2"),
-        environment={"PYTHONPATH": str(tmp_path)},
+        modules=tmp_path,
     )
     result = running.finish()
     assert result.code == 3, result.err
-    assert names(tmp_path / "out") == ["manifest.jsonl", "sound.mp4"]
+    assert names(tmp_path / "out") == ["intact.mp4", "manifest.jsonl"]
     records = records_of(tmp_path / "out")
     assert "kills.mp4: its process was killed" in str(records["kills.mp4"]["error"])
-    assert records["sound.mp4"]["error"] is None
+    assert records["intact.mp4"]["error"] is None

@@ -1,14 +1,14 @@
-"""Ctrl-C and SIGTERM: a prompt end, nothing half-written, exit code 130."""
+"""After Ctrl-C, SIGTERM or SIGHUP the program removes what is half-written and exits with 130."""
 
 import signal
 from pathlib import Path
 
 import pytest
 
-from faults.conftest import Gate, Start
-from running import names, unfinished, until
+from faults.conftest import Start
+from running import Gate, names, until
 
-HALF_LOADED = """
+LOADS_FOR_A_MINUTE = """
 import sys, time
 
 class Slow:
@@ -28,9 +28,9 @@ def test_in_the_middle_of_a_video(
 ) -> None:
     running = launch(
         *("detect-video", long_clip, tmp_path / "o.mp4", "--tracks", tmp_path / "o.csv"),
-        environment=gate.environment,
+        modules=gate.folder,
     )
-    until(lambda: bool(unfinished(tmp_path)))
+    until(lambda: bool(gate.held()))
     running.send(number)
     result = running.finish()
     assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
@@ -42,8 +42,8 @@ def test_in_the_middle_of_a_batch(
     launch: Start, gate: Gate, clips: Path, tmp_path: Path, number: signal.Signals, to_all: bool
 ) -> None:
     arguments = ("detect-video", clips, "-d", tmp_path, "--jobs", "2")
-    running = launch(*arguments, environment=gate.environment)
-    until(lambda: len(unfinished(tmp_path)) == 2)
+    running = launch(*arguments, modules=gate.folder)
+    until(lambda: len(gate.held()) == 2)
     running.send(number, to_all=to_all)
     result = running.finish()
     assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
@@ -53,8 +53,8 @@ def test_in_the_middle_of_a_batch(
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_while_the_program_is_loaded(launch: Start, tmp_path: Path, number: signal.Signals) -> None:
-    (tmp_path / "sitecustomize.py").write_text(HALF_LOADED)
-    running = launch("--version", environment={"PYTHONPATH": str(tmp_path)})
+    (tmp_path / "sitecustomize.py").write_text(LOADS_FOR_A_MINUTE)
+    running = launch("--version", modules=tmp_path)
     assert running.process.stderr is not None
     assert running.process.stderr.readline() == "loading\n"
     running.send(number)
@@ -62,16 +62,16 @@ def test_while_the_program_is_loaded(launch: Start, tmp_path: Path, number: sign
     assert (result.code, result.err.strip()) == (130, "vdet: interrupted")
 
 
-def test_what_nohup_lets_the_program_ignore_is_ignored(
+def test_a_signal_that_nohup_ignores_is_ignored(
     launch: Start, gate: Gate, clips: Path, tmp_path: Path
 ) -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     arguments = ("detect-video", clips / "a.mp4", tmp_path / "out.mp4")
     try:
-        running = launch(*arguments, environment=gate.environment)
+        running = launch(*arguments, modules=gate.folder)
     finally:
         signal.signal(signal.SIGHUP, before)
-    until(lambda: bool(unfinished(tmp_path)))
+    until(lambda: bool(gate.held()))
     running.send(signal.SIGHUP)
     gate.open()
     assert running.finish().code == 0

@@ -16,7 +16,7 @@ from hostile.mutations import mutated
 from hostile.trials import Trial, broken_promises, files_in, try_all
 
 SMALL = (
-    *("--set", "features={patch: 16, hog: {channels: []}, histogram: {bins: 8}}"),
+    *("--set", "detector.features={patch: 16, hog: {channels: []}, histogram: {bins: 8}}"),
     *("--set", "training.max_broken=0", "--jobs", "1"),
 )
 SECONDS = 20.0

@@ -18,21 +18,24 @@ from vdet.lanes.camera_file import load_camera
 
 SETTINGS = """\
 # looked at: one picture
-reference_height: 720
-search:
-  engine: auto
-  probability: 0.5
-  windows:
-  - {size: 160, overlap: 0.5, top: 380, bottom: 600}
-  - size: 240
-    step: 2
-    top: 300
-    bottom: 700
-  perspective: {sizes: [0.25, 0.5], horizon: 0.45, lowest: 1.1, beyond: 0.7, step: 2}
-  alternate: 2
-heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
+detector:
+  kind: svm
+  reference_height: 720
+  search:
+    engine: auto
+    probability: 0.5
+    windows:
+    - {size: 160, overlap: 0.5, top: 380, bottom: 600}
+    - size: 240
+      step: 2
+      top: 300
+      bottom: 700
+    perspective: {sizes: [0.25, 0.5], horizon: 0.45, lowest: 1.1, beyond: 0.7, step: 2}
+    alternate: 2
+  heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
+  score: {middle: 0.3, slope: 2}
 tracker:
-  motion: {smallest: 0.03, strong: 0.2, needed: 2.5, carried: 8}
+  method: rules
   history: 10
   min_region: 50
   match_method: ccoeff_normed
@@ -42,6 +45,16 @@ lanes:
 output:
   preset: 'superfast'
   crf: 20
+"""
+MOTION = """\
+tracker:
+  method: motion
+  smallest: 0.03
+  needed: 0.25
+  hidden: 5e-1
+  carried: 1
+input: {max_damaged: 0.1, frame_rate: 30}
+output: {scores: true}
 """
 CAMERA = """\
 # frame size, pixels
@@ -59,7 +72,8 @@ TOKENS = (
     *("---\n", "...\n", "%YAML 9.9\n", "%TAG ! x\n", "? ", "- ", ": ", "{", "}", "[", "]", "|\n"),
     *("'", '"', "#", "\t", "\r", "\0", "\n", "  ", "\x85", "\ufeff", '"\\UFFFFFFFF"', '"\\ud800"'),
     *("0", "-1", "1e999", ".inf", ".nan", "9" * 30, "0x" + "f" * 40, "1:60:60", "99999", "null"),
-    *("true", "~", "2001-99-99", "heat", "windows", "1e-300", "100000", "0.99", "\xff", "é", "🚗"),
+    *("true", "~", "2001-99-99", "heat", "windows", "rules", "motion", "1e-300", "100000", "0.99"),
+    *("\xff", "é", "🚗"),
 )
 NUMBERS = (
     *(
@@ -96,7 +110,8 @@ def test_500_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Pat
     inside.mkdir()
     out.mkdir()
     settings = mutated(SETTINGS.encode(), seed=1, count=150, tokens=TOKENS)
-    settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=200)
+    settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=150)
+    settings += with_other_words(MOTION, NUMBERS, seed=5, count=50)
     cameras = mutated(CAMERA.encode(), seed=3, count=50, tokens=TOKENS)
     cameras += with_other_words(CAMERA, NUMBERS, seed=4, count=100)
     few = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
@@ -123,30 +138,40 @@ ALIAS_BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 WICKED = {
     "alias bomb": (ALIAS_BOMB, r"2:8: is not YAML: aliases \(\*name\) are not accepted"),
-    "alias to itself": ("heat: &a [*a]", "aliases"),
-    "merge key": ("heat: &a {frames: 2}\nsearch: {<<: *a}", "aliases"),
-    "python object": ("heat: !!python/object/apply:os.system [id]", r"1:7: .*tags \(!name\)"),
-    "binary": ("heat: !!binary aGVhdA==", r"tags \(!name\) are not accepted"),
+    "alias to itself": ("detector: &a [*a]", "aliases"),
+    "merge key": ("lanes: &a {frames: 2}\ndetector: {<<: *a}", "aliases"),
+    "python object": ("detector: !!python/object/apply:os.system [id]", r"1:11: .*tags \(!name\)"),
+    "binary": ("detector: !!binary aGVhdA==", r"tags \(!name\) are not accepted"),
     "deep list": ("[" * 90_000, "is nested too deeply"),
     "deep map": ("{a: " * 20_000, "is nested too deeply"),
     "deep block": ("- " * 45_000, "is nested too deeply"),
     "deep keys": ("? " * 45_000, "is nested too deeply"),
-    "huge number": ("heat: {frames: " + "9" * 90_000 + "}", "1:16: .*the number is too large"),
-    "huge hexadecimal": ("heat: {frames: 0x" + "f" * 90_000 + "}", "the number is too large"),
-    "huge base 60": ("heat: {frames: " + "1:" * 40_000 + "1}", "the number is too large"),
-    "base 60 fraction": ("heat: {frames: " + "1:" * 40_000 + "1.5}", "cannot be understood"),
+    "huge number": ("input: {x: " + "9" * 90_000 + "}", "1:12: .*the number is too large"),
+    "huge hexadecimal": ("input: {x: 0x" + "f" * 90_000 + "}", "the number is too large"),
+    "huge base 60": ("input: {x: " + "1:" * 40_000 + "1}", "the number is too large"),
+    "base 60 fraction": ("input: {x: " + "1:" * 40_000 + "1.5}", "cannot be understood"),
     "huge version": ("%YAML " + "1" * 5000 + ".1\n---\nheat: {}", "is not YAML"),
     "no such character": (r'heat: "\UFFFFFFFF"', "is not YAML"),
-    "half a character": (r'heat: {weight: "\ud800"}', r"heat\.weight: .*got '\\ud800'"),
-    "half a character as key": (r'heat: {"\ud800": 1}', "heat"),
-    "time before time": ("heat: {frames: 0001-01-01T00:00:00+23:59}", "should be a valid integer"),
-    "infinity": ("heat: {threshold: .inf}", "heat.threshold: should be a finite number"),
-    "not a number": ("heat: {threshold: .nan}", "heat.threshold: should be a finite number"),
-    "NUL": ("heat: {frames: \0}", "is not YAML: unacceptable character #x0000"),
-    "several documents": ("heat: {frames: 2}\n---\nheat: {frames: 3}\n", "but found another doc"),
+    "half a character": (
+        r'detector: {heat: {weight: "\ud800"}}',
+        r"detector\.heat\.weight: .*got '\\ud800'",
+    ),
+    "half a character as kind": (r'detector: {kind: "\ud800"}', "detector.kind: .* is not known"),
+    "half a character as key": (r'detector: {"\ud800": 1}', "detector"),
+    "time before time": (
+        "detector: {heat: {frames: 0001-01-01T00:00:00+23:59}}",
+        "should be a valid integer",
+    ),
+    "infinity": ("input: {max_damaged: .inf}", "input.max_damaged: should be a finite number"),
+    "not a number": ("input: {max_damaged: .nan}", "input.max_damaged: should be a finite number"),
+    "NUL": ("input: {x: \0}", "is not YAML: unacceptable character #x0000"),
+    "several documents": ("input: {x: 2}\n---\ninput: {x: 3}\n", "but found another doc"),
     "one key 12,000 times": ("heat: 1\n" * 12_000, "is given twice"),
     "9,000 unknown keys": ("".join(f"k{i}: 1\n" for i in range(9000)), "k0: is no setting"),
-    "15,000 wrong items": ("search:\n  windows:\n" + "  - 1\n" * 15_000, "should be a section"),
+    "15,000 wrong items": (
+        "detector:\n search:\n  windows:\n" + "  - 1\n" * 15_000,
+        "should be a section",
+    ),
     "control characters": (r'"a\n\e[2J": 1', r"'a\\n\\x1b\[2J': is no setting"),
     "a long key": ("k" * 90_000 + ": 1", "mapping values are not allowed here"),
     "a long quoted key": ('? "' + "k" * 90_000 + '"\n: 1', "k…: is no setting"),
@@ -180,11 +205,11 @@ def test_nor_is_it_a_camera(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     "data",
     [
-        "heat: {frames: 2}".encode("utf-16"),
-        "heat: {frames: 2}".encode("utf-32"),
-        "heat: {weight: é}".encode("latin-1"),
+        "input: {x: 2}".encode("utf-16"),
+        "input: {x: 2}".encode("utf-32"),
+        "input: {x: é}".encode("latin-1"),
         codecs.BOM_UTF16_LE,
-        b"heat: {weight: \xed\xa0\x80}",
+        b"input: {x: \xed\xa0\x80}",
         b"\xc0\x80: 1",
     ],
 )

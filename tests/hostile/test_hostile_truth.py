@@ -10,11 +10,10 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.errors import TruthError
-from vdet.evaluate import rows
+from vdet.evaluate import labelled_video
+from vdet.evaluate.comparison import MAX_IDS, MAX_IN_FRAME, compare
 from vdet.evaluate.predictions import read_predictions
-from vdet.evaluate.preprocessing import MAX_IDS, MAX_IN_FRAME, compare
-from vdet.evaluate.truth import read_truth
-from vdet.evaluate.truth.cvat import MAX_DEPTH
+from vdet.evaluate.truth import MAX_DEPTH, read_truth
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
 GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)
@@ -40,7 +39,7 @@ CVAT = (
     )
     + "</annotations>\n"
 )
-CSV = "frame,time,id,x,y,width,height,from_match\n" + "".join(
+CSV = "frame,time,id,x,y,width,height,predicted\n" + "".join(
     f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,0\n" for f, i in BOXES
 )
 JSONL = "".join(
@@ -49,7 +48,7 @@ JSONL = "".join(
             "frame": f,
             "time": f / 25,
             "tracks": [
-                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "from_match": False}
+                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "predicted": False}
                 for i in (1, 2)
             ],
         }
@@ -147,7 +146,7 @@ WICKED = {
     "deep": (
         "t.xml",
         "<annotations>" + "<a>" * 1_000_000,
-        f"more than {MAX_DEPTH} elements in one",
+        f"more than {MAX_DEPTH} nested elements",
     ),
     "no number": ("t.txt", "1" * 200_000 + "x,1,1,1,1,1,1,1,1", "is not a number"),
     "no number, KITTI": ("t.txt", "9" * 200_000 + "x " * 17, "is not a number"),
@@ -194,7 +193,7 @@ def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
 
 
 def test_too_many_boxes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rows, "MAX_ROWS", 10)
+    monkeypatch.setattr(labelled_video, "MAX_ROWS", 10)
     path = tmp_path / "t.txt"
     path.write_text("".join(f"{n},1,1,1,1,1,1,1,1\n" for n in range(1, 11)))
     assert len(read_truth(path)) == 10

@@ -1,13 +1,13 @@
-"""Photographs of a flat chessboard, drawn as a camera of known lens would take them."""
+"""Drawn photographs of a flat chessboard, as a camera with known lens would take them."""
 
 import cv2
 import numpy as np
 
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.media.images import Image
 
 PATTERN = (9, 6)
-_TEXELS = 40  # a square of the board
+_TEXELS = 40  # side of a square of the board, texels
 _POSES = (
     (0.0, 0.0, 0.0, 0.0, 0.0, 13.0), (0.5, 0.0, 0.05, -1.5, 0.5, 13.0),
     (-0.5, 0.2, 0.0, 1.5, -0.5, 14.0), (0.1, 0.6, -0.05, 1.5, 1.0, 13.0),
@@ -16,13 +16,15 @@ _POSES = (
 )  # fmt: skip
 
 
-def photographs(camera: Camera, number: int = len(_POSES)) -> list[Image]:
+def photographs(camera: CalibratedCamera, number: int = len(_POSES)) -> list[Image]:
     """Draw the board, 9 × 6 inner corners, in different poses."""
     return [_photograph(camera, np.array(pose)) for pose in _POSES[:number]]
 
 
-def _photograph(camera: Camera, pose: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Image:
-    """Look up, for each pixel, where its ray meets the board; squares are the unit of length."""
+def _photograph(
+    camera: CalibratedCamera, pose: np.ndarray[tuple[int], np.dtype[np.float64]]
+) -> Image:
+    """Look up where the ray of each pixel meets the board; the unit of length is a square."""
     rotation, _ = cv2.Rodrigues(pose[:3])
     middle = np.array([(PATTERN[0] - 1) / 2, (PATTERN[1] - 1) / 2, 0])
     shift = pose[3:] - rotation @ middle
@@ -40,7 +42,7 @@ def _photograph(camera: Camera, pose: np.ndarray[tuple[int], np.dtype[np.float64
 
 
 def _board() -> Image:
-    """Draw the board from the front, a white margin around; its first corner is at (2, 2)."""
+    """Draw the board from the front with a white margin; its first corner is at (2, 2)."""
     squares = np.full((PATTERN[1] + 3, PATTERN[0] + 3), 230, np.uint8)
     rows, columns = np.indices((PATTERN[1] + 1, PATTERN[0] + 1))
     squares[1:-1, 1:-1][(rows + columns) % 2 == 0] = 25

@@ -1,33 +1,33 @@
-"""Roads with known lines, and settings that fit the camera which sees them."""
+"""Generated roads with known lines, and lane settings that fit their camera."""
 
 from collections.abc import Callable
 
 import pytest
 
-from vdet.config.lanes import LaneSettings, ViewSettings
-from vdet.lanes.camera import Camera as CalibratedCamera
-from vdet.lanes.finder import LaneFinder
+from vdet.config.lanes import LaneSettings, TopViewSettings
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
-from vdet.synthetic.camera import Camera
+from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Light, Line, Road, Scene
+from vdet.synthetic.scene import Carriageway, Light, Line, Scene
 
 YELLOW = (60, 180, 225)
 NEAR, FAR = 6.0, 42.0
 
 
 @pytest.fixture(scope="session")
-def settings_for() -> Callable[[Camera], LaneSettings]:
-    """Make settings whose view is the road from 6 m to 42 m ahead of a level camera."""
+def settings_for() -> Callable[[PinholeCamera], LaneSettings]:
+    """Make settings whose top view shows the road from 6 m to 42 m ahead of a level camera."""
 
-    def row(camera: Camera, distance: float) -> float:
+    def row(camera: PinholeCamera, distance: float) -> float:
         return (camera.horizon + camera.focal * camera.above_ground / distance) / camera.height
 
-    def column(camera: Camera, lateral: float, distance: float) -> float:
+    def column(camera: PinholeCamera, lateral: float, distance: float) -> float:
         return 0.5 + camera.focal * lateral / distance / camera.width
 
-    def make(camera: Camera) -> LaneSettings:
-        view = ViewSettings(
+    def make(camera: PinholeCamera) -> LaneSettings:
+        view = TopViewSettings(
             top=row(camera, FAR),
             bottom=row(camera, NEAR),
             top_left=column(camera, -1.85, FAR),
@@ -43,7 +43,7 @@ def settings_for() -> Callable[[Camera], LaneSettings]:
 
 @pytest.fixture(scope="session")
 def make_road() -> Callable[..., Scene]:
-    """Make a scene: a yellow line to the left, a dashed white one to the right, 3.7 m apart."""
+    """Make a scene: a yellow line on the left, a dashed white one on the right, 3.7 m apart."""
 
     def make(
         *,
@@ -55,8 +55,8 @@ def make_road() -> Callable[..., Scene]:
         frames: int = 4,
     ) -> Scene:
         return Scene(
-            camera=Camera.dashboard(*size, curvature=curvature),
-            road=Road(left=-7.0, right=7.0, lines=lines, asphalt=asphalt),
+            camera=PinholeCamera.dashboard(*size, curvature=curvature),
+            road=Carriageway(left=-7.0, right=7.0, lines=lines, asphalt=asphalt),
             light=light or Light(),
             frames=frames,
             seed=3,
@@ -66,16 +66,19 @@ def make_road() -> Callable[..., Scene]:
 
 
 @pytest.fixture
-def drive(settings_for: Callable[[Camera], LaneSettings]) -> Callable[..., list[Lane | None]]:
-    """Find the lane in each frame of scenes that follow one another."""
+def drive(
+    settings_for: Callable[[PinholeCamera], LaneSettings],
+) -> Callable[..., list[Lane | None]]:
+    """Find the lane in each frame of consecutive scenes."""
 
     def find(*scenes: Scene) -> list[Lane | None]:
         camera = scenes[0].camera
-        finder = LaneFinder(settings_for(camera), camera.width, camera.height)
-        lanes = []
+        finder = RoadFinder(LaneRequest(), settings_for(camera), camera.width, camera.height)
+        lanes: list[Lane | None] = []
         for scene in scenes:
             renderer = Renderer(scene)
-            lanes += [finder.find(renderer.image(index)) for index in range(scene.frames)]
+            images = [renderer.image(index) for index in range(scene.frames)]
+            lanes += [finder.update(finder.observe(image)).lane for image in images]
         return lanes
 
     return find
@@ -83,7 +86,7 @@ def drive(settings_for: Callable[[Camera], LaneSettings]) -> Callable[..., list[
 
 @pytest.fixture
 def wide_camera() -> CalibratedCamera:
-    """A camera whose lens bends straight lines visibly."""
+    """A camera with visible lens distortion."""
     return CalibratedCamera(
         640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5
     )

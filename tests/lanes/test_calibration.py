@@ -1,4 +1,4 @@
-"""Calibration on photographs drawn for a known camera."""
+"""Calibration with photographs drawn for a known camera."""
 
 from pathlib import Path
 
@@ -10,17 +10,19 @@ from lanes.chessboards import PATTERN, photographs
 from vdet.errors import ImageError
 from vdet.lanes import calibration as calibration_module
 from vdet.lanes.calibration import Calibration, calibrate, find_corners
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.media.images import Image, write_image
 
 
 @pytest.fixture(scope="module")
-def true_camera() -> Camera:
-    return Camera(640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0), 0)
+def true_camera() -> CalibratedCamera:
+    return CalibratedCamera(
+        640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0), 0
+    )
 
 
 @pytest.fixture(scope="module")
-def photos(true_camera: Camera, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+def photos(true_camera: CalibratedCamera, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("boards")
     paths = []
     for number, image in enumerate(photographs(true_camera)):
@@ -35,19 +37,19 @@ def calibration(photos: list[Path]) -> Calibration:
 
 
 def test_focal_length_and_principal_point_are_recovered(
-    calibration: Calibration, true_camera: Camera
+    calibration: Calibration, true_camera: CalibratedCamera
 ) -> None:
     camera = calibration.camera
     assert (camera.width, camera.height) == (640, 480)
     assert camera.focal == pytest.approx(true_camera.focal, rel=0.01)
     assert camera.center == pytest.approx(true_camera.center, abs=4)
     assert camera.rms < 0.2
-    assert len(calibration.views) == len(calibration.errors) == 8
+    assert len(calibration.photos) == len(calibration.errors) == 8
     assert calibration.skipped == ()
 
 
-def test_the_distortion_found_moves_points_as_the_true_one_does(
-    calibration: Calibration, true_camera: Camera
+def test_the_fitted_distortion_moves_points_as_the_true_one(
+    calibration: Calibration, true_camera: CalibratedCamera
 ) -> None:
     pixels = np.mgrid[40:620:8j, 40:450:8j].reshape(2, 1, -1).T
     moved = [
@@ -57,10 +59,12 @@ def test_the_distortion_found_moves_points_as_the_true_one_does(
     assert np.abs(moved[0] - moved[1]).max() < 2.5
 
 
-def test_the_board_is_looked_for_in_a_reduced_picture_and_found_in_the_large_one(
+def test_the_board_is_searched_in_a_reduced_picture_and_located_in_the_large_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    large = Camera(2560, 1920, (2240.0, 2232.0), (1289.5, 945.5), (0.0, 0.0, 0.0, 0.0, 0.0), 0)
+    large = CalibratedCamera(
+        2560, 1920, (2240.0, 2232.0), (1289.5, 945.5), (0.0, 0.0, 0.0, 0.0, 0.0), 0
+    )
     image = photographs(large, 1)[0]
     searched = []
     search = cv2.findChessboardCorners
@@ -71,7 +75,7 @@ def test_the_board_is_looked_for_in_a_reduced_picture_and_found_in_the_large_one
 
     monkeypatch.setattr(cv2, "findChessboardCorners", spy)
     corners = find_corners(image, PATTERN)
-    monkeypatch.setattr(calibration_module, "MAX_SEARCHED", image.size)
+    monkeypatch.setattr(calibration_module, "MAX_SEARCH_PIXELS", image.size)
     whole = find_corners(image, PATTERN)
     assert corners is not None
     assert whole is not None
@@ -79,7 +83,7 @@ def test_the_board_is_looked_for_in_a_reduced_picture_and_found_in_the_large_one
     assert searched[0] < 1_310_000 < searched[1]
 
 
-def test_corners_are_found_to_a_fraction_of_a_pixel(true_camera: Camera) -> None:
+def test_corners_are_found_to_a_fraction_of_a_pixel(true_camera: CalibratedCamera) -> None:
     front = photographs(true_camera, 1)[0]
     corners = find_corners(front, PATTERN)
     assert corners is not None
@@ -91,7 +95,7 @@ def test_corners_are_found_to_a_fraction_of_a_pixel(true_camera: Camera) -> None
     assert np.abs(corners - expected[:, 0]).max() < 0.15
 
 
-def test_a_photograph_without_a_board_is_skipped_and_named(
+def test_a_photograph_without_a_board_is_skipped_with_a_reason(
     photos: list[Path], tmp_path: Path
 ) -> None:
     blank = tmp_path / "wall.png"
@@ -99,13 +103,13 @@ def test_a_photograph_without_a_board_is_skipped_and_named(
     broken = tmp_path / "broken.png"
     broken.write_bytes(b"no picture")
     skipped = calibrate([*photos[:5], blank, broken], PATTERN).skipped
-    assert [skip.photo for skip in skipped] == [blank, broken]
+    assert [photo.path for photo in skipped] == [blank, broken]
     assert skipped[0].reason == "no board of 9×6 inner corners is seen"
     assert skipped[1].reason.startswith("is not a picture")
 
 
-def test_a_photograph_that_is_larger_by_a_pixel_is_used(
-    photos: list[Path], true_camera: Camera, tmp_path: Path
+def test_a_photograph_one_pixel_larger_is_used(
+    photos: list[Path], true_camera: CalibratedCamera, tmp_path: Path
 ) -> None:
     image = cv2.imread(str(photos[0]))
     assert image is not None
@@ -117,7 +121,7 @@ def test_a_photograph_that_is_larger_by_a_pixel_is_used(
     assert (found.camera.width, found.camera.height) == (640, 480)
 
 
-def test_a_photograph_of_another_size_is_skipped_and_named(
+def test_a_photograph_of_another_size_is_skipped_with_a_reason(
     photos: list[Path], tmp_path: Path
 ) -> None:
     image = cv2.imread(str(photos[0]))
@@ -125,13 +129,13 @@ def test_a_photograph_of_another_size_is_skipped_and_named(
     large = tmp_path / "large.png"
     write_image(large, np.asarray(cv2.resize(image, (960, 720)), np.uint8))
     skipped = calibrate([*photos[1:], large], PATTERN).skipped
-    assert [(skip.photo, skip.reason) for skip in skipped] == [
+    assert [(photo.path, photo.reason) for photo in skipped] == [
         (large, "is 960×720, the others are 640×480")
     ]
 
 
-def test_a_view_that_spoils_the_fit_is_dropped_and_named(
-    photos: list[Path], true_camera: Camera, tmp_path: Path
+def test_an_outlier_is_dropped_with_a_reason(
+    photos: list[Path], true_camera: CalibratedCamera, tmp_path: Path
 ) -> None:
     image = cv2.imread(str(photos[3]))
     assert image is not None
@@ -140,8 +144,8 @@ def test_a_view_that_spoils_the_fit_is_dropped_and_named(
     bent = tmp_path / "bent.png"  # of a board that is not flat
     write_image(bent, np.asarray(cv2.remap(image, waves, rows, cv2.INTER_LINEAR), np.uint8))
     found = calibrate([*photos, bent], PATTERN)
-    assert [skip.photo for skip in found.skipped] == [bent]
-    assert "would spoil the fit" in found.skipped[0].reason
+    assert [photo.path for photo in found.skipped] == [bent]
+    assert "is an outlier" in found.skipped[0].reason
     assert found.camera.focal == pytest.approx(true_camera.focal, rel=0.01)
 
 
@@ -156,7 +160,7 @@ def test_no_photograph_with_a_board_is_refused(photos: list[Path]) -> None:
 
 
 def test_boards_that_are_all_seen_from_the_front_are_refused(
-    true_camera: Camera, tmp_path: Path
+    true_camera: CalibratedCamera, tmp_path: Path
 ) -> None:
     front = photographs(true_camera, 1)[0]
     same = []

@@ -1,4 +1,4 @@
-"""The camera file: what is written is read, what is wrong is named."""
+"""The camera file: what is written can be read; mistakes are named."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdet.errors import ConfigError, OutputError
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.camera_file import load_camera, save_camera
 
 GOOD = {
@@ -32,7 +32,7 @@ def refusal(path: Path, **changes: object) -> str:
     return str(error.value).replace(str(path), "camera.yaml")
 
 
-def test_a_camera_is_read_as_it_was_written(path: Path, wide_camera: Camera) -> None:
+def test_a_camera_is_read_as_it_was_written(path: Path, wide_camera: CalibratedCamera) -> None:
     save_camera(wide_camera, path)
     assert load_camera(path) == wide_camera
 
@@ -47,26 +47,26 @@ small = st.floats(-10, 10)
     distortion=st.tuples(small, small, small, small, small),
     rms=st.floats(0, 100),
 )
-def test_any_camera_is_read_to_the_last_digit(
+def test_every_camera_is_read_with_all_its_digits(
     path: Path,
     focal: tuple[float, float],
     center: tuple[float, float],
     distortion: tuple[float, float, float, float, float],
     rms: float,
 ) -> None:
-    camera = Camera(640, 480, focal, center, distortion, rms)
+    camera = CalibratedCamera(640, 480, focal, center, distortion, rms)
     save_camera(camera, path)
     assert load_camera(path) == camera
 
 
-def test_the_file_explains_itself(path: Path, wide_camera: Camera) -> None:
+def test_the_file_explains_its_values(path: Path, wide_camera: CalibratedCamera) -> None:
     save_camera(wide_camera, path)
     text = path.read_text(encoding="utf-8")
     for words in ("# frame size, pixels", "width: 640", "[[fx, 0, cx]", "k1, k2, p1, p2, k3"):
         assert words in text
 
 
-def test_matrix_entries_without_a_meaning_are_refused(path: Path) -> None:
+def test_a_matrix_of_another_form_is_refused(path: Path) -> None:
     message = refusal(path, matrix=[[560.0, 3, 322.0], [0, 558.0, 236.0], [0, 0, 1]])
     assert message == "camera.yaml:1:1: matrix should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
 
@@ -93,7 +93,7 @@ def test_a_principal_point_outside_the_frame_is_refused(path: Path) -> None:
         ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: should be a finite number"),
         ("rms", float("inf"), "rms: should be a finite number"),
         ("rms", -1, "rms: should be greater than or equal to 0"),
-        ("colour", "red", "colour: is nothing that a camera file has; known: width,"),
+        ("colour", "red", "colour: is not a key of camera files; known: width,"),
     ],
 )
 def test_each_mistake_is_named_with_its_place(
@@ -119,8 +119,8 @@ def test_a_missing_file_is_named(path: Path) -> None:
         load_camera(path)
 
 
-def test_a_camera_is_not_written_into_a_folder_that_is_not_there(
-    tmp_path: Path, wide_camera: Camera
+def test_writing_into_a_missing_folder_is_an_error(
+    tmp_path: Path, wide_camera: CalibratedCamera
 ) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         save_camera(wide_camera, tmp_path / "none" / "camera.yaml")
@@ -128,7 +128,7 @@ def test_a_camera_is_not_written_into_a_folder_that_is_not_there(
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=80)
 @given(st.text(max_size=60) | st.sampled_from([*GOOD]).map(lambda key: f"{key}: [[]]"))
-def test_any_other_text_is_refused_in_words(path: Path, text: str) -> None:
+def test_any_other_text_is_a_config_error(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", errors="replace")
     with pytest.raises(ConfigError):
         load_camera(path)

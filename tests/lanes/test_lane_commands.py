@@ -1,4 +1,4 @@
-"""Lanes through the whole commands, on a clip that a strongly distorting lens took."""
+"""Lanes through the commands, on a clip with strong lens distortion."""
 
 import json
 from collections.abc import Callable
@@ -13,26 +13,25 @@ import pytest
 import yaml
 
 from conftest import Outcome, Run
-from red_cars import COLOUR, SETTINGS, red_finder
+from red_cars import SETTINGS, red_finder
 from vdet.config.lanes import LaneSettings
 from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.geometry import Box
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.camera_file import save_camera
-from vdet.lanes.undistortion import Undistorter
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image, read_image, write_image
-from vdet.synthetic.camera import Camera as RoadCamera
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
-LENS = Camera(WIDTH, HEIGHT, (480, 480), (320, 240), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
-CAR = Box(500, 300, 64, 56)  # near the edge; where the lens shows it
+LENS = CalibratedCamera(WIDTH, HEIGHT, (480, 480), (320, 240), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+CAR = Box(500, 300, 64, 56)  # in the distorted frame, near its edge
 CORNER = np.s_[400:, 600:]
-"""Pixels that nothing is drawn on, and that undistortion moves far."""
+"""Pixels without drawings that undistortion moves far."""
 STAGES = [
     "1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png",
     "6-road.png", "7-above.png", "8-mask.png", "9-fit.png",
@@ -41,16 +40,16 @@ STAGES = [
 
 @dataclass(frozen=True)
 class Files:
-    """What the commands are given."""
+    """The input files of the commands."""
 
     clip: Path
-    """A road in a bend as the lens shows it, and a red car that goes along with the camera."""
+    """A bend, distorted by the lens, and a red car that stays in one place of the frame."""
     picture: Path
     """Its first frame."""
     plain: Path
     """The road without lens or car."""
     bare: Path
-    """A picture of nothing but grey."""
+    """A grey picture."""
     camera: Path
     settings: Path
     model: Path
@@ -62,7 +61,7 @@ class Files:
 
     @property
     def lanes(self) -> tuple[str | Path, ...]:
-        """These, and those that find the lane."""
+        """The options that find red cars and the lane."""
         return *self.red, "--lanes", "--camera", self.camera
 
 
@@ -80,7 +79,7 @@ def road(make_road: Callable[..., Scene]) -> Scene:
 def files(
     road: Scene,
     undistorter: Undistorter,
-    settings_for: Callable[[RoadCamera], LaneSettings],
+    settings_for: Callable[[PinholeCamera], LaneSettings],
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Files:
     folder = tmp_path_factory.mktemp("lanes")
@@ -101,7 +100,7 @@ def files(
 
 
 def distorted(image: Image, undistorter: Undistorter) -> Image:
-    """Show an ideal camera's picture as the lens would."""
+    """Distort the picture of an ideal camera as the lens would."""
     columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
     pixels = np.column_stack([columns.ravel(), rows.ravel()]).astype(np.float64)
     x, y = undistorter.points(pixels).T.reshape(2, HEIGHT, WIDTH).astype(np.float32)
@@ -122,14 +121,11 @@ def write_video(path: Path, images: list[Image]) -> None:
 
 def red_settings(lanes: LaneSettings) -> Settings:
     windows = WindowSettings(size=32, overlap=0.75, top=280, bottom=400)
-    changes = {
-        "reference_height": HEIGHT,
-        "features": COLOUR,
-        "search": SETTINGS.search.model_copy(update={"windows": (windows,)}),
-        "lanes": lanes,
-        "output": OutputSettings(crf=4),
-    }
-    return SETTINGS.model_copy(update=changes)
+    search = SETTINGS.svm.search.model_copy(update={"windows": (windows,)})
+    detector = SETTINGS.svm.model_copy(update={"reference_height": HEIGHT, "search": search})
+    tracker = SETTINGS.tracker.model_copy(update={"reference_height": HEIGHT})
+    output = OutputSettings(crf=4)
+    return Settings(detector=detector, tracker=tracker, lanes=lanes, output=output)
 
 
 def video_images(path: Path) -> list[Image]:
@@ -145,8 +141,8 @@ def box_of(item: dict[str, Any]) -> Box:
     return Box(item["x"], item["y"], item["width"], item["height"])
 
 
-def check_lane(lane: dict[str, Any], camera: RoadCamera) -> None:
-    """Compare a lane as JSON has it with the road that was drawn."""
+def check_lane(lane: dict[str, Any], camera: PinholeCamera) -> None:
+    """Compare a lane in JSON with the road that was drawn."""
     assert set(lane) == {"radius", "offset", "width", "left", "right"}
     assert lane["radius"] == pytest.approx(1 / camera.curvature, rel=0.25)
     assert lane["offset"] == pytest.approx(0, abs=0.1)
@@ -162,13 +158,13 @@ def check_lane(lane: dict[str, Any], camera: RoadCamera) -> None:
 
 
 def sits_on(box: Box, car: Box) -> bool:
-    """Tell whether a box holds all of a car, with it in the middle."""
+    """Tell whether a box encloses a car and has the same middle."""
     (x, y), (car_x, car_y) = box.center, car.center
     return box.intersection(car) == car and abs(x - car_x) < 6 and abs(y - car_y) < 6
 
 
 def red_in(image: Image) -> Box:
-    """Give the box around what is as red as the car."""
+    """Return the box around the pixels that are as red as the car."""
     x, y, width, height = cv2.boundingRect(cv2.inRange(image, (0, 0, 180), (80, 80, 255)))
     return Box(x, y, width, height)
 
@@ -181,14 +177,14 @@ def has_outline(image: Image, box: Box, color: tuple[int, int, int]) -> bool:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where `TestVideo.records` puts its outputs."""
+    """The folder of the outputs of `TestVideo.records`."""
     return tmp_path_factory.mktemp("out")
 
 
 class TestVideo:
     @pytest.fixture
     def records(self, run: Run, files: Files, folder: Path) -> list[dict[str, Any]]:
-        """The records of one run, done once, which also wrote `out.mp4`."""
+        """The records of one run, which also wrote `out.mp4`."""
         if not (folder / "t.jsonl").exists():
             outputs = (folder / "out.mp4", "--tracks", folder / "t.jsonl")
             result = run("detect-video", files.clip, *outputs, *files.lanes)
@@ -209,24 +205,22 @@ class TestVideo:
         points = np.array(lane["left"] + lane["right"])
         assert (points == points.round(1)).all()
 
-    def test_boxes_are_told_where_they_are_in_the_input(
-        self, records: list[dict[str, Any]]
-    ) -> None:
+    def test_boxes_are_in_pixels_of_the_input(self, records: list[dict[str, Any]]) -> None:
         boxes = [box_of(track) for record in records for track in record["tracks"]]
         assert len(boxes) > COUNT // 2
         assert all(sits_on(box, CAR) for box in boxes)
 
-    def test_at_the_edge_a_box_is_drawn_where_undistortion_puts_it(
+    def test_boxes_are_drawn_in_pixels_of_the_undistorted_frame(
         self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
     ) -> None:
         (track,) = records[-1]["tracks"]
-        told, placed = box_of(track), undistorter.box(box_of(track))
+        reported, placed = box_of(track), undistorter.box(box_of(track))
         drawn = video_images(folder / "out.mp4")[-1]
         assert has_outline(drawn, placed, color_of(track["id"]))
-        assert not has_outline(drawn, told, color_of(track["id"]))
+        assert not has_outline(drawn, reported, color_of(track["id"]))
         car = red_in(undistorter.image(video_images(files.clip)[-1]))
         assert sits_on(placed, car)
-        assert told.right < car.right - 15, "an unmoved box would miss a quarter of the car"
+        assert reported.right < car.right - 15, "an unchanged box would miss a quarter of the car"
 
     def test_the_video_is_the_undistorted_one(
         self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
@@ -238,7 +232,7 @@ class TestVideo:
             assert np.abs(new[CORNER] - straight).mean() < 2
             assert np.abs(new[CORNER] - old[CORNER].astype(int)).mean() > 8
 
-    def test_the_lane_is_painted(
+    def test_the_lane_is_drawn(
         self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
     ) -> None:
         lane = records[0]["lane"]
@@ -260,7 +254,7 @@ class TestVideo:
         for one, three in zip(*(video_images(tmp_path / f"{n}.mp4") for n in "13"), strict=True):
             assert (one == three).all()
 
-    def test_without_lanes_records_are_as_ever(
+    def test_without_lanes_records_differ_only_by_the_lane(
         self, run: Run, files: Files, records: list[dict[str, Any]], tmp_path: Path
     ) -> None:
         path = tmp_path / "t.jsonl"
@@ -270,24 +264,22 @@ class TestVideo:
             {key: value for key, value in record.items() if key != "lane"} for record in records
         ]
 
-    def test_stages_show_how_the_lane_was_found(
-        self, run: Run, files: Files, tmp_path: Path
-    ) -> None:
+    def test_lane_stages_are_written(self, run: Run, files: Files, tmp_path: Path) -> None:
         options = ("--no-video", "--stages", tmp_path / "s", "--at", "0.2", "--frames", "7")
         assert run("detect-video", files.clip, *options, *files.lanes).code == 0
         assert sorted(path.name for path in (tmp_path / "s").iterdir()) == STAGES
 
-    def test_a_camera_of_another_shape_is_refused(
+    def test_a_camera_of_another_aspect_ratio_is_refused(
         self, run: Run, files: Files, tmp_path: Path
     ) -> None:
         wide = tmp_path / "wide.yaml"
-        save_camera(Camera(1280, 720, (960, 960), (640, 360), (0, 0, 0, 0, 0), 0), wide)
+        save_camera(CalibratedCamera(1280, 720, (960, 960), (640, 360), (0, 0, 0, 0, 0), 0), wide)
         out, tracks = tmp_path / "out.mp4", tmp_path / "t.csv"
         options = ("--tracks", tracks, *files.red, "--lanes", "--camera", wide)
         result = run("detect-video", files.clip, out, *options)
         assert result.code == 1
         assert f"{files.clip}: the camera was calibrated for 1280×720" in result.err
-        assert "another shape" in result.err
+        assert "another aspect ratio" in result.err
         assert list(tmp_path.iterdir()) == [wide]
 
 
@@ -297,22 +289,22 @@ class TestPictures:
         items: list[dict[str, Any]] = json.loads(result.out)
         return items
 
-    def test_the_lane_and_the_boxes_are_told_and_drawn(
+    def test_the_lane_and_the_boxes_are_reported_and_drawn(
         self, run: Run, files: Files, tmp_path: Path, road: Scene, undistorter: Undistorter
     ) -> None:
         out = tmp_path / "out.png"
         options = ("-o", out, "--json", "-", *files.lanes)
         (item,) = self.json_of(run("detect-image", files.picture, *options))
         check_lane(item["lane"], road.camera)
-        (told,) = map(box_of, item["boxes"])
-        assert sits_on(told, CAR)
+        (reported,) = map(box_of, item["boxes"])
+        assert sits_on(reported, CAR)
         drawn = read_image(out)
-        assert has_outline(drawn, undistorter.box(told), color_of(1))
-        assert not has_outline(drawn, told, color_of(1))
+        assert has_outline(drawn, undistorter.box(reported), color_of(1))
+        assert not has_outline(drawn, reported, color_of(1))
         straight = undistorter.image(read_image(files.picture))
         assert (drawn[CORNER] == straight[CORNER]).all()
 
-    def test_without_a_camera_pictures_are_taken_as_undistorted_with_one_warning(
+    def test_without_a_camera_pictures_count_as_undistorted_with_one_warning(
         self, run: Run, files: Files, road: Scene, tmp_path: Path
     ) -> None:
         pictures, out = (files.plain, files.bare), tmp_path / "out"
@@ -324,19 +316,17 @@ class TestPictures:
         assert "--lanes without --camera: pictures are taken as undistorted" in result.err
         assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
-    def test_without_lanes_none_is_told(self, run: Run, files: Files) -> None:
+    def test_without_lanes_no_lane_is_reported(self, run: Run, files: Files) -> None:
         (item,) = self.json_of(run("detect-image", files.plain, "--json", "-", *files.red))
         assert "lane" not in item
 
-    def test_stages_show_how_the_lane_was_found(
-        self, run: Run, files: Files, tmp_path: Path
-    ) -> None:
+    def test_lane_stages_are_written(self, run: Run, files: Files, tmp_path: Path) -> None:
         stages = tmp_path / "s"
         assert run("detect-image", files.picture, "--stages", stages, *files.lanes).code == 0
         assert sorted(path.name for path in stages.iterdir()) == STAGES
         assert read_image(stages / "6-road.png").shape == (HEIGHT, WIDTH, 3)
 
-    def test_a_picture_of_another_shape_does_not_stop_the_others(
+    def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
         self, run: Run, files: Files, tmp_path: Path
     ) -> None:
         other = tmp_path / "other.png"
@@ -350,7 +340,7 @@ class TestPictures:
 
 class TestWrongUse:
     @pytest.mark.parametrize("command", ["detect-video", "detect-image"])
-    def test_a_camera_without_lanes(self, run: Run, files: Files, command: str) -> None:
+    def test_a_camera_without_lanes_is_refused(self, run: Run, files: Files, command: str) -> None:
         outputs = ("out.mp4",) if command == "detect-video" else ("-o", "out.png")
         result = run(command, files.clip, *outputs, "--camera", files.camera)
         assert result.code == 2
@@ -365,7 +355,7 @@ class TestWrongUse:
         ],
     )
     @pytest.mark.parametrize("command", ["detect-video", "detect-image"])
-    def test_a_file_that_is_no_camera(
+    def test_a_file_that_is_not_a_camera_is_refused(
         self, run: Run, files: Files, tmp_path: Path, text: str | None, words: str, command: str
     ) -> None:
         path = tmp_path / "my-camera.yaml"

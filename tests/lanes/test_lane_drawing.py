@@ -1,4 +1,4 @@
-"""The lane drawn into frames, and the pictures of its stages."""
+"""The lane drawn into frames, and the stage pictures."""
 
 from dataclasses import replace
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings
-from vdet.lanes.drawing import draw_lane, lane_pictures, lane_text
-from vdet.lanes.finder import LaneFinder
+from vdet.lanes.drawing import draw_lane, lane_text
 from vdet.lanes.lane import Lane
+from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media.images import Image
 
 LANE = Lane(
@@ -33,13 +33,13 @@ def test_the_area_between_the_lines_is_tinted(frame: Image) -> None:
     assert green > red
 
 
-def test_the_lines_themselves_are_drawn(frame: Image) -> None:
+def test_the_lines_are_drawn(frame: Image) -> None:
     draw_lane(frame, LANE)
     for x, y in ((450, 550), (830, 550)):
         assert frame[y, x, 2] > 150
 
 
-def test_the_road_beside_the_lane_stays_as_it_was(frame: Image) -> None:
+def test_the_road_beside_the_lane_does_not_change(frame: Image) -> None:
     draw_lane(frame, LANE)
     assert (frame[460:, :280] == 100).all()
     assert (frame[460:, 1020:] == 100).all()
@@ -51,13 +51,13 @@ def test_text_is_written_into_the_upper_left_corner(frame: Image) -> None:
     assert (frame[130:440] == 100).all()
 
 
-def test_a_lane_that_reaches_out_of_the_frame_is_drawn_as_far_as_it_is_in_it() -> None:
+def test_only_the_visible_part_of_a_lane_is_drawn() -> None:
     small = np.full((480, 640, 3), 100, np.uint8)
     draw_lane(small, LANE)
     assert (small != 100).any()
 
 
-def test_the_text_says_how_the_lane_bends_and_where_the_camera_is() -> None:
+def test_the_text_describes_the_bend_and_the_place_of_the_camera() -> None:
     assert lane_text(LANE) == (
         "lane 3.7 m wide, bends left, radius 800 m",
         "0.25 m left of its middle",
@@ -67,11 +67,9 @@ def test_the_text_says_how_the_lane_bends_and_where_the_camera_is() -> None:
 
 
 @pytest.mark.parametrize("lane", [LANE, None])
-def test_every_stage_has_its_picture_with_and_without_a_lane(
-    frame: Image, lane: Lane | None
-) -> None:
-    finder = LaneFinder(LaneSettings(), 1280, 720)
-    pictures = lane_pictures(frame, finder.glance(frame), lane, finder.view)
+def test_every_stage_has_a_picture_with_and_without_a_lane(frame: Image, lane: Lane | None) -> None:
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 1280, 720)
+    pictures = replace(finder.update(finder.observe(frame)), lane=lane).pictures()
     assert list(pictures) == ["road", "above", "mask", "fit"]
     assert pictures["road"].shape == frame.shape
     assert pictures["above"].shape == pictures["mask"].shape == pictures["fit"].shape

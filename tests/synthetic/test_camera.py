@@ -3,36 +3,36 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.synthetic.camera import NEAR, Camera, beyond_near
+from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near
 
 metres = st.floats(-50, 50)
 
 
 def test_a_point_at_camera_height_far_ahead_lies_on_the_horizon() -> None:
-    camera = Camera.dashboard(1280, 720)
+    camera = PinholeCamera.dashboard(1280, 720)
     [[u, v]] = camera.project(np.array([[0.0, camera.above_ground, 1000.0]]))
     assert (u, v) == pytest.approx((640, camera.horizon))
 
 
 def test_projection_is_that_of_a_pinhole() -> None:
-    camera = Camera(800, 600, focal=1000, horizon=300, above_ground=1.2)
+    camera = PinholeCamera(800, 600, focal=1000, horizon=300, above_ground=1.2)
     [[u, v]] = camera.project(np.array([[2.0, 0.0, 20.0]]))
     assert (u, v) == pytest.approx((400 + 1000 * 2 / 20, 300 + 1000 * 1.2 / 20))
 
 
 def test_a_right_hand_bend_moves_the_road_by_half_its_curvature_times_distance_squared() -> None:
-    straight, bent = (Camera.dashboard(1280, 720, curvature) for curvature in (0.0, 1 / 500))
+    straight, bent = (PinholeCamera.dashboard(1280, 720, curvature) for curvature in (0.0, 1 / 500))
     point = np.array([[1.0, 0.0, 40.0]])
     moved = straight.project(point + np.array([40.0**2 / 2 / 500, 0, 0]))
     assert bent.project(point) == pytest.approx(moved)
 
 
-def test_a_polygon_behind_the_camera_is_not_seen() -> None:
+def test_a_polygon_behind_the_camera_has_no_outline() -> None:
     behind = np.array([[0, 0, -1], [1, 0, -1], [1, 1, -2]], dtype=float)
-    assert Camera.dashboard(1280, 720).outline(behind).shape == (0, 2)
+    assert PinholeCamera.dashboard(1280, 720).outline(behind).shape == (0, 2)
 
 
-def test_a_polygon_that_reaches_behind_the_camera_is_cut_where_near_begins() -> None:
+def test_a_polygon_that_reaches_behind_the_camera_is_cut_at_near() -> None:
     polygon = np.array([[0, 0, -3], [2, 0, -3], [2, 0, 5], [0, 0, 5]], dtype=float)
     kept = beyond_near(polygon)
     assert kept.min(axis=0).tolist() == [0, 0, NEAR]

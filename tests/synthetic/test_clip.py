@@ -9,16 +9,16 @@ import pytest
 from vdet.errors import OutputError
 from vdet.media import VideoReader
 from vdet.synthetic.clip import frames, write_clip, write_truth
-from vdet.synthetic.scene import Scene, Vehicle
-from vdet.synthetic.truth import truth
+from vdet.synthetic.scene import Scene, SceneVehicle
+from vdet.synthetic.truth import true_boxes
 
 MakeScene = Callable[..., Scene]
-Parked = Callable[[int, float, float], Vehicle]
+Parked = Callable[[int, float, float], SceneVehicle]
 
 
 @pytest.fixture
 def scene(make_scene: MakeScene, parked: Parked) -> Scene:
-    """Three frames: a vehicle in full view, one hidden behind it, one too small to count."""
+    """Three frames: a vehicle in full view, one hidden behind it, one too small."""
     vehicles = parked(1, 10.0, 0.0), parked(2, 30.0, 0.0), parked(3, 90.0, 9.0)
     return make_scene(*vehicles, size=(640, 360), frames=3)
 
@@ -48,7 +48,7 @@ def test_truth_lines_are_motchallenge_columns_counting_from_1(tmp_path: Path, sc
     assert rows[:, 0].tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
     assert rows[:3, 1].tolist() == [1, 2, 3]
     assert (rows[:, 7] == 3).all()
-    box = truth(scene, 0)[0].box
+    box = true_boxes(scene, 0)[0].box
     assert rows[0, 2:6].tolist() == [box.x + 1, box.y + 1, box.width, box.height]
 
 
@@ -65,6 +65,6 @@ def test_files_of_the_same_scene_are_equal_to_the_byte(tmp_path: Path, scene: Sc
     assert (tmp_path / "one.txt").read_bytes() == (tmp_path / "two.txt").read_bytes()
 
 
-def test_a_file_that_cannot_be_written_is_named(tmp_path: Path, scene: Scene) -> None:
+def test_the_error_names_a_file_that_cannot_be_written(tmp_path: Path, scene: Scene) -> None:
     with pytest.raises(OutputError, match=r"gt\.txt"):
         write_truth(tmp_path / "missing" / "gt.txt", scene)

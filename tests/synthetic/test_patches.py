@@ -19,11 +19,11 @@ def test_patches_are_64_pixels_bgr() -> None:
         assert patches.dtype == np.uint8
 
 
-def test_no_patches_asked_for_none_made() -> None:
+def test_zero_patches_are_an_empty_array() -> None:
     assert vehicle_patches(0, np.random.default_rng(0)).shape == (0, 64, 64, 3)
 
 
-def test_no_two_patches_are_alike() -> None:
+def test_all_patches_differ() -> None:
     patches = vehicle_patches(30, np.random.default_rng(1))
     assert len({patch.tobytes() for patch in patches}) == 30
 
@@ -33,7 +33,7 @@ def test_the_same_seed_gives_the_same_patches() -> None:
     assert np.array_equal(one, two)
 
 
-def test_the_layout_is_that_of_the_data_set_with_groups_in_balance(tmp_path: Path) -> None:
+def test_the_layout_is_that_of_the_data_set_with_groups_of_equal_size(tmp_path: Path) -> None:
     write_patches(tmp_path, seed=0, vehicles=21, non_vehicles=20)
     names = sorted(path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.png"))
     groups = [name.rpartition("/")[0] for name in names]
@@ -65,13 +65,13 @@ def test_files_of_the_same_seed_are_equal_to_the_byte(tmp_path: Path) -> None:
         assert path.read_bytes() == other.read_bytes()
 
 
-def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+def test_the_error_names_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "vehicles").write_text("in the way")
     with pytest.raises(OutputError, match="vehicles"):
         write_patches(tmp_path, seed=0, vehicles=1, non_vehicles=1)
 
 
-def test_vehicles_can_be_told_from_background() -> None:
+def test_a_linear_model_can_separate_vehicles_from_background() -> None:
     """Ridge regression on coarse gradients: far better than chance on patches of other roads."""
     train, test = (_described(seed) for seed in (0, 1))
     vectors, labels = train

@@ -5,34 +5,34 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from vdet.synthetic.camera import Camera
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import demo_scene, empty_road
 from vdet.synthetic.render import Renderer, render
 from vdet.synthetic.scene import Light, Line, Scene, Shadow
-from vdet.synthetic.worlds import default_clip, empty_road
 
 MakeScene = Callable[..., Scene]
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (640, 360), (1242, 375), (321, 241)])
 def test_a_frame_has_the_size_of_its_camera(size: tuple[int, int]) -> None:
-    image = render(default_clip(0, width=size[0], height=size[1]), 10)
+    image = render(demo_scene(0, width=size[0], height=size[1]), 10)
     assert image.shape == (size[1], size[0], 3)
     assert image.dtype == np.uint8
 
 
 def test_the_same_seed_gives_the_same_pixels_in_any_order() -> None:
-    first, second = (Renderer(default_clip(4, width=320, height=180)) for _ in range(2))
+    first, second = (Renderer(demo_scene(4, width=320, height=180)) for _ in range(2))
     forward = [first.image(index) for index in (0, 100, 200)]
     backward = [second.image(index) for index in (200, 100, 0)]
     assert np.array_equal(forward, backward[::-1])
 
 
 def test_another_seed_gives_another_road() -> None:
-    one, other = (render(default_clip(seed, width=320, height=180), 0) for seed in (1, 2))
+    one, other = (render(demo_scene(seed, width=320, height=180), 0) for seed in (1, 2))
     assert not np.array_equal(one, other)
 
 
-def test_noise_differs_from_frame_to_frame_with_the_deviation_asked_for(
+def test_noise_differs_from_frame_to_frame_and_has_the_given_deviation(
     make_scene: MakeScene,
 ) -> None:
     still = replace(make_scene(size=(640, 360)), speed=0.0)
@@ -41,7 +41,7 @@ def test_noise_differs_from_frame_to_frame_with_the_deviation_asked_for(
     assert difference.std() == pytest.approx(4 * np.sqrt(2), rel=0.1)
 
 
-def test_the_road_passes_below_and_repeats_after_its_period(make_scene: MakeScene) -> None:
+def test_the_road_moves_and_repeats_after_its_period(make_scene: MakeScene) -> None:
     renderer = Renderer(replace(make_scene(size=(640, 360)), speed=50.0))
     start = renderer.image(0)
     assert not np.array_equal(start, renderer.image(1))
@@ -50,7 +50,7 @@ def test_the_road_passes_below_and_repeats_after_its_period(make_scene: MakeScen
 
 
 @pytest.mark.parametrize("curvature", [-1 / 400, 0.0, 1 / 400])
-def test_a_solid_line_is_drawn_where_its_geometry_says(
+def test_a_solid_line_is_drawn_where_the_projection_puts_it(
     make_scene: MakeScene, curvature: float
 ) -> None:
     scene = make_scene(curvature=curvature)
@@ -64,10 +64,9 @@ def test_a_solid_line_is_drawn_where_its_geometry_says(
         assert left + bright.mean() == pytest.approx(u, abs=1)
 
 
-def test_a_dash_comes_nearer_with_the_camera(make_scene: MakeScene) -> None:
-    scene = replace(
-        make_scene(), speed=2.0, rate=Fraction(1)
-    )  # dashes of 3 m begin every 12 m, first at 0
+def test_a_dash_comes_nearer_as_the_camera_moves(make_scene: MakeScene) -> None:
+    # Dashes of 3 m begin every 12 m; the first one begins at 0.
+    scene = replace(make_scene(), speed=2.0, rate=Fraction(1))
     for index, (painted, bare) in enumerate([(13.5, 16.0), (11.5, 14.0), (9.5, 12.0)]):
         image = render(scene, index)
         points = np.array([[1.85, 0.0, painted], [1.85, 0.0, bare]])
@@ -96,15 +95,15 @@ def test_a_shadow_darkens_the_road_where_it_lies(make_scene: MakeScene) -> None:
         assert ratio[v, u - 20 : u + 20].mean() == pytest.approx(expected, abs=0.05)
 
 
-def test_exposure_scales_the_picture(make_scene: MakeScene) -> None:
+def test_exposure_scales_the_image(make_scene: MakeScene) -> None:
     scene = make_scene()
     dim = replace(scene, light=replace(scene.light, gain=0.5))
     assert render(dim, 0).mean() == pytest.approx(0.5 * render(scene, 0).mean(), rel=0.02)
 
 
-def test_the_roadside_stands_beside_the_carriageway() -> None:
+def test_roadside_objects_stand_beside_the_carriageway() -> None:
     for seed in range(5):
-        camera = Camera.dashboard(640, 360)
+        camera = PinholeCamera.dashboard(640, 360)
         scene = empty_road(np.random.default_rng(seed), camera, lane=1, lanes=3, seed=seed)
         for item in scene.roadside:
             inner = abs(item.lateral) - item.width / 2

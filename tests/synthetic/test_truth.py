@@ -8,17 +8,17 @@ import pytest
 
 from vdet.geometry import Box
 from vdet.synthetic.render import render
-from vdet.synthetic.scene import Scene, Vehicle, Waypoint
-from vdet.synthetic.truth import truth
+from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
 MakeScene = Callable[..., Scene]
-Parked = Callable[[int, float, float], Vehicle]
+Parked = Callable[[int, float, float], SceneVehicle]
 
 SIZES = [(1280, 720), (960, 540), (640, 360), (1242, 375)]
 
 
 def drawn(scene: Scene) -> npt.NDArray[np.bool_]:
-    """The pixels that differ from those of the same road without vehicles."""
+    """Return the pixels that differ from those of the same road without vehicles."""
     empty = render(replace(scene, vehicles=()), 0)
     return np.asarray(cv2.absdiff(render(scene, 0), empty).max(axis=2) > 12)
 
@@ -41,7 +41,7 @@ def test_the_true_box_bounds_what_is_drawn(
     lateral: float,
 ) -> None:
     scene = make_scene(parked(1, ahead, lateral), size=size)
-    [found] = truth(scene, 0)
+    [found] = true_boxes(scene, 0)
     assert sides(found.box) == pytest.approx(sides(drawn_box(scene)), abs=2)
     assert found.visibility == pytest.approx(1, abs=0.01)
 
@@ -51,7 +51,7 @@ def test_the_true_box_bounds_what_is_drawn_in_a_bend(
     make_scene: MakeScene, parked: Parked, curvature: float
 ) -> None:
     scene = make_scene(parked(1, 30.0, 0.0), curvature=curvature)
-    [found] = truth(scene, 0)
+    [found] = true_boxes(scene, 0)
     assert sides(found.box) == pytest.approx(sides(drawn_box(scene)), abs=2)
     assert (found.box.center[0] > 640) == (curvature > 0)
 
@@ -61,7 +61,7 @@ def test_a_vehicle_beside_the_camera_is_clipped_to_the_frame(
     make_scene: MakeScene, parked: Parked, ahead: float
 ) -> None:
     scene = make_scene(parked(1, ahead, 3.7))
-    [found] = truth(scene, 0)
+    [found] = true_boxes(scene, 0)
     assert found.box.right == 1280
     # below, the shadow on the ground shows too
     assert sides(found.box)[:3] == pytest.approx(sides(drawn_box(scene))[:3], abs=2)
@@ -73,23 +73,23 @@ def test_the_nearer_a_vehicle_at_the_side_the_less_of_it_is_visible(
     make_scene: MakeScene, parked: Parked
 ) -> None:
     places = (2.0, 4.0, 6.0, 9.0)
-    visible = [truth(make_scene(parked(1, z, 3.7)), 0)[0].visibility for z in places]
+    visible = [true_boxes(make_scene(parked(1, z, 3.7)), 0)[0].visibility for z in places]
     assert visible == sorted(visible)
     assert visible[-1] == pytest.approx(1, abs=0.01)
 
 
-def test_a_vehicle_behind_the_camera_or_gone_has_no_box(
+def test_a_vehicle_behind_the_camera_or_outside_its_times_has_no_box(
     make_scene: MakeScene, parked: Parked
 ) -> None:
-    gone = Vehicle(2, (Waypoint(5.0, 20.0, 0.0),), color=(0, 0, 0))
-    assert truth(make_scene(parked(1, -8.0, 3.7), gone), 0) == ()
+    gone = SceneVehicle(2, (Waypoint(5.0, 20.0, 0.0),), color=(0, 0, 0))
+    assert true_boxes(make_scene(parked(1, -8.0, 3.7), gone), 0) == ()
 
 
 def test_a_vehicle_right_behind_a_nearer_one_is_hidden_but_keeps_its_box(
     make_scene: MakeScene, parked: Parked
 ) -> None:
-    alone = truth(make_scene(parked(2, 30.0, 0.0)), 0)[0]
-    front, back = truth(make_scene(parked(1, 10.0, 0.0), parked(2, 30.0, 0.0)), 0)
+    alone = true_boxes(make_scene(parked(2, 30.0, 0.0)), 0)[0]
+    front, back = true_boxes(make_scene(parked(1, 10.0, 0.0), parked(2, 30.0, 0.0)), 0)
     assert back.box == alone.box
     assert (back.visibility, back.hidden) == (0, 1)
     assert front.hidden == 0
@@ -102,12 +102,12 @@ def test_hidden_is_the_share_of_the_farther_vehicle_that_the_nearer_one_covers(
     front, back = drawn(make_scene(near)), drawn(make_scene(far))
     covered = (front & back).sum() / back.sum()
     assert 0.2 < covered < 0.8
-    found = truth(make_scene(near, far), 0)[1]
+    found = true_boxes(make_scene(near, far), 0)[1]
     assert found.hidden == pytest.approx(covered, abs=0.05)
     assert found.visibility == pytest.approx(1 - found.hidden, abs=0.02)
 
 
-def test_a_nearer_vehicle_is_painted_over_a_farther_one_whatever_their_order(
+def test_a_nearer_vehicle_is_painted_over_a_farther_one_in_any_order(
     make_scene: MakeScene, parked: Parked
 ) -> None:
     near, far = parked(1, 10.0, 0.0), replace(parked(2, 30.0, 0.0), color=(230, 230, 230))
@@ -115,6 +115,23 @@ def test_a_nearer_vehicle_is_painted_over_a_farther_one_whatever_their_order(
     assert np.array_equal(hidden, render(make_scene(far, near), 0))
 
 
-def test_boxes_come_by_id(make_scene: MakeScene, parked: Parked) -> None:
+def test_boxes_are_ordered_by_id(make_scene: MakeScene, parked: Parked) -> None:
     scene = make_scene(parked(7, 10.0, 0.0), parked(3, 20.0, 3.7), parked(5, 15.0, -3.7))
-    assert [box.id for box in truth(scene, 0)] == [3, 5, 7]
+    assert [box.id for box in true_boxes(scene, 0)] == [3, 5, 7]
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "hidden", "expected"),
+    [(40, 24, 0.5, True), (39, 24, 0.0, False), (40, 23, 0.0, False), (90, 60, 0.51, False)],
+)
+def test_a_vehicle_must_be_found_if_it_is_large_and_half_of_it_is_not_hidden(
+    width: int, height: int, hidden: float, expected: bool
+) -> None:
+    vehicle = TrueBox(1, Box(0, 0, width, height), visibility=1 - hidden, hidden=hidden)
+    assert must_be_found(vehicle, 720) is expected
+
+
+def test_the_smallest_size_that_must_be_found_grows_with_the_frame() -> None:
+    vehicle = TrueBox(1, Box(0, 0, 20, 12), visibility=1.0, hidden=0.0)
+    assert must_be_found(vehicle, 360)
+    assert not must_be_found(vehicle, 540)

@@ -13,26 +13,28 @@ from vdet.errors import OutputError
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What made the results: the program with its version, the model's file and its SHA-256."""
+    """What made the results: the program with its version, the model's file and its SHA-256.
+
+    The last two are None for a detector without a model file.
+    """
 
     program: str
-    model: str
-    model_sha256: str
+    model: str | None
+    model_sha256: str | None
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
     """What became of a file.
 
-    `input`, `output` (the video) and `tracks_output` are absolute names; `width` and `height` are
-    of the upright picture in pixels, `frames` were read, `tracks` vehicles followed, in `seconds`
-    of wall time from `started`, in UTC. `error` is None where all went well; else there is no
-    output, and of the numbers only the seconds are known.
+    `input` is an absolute name, `outputs` has that of each output by the name of its sink. `width`
+    and `height` are of the upright picture in pixels, `frames` were read, `tracks` vehicles
+    followed, in `seconds` of wall time from `started`, in UTC. `error` is None where all went well;
+    else there is no output, and of the numbers only the seconds are known.
     """
 
     input: str
-    output: str | None
-    tracks_output: str | None
+    outputs: dict[str, str]
     started: str
     seconds: float
     width: int | None = None

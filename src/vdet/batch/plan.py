@@ -1,28 +1,29 @@
 """What a batch will do: a job a video, refused as a whole before any work if it cannot be right."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vdet.batch.inputs import Source, find_sources
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
-from vdet.media.writer import SUFFIXES
-from vdet.pipeline.run import VideoJob
+from vdet.pipeline.loop import VideoJob
+from vdet.pipeline.sinks.protocol import Output, check_sink, sink_kind
 
 MANIFEST = "manifest.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
-class Wishes:
-    """What is to be made of every video, and what of outputs that are there already.
+class OutputOptions:
+    """Which outputs every video gets, and what is done about outputs that are there already.
 
-    `tracks` is the suffix of the files of tracks; None for none. With `skip_existing` a job is left
-    out if all its outputs are there, and makes all of them anew if only some are.
+    `suffixes` has the suffix of the output's file for each sink, by the sink's name. None: the
+    video's own suffix where the sink can write it, else the first that it can write. With
+    `skip_existing` a job is left out if all its outputs are there, and makes all of them again if
+    only some are.
     """
 
-    video: bool = True
-    tracks: str | None = None
+    suffixes: Mapping[str, str | None]
     overwrite: bool = False
     skip_existing: bool = False
 
@@ -41,7 +42,9 @@ class Plan:
         return self.folder / MANIFEST
 
 
-def make_plan(clips: Sequence[Path], folder: Path, common: VideoJob, wishes: Wishes) -> Plan:
+def make_plan(
+    clips: Sequence[Path], folder: Path, common: VideoJob, options: OutputOptions
+) -> Plan:
     """Plan a job for every video that `clips` stand for; outputs lie in `folder` as these do.
 
     Parameters
@@ -55,30 +58,38 @@ def make_plan(clips: Sequence[Path], folder: Path, common: VideoJob, wishes: Wis
         There is no video; `folder` and an input lie in one another; two outputs have one name.
     OutputError
         An output cannot be written, or is there already.
+    ConfigError
+        There is no sink of a name.
     """
     _refuse_nested(clips, folder)
     sources = find_sources(clips)
-    jobs = [_job(source, folder, common, wishes) for source in sources]
+    jobs = [_job(source, folder, common, options) for source in sources]
     _refuse_inside(sources, folder)
     _refuse_shared(jobs, folder)
-    done = [wishes.skip_existing and _is_done(job) for job in jobs]
+    done = [options.skip_existing and _is_done(job) for job in jobs]
     plan = Plan(folder, tuple(_where(jobs, done, False)), tuple(_where(jobs, done, True)))
     check_output(plan.manifest, overwrite=True, makes_folder=True)
-    for path in (path for job in plan.jobs for path in job.outputs):
-        replaces = wishes.overwrite or wishes.skip_existing
-        check_output(path, overwrite=replaces, makes_folder=True)
+    replaces = options.overwrite or options.skip_existing
+    for output in (output for job in plan.jobs for output in job.outputs):
+        check_sink(output, overwrite=replaces, makes_folder=True)
     return plan
 
 
-def _job(source: Source, folder: Path, common: VideoJob, wishes: Wishes) -> VideoJob:
+def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions) -> VideoJob:
     place = folder / source.place
-    video = place if place.suffix.lower() in SUFFIXES else place.with_suffix(".mp4")
-    return replace(
-        common,
-        source=source.path,
-        video=video if wishes.video else None,
-        tracks=place.with_suffix(wishes.tracks) if wishes.tracks else None,
-    )
+    outputs = [
+        Output(sink, _path(place, sink, suffix)) for sink, suffix in options.suffixes.items()
+    ]
+    return replace(common, source=source.path, outputs=tuple(outputs))
+
+
+def _path(place: Path, sink: str, suffix: str | None) -> Path:
+    if suffix is not None:
+        return place.with_suffix(suffix)
+    writable = sink_kind(sink).suffixes
+    if not writable or place.suffix.lower() in writable:
+        return place
+    return place.with_suffix(writable[0])
 
 
 def _where(jobs: Sequence[VideoJob], done: Sequence[bool], wanted: bool) -> Iterator[VideoJob]:
@@ -86,7 +97,7 @@ def _where(jobs: Sequence[VideoJob], done: Sequence[bool], wanted: bool) -> Iter
 
 
 def _is_done(job: VideoJob) -> bool:
-    return all(path.is_file() for path in job.outputs)
+    return all(output.path.is_file() for output in job.outputs)
 
 
 def _refuse_nested(clips: Iterable[Path], folder: Path) -> None:
@@ -108,20 +119,23 @@ def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
 
 
 def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
-    """Refuse an output that is another job's too, or the manifest, or an input."""
+    """Refuse an output that is another output too, or the manifest, or an input."""
     inputs = {job.source.resolve() for job in jobs}
     owners: dict[Path, Path] = {}
     for job in jobs:
-        for output in job.outputs:
-            if output.resolve() in inputs:
-                raise OutputError(f"{output}: is an input itself; give another folder")
-            if output == folder / MANIFEST:
+        for path in (output.path for output in job.outputs):
+            if path.resolve() in inputs:
+                raise OutputError(f"{path}: is an input itself; give another folder")
+            if path == folder / MANIFEST:
                 raise BatchError(
-                    f"{job.source}: its tracks would be {output}, which is the manifest"
+                    f"{job.source}: one of its outputs would be {path}, which is the manifest"
                 )
-            other = owners.setdefault(output, job.source)
-            if other != job.source:
+            if path not in owners:
+                owners[path] = job.source
+            elif (other := owners[path]) == job.source:
+                raise BatchError(f"{path}: two outputs of {job.source} would have this name")
+            else:
                 raise BatchError(
-                    f"{other} and {job.source}: both would become {output}; rename one, or take "
+                    f"{other} and {job.source}: both would become {path}; rename one, or take "
                     "them from a folder above both"
                 )

@@ -1,92 +1,80 @@
-"""Run a planned batch: every file once, records as they end, nothing left behind."""
+"""Run a planned batch: process every file, and write its record when it has ended."""
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from functools import partial
 from typing import TypeVar
 
 from vdet.batch.manifest import Origin, Record, appending
 from vdet.batch.plan import Plan
-from vdet.batch.pools import Pool
-from vdet.batch.task import process_file, record_of_killed
-from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
+from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import make_folder, remove_stale
-from vdet.pipeline.run import VideoJob
+from vdet.pipeline.loop import VideoJob
+from vdet.workers import WorkerKilledError, Workers
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 def run_batch(
-    plan: Plan, model: LinearModel, settings: Settings, origin: Origin, *, pool: Pool, threads: int
+    plan: Plan, work: Work, origin: Origin, *, workers: Workers
 ) -> Generator[tuple[VideoJob, Record]]:
-    """Do the jobs of a plan; yield each when it has ended, with its record in the manifest.
+    """Process the files of a plan; yield each when it has ended, with its record in the manifest.
 
-    Parameters
-    ----------
-    threads
-        For each file: of the search, of the decoder, and of the encoder.
+    At the end, temporary files of killed worker processes are removed.
 
     Raises
     ------
     OutputError
         The manifest, or the output folder, cannot be written.
     ClusterError
-        The cluster of `pool` cannot be used, or no more.
+        The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)
-    function = partial(process_file, model=model, settings=settings, threads=threads)
+    function = partial(process_file, work=work)
     try:
         with (
             appending(plan.manifest, origin) as add,
-            closing(each_once(function, plan.jobs, pool)) as results,
+            closing(each_once(function, plan.jobs, workers)) as results,
         ):
             for job, result in results:
                 record = result or record_of_killed(job)
                 add(record)
                 yield job, record
     finally:
-        for folder in {output.parent for job in plan.jobs for output in job.outputs}:
+        for folder in {output.path.parent for job in plan.jobs for output in job.outputs}:
             remove_stale(folder)
 
 
 def each_once(
-    function: Callable[[T], R], items: Sequence[T], pool: Pool
+    function: Callable[[T], R], items: Sequence[T], workers: Workers
 ) -> Generator[tuple[T, R | None]]:
-    """Yield every item with what `function` makes of it; None if that killed the process.
+    """Yield every item with its result, in the order in which they end.
 
-    When a process is killed the items that were being worked at are put aside, and done in the end
-    one after the other: so it is known which of them is to blame, and the others are not.
+    The result is None for an item that kills its worker process. When a process is killed, several
+    items may be in work, and any of them may be the cause. They are repeated at the end, one by
+    one, so that only the cause is blamed.
     """
-    left = dict(enumerate(items))
-    aside: set[int] = set()
-    while chosen := {number: item for number, item in left.items() if number not in aside}:
-        begun: list[int] = []
+    left = list(items)
+    suspects: list[T] = []
+    while left:
+        ended: set[int] = set()
         try:
-            for number, result in pool.map(partial(_numbered, function), _noting(chosen, begun)):
-                yield left.pop(number), result
-        except BrokenExecutor:
-            aside.update(left.keys() & begun)
-    for number in sorted(aside):
-        yield left[number], _alone(function, left[number], pool)
+            with closing(workers.map(function, left)) as results:
+                for number, result in results:
+                    ended.add(number)
+                    yield left[number], result
+        except WorkerKilledError as error:
+            suspects += (left[number] for number in sorted(error.lost))
+            ended |= error.lost
+        left = [item for number, item in enumerate(left) if number not in ended]
+    for item in suspects:
+        yield item, _result_alone(function, item, workers)
 
 
-def _alone(function: Callable[[T], R], item: T, pool: Pool) -> R | None:
+def _result_alone(function: Callable[[T], R], item: T, workers: Workers) -> R | None:
     try:
-        (result,) = pool.map(function, [item])
-    except BrokenExecutor:
+        ((_, result),) = workers.map(function, [item])
+    except WorkerKilledError:
         return None
     return result
-
-
-def _numbered(function: Callable[[T], R], numbered: tuple[int, T]) -> tuple[int, R]:
-    number, item = numbered
-    return number, function(item)
-
-
-def _noting(items: Mapping[int, T], begun: list[int]) -> Iterator[tuple[int, T]]:
-    for number, item in items.items():
-        begun.append(number)
-        yield number, item

@@ -6,27 +6,42 @@ import time
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.factory import load_detector
 from vdet.errors import in_one_line
 from vdet.files import make_folder
-from vdet.pipeline.run import Summary, VideoJob, process_video
+from vdet.pipeline.loop import Summary, VideoJob, run_video
 
 
-def process_file(job: VideoJob, *, model: LinearModel, settings: Settings, threads: int) -> Record:
-    """Run a job, with the folders that it needs, and tell of it; no error gets out."""
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What every video of a batch is processed with; a worker loads the model by itself.
+
+    `model` is a model file, None for a detector without one. `threads` are those of the search, of
+    the decoder and of the encoder of each video.
+    """
+
+    settings: Settings
+    model: Path | None
+    threads: int
+
+
+def process_file(job: VideoJob, *, work: Work) -> Record:
+    """Run a job, make the folders that it needs, and return its record; no error gets out."""
     began, started = time.perf_counter(), _now()
     summary, error = None, None
+    threads = work.threads
     with _warnings_of(job) as warnings:
         try:
             for output in job.outputs:
-                make_folder(output.parent)
-            summary = process_video(job, model, settings, threads=threads, codec_threads=threads)
+                make_folder(output.path.parent)
+            model = load_detector(work.settings.detector, work.model)
+            summary = run_video(job, model, work.settings, threads=threads, codec_threads=threads)
         except Exception as failure:
             error = in_one_line(failure)
             if os.environ.get("VDET_DEBUG") == "1":
@@ -36,7 +51,7 @@ def process_file(job: VideoJob, *, model: LinearModel, settings: Settings, threa
 
 
 def record_of_killed(job: VideoJob) -> Record:
-    """Tell of a job whose process was killed, also when nothing else ran beside it."""
+    """Return the record of a job whose process was killed, also when nothing else ran beside it."""
     error = f"{job.source}: its process was killed, or crashed; there may be too little memory"
     return _record(job, _now(), 0.0, error=error)
 
@@ -52,8 +67,7 @@ def _record(
 ) -> Record:
     record = Record(
         input=str(job.source.absolute()),
-        output=_name(job.video),
-        tracks_output=_name(job.tracks),
+        outputs={output.sink: str(output.path.absolute()) for output in job.outputs},
         started=started,
         seconds=round(seconds, 3),
         warnings=warnings,
@@ -68,10 +82,6 @@ def _record(
         frames=summary.frames,
         tracks=summary.tracks,
     )
-
-
-def _name(path: Path | None) -> str | None:
-    return None if path is None else str(path.absolute())
 
 
 def _now() -> str:
@@ -95,7 +105,7 @@ class _Collector(logging.Handler):
 @contextmanager
 def _warnings_of(job: VideoJob) -> Iterator[list[str]]:
     messages: list[str] = []
-    collector = _Collector([job.source, *job.outputs], messages)
+    collector = _Collector([job.source, *(each.path for each in job.outputs)], messages)
     log = logging.getLogger("vdet")
     log.addHandler(collector)
     try:

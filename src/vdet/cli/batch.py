@@ -2,6 +2,7 @@
 
 import hashlib
 import logging
+import re
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -12,16 +13,17 @@ import click
 
 import vdet
 from vdet.batch.manifest import Origin, Record
-from vdet.batch.plan import Plan, Wishes, make_plan
-from vdet.batch.pools import Cluster, Pool, Processes
+from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.batch.run import run_batch
+from vdet.batch.task import Work
 from vdet.cli.options import PathOf, scheduler_option
 from vdet.cli.progress import files_bar, tell
 from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.factory import model_file
 from vdet.errors import SOME_FAILED, VdetError
-from vdet.pipeline.run import VideoJob
-from vdet.pipeline.sinks.tracks import SUFFIXES
+from vdet.pipeline.loop import VideoJob
+from vdet.pipeline.sinks.protocol import Output, sink_kind
+from vdet.workers import DaskCluster, LocalProcesses, Workers
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -42,16 +44,6 @@ class BatchOptions:
     def any_but_folder(self) -> bool:
         """Whether one was given that says nothing without a folder."""
         return bool(self.jobs or self.skip_existing or self.dry_run or self.scheduler)
-
-
-@dataclass(frozen=True, slots=True)
-class Work:
-    """What every file of a batch is processed with."""
-
-    model: LinearModel
-    model_path: Path
-    settings: Settings
-    threads: int | None
 
 
 def batch_options(command: F) -> F:
@@ -78,43 +70,67 @@ def batch_options(command: F) -> F:
     return command
 
 
-def wishes_of(
-    options: BatchOptions, *, no_video: bool, tracks: Path | None, overwrite: bool
-) -> Wishes:
-    """Read what the files of a batch are to become; raise `click.UsageError` on nonsense."""
-    suffix = None if tracks is None else str(tracks).lower()
-    if suffix not in (None, *SUFFIXES):
-        raise click.UsageError(f"with -d give --tracks a suffix: {', '.join(SUFFIXES)}")
-    if no_video and suffix is None:
+def output_options(
+    options: BatchOptions,
+    *,
+    no_video: bool,
+    tracks: Path | None,
+    sinks: Sequence[Output],
+    overwrite: bool,
+) -> OutputOptions:
+    """Read which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
+    suffixes: dict[str, str | None] = {} if no_video else {"video": None}
+    for output in (*([Output("tracks", tracks)] if tracks else []), *sinks):
+        if suffixes.get(output.sink) is not None:
+            raise click.UsageError(f"{output.sink} is given two suffixes; keep one")
+        suffixes[output.sink] = _suffix(output)
+    if not suffixes:
         raise click.UsageError("nothing would be written; leave out --no-video, or give --tracks")
     if overwrite and options.skip_existing:
         raise click.UsageError("--overwrite and --skip-existing do not go together")
     if options.jobs and options.scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
-    return Wishes(not no_video, suffix, overwrite=overwrite, skip_existing=options.skip_existing)
+    return OutputOptions(suffixes, overwrite=overwrite, skip_existing=options.skip_existing)
+
+
+def _suffix(output: Output) -> str:
+    """Return the suffix that an output has in a batch; its name is that of the video."""
+    kind, suffix = sink_kind(output.sink), str(output.path).lower()
+    if kind.marker:
+        raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
+    if not re.fullmatch(r"\.[a-z0-9]+", suffix) or suffix not in (kind.suffixes or [suffix]):
+        known = ", ".join(kind.suffixes) or "as in .txt"
+        option = "--tracks" if output.sink == "tracks" else f"--sink {output.sink}"
+        raise click.UsageError(f"with -d give {option} a suffix: {known}")
+    return suffix
 
 
 def do_batch(
     clips: Sequence[Path],
     common: VideoJob,
-    wishes: Wishes,
+    outputs: OutputOptions,
     options: BatchOptions,
-    work: Work,
     *,
+    settings: Settings,
+    model: Path | None,
+    threads: int | None,
     quiet: bool,
 ) -> int:
     """Do a batch, or list it, and return the exit code."""
     folder = options.folder or Path()
     if options.scheduler:  # the workers stand in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
-    plan = make_plan(clips, folder, common, wishes)
+        model = model.absolute() if model else None
+    plan = make_plan(clips, folder, common, outputs)
     if options.dry_run:
         click.echo("\n".join(_listing(plan)))
         return 0
     if not plan.jobs:
         click.echo(f"all of {len(plan.skipped)} files are there already", err=True)
         return 0
-    failed = _run(plan, options, work, quiet=quiet)
+    workers, share = _workers(options, len(plan.jobs))
+    work = Work(settings, model, threads or share)
+    failed = _run(plan, work, workers, quiet=quiet)
     if not failed:
         return 0
     return SOME_FAILED if plan.skipped or len(failed) < len(plan.jobs) else VdetError.exit_code
@@ -123,22 +139,18 @@ def do_batch(
 def _listing(plan: Plan) -> list[str]:
     """Say a line a file what would be done."""
     return [
-        *(
-            f"{job.source}: {', '.join(map(str, job.outputs))} there already"
-            for job in plan.skipped
-        ),
-        *(f"{job.source} → {', '.join(map(str, job.outputs))}" for job in plan.jobs),
+        *(f"{job.source}: {_names(job)} there already" for job in plan.skipped),
+        *(f"{job.source} → {_names(job)}" for job in plan.jobs),
     ]
 
 
-def _run(plan: Plan, options: BatchOptions, work: Work, *, quiet: bool) -> list[Record]:
+def _names(job: VideoJob) -> str:
+    return ", ".join(str(output.path) for output in job.outputs)
+
+
+def _run(plan: Plan, work: Work, workers: Workers, *, quiet: bool) -> list[Record]:
     """Run the batch, tell of it on standard error, and return what failed."""
-    digest = hashlib.sha256(work.model_path.read_bytes()).hexdigest()
-    origin = Origin(f"vdet {vdet.__version__}", work.model_path.name, digest)
-    pool, threads = _pool(options, len(plan.jobs))
-    results = run_batch(
-        plan, work.model, work.settings, origin, pool=pool, threads=work.threads or threads
-    )
+    results = run_batch(plan, work, _origin(work), workers=workers)
     failed = []
     with files_bar(len(plan.jobs), quiet=quiet) as advance, closing(results):
         for job, record in results:
@@ -155,15 +167,23 @@ def _run(plan: Plan, options: BatchOptions, work: Work, *, quiet: bool) -> list[
     return failed
 
 
-def _pool(options: BatchOptions, files: int) -> tuple[Pool, int]:
+def _origin(work: Work) -> Origin:
+    program = f"vdet {vdet.__version__}"
+    path = model_file(work.settings.detector, work.model)
+    if path is None:
+        return Origin(program, None, None)
+    return Origin(program, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
     """Return where to work, and how many threads the search of each file has there."""
     if options.scheduler:
-        return Cluster(options.scheduler), 1
+        return DaskCluster(options.scheduler), 1
     from joblib import cpu_count
 
     cores = cpu_count()
     jobs = min(options.jobs or cores, files)
-    return Processes(jobs), max(1, cores // jobs)
+    return LocalProcesses(jobs), max(1, cores // jobs)
 
 
 def _tell(job: VideoJob, record: Record, *, quiet: bool) -> None:

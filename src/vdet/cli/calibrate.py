@@ -10,11 +10,10 @@ import click
 from vdet.cli.options import PathOf, overwrite_option
 from vdet.errors import OutputError
 from vdet.files import check_output
-from vdet.lanes.calibration import Pattern
+from vdet.lanes.calibration import Pattern, check_previews, write_previews
 from vdet.lanes.calibration import calibrate as fit_camera
 from vdet.lanes.camera_file import save_camera
-from vdet.lanes.preview import check_previews, write_previews
-from vdet.pipeline.stills import find_images
+from vdet.pipeline.pictures import find_images
 
 log = logging.getLogger("vdet")
 
@@ -78,12 +77,12 @@ def calibrate(
         check_previews(preview, found, overwrite=overwrite)
     calibration = fit_camera(found, pattern)
     for skip in calibration.skipped:
-        log.warning("%s: not used: %s", skip.photo, skip.reason)
+        log.warning("%s: not used: %s", skip.path, skip.reason)
     save_camera(calibration.camera, output)
     if preview:
         write_previews(preview, calibration, pattern)
     camera = calibration.camera
     click.echo(
         f"{output}: {camera.width}×{camera.height}, focal length {camera.focal[0]:.0f} px, "
-        f"RMS error {camera.rms:.2f} px, {len(calibration.views)} of {len(found)} photographs used"
+        f"RMS error {camera.rms:.2f} px, {len(calibration.photos)} of {len(found)} photographs used"
     )

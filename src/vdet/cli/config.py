@@ -10,4 +10,4 @@ from vdet.config.rendering import render
 @settings_options
 def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     """Print the effective settings as commented YAML."""
-    click.echo(render(read_settings(config_name, assignments).settings), nl=False)
+    click.echo(render(read_settings(config_name, assignments)), nl=False)

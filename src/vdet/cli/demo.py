@@ -26,7 +26,7 @@ def demo(
     """Draw a road with vehicles, train, detect, and compare with the truth, all in DIR."""
     from vdet.demo import DemoFiles, check_demo, run_demo
 
-    settings = read_settings(config_name, assignments).settings
+    settings = read_settings(config_name, assignments)
     files = DemoFiles(folder)
     check_demo(files, overwrite=overwrite)
     with progress_bar("", quiet=quiet) as progress:

@@ -11,13 +11,15 @@ from vdet.cli.options import (
     model_option,
     overwrite_option,
     read_lanes,
-    read_model,
     read_settings,
+    read_sinks,
     settings_options,
+    sink_option,
 )
-from vdet.errors import ImageError
-from vdet.files import check_output, write_json
-from vdet.pipeline.stills import StillResult, find_images, list_results, plan, process_still
+from vdet.detect.factory import load_detector
+from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
+from vdet.pipeline.sinks.json_list import STANDARD_OUTPUT
+from vdet.pipeline.sinks.protocol import Output, check_sink
 
 log = logging.getLogger("vdet")
 
@@ -27,8 +29,11 @@ log = logging.getLogger("vdet")
 @click.option(
     "-o", "--output", type=PathOf(), help="Annotated picture, or a folder for several of them."
 )
-@click.option("--json", "json_target", metavar="FILE", help="The boxes; - for standard output.")
+@click.option(
+    "--json", "json_target", type=PathOf(), metavar="FILE", help="The boxes; - for standard output."
+)
 @click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage.")
+@sink_option
 @lane_options
 @model_option
 @settings_options
@@ -37,8 +42,9 @@ def detect_image(
     *,
     images: tuple[Path, ...],
     output: Path | None,
-    json_target: str | None,
+    json_target: Path | None,
     stages: Path | None,
+    sinks: tuple[str, ...],
     lanes: bool,
     camera_path: Path | None,
     model_path: Path | None,
@@ -47,24 +53,20 @@ def detect_image(
     overwrite: bool,
 ) -> None:
     """Find vehicles in each IMAGE: files, or folders of them."""
-    if not (output or json_target or stages):
+    shared = read_sinks(sinks)
+    if json_target is not None:
+        shared = (Output("json", json_target), *shared)
+    if not (output or stages or shared):
         raise click.UsageError("nothing would be written; give -o, --json or --stages")
     request = read_lanes(lanes, camera_path)
-    loaded = read_settings(config_name, assignments)
-    model = read_model(model_path, loaded)
+    settings = read_settings(config_name, assignments)
+    model = load_detector(settings.detector, model_path)
     sources = find_images(images)
-    if json_target not in (None, "-"):
-        check_output(Path(json_target), overwrite=overwrite, inputs=sources)
-    jobs = plan(sources, output, stages, overwrite=overwrite)
-    results: list[StillResult] = []
-    failures: list[ImageError] = []
-    for job in jobs:
-        try:
-            results.append(process_still(job, model, loaded.settings, request))
-        except ImageError as error:
-            failures.append(error)
-    if json_target and results:
-        write_json(list_results(results), json_target)
+    for each in shared:
+        if each.path != STANDARD_OUTPUT:
+            check_sink(each, overwrite=overwrite, inputs=sources)
+    jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
+    failures = run_pictures(jobs, shared, model, settings, request)
     if failures:
         *others, last = failures
         for failure in others:

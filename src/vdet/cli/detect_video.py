@@ -5,21 +5,24 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.batch import BatchOptions, Work, batch_options, do_batch, wishes_of
+from vdet.cli.batch import BatchOptions, batch_options, do_batch, output_options
 from vdet.cli.options import (
     PathOf,
     Time,
-    find_model,
     lane_options,
     model_option,
     overwrite_option,
     read_lanes,
-    read_model,
     read_settings,
+    read_sinks,
     settings_options,
+    sink_option,
 )
 from vdet.cli.progress import progress_bar
-from vdet.pipeline.run import VideoJob, check_job, process_video
+from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
+from vdet.pipeline.loop import VideoJob, check_job, run_video
+from vdet.pipeline.sinks.protocol import Output
 
 
 @click.command()
@@ -29,7 +32,7 @@ from vdet.pipeline.run import VideoJob, check_job, process_video
     "--tracks",
     type=PathOf(),
     metavar="FILE",
-    help="Every shown box: .txt (MOT), .csv or .jsonl; with -d only such a suffix.",
+    help="Every shown box: .txt (MOTChallenge), .csv or .jsonl. With -d give only the suffix.",
 )
 @click.option("--start", type=Time(), help="From this time on: seconds or HH:MM:SS.")
 @click.option("--end", type=Time(), help="Up to this time.")
@@ -37,10 +40,16 @@ from vdet.pipeline.run import VideoJob, check_job, process_video
 @click.option(
     "--threads",
     type=click.IntRange(min=1),
-    help="Of the search of a video; else one a core, shared by --jobs.",
+    help="Threads that search one video. Default: one a core, shared by --jobs.",
 )
-@click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage …")
-@click.option("--at", type=Time(), help="… of the frame at this time.")
+@click.option(
+    "--stages",
+    type=PathOf(),
+    metavar="DIR",
+    help="A picture of every stage of one frame; see --at.",
+)
+@click.option("--at", type=Time(), help="Time of the frame that --stages shows.")
+@sink_option
 @batch_options
 @lane_options
 @model_option
@@ -59,6 +68,7 @@ def detect_video(
     threads: int | None,
     stages: Path | None,
     at: Fraction | None,
+    sinks: tuple[str, ...],
     lanes: bool,
     camera_path: Path | None,
     model_path: Path | None,
@@ -79,25 +89,36 @@ def detect_video(
     batch = BatchOptions(folder, jobs, skip_existing, dry_run, scheduler)
     if start is not None and end is not None and end <= start:
         raise click.UsageError("--end must be later than --start")
+    others = read_sinks(sinks)
     if folder is None:
-        wishes = None
         source, output = _in_and_out(clips, batch)
-        _check_usage(output, no_video=no_video, tracks=tracks, stages=stages, at=at)
+        outputs = _outputs(output, tracks, stages, others)
+        _check_usage(output, outputs, no_video=no_video, with_stages=stages is not None, at=at)
+        wanted = None
     else:
         if stages is not None or at is not None:
             raise click.UsageError("--stages and --at are for one video; leave out -d")
-        wishes = wishes_of(batch, no_video=no_video, tracks=tracks, overwrite=overwrite)
-        source, output, tracks = Path(), None, None  # each file has its own
+        source, outputs = Path(), ()  # each video has its own
+        wanted = output_options(
+            batch, no_video=no_video, tracks=tracks, sinks=others, overwrite=overwrite
+        )
     request = read_lanes(lanes, camera_path)
-    loaded = read_settings(config_name, assignments)
-    path = find_model(model_path, loaded)
-    work = Work(read_model(path, loaded), path, loaded.settings, threads)
+    settings = read_settings(config_name, assignments)
     moment = at or Fraction(0)
-    job = VideoJob(source, output, tracks, start, end, frames, stages, moment, request)
-    if wishes is not None:
-        return do_batch(clips, job, wishes, batch, work, quiet=quiet)
-    check_job(job, overwrite=overwrite)
-    _do_one(job, work, quiet=quiet)
+    job = VideoJob(source, outputs, start, end, frames, moment, request)
+    if wanted is not None:
+        load_detector(settings.detector, model_path)  # refused before any work
+        return do_batch(
+            clips,
+            job,
+            wanted,
+            batch,
+            settings=settings,
+            model=model_path,
+            threads=threads,
+            quiet=quiet,
+        )
+    _do_one(job, settings, model_path, threads, overwrite=overwrite, quiet=quiet)
     return 0
 
 
@@ -110,27 +131,42 @@ def _in_and_out(clips: tuple[Path, ...], batch: BatchOptions) -> tuple[Path, Pat
     return source, outputs[0] if outputs else None
 
 
+def _outputs(
+    video: Path | None, tracks: Path | None, stages: Path | None, others: tuple[Output, ...]
+) -> tuple[Output, ...]:
+    named = {"video": video, "tracks": tracks, "stages": stages}
+    return (*(Output(sink, path) for sink, path in named.items() if path is not None), *others)
+
+
 def _check_usage(
-    output: Path | None,
+    video: Path | None,
+    outputs: tuple[Output, ...],
     *,
     no_video: bool,
-    tracks: Path | None,
-    stages: Path | None,
+    with_stages: bool,
     at: Fraction | None,
 ) -> None:
-    if no_video == (output is not None):
+    if no_video == (video is not None):
         raise click.UsageError("give OUT, or --no-video without OUT; or -d DIR for several videos")
-    if output is None and tracks is None and stages is None:
+    if not outputs:
         raise click.UsageError("nothing would be written; give OUT, --tracks or --stages")
-    if (stages is None) != (at is None):
+    if with_stages == (at is None):
         raise click.UsageError("--stages and --at go together")
 
 
-def _do_one(job: VideoJob, work: Work, *, quiet: bool) -> None:
+def _do_one(
+    job: VideoJob,
+    settings: Settings,
+    model_path: Path | None,
+    threads: int | None,
+    *,
+    overwrite: bool,
+    quiet: bool,
+) -> None:
+    model = load_detector(settings.detector, model_path)
+    check_job(job, overwrite=overwrite)
     with progress_bar(" frames", quiet=quiet) as progress:
-        summary = process_video(
-            job, work.model, work.settings, threads=work.threads, progress=progress
-        )
+        summary = run_video(job, model, settings, threads=threads, progress=progress)
     if not quiet:
         rate = summary.frames / summary.seconds
         click.echo(

@@ -5,10 +5,18 @@ from pathlib import Path
 import click
 
 from vdet.cli.eval_options import give_results, results_options
-from vdet.cli.options import PathOf, model_option, read_model, read_settings, settings_options
+from vdet.cli.options import (
+    PathOf,
+    model_option,
+    read_settings,
+    read_sinks,
+    settings_options,
+    sink_option,
+)
 from vdet.cli.progress import progress_bar
+from vdet.detect.factory import load_detector, model_file
 from vdet.evaluate.output import check_outputs
-from vdet.resources import shipped_model
+from vdet.pipeline.sinks.protocol import check_sink
 
 
 @click.command()
@@ -33,8 +41,9 @@ from vdet.resources import shipped_model
     "sweeps",
     multiple=True,
     metavar="KEY=VALUE,VALUE",
-    help="Compare values of a setting, as in heat.threshold=1,2,4; several make a grid.",
+    help="Compare values of a setting, as in detector.heat.threshold=1,2; several make a grid.",
 )
+@sink_option
 @model_option
 @settings_options
 @results_options
@@ -46,6 +55,7 @@ def video(
     truths: tuple[Path, ...],
     until: int | None,
     sweeps: tuple[str, ...],
+    sinks: tuple[str, ...],
     model_path: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
@@ -63,15 +73,21 @@ def video(
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     swept = grid(sweeps)
-    loaded = [read_settings(config_name, (*assignments, *extra)) for extra in swept]
-    path = model_path or shipped_model(loaded[0].settings.features)
-    model, *_ = [read_model(path, each) for each in loaded]  # all fit it, or it says so
-    inputs = [*videos, *truths, path]
+    outputs = read_sinks(sinks)
+    if outputs and (len(swept) > 1 or len(videos) > 1):
+        raise click.UsageError("--sink is for one video under one setting; leave out the others")
+    settings = [read_settings(config_name, (*assignments, *extra)) for extra in swept]
+    for each in settings:
+        load_detector(each.detector, model_path)  # all fit the model, or it says so
+    files = [path for each in settings if (path := model_file(each.detector, model_path))]
+    inputs = [*videos, *truths, *files]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
+    for output in outputs:
+        check_sink(output, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
-    variants = [Variant(extra, each.settings) for extra, each in zip(swept, loaded, strict=True)]
+    variants = [Variant(extra, each) for extra, each in zip(swept, settings, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:
-        runs = evaluate_clips(clips, model, variants, progress)
+        runs = evaluate_clips(clips, model_path, variants, progress, outputs=outputs)
     give_results(
         run_lines(runs),
         plain(runs),

@@ -8,14 +8,13 @@ from vdet.cli.options import (
     PathOf,
     model_option,
     overwrite_option,
-    read_model,
     read_settings,
     settings_options,
 )
 from vdet.cli.progress import progress_bar
+from vdet.detect.factory import model_file
 from vdet.errors import OutputError
 from vdet.files import check_output
-from vdet.resources import shipped_model
 
 
 @click.command()
@@ -75,13 +74,13 @@ def mine(
         raise click.UsageError("--until must not be before --from")
     if output.suffix.lower() != ".zip":
         raise OutputError(f"{output}: patches are written as .zip; name it so")
-    loaded = read_settings(config_name, assignments)
-    path = model_path or shipped_model(loaded.settings.features)
-    model = read_model(path, loaded)
-    check_output(output, overwrite=overwrite, inputs=[video, truth, path])
+    settings = read_settings(config_name, assignments)
+    file = model_file(settings.detector, model_path)
+    inputs = [video, truth, *([file] if file else [])]
+    check_output(output, overwrite=overwrite, inputs=inputs)
     job = MiningJob(video, truth, output, every, first, until)
     with progress_bar(" frames", quiet=quiet) as progress:
-        mined = mine_patches(job, model, loaded.settings, progress=progress)
+        mined = mine_patches(job, settings, model_path, progress=progress)
     click.echo(
         f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "
         f"{mined.false_alarms} false alarms, {mined.parts} more on parts of vehicles; "

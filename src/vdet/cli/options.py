@@ -9,11 +9,11 @@ from typing import Any, TypeVar
 
 import click
 
-from vdet.config.loading import LoadedSettings, load_settings
-from vdet.detect.svm.model import LinearModel, load_model
+from vdet.config.loading import find_config, load_settings
+from vdet.config.schema import Settings
 from vdet.lanes.camera_file import load_camera
 from vdet.lanes.road import LaneRequest
-from vdet.resources import find_config, shipped_model
+from vdet.pipeline.sinks.protocol import Output
 
 _TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
 
@@ -57,7 +57,7 @@ def settings_options(command: F) -> F:
         "assignments",
         multiple=True,
         metavar="KEY=VALUE",
-        help="Change one setting, as in tracker.history=12; may be given often.",
+        help="Change one setting, as in output.crf=18; may be given often.",
     )(command)
     return click.option(
         "-c",
@@ -68,30 +68,42 @@ def settings_options(command: F) -> F:
     )(command)
 
 
-def read_settings(config_name: str | None, assignments: tuple[str, ...]) -> LoadedSettings:
+def read_settings(config_name: str | None, assignments: tuple[str, ...]) -> Settings:
     """Read what `settings_options` gave."""
     return load_settings(find_config(config_name) if config_name else None, assignments)
 
 
 def model_option(command: F) -> F:
-    """Add `--model FILE`; read it with `read_model`."""
+    """Add `--model FILE`; load it with `load_detector`."""
     return click.option(
         "--model",
         "model_path",
         type=PathOf(),
         metavar="FILE",
-        help="Model from vdet train; else the shipped one that fits the settings.",
+        help="Model file of the detector; else the shipped one that fits the settings.",
     )(command)
 
 
-def read_model(model_path: Path | None, loaded: LoadedSettings) -> LinearModel:
-    """Read the model, and check it against the features that were asked for."""
-    return load_model(find_model(model_path, loaded), loaded.features)
+def sink_option(command: F) -> F:
+    """Add `--sink NAME=FILE`; read it with `read_sinks`."""
+    return click.option(
+        "--sink",
+        "sinks",
+        multiple=True,
+        metavar="NAME=FILE",
+        help="Another output, by the name of its sink; may be given often.",
+    )(command)
 
 
-def find_model(model_path: Path | None, loaded: LoadedSettings) -> Path:
-    """Return the model that was given, or else the shipped one that fits the settings."""
-    return model_path or shipped_model(loaded.settings.features)
+def read_sinks(sinks: tuple[str, ...]) -> tuple[Output, ...]:
+    """Read what `sink_option` gave."""
+    outputs = []
+    for text in sinks:
+        name, equals, path = text.partition("=")
+        if not (name and equals and path):
+            raise click.UsageError(f"--sink {text}: expected NAME=FILE, as in tracks=out.csv")
+        outputs.append(Output(name, Path(path)))
+    return tuple(outputs)
 
 
 def lane_options(command: F) -> F:

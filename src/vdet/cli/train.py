@@ -47,7 +47,7 @@ def train(
 
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
-    settings = read_settings(config_name, assignments).settings
+    settings = read_settings(config_name, assignments)
     if output.suffix.lower() != ".npz":
         raise OutputError(f"{output}: models are written as .npz; name it so")
     report_path = output.with_suffix(".json")
@@ -61,7 +61,7 @@ def train(
             files,
             settings,
             boxed=boxed,
-            jobs=jobs or -1,
+            jobs=jobs,
             scheduler=scheduler,
             progress=start(len(files) + len(boxed)),
         )

@@ -108,7 +108,7 @@ def parse_assignment(text: str) -> Document:
     key, equals, value = text.partition("=")
     parts = key.strip().split(".")
     if not equals or not all(parts):
-        raise ConfigError(f"--set {text}: expected KEY=VALUE, as in tracker.history=12")
+        raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
     name = "--set"
     walk = _Walk(name)
     path: Key = tuple(int(part) if _is_number(part) else part for part in parts)

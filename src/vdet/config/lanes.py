@@ -1,40 +1,57 @@
-"""Settings of the lane finder. Places in the frame are fractions of it, so any size works."""
+"""Settings of the lane finder. Places in the frame are shares of its size, so any size works."""
 
 from pydantic import Field, model_validator
 
 from vdet.config.section import Fraction, Section
 
-_MAX_PIXELS = 4_000_000  # of the view from above
+_MAX_PIXELS = 4_000_000  # of the top view
 
 
-class ViewSettings(Section):
-    """The stretch of road that is seen from above: a trapezoid on straight lane lines.
+class TopViewSettings(Section):
+    """The road that is seen from above: a trapezoid in the frame, its sides on straight lane lines.
 
-    For another camera: take an undistorted frame of a straight and level road, choose two rows,
-    and note where the lines of the vehicle's lane cross them; the nearer row above the bonnet,
-    the farther one a little below the horizon.
+    For another camera, take an undistorted frame of a straight and level road. Choose two rows:
+    the nearer one above the bonnet, the farther one a little below the horizon. Note the columns
+    at which the lines of the vehicle's lane cross them.
     """
 
-    top: Fraction = Field(0.63, description="farther row of the trapezoid, share of the height")
-    bottom: Fraction = Field(0.93, description="nearer row")
+    top: Fraction = Field(
+        0.63, description="farther row of the trapezoid, share of the frame's height"
+    )
+    bottom: Fraction = Field(
+        0.93, description="nearer row of the trapezoid, share of the frame's height"
+    )
     top_left: float = Field(
-        0.4602, ge=-2, le=3, description="where the lane's left line crosses the farther row, "
-        "share of the width"
+        0.4602, ge=-2, le=3, description="column of the left line in the farther row, share of the "
+        "frame's width"
     )  # fmt: skip
-    top_right: float = Field(0.5382, ge=-2, le=3, description="where the right line does")
-    bottom_left: float = Field(0.2086, ge=-2, le=3, description="the left line, nearer row")
-    bottom_right: float = Field(0.7898, ge=-2, le=3, description="the right line, nearer row")
-    lane_width: float = Field(3.7, gt=0, le=20, description="metres between these lines")
+    top_right: float = Field(
+        0.5382, ge=-2, le=3, description="column of the right line in the farther row"
+    )
+    bottom_left: float = Field(
+        0.2086, ge=-2, le=3, description="column of the left line in the nearer row"
+    )
+    bottom_right: float = Field(
+        0.7898, ge=-2, le=3, description="column of the right line in the nearer row"
+    )
+    lane_width: float = Field(3.7, gt=0, le=20, description="width of the lane, metres")
     length: float = Field(
-        37.0, gt=1, le=500, description="metres between the two rows, by dashes of known length or "
-        "as focal length in pixels × lane_width × (1 / width at top − 1 / width at bottom, pixels)"
+        37.0, gt=1, le=500, description="distance on the road between the two rows, metres; "
+        "measure it by dashes of known length, or compute focal length × lane_width × (1 / lane "
+        "width in the farther row − 1 / lane width in the nearer row), all but lane_width in pixels"
     )  # fmt: skip
-    margin: float = Field(3.0, ge=0, le=50, description="metres seen on both sides of the lane")
-    across: float = Field(30.0, ge=5, le=200, description="pixels a metre across the road")
-    along: float = Field(8.0, ge=1, le=50, description="pixels a metre along it")
+    margin: float = Field(
+        3.0, ge=0, le=50, description="road shown on each side of the lane, metres"
+    )
+    across: float = Field(
+        30.0, ge=5, le=200, description="resolution across the road, pixels per metre"
+    )
+    along: float = Field(
+        8.0, ge=1, le=50, description="resolution along the road, pixels per metre"
+    )
 
     @model_validator(mode="after")
-    def _is_a_trapezoid(self) -> "ViewSettings":
+    def _check_trapezoid(self) -> "TopViewSettings":
         if self.bottom <= self.top:
             raise ValueError("bottom must be below top, a larger share of the height")
         far, near = self.top_right - self.top_left, self.bottom_right - self.bottom_left
@@ -49,67 +66,88 @@ class ViewSettings(Section):
 class MaskSettings(Section):
     """Which pixels are paint: lighter or yellower than the road on both sides of them."""
 
-    line_width: float = Field(0.15, gt=0, le=1, description="of a painted line, metres")
+    line_width: float = Field(0.15, gt=0, le=1, description="width of a painted line, metres")
     reach: float = Field(
-        0.35, gt=0, le=3, description="how far to either side the road is looked at, metres"
-    )
+        0.35, gt=0, le=3, description="distance at which a pixel is compared with the road on its "
+        "left and right, metres"
+    )  # fmt: skip
     lightness: Fraction = Field(
-        0.10, description="a line is lighter than the road by this share of the road's lightness"
-    )
+        0.10, description="smallest rise in lightness from the road to paint, share of the road's "
+        "lightness"
+    )  # fmt: skip
     least_lightness: float = Field(
-        10.0, ge=0, le=255, description="and by so many of 255 levels of lightness at least"
-    )
+        10.0, ge=0, le=255, description="smallest rise in lightness from the road to paint, on a "
+        "scale of 0 to 255"
+    )  # fmt: skip
     yellow: float = Field(
-        9.0, ge=0, le=255, description="or yellower by so many levels of Lab's b channel"
-    )
+        9.0, ge=0, le=255, description="smallest rise in the b channel of CIELAB from the road to "
+        "yellow paint, on a scale of 0 to 255; yellow paint need not be lighter"
+    )  # fmt: skip
 
 
 class LaneSearchSettings(Section):
-    """Where the pixels of the lane's two lines are looked for."""
+    """Where the painted pixels of the two lines are searched."""
 
     base: float = Field(
-        15.0, gt=0, le=200, description="metres, nearest ones, of which the histogram is taken"
-    )
+        15.0, gt=0, le=200, description="length of the nearest part of the road, which the "
+        "histogram covers, metres"
+    )  # fmt: skip
     window: float = Field(3.0, gt=0, le=50, description="length of a sliding window, metres")
     margin: float = Field(
-        0.5, gt=0, le=3, description="to either side of a window's middle or of the last fit, m"
-    )
-    fine_margin: float = Field(0.2, gt=0, le=3, description="the same around a first fit, metres")
+        0.5, gt=0, le=3, description="largest distance of paint from the middle of its window or "
+        "from the last frame's curve, metres"
+    )  # fmt: skip
+    fine_margin: float = Field(
+        0.2, gt=0, le=3, description="largest distance of paint from a curve that was fitted to "
+        "this frame, metres"
+    )  # fmt: skip
 
 
 class LaneCheckSettings(Section):
-    """What a lane must look like to be believed."""
+    """Conditions that curves must meet to count as a lane."""
 
-    width: float = Field(0.6, gt=0, le=5, description="its width may differ from lane_width, m")
-    parallel: float = Field(
-        1.6, gt=0, le=5, description="its lines may run apart or together over the view, metres "
-        "(a car that pitches sees them so)"
+    width: float = Field(
+        0.6, gt=0, le=5, description="largest difference between the width and view.lane_width, "
+        "metres"
     )  # fmt: skip
-    radius: float = Field(150.0, gt=0, description="bends are no tighter than this, metres")
-    marking: float = Field(4.0, gt=0, description="metres of paint seen, each line")
-    scatter: float = Field(
-        0.08, gt=0, le=1, description="root mean square of the paint's distance to the fit, metres"
+    parallel: float = Field(
+        1.6, gt=0, le=5, description="how much the lines may converge or diverge over view.length, "
+        "metres; they do so when the vehicle pitches"
+    )  # fmt: skip
+    radius: float = Field(150.0, gt=0, description="smallest radius of a bend, metres")
+    marking: float = Field(
+        4.0, gt=0, description="shortest length of paint by which a line is seen, metres"
     )
+    scatter: float = Field(
+        0.08, gt=0, le=1, description="largest root mean square distance of paint from its curve, "
+        "metres"
+    )  # fmt: skip
     jump: float = Field(
-        0.35, gt=0, le=5, description="a line may move from frame to frame by this, metres"
+        0.35, gt=0, le=5, description="largest sideways move of a line between two frames, metres"
     )
 
 
 class LaneTrackSettings(Section):
-    """How fits of consecutive frames become one lane."""
+    """How the curves of consecutive frames become one lane."""
 
     memory: float = Field(
-        0.6, ge=0, lt=1, description="weight of the frames before against this one's, each frame"
+        0.6, ge=0, lt=1, description="weight of the frames before, if the newest frame has weight 1"
     )
-    curve_memory: float = Field(0.95, ge=0, lt=1, description="the same for the radius shown")
-    carry: int = Field(12, ge=0, le=1000, description="frames that an unseen line is kept for")
-    straight: float = Field(5000.0, gt=0, description="radius from which on a road is straight, m")
+    curve_memory: float = Field(
+        0.95, ge=0, lt=1, description="share of the frames before in the radius that is shown"
+    )
+    carry: int = Field(
+        12, ge=0, le=1000, description="number of frames for which an unseen line is kept"
+    )
+    straight: float = Field(
+        5000.0, gt=0, description="radius from which the road counts as straight, metres"
+    )
 
 
 class LaneSettings(Section):
-    """The lane finder: view from above, paint, search, checks, smoothing."""
+    """Finding the lane: top view, paint, search, checks, smoothing."""
 
-    view: ViewSettings = ViewSettings()
+    view: TopViewSettings = TopViewSettings()
     mask: MaskSettings = MaskSettings()
     search: LaneSearchSettings = LaneSearchSettings()
     check: LaneCheckSettings = LaneCheckSettings()

@@ -3,83 +3,125 @@
 import difflib
 import itertools
 import reprlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import UnionType
 from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ValidationError, create_model
 from pydantic_core import ErrorDetails
 
 from vdet.config.document import Document, Key, mistakes, parse_assignment, read_document
-from vdet.config.schema import FeatureSettings, Settings
+from vdet.config.kinds import UNIONS, Kinds, kind_names, section_of_kind
+from vdet.config.schema import Section, Settings
 from vdet.errors import ConfigError
 from vdet.files import printable
 
-
-@dataclass(frozen=True, slots=True)
-class LoadedSettings:
-    """Settings, and whether their features were asked for rather than left at the default."""
-
-    settings: Settings
-    features: FeatureSettings | None
-    """The feature settings where a file or an assignment gives any, else None."""
+_PACKAGE = Path(__file__).parents[1]
+# In a wheel the configs lie in the package; in a work tree beside `src`.
+_CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
 
 
-_TAG = "method"
-"""Names the kind of a section that has several."""
+def find_config(name: str) -> Path:
+    """Return the config file at the path `name`, or else the shipped one of that name (`seed`).
 
-_TAGGED = {name for name, field in Settings.model_fields.items() if field.discriminator == _TAG}
+    Raises
+    ------
+    ConfigError
+        There is neither.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path
+    shipped = {file.stem: file for folder in _CONFIGS for file in sorted(folder.glob("*.yaml"))}
+    if name in shipped:
+        return shipped[name]
+    raise ConfigError(f"{name}: no such file; shipped configs are: {', '.join(shipped)}")
 
 
-def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> LoadedSettings:
-    """Read settings: defaults, then the file at `path`, then assignments such as `heat.frames=3`.
+def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> Settings:
+    """Read settings: defaults, then the file at `path`, then assignments such as `input.crf=18`.
 
     A list in a later layer replaces the whole list of an earlier one; an assignment may name one
-    item of it (`search.windows.0.step=2`).
+    item of it (`detector.search.windows.0.step=2`). Where a layer chooses another kind of detector
+    or method of tracking than the layers below, that section starts from the defaults of this kind.
 
     Raises
     ------
     ConfigError
         One line for each mistake, with file, line, column, key and what was expected.
     """
-    defaults = Settings().model_dump(mode="json")
     layers = [read_document(path)] if path else []
-    errors: list[str] = []
-    for text in assignments:
-        try:
-            layers.append(parse_assignment(text))
-        except ConfigError as error:
-            errors.append(str(error))
-    values, places = _merge(defaults, layers)
+    assigned, errors = _read_assignments(assignments)
+    layers.append(assigned)
+    try:
+        values, places, kinds = _merge(layers)
+    except ConfigError as error:
+        raise mistakes([*errors, *str(error).splitlines()], len(errors) + 1) from error
     details: list[ErrorDetails] = []
     try:
-        settings = Settings.model_validate(values)
+        settings = _validate(values, kinds)
     except ValidationError as error:
         details = error.errors()
     if errors or details:
-        described = (_describe(detail, places) for detail in details)
+        described = (_describe(detail, places, kinds) for detail in details)
         raise mistakes(itertools.chain(errors, described), len(errors) + len(details))
-    given = any("features" in layer.values for layer in layers)
-    return LoadedSettings(settings, settings.features if given else None)
+    return settings
 
 
-def _merge(values: dict[str, Any], layers: Sequence[Document]) -> tuple[Any, dict[Key, str]]:
-    merged: Any = values
+def _read_assignments(assignments: Sequence[str]) -> tuple[Document, list[str]]:
+    """Join assignments to one layer; what cannot be read is returned as lines of errors."""
+    values: Any = {}
+    places: dict[Key, str] = {}
+    errors: list[str] = []
+    for text in assignments:
+        try:
+            document = parse_assignment(text)
+        except ConfigError as error:
+            errors.append(str(error))
+        else:
+            values = _overlay(values, document.values)
+            places |= document.places
+    return Document(values, places), errors
+
+
+def _merge(layers: Sequence[Document]) -> tuple[dict[str, Any], dict[Key, str], Kinds]:
+    """Lay the layers over the defaults; return values, places and the kind of each union."""
+    values: dict[str, Any] = Settings().model_dump(mode="json")
+    kinds = {name: section_of_kind(name, values[name][key]) for name, key in UNIONS.items()}
     places: dict[Key, str] = {}
     for layer in layers:
-        merged = _overlay(merged, layer.values)
+        for name, key in UNIONS.items():
+            given = layer.values.get(name)
+            kind = given.get(key) if isinstance(given, dict) else None
+            if isinstance(kind, str) and kind != values[name][key]:
+                kinds[name] = _chosen(name, kind, layer)
+                values[name] = kinds[name]().model_dump(mode="json")
+        values = _overlay(values, layer.values)
         places |= layer.places
-    return merged, places
+    return values, places, kinds
+
+
+def _chosen(name: str, kind: str, layer: Document) -> type[Section]:
+    try:
+        return section_of_kind(name, kind)
+    except ConfigError as error:
+        key: Key = (name, UNIONS[name])
+        raise ConfigError(f"{_place(key, layer.places)}: {format_key(key)}: {error}") from error
+
+
+def _validate(values: Mapping[str, Any], kinds: Kinds) -> Settings:
+    """Check values against the sections of the chosen kinds."""
+    fields: Any = {name: (kind, ...) for name, kind in kinds.items()}
+    checked = create_model("Settings", __base__=Settings, **fields).model_validate(values)
+    return Settings.model_construct(
+        **{name: getattr(checked, name) for name in Settings.model_fields}
+    )
 
 
 def _overlay(below: Any, above: Any) -> Any:
     if isinstance(below, dict) and above is None:  # a section of which nothing is given
         return below
     if isinstance(below, dict) and isinstance(above, dict):
-        if above.get(_TAG, below.get(_TAG)) != below.get(_TAG):
-            below = {}  # another kind of section, with its own defaults
         return below | {key: _overlay(below.get(key), value) for key, value in above.items()}
     if (
         isinstance(below, list)
@@ -90,19 +132,14 @@ def _overlay(below: Any, above: Any) -> Any:
     return above
 
 
-def _describe(detail: ErrorDetails, places: dict[Key, str]) -> str:
-    key = _written_key(tuple(detail["loc"]))
+def _describe(detail: ErrorDetails, places: dict[Key, str], kinds: Kinds) -> str:
+    key = tuple(detail["loc"])
     place = _place(key, places)
-    expected = _expected(detail)
+    expected = _expected(detail, kinds)
     return f"{place}: {format_key(key)}: {expected}" if key else f"{place}: {expected}"
 
 
-def _written_key(key: Key) -> Key:
-    """Return the key as users write it: without the kind of a section, which pydantic adds."""
-    return key if len(key) < 2 or key[0] not in _TAGGED else (key[0], *key[2:])
-
-
-def _place(key: Key, places: dict[Key, str]) -> str:
+def _place(key: Key, places: Mapping[Key, str]) -> str:
     """Return the place of `key`, or of the nearest thing in or around it that was written down."""
     if within := [place for at, place in places.items() if at[: len(key)] == key]:
         return within[0]
@@ -110,7 +147,7 @@ def _place(key: Key, places: dict[Key, str]) -> str:
 
 
 def format_key(key: Key) -> str:
-    """Write a path as a user would: `search.windows[0].size`."""
+    """Write a path as a user would: `detector.search.windows[0].size`."""
     text = ""
     for part in key:
         name = printable(str(part))
@@ -124,10 +161,11 @@ _EXPECTED = {
 }
 
 
-def _expected(detail: ErrorDetails) -> str:
+def _expected(detail: ErrorDetails, kinds: Kinds) -> str:
     match detail["type"]:
         case "extra_forbidden" | "invalid_key":
-            return f"is no setting{_suggestion(tuple(detail['loc']))}"
+            key = tuple(detail["loc"])
+            return _belongs(key, kinds) or f"is no setting{_suggestion(key, kinds)}"
         case "missing":
             return "is missing"
         case "value_error":
@@ -136,18 +174,36 @@ def _expected(detail: ErrorDetails) -> str:
     return f"{message} (got {reprlib.repr(detail['input'])})"
 
 
-def _suggestion(key: Key) -> str:
-    names = _names_beside(key)
+def _belongs(key: Key, kinds: Kinds) -> str:
+    """Say which other kind a key belongs to; nothing where it belongs to none."""
+    if len(key) < 2 or key[0] not in UNIONS:
+        return ""
+    name = str(key[0])
+    choice = UNIONS[name]
+    chosen = kinds[name].model_fields[choice].default
+    owners = [
+        kind
+        for kind in kind_names(name)
+        if kind != chosen and key[1] in section_of_kind(name, kind).model_fields
+    ]
+    if not owners:
+        return ""
+    owner = " or ".join(owners)
+    return f"belongs to {name}.{choice}: {owner}, and has no effect with {chosen}"
+
+
+def _suggestion(key: Key, kinds: Kinds) -> str:
+    names = _names_beside(key, kinds)
     if close := difflib.get_close_matches(str(key[-1]), names, n=1):
         return f"; did you mean {close[0]}?"
     return f"; known here: {', '.join(names)}" if names else ""
 
 
-def _names_beside(key: Key) -> list[str]:
+def _names_beside(key: Key, kinds: Kinds) -> list[str]:
     section: Any = Settings
-    for part in key[:-1]:
-        if isinstance(section, UnionType):  # the section that the tag names
-            (section,) = [k for k in get_args(section) if k.model_fields[_TAG].default == part]
+    for depth, part in enumerate(key[:-1]):
+        if depth == 0 and part in kinds:
+            section = kinds[str(part)]
         elif not isinstance(part, int):
             section = section.model_fields[part].annotation
         elif args := get_args(section):  # tuple[WindowSettings, ...]

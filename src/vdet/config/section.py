@@ -1,12 +1,12 @@
 """What every part of the settings is made of."""
 
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 
 class _FrameLength:
-    """Marks a length in pixels of a frame `reference_height` rows high (see `scaling`)."""
+    """Marks a length in pixels of a frame `reference_height` rows high (see `scale_lengths`)."""
 
 
 FRAME_LENGTH = _FrameLength()
@@ -18,3 +18,25 @@ class Section(BaseModel):
     """A part of the settings: unchangeable, unknown keys refused, no NaN."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+S = TypeVar("S", bound=Section)
+
+
+def scale_lengths(section: S, factor: float) -> S:
+    """Multiply every frame length of `section` and of the sections in it by `factor`.
+
+    Products are rounded to whole pixels, halves up; fractions and counts stay as they are.
+    """
+    if factor == 1:
+        return section
+    scaled: dict[str, Any] = {}
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if FRAME_LENGTH in field.metadata:
+            scaled[name] = int(value * factor + 0.5)
+        elif isinstance(value, Section):
+            scaled[name] = scale_lengths(value, factor)
+        elif isinstance(value, tuple) and value and isinstance(value[0], Section):
+            scaled[name] = tuple(scale_lengths(item, factor) for item in value)
+    return section.model_copy(update=scaled)

@@ -10,7 +10,13 @@ Seconds = Annotated[float, Field(ge=0, le=1000)]
 Positive = Annotated[float, Field(gt=0, le=1000)]
 
 
-class MotionTrackerSettings(Section):
+class TrackerSettings(Section):
+    """How detections become tracks. Each method has a class of its own."""
+
+    method: str
+
+
+class MotionTrackerSettings(TrackerSettings):
     """The motion tracker (`vdet.track.motion` explains it); times are seconds."""
 
     method: Literal["motion"] = Field(
@@ -62,10 +68,17 @@ class MotionTrackerSettings(Section):
     remembered_hidden: Seconds = Field(5.0, description="the same behind another vehicle")
 
 
-class RulesTrackerSettings(Section):
+class RulesTrackerSettings(TrackerSettings):
     """The rules of the original system (`vdet.track.rules` lists them); times are frames."""
 
     method: Literal["rules"] = Field("rules", description="motion or rules")
+    reference_height: int = Field(
+        720,
+        ge=16,
+        le=100_000,
+        description="lengths in frame pixels below are for a frame with this many rows; for "
+        "another frame they are multiplied by rows / reference_height and rounded",
+    )
     history: int = Field(
         10, ge=1, le=1000, description="detections that a car's box is averaged over"
     )
@@ -107,9 +120,3 @@ class RulesTrackerSettings(Section):
         12, ge=1, description="a car is deleted after this many matches in a row"
     )
     max_misses: int = Field(5, ge=1, description="a car is deleted after this many misses in a row")
-
-
-TrackerSettings = Annotated[
-    MotionTrackerSettings | RulesTrackerSettings, Field(discriminator="method")
-]
-"""The settings of the tracker that `method` names."""

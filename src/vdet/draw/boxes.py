@@ -1,18 +1,26 @@
 """Boxes with labels, drawn into BGR images."""
 
 import colorsys
+from collections.abc import Iterator
 
 import cv2
+import numpy as np
 
 from vdet.geometry import Box
 from vdet.media.images import Image
 
 Color = tuple[int, int, int]
+"""Blue, green, red, 0 to 255."""
 
 GREEN: Color = (80, 220, 60)
 WHITE: Color = (255, 255, 255)
+BLACK: Color = (0, 0, 0)
 _GOLDEN_RATIO = 0.618034
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_FONT = cv2.FONT_HERSHEY_DUPLEX
+_SMALLEST_TEXT = 0.35
+"""Font scale; smaller digits cannot be read."""
+_DASH = 4
+"""Length of a dash and of the gap after it, in line widths."""
 
 
 def color_of(number: int) -> Color:
@@ -23,32 +31,90 @@ def color_of(number: int) -> Color:
 
 
 def line_width(image: Image) -> int:
-    """Return a line width that looks the same at any frame height; 3 at 720 rows."""
+    """Return a line width in pixels that looks the same at any frame height; 3 at 720 rows."""
     height: int = image.shape[0]
     return max(1, (height + 120) // 240)
 
 
-def draw_box(image: Image, box: Box, color: Color, label: str = "") -> None:
-    """Draw an outline just inside `box` and a label above it (inside, at the frame's top)."""
-    for inset in range(line_width(image)):  # OpenCV's own thick lines are a pixel or two wider
-        corner = (box.right - 1 - inset, box.bottom - 1 - inset)
-        cv2.rectangle(image, (box.x + inset, box.y + inset), corner, color)
+def draw_box(
+    image: Image, box: Box, color: Color, label: str = "", *, dashed: bool = False
+) -> None:
+    """Draw an outline just inside a box, and a label above it (inside it at the frame's top).
+
+    Parameters
+    ----------
+    image
+        BGR uint8 `(H, W, 3)`; it is changed.
+    box
+        In pixels of the image; it may reach beyond the image.
+    dashed
+        Whether the outline has gaps. This marks a box that is predicted, not detected.
+    """
+    dash = _DASH * line_width(image) if dashed else None
+    for side in _sides(box, line_width(image)):
+        for part in _dashes(side, dash) if dash else [side]:
+            _fill(image, part, color)
     if label:
         draw_label(image, label, (box.x, box.y), color)
 
 
 def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -> None:
-    """Write dark text on a filled tag whose lower left corner is `corner`, `(x, y)`.
+    """Write text on a filled tag whose lower left corner is `corner`, `(x, y)` in pixels.
 
-    The tag is moved so that it lies in the image.
+    The tag is moved so that it lies in the image. Text that is wider than the image becomes
+    smaller; if it still does not fit, its end is cut off.
     """
-    scale = max(0.35, image.shape[0] / 1200)
-    thickness = max(1, round(scale * 2))
-    (width, height), baseline = cv2.getTextSize(text, _FONT, scale, thickness)
-    pad = baseline // 2 + 1
-    tag_width, tag_height = width + 2 * pad, height + baseline + pad
-    x = max(0, min(corner[0], image.shape[1] - tag_width))
-    y = max(0, min(corner[1] - tag_height, image.shape[0] - tag_height))
-    cv2.rectangle(image, (x, y), (x + tag_width, y + tag_height), color, cv2.FILLED)
-    origin = (x + pad, y + height + pad)
-    cv2.putText(image, text, origin, _FONT, scale, (0, 0, 0), thickness, cv2.LINE_AA)
+    rows, columns = image.shape[:2]
+    scale = _text_scale(image, text)
+    stroke = max(1, round(1.5 * scale))
+    margin = max(3, round(6 * scale))
+    (width, height), baseline = cv2.getTextSize(text, _FONT, scale, stroke)
+    tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
+    x = max(0, min(corner[0], columns - tag_width))
+    y = max(0, min(corner[1], rows) - tag_height)
+    _fill(image, Box(x, y, tag_width, tag_height), color)
+    origin = (x + margin, y + margin + height)
+    cv2.putText(image, text, origin, _FONT, scale, text_color(color), stroke, cv2.LINE_AA)
+
+
+def text_color(background: Color) -> Color:
+    """Return black or white: the one with the higher contrast ratio (WCAG 2.1) on a background."""
+    shares = np.array(background) / 255
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    luminance = float(linear @ (0.0722, 0.7152, 0.2126))
+    on_black, on_white = (luminance + 0.05) / 0.05, 1.05 / (luminance + 0.05)
+    return BLACK if on_black > on_white else WHITE
+
+
+def _text_scale(image: Image, text: str) -> float:
+    """Return the font scale that fits the image's height, or less so that the text fits in."""
+    rows, columns = (int(side) for side in image.shape[:2])
+    (width, _), _ = cv2.getTextSize(text, _FONT, 1, 1)
+    return max(_SMALLEST_TEXT, min(rows / 1200, columns / (width + 20)))
+
+
+def _sides(box: Box, width: int) -> Iterator[Box]:
+    """Give the four sides of an outline just inside a box; those of a small box overlap."""
+    across, down = min(width, box.width), min(width, box.height)
+    yield Box(box.x, box.y, box.width, down)
+    yield Box(box.x, box.bottom - down, box.width, down)
+    yield Box(box.x, box.y, across, box.height)
+    yield Box(box.right - across, box.y, across, box.height)
+
+
+def _dashes(side: Box, dash: int) -> Iterator[Box]:
+    """Cut a side into dashes of about `dash` pixels and equal gaps, with a dash at each end."""
+    length = max(side.width, side.height)
+    gaps = max(1, round((length - dash) / (2 * dash)))
+    dash = min(dash, max(1, length // 3))
+    for start in np.linspace(0, length - dash, gaps + 1).round().astype(int).tolist():
+        if side.width > side.height:
+            yield Box(side.x + start, side.y, dash, side.height)
+        else:
+            yield Box(side.x, side.y + start, side.width, dash)
+
+
+def _fill(image: Image, box: Box, color: Color) -> None:
+    """Fill the part of a box that lies in the image."""
+    inside = box.clipped(image.shape[1], image.shape[0])
+    image[inside.y : inside.bottom, inside.x : inside.right] = color

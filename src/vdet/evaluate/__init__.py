@@ -1,5 +1,5 @@
-"""How well it works: the metrics of the trade, and what they are measured on.
+"""Metrics of detection and tracking, and what they are computed from.
 
-`truth` and `predictions` read files of boxes, `scores` measures one against the other, `clips`
-runs detection on labelled videos, `patches` measures the classifier, `report` makes HTML of either.
+`truth` and `predictions` read files of boxes, `scores` compares one with the other, `clips` runs
+detection on labelled videos, `report` makes HTML of the results.
 """

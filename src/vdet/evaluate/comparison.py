@@ -1,12 +1,34 @@
-"""Truth beside predictions, frame by frame: what every metric starts from."""
+"""Truth and predictions side by side, frame by frame: the input of every metric.
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+Ignore regions are applied here, by one rule for all metrics. In every frame the predictions are
+first paired with the vehicles that count (IoU at least 0.5, largest sum of IoU). A prediction that
+is left over and has at least half of its own area in a single ignore region is dropped: it is
+neither right nor wrong. The ignore regions are dropped too: they need not be found.
+Source: how the KITTI tracking benchmark treats DontCare, and COCO treats crowds at IoU 0.5.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from vdet.evaluate.labelled_video import Integers
-from vdet.geometry import Float64Array
+from vdet.errors import TruthError
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.geometry import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
+
+MATCH_IOU = 0.5
+"""A prediction with at least this overlap finds a vehicle."""
+
+MAX_IDS = 10_000
+"""Most vehicles, and most tracks, in one video."""
+MAX_IN_FRAME = 1000
+"""Most boxes of either kind in one frame."""
+MAX_PAIRS = 25_000_000
+"""Most pairs of a vehicle and a track; also most pairs of their boxes, summed over the frames."""
+
+_IGNORED_SHARE = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -16,10 +38,10 @@ class ComparedFrame:
     Attributes
     ----------
     number
-        Of the frame, from 1.
+        Number of the frame, from 1.
     vehicles, tracks
-        int64 `(n,)` and `(m,)`: which true vehicle and which predicted track each box is; an index
-        into the `vehicle_ids` and `track_ids` of the `Comparison`.
+        int64 `(n,)` and `(m,)`: the true vehicle and the predicted track of each box, as indices
+        into `vehicle_ids` and `track_ids` of the `Comparison`.
     vehicle_boxes, track_boxes
         float64 `(n, 4)` and `(m, 4)`: x, y, width, height in full-frame pixels.
     scores
@@ -29,8 +51,8 @@ class ComparedFrame:
     """
 
     number: int
-    vehicles: Integers
-    tracks: Integers
+    vehicles: Int64Array
+    tracks: Int64Array
     vehicle_boxes: Float64Array
     track_boxes: Float64Array
     scores: Float64Array
@@ -44,32 +66,154 @@ class Comparison:
     Attributes
     ----------
     frames
-        Of several pooled videos they stand end to end.
+        The frames of several pooled videos stand one after the other.
     vehicle_ids, track_ids
         int64: the id in its file of every vehicle and track that has a box in `frames`.
     seconds
-        Length of the video, None where it is not known.
+        Length of the video, None if it is not known.
     """
 
     frames: tuple[ComparedFrame, ...]
-    vehicle_ids: Integers
-    track_ids: Integers
+    vehicle_ids: Int64Array
+    track_ids: Int64Array
     seconds: float | None
 
-    def vehicle_lengths(self) -> Integers:
+    def vehicle_lengths(self) -> Int64Array:
         """Return the number of boxes of every vehicle, int64."""
         return counts((frame.vehicles for frame in self.frames), len(self.vehicle_ids))
 
-    def track_lengths(self) -> Integers:
+    def track_lengths(self) -> Int64Array:
         """Return the number of boxes of every track, int64."""
         return counts((frame.tracks for frame in self.frames), len(self.track_ids))
 
 
-def counts(indices: Iterable[Integers], length: int) -> Integers:
+def compare(
+    prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None = None
+) -> Comparison:
+    """Put predictions beside the truth of the same video and apply the ignore regions.
+
+    The video is taken to end with the last frame that either of them knows. If the truth covers
+    only a part of the video, cut the predictions with `until` first; otherwise all later ones are
+    false alarms.
+
+    Parameters
+    ----------
+    rate
+        Frames per second; None takes that of the predictions or the truth.
+
+    Raises
+    ------
+    TruthError
+        There are more than `MAX_IDS`, `MAX_IN_FRAME` or `MAX_PAIRS`, far more than on any road.
+    """
+    _check_size(prediction, truth)
+    numbers = np.union1d(prediction.frames, truth.frames).tolist()
+    kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
+    vehicle_ids = np.unique(joined(vehicles.ids for vehicles, _ in kept))
+    track_ids = np.unique(joined(tracks.ids for _, tracks in kept))
+    frames = [
+        ComparedFrame(
+            number,
+            np.searchsorted(vehicle_ids, vehicles.ids),
+            np.searchsorted(track_ids, tracks.ids),
+            vehicles.boxes,
+            tracks.boxes,
+            tracks.scores,
+            iou_matrix(vehicles.boxes, tracks.boxes),
+        )
+        for number, (vehicles, tracks) in zip(numbers, kept, strict=True)
+        if len(vehicles) or len(tracks)
+    ]
+    rate = rate or prediction.rate or truth.rate
+    seconds = max(prediction.last_frame, truth.last_frame) / rate if rate else None
+    return Comparison(tuple(frames), vehicle_ids, track_ids, seconds)
+
+
+def pool(comparisons: Sequence[Comparison]) -> Comparison:
+    """Join the comparisons of several videos; the scores of the result are their total.
+
+    The same id in two videos stands for two vehicles or tracks. The length is known only if that of
+    every video is.
+    """
+    frames: list[ComparedFrame] = []
+    vehicles = tracks = 0
+    for one in comparisons:
+        frames += [
+            replace(frame, vehicles=frame.vehicles + vehicles, tracks=frame.tracks + tracks)
+            for frame in one.frames
+        ]
+        vehicles += len(one.vehicle_ids)
+        tracks += len(one.track_ids)
+    seconds = [one.seconds for one in comparisons if one.seconds is not None]
+    return Comparison(
+        tuple(frames),
+        joined(one.vehicle_ids for one in comparisons),
+        joined(one.track_ids for one in comparisons),
+        sum(seconds) if len(seconds) == len(comparisons) else None,
+    )
+
+
+def assign(weights: npt.NDArray[Any]) -> tuple[Int64Array, Int64Array]:
+    """Pair rows with columns, each at most once, so that the sum of the weights is largest.
+
+    Parameters
+    ----------
+    weights
+        Shape `(n, m)`.
+
+    Returns
+    -------
+    Rows and columns of the pairs with a weight above 0, rows ascending.
+    """
+    from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
+
+    rows, columns = linear_sum_assignment(weights, maximize=True)
+    paired = weights[rows, columns] > np.finfo(np.float64).eps
+    return rows[paired], columns[paired]
+
+
+def at_least(overlaps: Float64Array, threshold: float) -> BoolArray:
+    """Return where `overlaps` reach `threshold`, up to the rounding of a float64."""
+    return np.asarray(overlaps >= threshold - np.finfo(np.float64).eps)
+
+
+def counts(indices: Iterable[Int64Array], length: int) -> Int64Array:
     """Return how often each of 0 … `length` - 1 occurs in all `indices` together, int64."""
     return np.bincount(joined(indices), minlength=length)
 
 
-def joined(arrays: Iterable[Integers]) -> Integers:
-    """Return one-dimensional arrays end to end; an empty one where there are none."""
+def joined(arrays: Iterable[Int64Array]) -> Int64Array:
+    """Return one-dimensional arrays as one; an empty one if there are none."""
     return np.concatenate([np.empty(0, np.int64), *arrays])
+
+
+def _check_size(prediction: LabelledVideo, truth: LabelledVideo) -> None:
+    """Refuse a comparison that would take hours and gigabytes."""
+    tracks, vehicles = (len(np.unique(each.ids)) for each in (prediction, truth))
+    found, found_counts = np.unique(prediction.frames, return_counts=True)
+    true, true_counts = np.unique(truth.frames, return_counts=True)
+    _, in_found, in_true = np.intersect1d(found, true, return_indices=True)
+    in_frames = int(np.sum(found_counts[in_found] * true_counts[in_true]))
+    most = max(found_counts.max(initial=0), true_counts.max(initial=0))
+    if (
+        max(tracks, vehicles) > MAX_IDS
+        or most > MAX_IN_FRAME
+        or max(tracks * vehicles, in_frames) > MAX_PAIRS
+    ):
+        raise TruthError(
+            f"{tracks:,} tracks with {len(prediction):,} boxes and {vehicles:,} vehicles with "
+            f"{len(truth):,}, up to {most:,} in one frame, are too many to compare; cut the video "
+            "into parts"
+        )
+
+
+def _apply_regions(
+    tracks: LabelledVideo, truth: LabelledVideo
+) -> tuple[LabelledVideo, LabelledVideo]:
+    """Return the vehicles and the predictions of a frame that count."""
+    vehicles, regions = truth.where(~truth.ignored), truth.where(truth.ignored)
+    iou = iou_matrix(vehicles.boxes, tracks.boxes)
+    _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
+    covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_SHARE)
+    covered[paired] = False
+    return vehicles, tracks.where(~np.asarray(covered.any(axis=1)))

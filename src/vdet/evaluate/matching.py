@@ -4,14 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.evaluate.assignment import assign, at_least
-from vdet.evaluate.comparison import ComparedFrame, Comparison
-from vdet.evaluate.labelled_video import Integers
-from vdet.evaluate.preprocessing import MATCH_IOU
-from vdet.geometry import Float64Array
+from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame, Comparison, assign, at_least
+from vdet.geometry import Float64Array, Int64Array
 
-_NOBODY = -1
-_LOYALTY = 1000.0  # outweighs any sum of overlaps
+UNMATCHED = -1
+"""Stands for the partner of a vehicle that no track has found."""
+
+_KEEP_BONUS = 1000.0  # larger than any sum of overlaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,19 +18,19 @@ class MatchedFrame:
     """A frame's pairs: row `vehicle_rows[i]` of its vehicles, row `track_rows[i]` of its tracks."""
 
     frame: ComparedFrame
-    vehicle_rows: Integers
-    track_rows: Integers
+    vehicle_rows: Int64Array
+    track_rows: Int64Array
 
     def __len__(self) -> int:
         return len(self.vehicle_rows)
 
     @property
-    def vehicles(self) -> Integers:
-        """The vehicles that were found, int64: as in `ComparedFrame.vehicles`."""
+    def vehicles(self) -> Int64Array:
+        """The vehicles that were found, int64: indices as in `ComparedFrame.vehicles`."""
         return self.frame.vehicles[self.vehicle_rows]
 
     @property
-    def tracks(self) -> Integers:
+    def tracks(self) -> Int64Array:
         """The track that found each of `vehicles`, int64."""
         return self.frame.tracks[self.track_rows]
 
@@ -44,24 +43,24 @@ class MatchedFrame:
 def match(comparison: Comparison) -> list[MatchedFrame]:
     """Pair vehicles with predictions in every frame, at IoU 0.5 and above.
 
-    A pair of the frame before stays together where it still overlaps enough; the others are paired
+    A pair of the previous frame stays together if it still overlaps enough; the others are paired
     so that the sum of IoU is largest. As in TrackEval, a frame without vehicles or without
-    predictions does not count as the frame before.
+    predictions does not count as the previous frame.
     Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
     MOT Metrics", 2008.
     """
-    partners = np.full(len(comparison.vehicle_ids), _NOBODY)
+    partners = np.full(len(comparison.vehicle_ids), UNMATCHED)
     matched = []
     for frame in comparison.frames:
         pairs = _match_frame(frame, partners)
         matched.append(pairs)
         if frame.iou.size:
-            partners[:] = _NOBODY
+            partners[:] = UNMATCHED
             partners[pairs.vehicles] = pairs.tracks
     return matched
 
 
-def _match_frame(frame: ComparedFrame, partners: Integers) -> MatchedFrame:
+def _match_frame(frame: ComparedFrame, partners: Int64Array) -> MatchedFrame:
     together = partners[frame.vehicles][:, np.newaxis] == frame.tracks[np.newaxis, :]
-    wishes = np.where(at_least(frame.iou, MATCH_IOU), frame.iou + _LOYALTY * together, 0)
-    return MatchedFrame(frame, *assign(wishes))
+    weights = np.where(at_least(frame.iou, MATCH_IOU), frame.iou + _KEEP_BONUS * together, 0)
+    return MatchedFrame(frame, *assign(weights))

@@ -1,26 +1,59 @@
-"""Where results go: numbers to a file or standard output, a report into a folder."""
+"""Results on their way out: tables as text, the checks of the output files, the report's file."""
 
 import importlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder, replacing
 
 PAGE = "report.html"
+ABSENT = "–"
+
+
+def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return aligned lines, headings first: the first column to the left, the others to the right.
+
+    Parameters
+    ----------
+    headings
+        One per column.
+    rows
+        One text per column each.
+    """
+    widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
+    return [_line(row, widths) for row in (headings, *rows)]
+
+
+def _line(row: Sequence[str], widths: Sequence[int]) -> str:
+    first, *others = zip(row, widths, strict=True)
+    cells = [first[0].ljust(first[1]), *(text.rjust(width) for text, width in others)]
+    return "  ".join(cells).rstrip()
+
+
+def share(value: float | None, digits: int = 3) -> str:
+    """Write a ratio; a dash for None."""
+    return ABSENT if value is None else f"{value:.{digits}f}"
 
 
 def check_outputs(
     json_target: str | None, report: Path | None, *, overwrite: bool, inputs: Iterable[Path]
 ) -> None:
-    """Refuse, before any work, what could not be written; the folder of a report is made.
+    """Refuse outputs that could not be written, before any work; make the report's folder.
 
-    `inputs` are the files that the work reads.
+    Parameters
+    ----------
+    json_target
+        File for the numbers, `-` for standard output, None for neither.
+    report
+        Folder for the report, None for no report.
+    inputs
+        Files that the work reads.
 
     Raises
     ------
     OutputError
-        A file is there already (and not `overwrite`) or cannot be written; matplotlib, which
+        A file exists already (and not `overwrite`) or cannot be written, or matplotlib, which
         draws the report, is not installed.
     """
     if json_target not in (None, "-"):

@@ -2,35 +2,39 @@
 
 from dataclasses import asdict, dataclass
 
-from vdet.evaluate.clear import clear
-from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.detection import detection
-from vdet.evaluate.hota import hota
-from vdet.evaluate.identity import identity
+from vdet.evaluate.comparison import Comparison, compare
+from vdet.evaluate.detection_metrics import detection_metrics
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.timeliness import FirstDetection, false_tracks, first_detections
+from vdet.evaluate.timelines import FirstDetection, first_detections, timelines
+from vdet.evaluate.tracking_metrics import (
+    clear_metrics,
+    false_tracks,
+    hota_metrics,
+    identity_metrics,
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """What the modules of the same names explain; every ratio with nothing to divide by is 0.
+    """The metrics of `detection_metrics`, `tracking_metrics` and `timelines`.
+
+    A ratio is 0 if there is nothing to divide by.
 
     Attributes
     ----------
     vehicles, vehicle_boxes, tracks, track_boxes
-        What was counted, ignore regions and what they swallowed aside.
+        What was counted, without ignore regions and the predictions dropped for them.
     first_detections
         One for every vehicle.
     mean_delay
-        Mean frames to the first detection of the vehicles found at all; None where none is.
+        Mean frames until the first detection, over the vehicles that were found; None if none was.
     never_found
         Vehicles without any match.
     false_tracks
-        Tracks of which more than half of the boxes match nothing.
+        Number of tracks of which more than half of the boxes match nothing.
     false_tracks_per_minute
-        None where the length of the video is not known.
+        None if the length of the video is not known.
     """
 
     vehicles: int
@@ -72,15 +76,15 @@ def score(prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None
     Parameters
     ----------
     rate
-        Frames a second; where it is not given, that of the predictions or the truth.
+        Frames per second; None takes that of the predictions or the truth.
     """
     return score_comparison(compare(prediction, truth, rate=rate))
 
 
 def score_comparison(comparison: Comparison) -> Scores:
-    """Score a comparison: one video, or several that `pool` has joined for their total."""
+    """Score a comparison: one video, or several that `pool` has joined."""
     matched = match(comparison)
-    first = first_detections(comparison, matched)
+    first = first_detections(timelines(comparison, matched))
     delays = [each.delay for each in first if each.delay is not None]
     wrong = false_tracks(comparison, matched)
     minutes = comparison.seconds / 60 if comparison.seconds else None
@@ -94,8 +98,8 @@ def score_comparison(comparison: Comparison) -> Scores:
         never_found=len(first) - len(delays),
         false_tracks=wrong,
         false_tracks_per_minute=wrong / minutes if minutes else None,
-        **asdict(detection(comparison, matched)),
-        **asdict(clear(comparison, matched)),
-        **asdict(identity(comparison)),
-        **asdict(hota(comparison)),
+        **asdict(detection_metrics(comparison, matched)),
+        **asdict(clear_metrics(comparison, matched)),
+        **asdict(identity_metrics(comparison)),
+        **asdict(hota_metrics(comparison)),
     )

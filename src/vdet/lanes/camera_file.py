@@ -1,4 +1,4 @@
-"""The file a camera is kept in: short YAML that a person can read, and check."""
+"""The camera file: a camera as short YAML that people can read."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +11,7 @@ from vdet.config.loading import format_key
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 from vdet.files import replacing
-from vdet.lanes.camera import Camera
+from vdet.lanes.camera import CalibratedCamera
 
 _Side = Annotated[int, Field(ge=16, le=100_000)]
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
@@ -26,18 +26,18 @@ class _CameraFile(Section):
     rms: float = Field(ge=0)
 
     @model_validator(mode="after")
-    def _matrix_has_its_form(self) -> "_CameraFile":
+    def _check_matrix_form(self) -> "_CameraFile":
         (_, skew, _), (zero, _, _), last = self.matrix
         if (skew, zero, last) != (0, 0, (0, 0, 1)):
             raise ValueError("matrix should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
         return self
 
 
-def save_camera(camera: Camera, path: Path) -> None:
+def save_camera(camera: CalibratedCamera, path: Path) -> None:
     """Write a camera as YAML. Raises `OutputError`."""
     rows = "\n".join(f"  - [{', '.join(map(repr, row))}]" for row in camera.matrix.tolist())
     text = f"""\
-# A camera, as `vdet calibrate` found it.
+# A camera, written by `vdet calibrate`.
 
 # frame size, pixels
 width: {camera.width}
@@ -54,13 +54,13 @@ rms: {camera.rms!r}
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def load_camera(path: Path) -> Camera:
-    """Read a camera.
+def load_camera(path: Path) -> CalibratedCamera:
+    """Read a camera file.
 
     Raises
     ------
     ConfigError
-        The file cannot be read, is not YAML, or is no camera; one line a mistake.
+        The file cannot be read, is not YAML, or is not a camera file; one line for each mistake.
     """
     document = read_document(path)
     try:
@@ -69,9 +69,11 @@ def load_camera(path: Path) -> Camera:
         lines = (_describe(detail, document, path) for detail in error.errors())
         raise mistakes(lines, error.error_count()) from error
     (fx, _, cx), (_, fy, cy), _ = read.matrix
-    camera = Camera(read.width, read.height, (fx, fy), (cx, cy), read.distortion, read.rms)
-    if camera.flaw:
-        raise ConfigError(f"{document.places['matrix',]}: matrix: {camera.flaw}")
+    camera = CalibratedCamera(
+        read.width, read.height, (fx, fy), (cx, cy), read.distortion, read.rms
+    )
+    if camera.problem:
+        raise ConfigError(f"{document.places['matrix',]}: matrix: {camera.problem}")
     return camera
 
 
@@ -81,9 +83,8 @@ def _describe(detail: ErrorDetails, document: Document, path: Path) -> str:
         case "missing":
             text = "is missing; `vdet calibrate` writes camera files"
         case "extra_forbidden":
-            text = (
-                f"is nothing that a camera file has; known: {', '.join(_CameraFile.model_fields)}"
-            )
+            known = ", ".join(_CameraFile.model_fields)
+            text = f"is not a key of camera files; known: {known}"
         case _:
             text = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
     place = _place(document, key, path)
@@ -91,7 +92,7 @@ def _describe(detail: ErrorDetails, document: Document, path: Path) -> str:
 
 
 def _place(document: Document, key: Key, path: Path) -> str:
-    """Return where `key` stands, or what it should be in."""
+    """Return the place of `key`, or of the nearest key around it that the file has."""
     if key in document.places or not key:
         return document.places.get(key, str(path))
     return _place(document, key[:-1], path)

@@ -1,14 +1,18 @@
-"""The two lines of a lane as curves on the ground, as a camera sees them.
+"""The two lines of a lane as curves on the ground, and their least-squares fit to paint.
 
-Lines of one lane bend alike, so they share curvature and heading; each has its own place. A car
-that pitches up or down sees straight parallel lines run together or apart. With z the distance
-ahead at which a point appears (`view`), the camera sees each line at::
+The lines of a lane are parallel, so they share curvature and heading. A vehicle that pitches up or
+down sees parallel lines converge or diverge. With z the distance ahead at which a point appears in
+the top view, the camera sees each line at::
 
-    seen(z) = 1 - pitch · z
-    x(z) = place · seen(z) + heading · z + bend · z² / seen(z)
+    scale(z) = 1 - pitch · z
+    x(z) = position · scale(z) + heading · z + bend · z² / scale(z)
 
-This is place + heading · Z + bend · Z² at the true distance Z = z / seen(z), which a pitch makes
-look like z, and all widths there like seen(z) times as large.
+This is position + heading · Z + bend · Z² at the true distance Z = z / scale(z). A pitch makes Z
+look like z, and widths there look scale(z) times as large.
+
+The curves are linear in their five parameters, except for two products with the pitch. There a
+guess takes the place of the other factor. Every painted row has the same weight. Normal equations
+of several frames can be added, so earlier frames count with less weight and need no second fit.
 """
 
 from dataclasses import dataclass
@@ -16,22 +20,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.geometry import Float64Array
+from vdet.lanes.paint import LinePaint, LinePositions
 
-_LEAST_SEEN = 0.3  # no pitch of a car that is on its wheels makes less of a width
+_MIN_SCALE = 0.3  # the pitch of a real vehicle keeps the scale above this
+_PITCH = 4  # index of the pitch among the five parameters, in the order of `LaneCurves`
+
+# Prior knowledge: how many painted rows (deviation 0.1 m) a typical deviation counts as.
+_BEND_WEIGHT = (0.1 / 0.001) ** 2
+_PITCH_WEIGHT = (0.1 / 0.003) ** 2
+_WIDTH_WEIGHT = (0.1 / 0.2) ** 2
+_MIN_WEIGHT = 1e-3  # keeps the equations solvable
 
 
 @dataclass(frozen=True, slots=True)
-class Curves:
+class LaneCurves:
     """Both lines of a lane: second order in the distance ahead, metres to the right."""
 
     bend: float
-    """Half the curvature, 1/m, positive to the right."""
+    """Half the curvature, 1/m, positive in a bend to the right."""
     heading: float
+    """Slope of the lines beside the camera: metres to the right per metre ahead."""
     left: float
-    """Place of the left line beside the camera, metres."""
+    """Position of the left line beside the camera, metres."""
     right: float
+    """Position of the right line beside the camera, metres."""
     pitch: float
-    """Tangent of the car's pitch by the camera's height, 1/m."""
+    """Tangent of the vehicle's pitch divided by the camera's height, 1/m."""
 
     @property
     def width(self) -> float:
@@ -39,28 +53,69 @@ class Curves:
         return self.right - self.left
 
     @property
-    def hold_camera(self) -> bool:
+    def contain_camera(self) -> bool:
         """Whether the camera is between the lines."""
         return self.left < 0 < self.right
 
-    def at(self, z: Float64Array) -> tuple[Float64Array, Float64Array]:
+    def at(self, z: Float64Array) -> LinePositions:
         """Return x of the left and of the right line at distances `(n,)`, as the camera sees it."""
-        seen = seen_width(z, self.pitch)
-        common = self.heading * z + self.bend * z**2 / seen
-        return self.left * seen + common, self.right * seen + common
+        scale = pitch_scale(z, self.pitch)
+        common = self.heading * z + self.bend * z**2 / scale
+        return self.left * scale + common, self.right * scale + common
 
 
-def seen_width(z: Float64Array, pitch: float) -> Float64Array:
-    """Return as how many metres a metre across is seen at distances `(n,)`."""
-    return np.maximum(1 - pitch * z, _LEAST_SEEN)
+def pitch_scale(z: Float64Array, pitch: float) -> Float64Array:
+    """Return how much larger than without pitch a width appears at distances `(n,)`."""
+    return np.maximum(1 - pitch * z, _MIN_SCALE)
 
 
 @dataclass(frozen=True, slots=True)
-class Paint:
-    """Rows of paint that may belong to one line: distances and lateral places, metres, `(n,)`."""
+class NormalEquations:
+    """Normal equations of a least-squares fit of `LaneCurves`, `(5, 5)` and `(5,)`."""
 
-    z: Float64Array
-    x: Float64Array
+    matrix: Float64Array
+    vector: Float64Array
+
+    def plus_earlier(self, earlier: "NormalEquations", memory: float) -> "NormalEquations":
+        """Add the equations of earlier frames, weighted by `memory`, without their pitch.
+
+        The pitch of a vehicle changes from frame to frame; its position and the road do not. The
+        earlier pitch is eliminated (Schur complement).
+        """
+        share = earlier.matrix[:, _PITCH] / (earlier.matrix[_PITCH, _PITCH] + _PITCH_WEIGHT)
+        matrix = earlier.matrix - np.outer(share, earlier.matrix[_PITCH])
+        vector = earlier.vector - share * earlier.vector[_PITCH]
+        matrix[_PITCH] = matrix[:, _PITCH] = vector[_PITCH] = 0
+        return NormalEquations(self.matrix + memory * matrix, self.vector + memory * vector)
 
 
-NONE = Paint(np.empty(0), np.empty(0))
+def normal_equations(left: LinePaint, right: LinePaint, guess: LaneCurves) -> NormalEquations:
+    """Return the equations that the paint of both lines gives; `guess` linearizes the pitch."""
+    rows = np.concatenate(
+        [_rows(left, (1, 0), guess.left, guess), _rows(right, (0, 1), guess.right, guess)]
+    )
+    return NormalEquations(rows.T @ rows, rows.T @ np.concatenate([left.x, right.x]))
+
+
+def solve(equations: NormalEquations, width: float) -> LaneCurves:
+    """Return the curves that fit best.
+
+    With little paint, they are straight and level, and the lane is `width` metres wide.
+    """
+    apart = np.array([0, 0, -1, 1, 0])
+    prior = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
+    prior += _WIDTH_WEIGHT * np.outer(apart, apart)
+    vector = equations.vector + _WIDTH_WEIGHT * width * apart
+    return LaneCurves(*np.linalg.solve(equations.matrix + prior, vector).tolist())
+
+
+def _rows(
+    paint: LinePaint, side: tuple[int, int], position: float, guess: LaneCurves
+) -> Float64Array:
+    """Return the coefficients of the five parameters at each painted row of a line, `(n, 5)`."""
+    rows = np.empty((len(paint.z), 5))
+    rows[:, 0] = paint.z**2 / pitch_scale(paint.z, guess.pitch)
+    rows[:, 1] = paint.z
+    rows[:, 2:4] = side
+    rows[:, _PITCH] = -position * paint.z
+    return rows

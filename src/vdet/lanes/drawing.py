@@ -2,10 +2,11 @@
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from vdet.lanes.finder import Glance
-from vdet.lanes.lane import Lane, Polyline
-from vdet.lanes.view import View
+from vdet.geometry import Float64Array
+from vdet.lanes.lane import Lane
+from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
 Color = tuple[int, int, int]
@@ -13,21 +14,21 @@ Color = tuple[int, int, int]
 AREA: Color = (80, 200, 60)
 LINE: Color = (40, 60, 255)
 _TEXT: Color = (255, 255, 255)
-_SHADE: Color = (0, 0, 0)
+_SHADOW: Color = (0, 0, 0)
 _OPACITY = 0.3
 _SHIFT = 4  # fractional bits of the coordinates given to OpenCV
-_ENLARGED = 2  # pictures from above are small
+_SCALE = 2  # top views are small, so their pictures are enlarged
 
 
 def draw_lane(image: Image, lane: Lane) -> None:
-    """Draw the lane's area and lines into an undistorted frame, and write what is told of it."""
+    """Draw the lane's area and lines into an undistorted frame, and write its numbers."""
     _draw_area(image, lane.left, lane.right)
     for number, text in enumerate(lane_text(lane)):
         _write(image, text, number)
 
 
 def lane_text(lane: Lane) -> tuple[str, str]:
-    """Say in words how the lane bends, and where in it the camera is."""
+    """Return two lines of text: the lane's width and bend, and the camera's place in it."""
     side = "left" if lane.curvature < 0 else "right"
     bend = f"bends {side}, radius {lane.radius:.0f} m" if lane.radius else "straight"
     place = "right" if lane.offset > 0 else "left"
@@ -37,53 +38,61 @@ def lane_text(lane: Lane) -> tuple[str, str]:
     )
 
 
-def lane_pictures(image: Image, glance: Glance, lane: Lane | None, view: View) -> dict[str, Image]:
-    """Return a picture of every stage: the stretch of road, seen from above, its paint, the fit.
+def stage_pictures(
+    image: Image, top: Image, mask: Image, lane: Lane | None, top_view: TopView
+) -> dict[str, Image]:
+    """Return pictures of the stages: `road`, `above`, `mask` and `fit`, BGR uint8.
 
     Parameters
     ----------
     image
-        The undistorted frame, BGR uint8 `(H, W, 3)`; not changed.
+        The undistorted frame, BGR uint8 `(H, W, 3)`; `road` shows the outline of the top view
+        in it.
+    top
+        The top view of the frame, BGR uint8 `(rows, columns, 3)`; `above`, and `fit` with the lane.
+    mask
+        The paint in the top view, uint8 `(rows, columns)`.
     """
     road = image.copy()
-    cv2.polylines(road, [_fixed(view.outline)], True, LINE, _thickness(image), cv2.LINE_AA, _SHIFT)
-    fit = _enlarged(glance.above)
+    outline = _fixed_point(top_view.outline)
+    cv2.polylines(road, [outline], True, LINE, _thickness(image), cv2.LINE_AA, _SHIFT)
+    fit = _enlarge(top)
     if lane:
-        _draw_area(fit, *(view.to_above(line) * _ENLARGED for line in (lane.left, lane.right)))
+        _draw_area(fit, *(top_view.frame_to_top(line) * _SCALE for line in (lane.left, lane.right)))
     return {
         "road": road,
-        "above": _enlarged(glance.above),
-        "mask": _enlarged(np.asarray(cv2.cvtColor(glance.mask, cv2.COLOR_GRAY2BGR), np.uint8)),
+        "above": _enlarge(top),
+        "mask": _enlarge(np.asarray(cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR), np.uint8)),
         "fit": fit,
     }
 
 
-def _draw_area(image: Image, left: Polyline, right: Polyline) -> None:
-    """Shade what is between the lines, and draw them."""
+def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
+    """Tint the area between two lines, pixels `(n, 2)`, and draw the lines."""
     area = np.concatenate([left, right[::-1]])
     height, width = image.shape[:2]
     x0, y0 = np.clip(area.min(axis=0), 0, (width, height)).astype(int)
     x1, y1 = np.clip(area.max(axis=0) + 2, 0, (width, height)).astype(int)
-    around = image[y0:y1, x0:x1]  # the rest stays as it is
-    shaded = around.copy()
-    cv2.fillPoly(shaded, [_fixed(area - (x0, y0))], AREA, cv2.LINE_8, _SHIFT)
-    around[:] = cv2.addWeighted(shaded, _OPACITY, around, 1 - _OPACITY, 0)
-    lines = [_fixed(left), _fixed(right)]
+    around = image[y0:y1, x0:x1]  # blend only the part that changes
+    tinted = around.copy()
+    cv2.fillPoly(tinted, [_fixed_point(area - (x0, y0))], AREA, cv2.LINE_8, _SHIFT)
+    around[:] = cv2.addWeighted(tinted, _OPACITY, around, 1 - _OPACITY, 0)
+    lines = [_fixed_point(left), _fixed_point(right)]
     cv2.polylines(image, lines, False, LINE, _thickness(image), cv2.LINE_AA, _SHIFT)
 
 
 def _write(image: Image, text: str, number: int) -> None:
-    """Write a line of text into the upper left corner."""
+    """Write text into the upper left corner, in line `number` from 0."""
     scale = max(0.35, len(image) / 900)
     thickness = max(1, round(2 * scale))
     origin = round(20 * scale), round(40 * scale * (number + 1))
     font = cv2.FONT_HERSHEY_SIMPLEX
-    cv2.putText(image, text, origin, font, scale, _SHADE, 3 * thickness, cv2.LINE_8)
+    cv2.putText(image, text, origin, font, scale, _SHADOW, 3 * thickness, cv2.LINE_8)
     cv2.putText(image, text, origin, font, scale, _TEXT, thickness, cv2.LINE_AA)
 
 
-def _enlarged(picture: Image) -> Image:
-    size = (picture.shape[1] * _ENLARGED, picture.shape[0] * _ENLARGED)
+def _enlarge(picture: Image) -> Image:
+    size = (picture.shape[1] * _SCALE, picture.shape[0] * _SCALE)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
@@ -91,5 +100,5 @@ def _thickness(image: Image) -> int:
     return max(1, len(image) // 240)
 
 
-def _fixed(points: Polyline) -> np.ndarray[tuple[int, ...], np.dtype[np.int32]]:
+def _fixed_point(points: Float64Array) -> npt.NDArray[np.int32]:
     return np.rint(points * (1 << _SHIFT)).astype(np.int32)

@@ -1,26 +1,46 @@
-"""What is told of the lane in a frame."""
+"""The lane in one frame, and its JSON form."""
 
 from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-Polyline = npt.NDArray[np.float64]
+from vdet.geometry import Float64Array
 
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """The lane that the camera is in, in metres, and its lines in the undistorted frame."""
+    """The lane that the camera is in: its shape in metres, its two lines in pixels.
+
+    The lines are in the undistorted frame, `(n, 2)` as `x, y`, and begin at the nearest point.
+    """
 
     curvature: float
-    """1/m, positive to the right; smoothed over more frames than the lines."""
+    """1/m, positive in a bend to the right; smoothed over more frames than the lines."""
     radius: float | None
-    """Of the bend, metres; None where the road is straight (`lanes.track.straight`)."""
+    """Radius of the bend, metres; None if the road is straight (setting `lanes.track.straight`)."""
     offset: float
-    """Of the camera from the lane's middle, metres, positive to the right."""
+    """Distance of the camera from the middle of the lane, metres; positive: it is to the right."""
     width: float
-    """Metres."""
-    left: Polyline
-    """The left line, pixels `(n, 2)` of the undistorted frame, the nearest point first."""
-    right: Polyline
-    """The right line, likewise."""
+    """Width of the lane, metres."""
+    left: Float64Array
+    right: Float64Array
+
+
+def lane_record(lane: Lane | None) -> dict[str, Any] | None:
+    """Return a lane as plain values for JSON; None if there is none.
+
+    `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres.
+    `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths. All mean the same as in `Lane`.
+    """
+    if lane is None:
+        return None
+    return {
+        "radius": None if lane.radius is None else round(lane.radius, 3),
+        "offset": round(lane.offset, 3),
+        "width": round(lane.width, 3),
+        "left": _points(lane.left),
+        "right": _points(lane.right),
+    }
+
+
+def _points(line: Float64Array) -> list[list[float]]:
+    return [[round(x, 1), round(y, 1)] for x, y in line.tolist()]

@@ -1,75 +1,159 @@
-"""The road in frames as the camera delivers them: undistorted, with its lane."""
+"""The road in the frames of a video: each frame undistorted, with its lane.
+
+`RoadFinder.observe` does what needs one frame alone. `RoadFinder.update` takes the frames in their
+order: it fits the lane near the last one, or finds a new one, and smooths it over time.
+"""
 
 from dataclasses import dataclass
 
-from vdet.config.lanes import LaneSettings
+import numpy as np
+
+from vdet.config.lanes import LaneSettings, LaneTrackSettings
 from vdet.geometry import Box
-from vdet.lanes.camera import Camera
-from vdet.lanes.drawing import lane_pictures
-from vdet.lanes.finder import Glance, LaneFinder
+from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.lanes.curves import LaneCurves, NormalEquations, solve
+from vdet.lanes.drawing import stage_pictures
+from vdet.lanes.frame_fit import FrameFit, fit_near, fit_new
 from vdet.lanes.lane import Lane
-from vdet.lanes.undistortion import Undistorter
-from vdet.lanes.view import View
+from vdet.lanes.paint import paint_mask
+from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
+
+_LINE_POINTS = 24  # of each line of a `Lane`
 
 
 @dataclass(frozen=True, slots=True)
 class LaneRequest:
-    """Lanes are to be found; `camera` took the frames, None where they are undistorted already."""
+    """Ask for lanes; `camera` took the frames, None if they are undistorted already."""
 
-    camera: Camera | None = None
+    camera: CalibratedCamera | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
-    """What one frame shows by itself."""
+class FrameView:
+    """One frame, prepared for the lane search."""
 
     image: Image
-    """The undistorted frame, BGR uint8 `(H, W, 3)`; the frame itself where no camera is given."""
-    glance: Glance
+    """The undistorted frame, BGR uint8 `(H, W, 3)`; the frame itself if there is no camera."""
+    top: Image
+    """The road from above, BGR uint8 `(rows, columns, 3)`."""
+    mask: Image
+    """The paint on it, uint8 `(rows, columns)`: 255 for paint, else 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class Road:
     """The road in one frame of a video."""
 
-    image: Image
-    """As in `Look`."""
+    view: FrameView
+    """The frame's pictures, from `RoadFinder.observe`."""
     lane: Lane | None
-    """None where none is known well enough."""
-    glance: Glance
-    view: View
+    """The lane, smoothed over this frame and those before; None if it is not reliably known."""
+    top_view: TopView
     undistorter: Undistorter | None
 
+    @property
+    def image(self) -> Image:
+        """The undistorted frame, BGR uint8 `(H, W, 3)`; the frame itself if there is no camera."""
+        return self.view.image
+
     def place(self, box: Box) -> Box:
-        """Return where what `box` holds in the frame lies in `image`; area 0: outside it."""
+        """Return the box in `image` for a box in the original frame; area 0 if it lies outside."""
         return self.undistorter.box(box) if self.undistorter else box
 
     def pictures(self) -> dict[str, Image]:
-        """Return a picture of every stage of finding the lane, as `lane_pictures` does."""
-        return lane_pictures(self.image, self.glance, self.lane, self.view)
+        """Return a picture of every stage of finding the lane, as `stage_pictures` makes them."""
+        view = self.view
+        return stage_pictures(view.image, view.top, view.mask, self.lane, self.top_view)
 
 
-class RoadWatch:
-    """Undistorts the frames of one video and finds the lane in them.
+@dataclass(frozen=True, slots=True)
+class _LaneState:
+    """What the frames so far say about the lane."""
 
-    `look` may be called by many threads at a time; `follow` takes the looks in order.
-    Raises `ConfigError` for frames of another shape than the camera's.
+    curves: LaneCurves
+    equations: NormalEquations
+    unseen: tuple[int, int]
+    """Number of frames since the left and the right line were last seen."""
+    curvature: float
+    """1/m, smoothed over more frames than the curves."""
+
+
+class RoadFinder:
+    """Undistorts the frames of one video, `width` × `height` pixels, and finds the lane in them.
+
+    Several threads may call `observe` at the same time. `update` must get the results one by one,
+    in the order of the frames.
+
+    Raises
+    ------
+    ConfigError
+        The aspect ratio of the frames is not the camera's.
     """
 
     def __init__(
         self, request: LaneRequest, settings: LaneSettings, width: int, height: int
     ) -> None:
         camera = request.camera
+        self._settings = settings
         self._undistorter = Undistorter(camera, width, height) if camera else None
-        self._finder = LaneFinder(settings, width, height)
+        self._top_view = TopView(settings.view, width, height)
+        self._state: _LaneState | None = None
 
-    def look(self, image: Image) -> Look:
-        """Undistort a frame, BGR uint8 `(H, W, 3)`, and pick out the paint on its road."""
+    def observe(self, image: Image) -> FrameView:
+        """Undistort a frame, BGR uint8 `(H, W, 3)`, and mark the paint in its top view."""
         undistorted = self._undistorter.image(image) if self._undistorter else image
-        return Look(undistorted, self._finder.glance(undistorted))
+        top = self._top_view.image(undistorted)
+        mask = paint_mask(top, self._settings.mask, self._top_view.across)
+        return FrameView(undistorted, top, mask)
 
-    def follow(self, look: Look) -> Road:
-        """Take the next frame in."""
-        lane = self._finder.follow(look.glance)
-        return Road(look.image, lane, look.glance, self._finder.view, self._undistorter)
+    def update(self, view: FrameView) -> Road:
+        """Return the road in the next frame."""
+        self._state = self._next_state(view.mask)
+        lane = self._lane(self._state) if self._state else None
+        return Road(view, lane, self._top_view, self._undistorter)
+
+    def _next_state(self, mask: Image) -> _LaneState | None:
+        """Fit near the last lane; else find a new one; else keep the last one for some frames."""
+        settings, state = self._settings, self._state
+        near = fit_near(mask, self._top_view, state.curves, settings) if state else None
+        if state and near and (updated := _advance(state, near, settings.track)):
+            return updated
+        if new := fit_new(mask, self._top_view, settings):
+            return _LaneState(new.curves, new.equations, (0, 0), 2 * new.curves.bend)
+        return _advance(state, None, settings.track) if state and not near else None
+
+    def _lane(self, state: _LaneState) -> Lane:
+        curves, curvature = state.curves, state.curvature
+        far, near = self._top_view.distances[[0, -1]]
+        z = np.geomspace(near, far, _LINE_POINTS)
+        left, right = curves.at(z)
+        straight = abs(curvature) * self._settings.track.straight < 1
+        return Lane(
+            curvature=curvature,
+            radius=None if straight else 1 / abs(curvature),
+            offset=-(curves.left + curves.right) / 2,
+            width=curves.width,
+            left=self._top_view.ground_to_frame(left, z),
+            right=self._top_view.ground_to_frame(right, z),
+        )
+
+
+def _advance(
+    state: _LaneState, fit: FrameFit | None, settings: LaneTrackSettings
+) -> _LaneState | None:
+    """Add the fit of the next frame, None if it shows no lane; None if the lane is lost.
+
+    The lane is lost if one of its lines was not seen in more than `settings.carry` frames in a
+    row, or if the camera has left it.
+    """
+    seen = fit.seen if fit else (False, False)
+    left, right = (0 if now else before + 1 for now, before in zip(seen, state.unseen, strict=True))
+    curves, equations, curvature = state.curves, state.equations, state.curvature
+    if fit:
+        equations = fit.equations.plus_earlier(equations, settings.memory)
+        curves = solve(equations, curves.width)
+        curvature += (1 - settings.curve_memory) * (2 * curves.bend - curvature)
+    if max(left, right) > settings.carry or not curves.contain_camera:
+        return None
+    return _LaneState(curves, equations, (left, right), curvature)

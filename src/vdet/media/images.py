@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet import MAX_PICTURE_PIXELS, MAX_PICTURE_SIDE
 from vdet.errors import ImageError
 from vdet.files import read_whole, replacing
 from vdet.media.captured import capture_stderr
@@ -17,10 +16,14 @@ Image = npt.NDArray[np.uint8]
 
 log = logging.getLogger("vdet")
 
+MAX_PICTURE_PIXELS = 2**25
+"""A picture of more pixels is not read: an 8K frame has fewer."""
+MAX_PICTURE_SIDE = 2**15
+
 MAX_BYTES = 256_000_000
 """Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits, not compressed at all."""
 
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
+PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 
 
 def read_image(path: Path) -> Image:
@@ -102,13 +105,19 @@ def _to_uint8(image: cv2.typing.MatLike) -> Image:
     return scaled
 
 
-def write_image(path: Path, image: Image) -> None:
-    """Write a picture in the format that the suffix names. Raises `ImageError`, `OutputError`."""
+def encode_image(image: Image, path: Path) -> bytes:
+    """Encode a picture in the format that the suffix of `path` names. Raises `ImageError`."""
     try:
         written, data = cv2.imencode(path.suffix, image)
     except cv2.error:
         written = False
     if not written:
-        raise ImageError(f"{path}: pictures are written as {', '.join(sorted(SUFFIXES))}")
+        raise ImageError(f"{path}: pictures are written as {', '.join(sorted(PICTURE_SUFFIXES))}")
+    return data.tobytes()
+
+
+def write_image(path: Path, image: Image) -> None:
+    """Write a picture in the format that the suffix names. Raises `ImageError`, `OutputError`."""
+    data = encode_image(image, path)
     with replacing(path) as temporary:
-        temporary.write_bytes(data.tobytes())
+        temporary.write_bytes(data)

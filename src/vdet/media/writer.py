@@ -9,7 +9,6 @@ import av
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.files import replacing
 from vdet.media.encoder import Encoder
 from vdet.media.frame import Frame, VideoInfo
 
@@ -77,12 +76,14 @@ class VideoWriter:
         info: VideoInfo,
         settings: OutputSettings,
         *,
+        name: Path | None = None,
         whole_sound: bool = True,
         threads: int | None = None,
     ) -> None:
         if path.suffix.lower() not in SUFFIXES:
             raise OutputError(f"{path}: videos are written as {', '.join(SUFFIXES)}; name it so")
-        self._path = path
+        self._file = path
+        self._path = name or path
         self._info = info
         self._settings = settings
         self._whole_sound = whole_sound
@@ -91,7 +92,6 @@ class VideoWriter:
 
     def __enter__(self) -> Self:
         with contextlib.ExitStack() as stack:
-            self._temporary = stack.enter_context(replacing(self._path))
             stack.push(self._refuse_none)
             stack.enter_context(self._naming_the_file())
             self._stack = stack.pop_all()
@@ -109,7 +109,7 @@ class VideoWriter:
 
     def _open(self, first: Frame) -> Encoder:
         return Encoder(
-            self._temporary,
+            self._file,
             self._info,
             self._settings,
             origin=first.time,

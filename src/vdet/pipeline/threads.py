@@ -1,8 +1,8 @@
-"""Threads with bounded queues: items keep their order, an error anywhere ends everything.
+"""Threads with bounded queues: items keep their order, an error in one thread ends all.
 
-Each part is a context manager; when its block is left, however, its threads have ended. The one
-exception: a thread that hangs in a read or write which never ends (a network disk that is gone) is
-left alone after a moment, together with what it alone has open.
+Each part is a context manager. When its block ends, its threads have ended. There is one exception:
+a thread that hangs in a read or write (for instance on a network disk that is gone) is abandoned
+after `JOIN_TIMEOUT`, together with the files that only it has open.
 """
 
 import contextlib
@@ -20,69 +20,69 @@ from threadpoolctl import threadpool_limits
 T = TypeVar("T")
 R = TypeVar("R")
 
-_TICK = 0.1  # seconds between looks at whether all is over
-_MOMENT = 2.0  # seconds that a thread is given to end, once all is over
+POLL_INTERVAL = 0.1  # seconds between checks whether the other side has ended
+JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
 
 
 class _End:
-    """Comes through a queue after the last item, with the error that ended them, if one did."""
+    """The last entry of a queue, with the error that ended the items, if there was one."""
 
     def __init__(self, error: BaseException | None = None) -> None:
         self.error = error
 
 
-class Stalled(Exception):  # noqa: N818
-    """The other side did not move for as long as one has patience."""
+class StalledError(Exception):
+    """The other side did not give or take an item in time."""
 
 
-class _Over(Exception):  # noqa: N818
+class _ClosedError(Exception):
     """Ends a thread when the other side has ended with an error."""
 
 
 class _Channel(Generic[T]):
-    """A bounded queue that either side can give up."""
+    """A bounded queue that either side can close."""
 
     def __init__(self, depth: int) -> None:
         self._queue: queue.Queue[T | _End] = queue.Queue(depth)
-        self._given_up = threading.Event()
+        self._closed = threading.Event()
 
-    def put(self, item: T | _End, patience: float | None = None) -> bool:
-        """Wait for room; return False if nobody will read any more."""
+    def put(self, item: T | _End, timeout: float | None = None) -> bool:
+        """Wait for room; return False if the queue is closed."""
         waited = 0.0
-        while not self._given_up.is_set():
+        while not self._closed.is_set():
             with contextlib.suppress(queue.Full):
-                self._queue.put(item, timeout=_TICK)
+                self._queue.put(item, timeout=POLL_INTERVAL)
                 return True
-            waited += _TICK
-            if patience is not None and waited >= patience:
-                raise Stalled
+            waited += POLL_INTERVAL
+            if timeout is not None and waited >= timeout:
+                raise StalledError
         return False
 
-    def take(self, patience: float | None = None) -> Iterator[T]:
-        while not isinstance(item := self._next(patience), _End):
+    def take(self, timeout: float | None = None) -> Iterator[T]:
+        while not isinstance(item := self._next(timeout), _End):
             yield item
         if item.error is not None:
             raise item.error
 
-    def give_up(self) -> None:
-        self._given_up.set()
+    def close(self) -> None:
+        self._closed.set()
 
-    def _next(self, patience: float | None) -> T | _End:
+    def _next(self, timeout: float | None) -> T | _End:
         try:
-            item = self._queue.get(timeout=patience)
+            item = self._queue.get(timeout=timeout)
         except queue.Empty:
-            raise Stalled from None
-        return _End(_Over()) if self._given_up.is_set() else item
+            raise StalledError from None
+        return _End(_ClosedError()) if self._closed.is_set() else item
 
 
 @contextlib.contextmanager
-def ahead(
-    items: Iterable[T], depth: int = 4, *, patience: float | None = None
+def prefetch(
+    items: Iterable[T], depth: int = 4, *, timeout: float | None = None
 ) -> Iterator[Iterator[T]]:
-    """Go through `items` in a thread; at most `depth` wait for the reader, and one for room.
+    """Take `items` in a thread, ahead of the reader; at most `depth` wait, and one for room.
 
-    A generator is also closed in that thread. `Stalled` is raised where the next item does not come
-    within `patience` seconds.
+    A generator is closed in that thread too. If the next item does not come within `timeout`
+    seconds, `StalledError` is raised.
     """
     channel: _Channel[T] = _Channel(depth)
 
@@ -96,37 +96,37 @@ def ahead(
         except BaseException as error:
             channel.put(_End(error))
 
-    thread = threading.Thread(target=fill, name="vdet-ahead", daemon=True)
+    thread = threading.Thread(target=fill, name="vdet-prefetch", daemon=True)
     thread.start()
     try:
-        yield channel.take(patience)
+        yield channel.take(timeout)
     finally:
-        channel.give_up()
-        thread.join(_MOMENT)
+        channel.close()
+        thread.join(JOIN_TIMEOUT)
 
 
-def aside(call: Callable[[], T], *, patience: float | None = None) -> T:
-    """Return what `call` gives; it runs in a thread, so that even if it hangs Ctrl-C is heard.
+def run_in_thread(call: Callable[[], T], *, timeout: float | None = None) -> T:
+    """Return the result of `call`; it runs in a thread, so that Ctrl-C works even if it hangs.
 
-    `Stalled` is raised where it does not end within `patience` seconds.
+    `StalledError` is raised if it does not end within `timeout` seconds.
     """
-    with ahead((call() for _ in range(1)), patience=patience) as results:
+    with prefetch((call() for _ in range(1)), timeout=timeout) as results:
         return next(results)
 
 
 @contextlib.contextmanager
-def behind(
+def write_async(
     take: Callable[[T], object],
     depth: int = 4,
     *,
     within: AbstractContextManager[object] | None = None,
-    patience: float | None = None,
+    timeout: float | None = None,
 ) -> Iterator[Callable[[T], None]]:
-    """Give a function that hands items to `take` in a thread, at most `depth` of them waiting.
+    """Give a function that passes items to `take` in a thread; at most `depth` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
-    one. An error of either is raised by the next call, or when the block ends; `Stalled` by a
-    call for which there is no room within `patience` seconds.
+    one. An error in the thread is raised by the next call, or when the block ends. A call raises
+    `StalledError` if there is no room within `timeout` seconds.
     """
     channel: _Channel[T] = _Channel(depth)
     failures: list[BaseException] = []
@@ -138,23 +138,23 @@ def behind(
                     take(item)
         except BaseException as error:
             failures.append(error)
-            channel.give_up()
+            channel.close()
 
-    def hand_over(item: T) -> None:
-        if not channel.put(item, patience):
+    def put(item: T) -> None:
+        if not channel.put(item, timeout):
             raise failures[0]
 
-    thread = threading.Thread(target=drain, name="vdet-behind", daemon=True)
+    thread = threading.Thread(target=drain, name="vdet-write", daemon=True)
     thread.start()
     try:
-        yield hand_over
+        yield put
         channel.put(_End())
         thread.join()
     except BaseException:
-        with contextlib.suppress(Stalled):
-            channel.put(_End(_Over()), _MOMENT)
-        thread.join(_MOMENT)
-        channel.give_up()
+        with contextlib.suppress(StalledError):
+            channel.put(_End(_ClosedError()), JOIN_TIMEOUT)
+        thread.join(JOIN_TIMEOUT)
+        channel.close()
         raise
     if failures:
         raise failures[0]
@@ -165,10 +165,10 @@ def _closing(items: Iterable[object]) -> AbstractContextManager[object]:
 
 
 @contextlib.contextmanager
-def each_with(
+def map_ordered(
     function: Callable[[T], R], items: Iterable[T], threads: int
 ) -> Iterator[Iterator[tuple[T, R]]]:
-    """Pair items with what `function` makes of them, some in parallel, all in order."""
+    """Pair items with the results of `function`, computed in parallel, in their order."""
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
         def pairs() -> Iterator[tuple[T, R]]:
@@ -188,8 +188,8 @@ def each_with(
 
 
 @contextlib.contextmanager
-def quiet_libraries() -> Iterator[None]:
-    """Keep OpenCV and BLAS to one thread a call: the parallel work is by frames."""
+def single_threaded_libraries() -> Iterator[None]:
+    """Limit OpenCV and BLAS to one thread a call: frames are what is processed in parallel."""
     threads = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:

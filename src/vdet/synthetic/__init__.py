@@ -1,26 +1,26 @@
-"""Road scenes and patches drawn in code, with their truth: the demo and the tests live on them.
+"""Drawn road scenes and patches with their truth, for the demo and the tests.
 
-`scene` says what a scene is, `worlds` makes some from a seed, `render` draws them, `truth` tells
-where the vehicles are, `patches` and `clip` write them to files.
+`scene` describes a scene, `random_scenes` makes scenes from a seed, `render` draws them, `truth`
+gives the boxes of the vehicles, `patches` and `clip` write files.
 """
 
-from vdet.synthetic.clip import counts, frames, write_clip, write_truth
+from vdet.synthetic.clip import frames, write_clip, write_truth
 from vdet.synthetic.patches import background_patches, vehicle_patches, write_patches
+from vdet.synthetic.random_scenes import demo_scene, empty_road, traffic_scene
 from vdet.synthetic.render import Renderer, render
-from vdet.synthetic.truth import TrueBox, truth
-from vdet.synthetic.worlds import default_clip, empty_road, traffic
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
 __all__ = [
     "Renderer",
     "TrueBox",
     "background_patches",
-    "counts",
-    "default_clip",
+    "demo_scene",
     "empty_road",
     "frames",
+    "must_be_found",
     "render",
-    "traffic",
-    "truth",
+    "traffic_scene",
+    "true_boxes",
     "vehicle_patches",
     "write_clip",
     "write_patches",

@@ -1,4 +1,4 @@
-"""The pinhole camera, and roads that bend in front of it.
+"""The pinhole camera: from points in metres to pixels.
 
 Points are metres: x to the right of the camera, y up from the ground, z ahead of the camera,
 measured along the road. Pixels are x to the right, y down, whole numbers at pixel centres.
@@ -7,19 +7,18 @@ measured along the road. Pixels are x to the right, y down, whole numbers at pix
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Points = npt.NDArray[np.float64]
+from vdet.geometry import Float64Array
 
 NEAR = 0.5
 """Metres; nothing nearer than this is drawn."""
 
 
 @dataclass(frozen=True, slots=True)
-class Camera:
-    """A level camera over a flat road; tilt is expressed by the horizon's row.
+class PinholeCamera:
+    """A level camera over a flat road; the row of the horizon stands for its tilt.
 
-    `width`, `height`, `focal` and `horizon` are pixels, `above_ground` is metres, `curvature` is
+    `width`, `height`, `focal` and `horizon` are pixels, `above_ground` is metres. `curvature` is
     that of the road ahead in 1/m, positive to the right: the road's centre at distance z is
     displaced by curvature · z² / 2.
     """
@@ -32,11 +31,11 @@ class Camera:
     curvature: float = 0.0
 
     @classmethod
-    def dashboard(cls, width: int, height: int, curvature: float = 0.0) -> "Camera":
+    def dashboard(cls, width: int, height: int, curvature: float = 0.0) -> "PinholeCamera":
         """Return a usual dashboard camera: at 720 rows, focal length 1152 and horizon row 410."""
         return cls(width, height, 1.6 * height, 0.57 * height, curvature=curvature)
 
-    def project(self, points: Points) -> Points:
+    def project(self, points: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` of points `(n, 3)`, all of them ahead of the camera."""
         x, y, z = points.T
         pixels = np.empty((len(points), 2))
@@ -44,27 +43,27 @@ class Camera:
         pixels[:, 1] = self.horizon + self.focal * (self.above_ground - y) / z
         return pixels
 
-    def outline(self, polygon: Points) -> Points:
-        """Return the pixels `(m, 2)` of what of a polygon `(n, 3)` is beyond `NEAR`; m may be 0."""
+    def outline(self, polygon: Float64Array) -> Float64Array:
+        """Return the pixels `(m, 2)` of the part of a polygon `(n, 3)` beyond `NEAR`."""
         return self.project(beyond_near(polygon))
 
 
-def beyond_near(polygon: Points) -> Points:
-    """Return what of a polygon `(n, 3)` lies at z ≥ NEAR (Sutherland and Hodgman 1974)."""
+def beyond_near(polygon: Float64Array) -> Float64Array:
+    """Return the part of a polygon `(n, 3)` at z ≥ `NEAR` (Sutherland and Hodgman 1974)."""
     ahead = polygon[:, 2] >= NEAR
     if ahead.all():
         return polygon
     kept = []
     for i in range(len(polygon)):
-        before, here = polygon[i - 1], polygon[i]
+        previous, current = polygon[i - 1], polygon[i]
         if ahead[i - 1] != ahead[i]:
-            share = (NEAR - before[2]) / (here[2] - before[2])
-            kept.append(before + share * (here - before))
+            share = (NEAR - previous[2]) / (current[2] - previous[2])
+            kept.append(previous + share * (current - previous))
         if ahead[i]:
-            kept.append(here)
+            kept.append(current)
     return np.array(kept).reshape(-1, 3)
 
 
-def along(start: float, end: float) -> npt.NDArray[np.float64]:
-    """Return distances from `start` to `end`, 5 % apart: close enough to follow any bend."""
+def distances(start: float, end: float) -> Float64Array:
+    """Return distances from `start` to `end`, 5 % apart, which is enough to follow any bend."""
     return np.geomspace(start, end, 2 + int(20 * np.log(end / start)))

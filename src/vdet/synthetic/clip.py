@@ -1,4 +1,4 @@
-"""Scenes → a video and its truth, as files."""
+"""A scene as a video file and a truth file."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -9,12 +9,9 @@ from vdet.files import replacing
 from vdet.media import Frame, VideoInfo, VideoWriter
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import TrueBox, truth
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
-SMALLEST = (40, 24)
-"""Width and height in pixels of a 720-row frame from which on a vehicle counts."""
-
-_CAR = 3  # class of MOTChallenge
+_CAR = 3  # class number in MOTChallenge
 
 
 def frames(scene: Scene) -> Iterator[Frame]:
@@ -30,7 +27,7 @@ def write_clip(path: Path, scene: Scene) -> None:
     Raises
     ------
     OutputError
-        The file cannot be written, or its suffix is not one of a video.
+        The file cannot be written, or its suffix is not that of a video.
     """
     info = VideoInfo(
         path=path,
@@ -46,11 +43,11 @@ def write_clip(path: Path, scene: Scene) -> None:
 
 
 def write_truth(path: Path, scene: Scene) -> None:
-    """Write where every vehicle is, in the columns of MOTChallenge ground truth.
+    """Write the true box of each vehicle, in the columns of MOTChallenge ground truth.
 
-    One line a box: `frame, id, left, top, width, height, flag, class, visibility`; frames and
-    pixels count from 1, the class is 3 (car). The flag is 1 for a vehicle that counts and 0 for
-    an ignore region (`counts`).
+    One line per box: `frame, id, left, top, width, height, flag, class, visibility`; frames and
+    pixels count from 1, the class is 3 (car). The flag is 1 for a vehicle that must be
+    found and 0 for an ignore region (`must_be_found`).
 
     Raises
     ------
@@ -59,22 +56,11 @@ def write_truth(path: Path, scene: Scene) -> None:
     """
     with replacing(path) as temporary, temporary.open("w", encoding="ascii", newline="\n") as file:
         for index in range(scene.frames):
-            for box in truth(scene, index):
+            for box in true_boxes(scene, index):
                 file.write(_line(index + 1, box, scene.camera.height))
 
 
-def counts(vehicle: TrueBox, frame_height: int) -> bool:
-    """Tell whether a vehicle is to be found: large enough, and at least half of it not hidden.
-
-    The smallest size is `SMALLEST` in a frame of 720 rows and grows with the frame. A vehicle that
-    the frame's edge cuts counts by the size of its part inside.
-    """
-    width, height = (length * frame_height / 720 for length in SMALLEST)
-    large = vehicle.box.width >= width and vehicle.box.height >= height
-    return large and vehicle.hidden <= 0.5
-
-
 def _line(number: int, vehicle: TrueBox, frame_height: int) -> str:
-    box, flag = vehicle.box, int(counts(vehicle, frame_height))
+    box, flag = vehicle.box, int(must_be_found(vehicle, frame_height))
     place = f"{box.x + 1},{box.y + 1},{box.width},{box.height}"
     return f"{number},{vehicle.id},{place},{flag},{_CAR},{vehicle.visibility:.3f}\n"

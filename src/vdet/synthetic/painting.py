@@ -1,23 +1,23 @@
-"""Filling outlines with a colour, to a sixteenth of a pixel."""
+"""Colours, and outlines filled with them to a sixteenth of a pixel."""
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.draw.boxes import Color
+from vdet.geometry import Float64Array
 from vdet.media.images import Image
-from vdet.synthetic.camera import Points
-from vdet.synthetic.scene import Color
 
 _SHIFT = 4  # fractional bits of the coordinates given to OpenCV
 
 
-def fill(image: Image, outline: Points, color: Color) -> None:
-    """Fill an outline of pixels `(n, 2)` with smooth edges; one without corners does nothing."""
+def fill(image: Image, outline: Float64Array, color: Color) -> None:
+    """Fill an outline of pixels `(n, 2)` with smooth edges; an empty outline changes nothing."""
     if len(outline):
         cv2.fillPoly(image, [_fixed(outline)], color, cv2.LINE_AA, _SHIFT)
 
 
-def fill_mask(mask: Image, outline: Points) -> None:
+def fill_mask(mask: Image, outline: Float64Array) -> None:
     """Set the pixels `(H, W)` inside an outline to 255, its border included."""
     if len(outline):
         cv2.fillPoly(mask, [_fixed(outline)], 255, cv2.LINE_8, _SHIFT)
@@ -35,5 +35,5 @@ def mixed(color: Color, other: Color, share: float) -> Color:
     return blue, green, red
 
 
-def _fixed(outline: Points) -> npt.NDArray[np.int32]:
+def _fixed(outline: Float64Array) -> npt.NDArray[np.int32]:
     return np.rint(outline * (1 << _SHIFT)).astype(np.int32)

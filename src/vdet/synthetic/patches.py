@@ -1,13 +1,13 @@
-"""Labelled patches cut from rendered roads, in the layout of the Udacity set.
+"""Labelled patches cut from rendered roads, in the layout of the Udacity data set.
 
-Vehicles come in the groups `near` and `far`, non-vehicles as `road` (anything along the
-carriageway), `roadside` (what stands beside it) and `parts` (a corner of a vehicle, or one that is
-far too small for the patch).
+Vehicles form the groups `near` and `far`. Non-vehicles form the groups `road` (any place along the
+carriageway), `roadside` (objects beside it) and `parts` (a corner of a vehicle, or a vehicle that
+is far too small for the patch).
 """
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -16,8 +16,11 @@ import numpy as np
 from vdet.errors import OutputError
 from vdet.geometry import Box
 from vdet.media.images import Image, write_image
-from vdet.synthetic.truth import TrueBox
-from vdet.synthetic.views import views
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import PERIOD, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import TrueBox, true_boxes
 
 PATCH = 64
 """Side of a patch, pixels."""
@@ -25,9 +28,22 @@ PATCH = 64
 VEHICLE_GROUPS = ("near", "far")
 BACKGROUND_GROUPS = ("road", "roadside", "parts")
 
-_MOST_VEHICLE = 0.15  # share of a background patch that a vehicle may fill
+_MAX_VEHICLE = 0.15  # largest share of a background patch that vehicles fill
 _FAR = 130  # windows narrower than this many pixels are `far`
-_SMALLEST = 32  # pixels of the frame along a window's side
+_SMALLEST = 32  # least side of a window, pixels of the frame
+_FRAMES = 40  # frames of each road
+_SPEED = 400.0  # m/s, so that consecutive frames show different places
+_CARS = 50  # different cars on each road
+_OBJECTS = 8  # most roadside objects taken from a frame
+
+
+@dataclass(frozen=True, slots=True)
+class _LabelledFrame:
+    """A rendered frame, its vehicles, and the boxes of some objects beside the road."""
+
+    image: Image
+    vehicles: tuple[TrueBox, ...]
+    objects: tuple[Box, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +58,7 @@ def vehicle_patches(count: int, rng: np.random.Generator) -> Image:
 
 
 def background_patches(count: int, rng: np.random.Generator) -> Image:
-    """Return patches that no vehicle fills, BGR uint8 `(count, 64, 64, 3)`."""
+    """Return patches without a whole vehicle, BGR uint8 `(count, 64, 64, 3)`."""
     return _stacked(_collect(_background_samples(rng), BACKGROUND_GROUPS, count))
 
 
@@ -84,7 +100,7 @@ def _make_folder(folder: Path) -> None:
 
 
 def _collect(samples: Iterator[_Sample], groups: tuple[str, ...], count: int) -> list[_Sample]:
-    """Take samples as they come until each group has its share of `count`."""
+    """Take samples until each group has its share of `count`, equal to within one."""
     missing = {group: (count + i) // len(groups) for i, group in enumerate(groups)}
     kept: list[_Sample] = []
     while len(kept) < count:
@@ -96,28 +112,28 @@ def _collect(samples: Iterator[_Sample], groups: tuple[str, ...], count: int) ->
 
 
 def _vehicle_samples(rng: np.random.Generator) -> Iterator[_Sample]:
-    for view in views(rng):
-        for vehicle in view.vehicles * 2:
+    for frame in _labelled_frames(rng):
+        for vehicle in frame.vehicles * 2:
             window = _around(vehicle.box, rng)
-            if vehicle.visibility > 0.9 and _fits(window, view.image):
+            if vehicle.visibility > 0.9 and _fits(window, frame.image):
                 group = "far" if window.width < _FAR else "near"
-                yield _Sample(group, _cut(view.image, window, rng))
+                yield _Sample(group, _cut(frame.image, window, rng))
 
 
 def _background_samples(rng: np.random.Generator) -> Iterator[_Sample]:
-    for view in views(rng):
-        windows = [("road", _along_road(view.image, rng)) for _ in range(8)]
-        windows += [("roadside", _around(box, rng)) for box in view.objects]
-        windows += [("parts", _at_edge(vehicle.box, rng)) for vehicle in view.vehicles * 4]
+    for frame in _labelled_frames(rng):
+        windows = [("road", _along_road(frame.image, rng)) for _ in range(8)]
+        windows += [("roadside", _around(box, rng)) for box in frame.objects]
+        windows += [("parts", _at_edge(vehicle.box, rng)) for vehicle in frame.vehicles * 4]
         for group, window in windows:
-            if _fits(window, view.image) and not _filled(window, view.vehicles):
-                yield _Sample(group, _cut(view.image, window, rng))
+            if _fits(window, frame.image) and not _is_filled(window, frame.vehicles):
+                yield _Sample(group, _cut(frame.image, window, rng))
 
 
 def _around(box: Box, rng: np.random.Generator) -> Box:
-    """Return a square about a box, a little off in place and size.
+    """Return a square around a box, with a random error in place and size.
 
-    On a wide box (a side in view) it may be as narrow as the box is high.
+    On a wide box (a visible side) it may be as narrow as the box is high.
     """
     side = max(1.1 * box.height, rng.uniform(0.8, 1.25) * box.width)
     x, y = np.array(box.center) + rng.uniform(-0.08, 0.08, 2) * side - side / 2
@@ -132,7 +148,7 @@ def _along_road(image: Image, rng: np.random.Generator) -> Box:
 
 
 def _at_edge(box: Box, rng: np.random.Generator) -> Box:
-    """Return a square of a window's size that touches a vehicle's box, or swallows it whole."""
+    """Return a square that cuts a vehicle's box at its edge, or is far larger than the box."""
     side = max(box.width, box.height)
     if rng.random() < 0.3:
         side *= 3
@@ -143,18 +159,18 @@ def _at_edge(box: Box, rng: np.random.Generator) -> Box:
 
 
 def _fits(window: Box, image: Image) -> bool:
-    """Tell whether a window lies in the frame and is large enough to show anything."""
+    """Tell whether a window lies in the frame and is large enough."""
     height, width = image.shape[:2]
     return window.width >= _SMALLEST and window.clipped(width, height) == window
 
 
-def _filled(window: Box, vehicles: tuple[TrueBox, ...]) -> bool:
+def _is_filled(window: Box, vehicles: tuple[TrueBox, ...]) -> bool:
     filled = sum(window.intersection(vehicle.box).area for vehicle in vehicles)
-    return filled > _MOST_VEHICLE * window.area
+    return filled > _MAX_VEHICLE * window.area
 
 
 def _cut(image: Image, window: Box, rng: np.random.Generator) -> Image:
-    """Return a window as a patch, as another lens and exposure might give it."""
+    """Return a window as a patch, with random blur, mirroring and exposure."""
     part = image[window.y : window.bottom, window.x : window.right]
     patch = cv2.resize(part, (PATCH, PATCH), interpolation=cv2.INTER_AREA)
     if rng.random() < 0.4:
@@ -162,3 +178,62 @@ def _cut(image: Image, window: Box, rng: np.random.Generator) -> Image:
     if rng.random() < 0.5:
         patch = cv2.flip(patch, 1)
     return np.asarray(np.clip(patch * rng.uniform(0.75, 1.25), 0, 255), np.uint8)
+
+
+def _labelled_frames(rng: np.random.Generator) -> Iterator[_LabelledFrame]:
+    """Render frames of one random road after another, without end."""
+    while True:
+        scene = _busy_road(rng)
+        renderer = Renderer(scene)
+        for index in range(scene.frames):
+            image = _compressed(renderer.image(index), rng)
+            yield _LabelledFrame(image, true_boxes(scene, index), _objects(scene, index))
+
+
+def _compressed(image: Image, rng: np.random.Generator) -> Image:
+    """Return a frame with the losses of JPEG compression, since all real frames have some."""
+    quality = int(rng.integers(30, 95))
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR_BGR), np.uint8)
+
+
+def _busy_road(rng: np.random.Generator) -> Scene:
+    """Return a road on which each frame has its own vehicles, two in each lane."""
+    lanes = int(rng.integers(2, 5))
+    lane = int(rng.integers(lanes))
+    seed = int(rng.integers(2**31))
+    camera = PinholeCamera(
+        width=960,
+        height=320,
+        focal=864.0,
+        horizon=120.0,
+        above_ground=float(rng.uniform(1.1, 1.6)),
+        curvature=float(rng.uniform(-1, 1) / 600),
+    )
+    road = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
+    scene = replace(road, frames=_FRAMES, speed=_SPEED)
+    cars = [(random_paint(rng), random_body(rng)) for _ in range(_CARS)]
+    vehicles: list[SceneVehicle] = []
+    for index in range(_FRAMES):
+        for lateral in (np.arange(lanes) - lane) * LANE_WIDTH:
+            near = rng.uniform(6.5, 16) + abs(lateral)
+            for ahead in (near, near + rng.uniform(8, 24)):
+                place = Waypoint(scene.time(index), ahead, lateral + rng.uniform(-0.6, 0.6))
+                color, body = cars[rng.integers(len(cars))]
+                vehicles.append(SceneVehicle(len(vehicles) + 1, (place,), color, body))
+    return replace(scene, vehicles=tuple(vehicles))
+
+
+def _objects(scene: Scene, index: int) -> tuple[Box, ...]:
+    """Return the boxes of some objects beside the road."""
+    station = scene.station(index)
+    boxes = []
+    for item in scene.roadside:
+        ahead = (item.station - station) % PERIOD
+        if 8 < ahead < 70:
+            left, right = item.lateral - item.width / 2, item.lateral + item.width / 2
+            corners = np.array([[left, item.height, ahead], [right, 0.0, ahead]])
+            (x0, y0), (x1, y1) = scene.camera.project(corners)
+            boxes.append(Box(round(x0), round(y0), round(x1 - x0), round(y1 - y0)))
+    inside = [b for b in boxes if b.clipped(scene.camera.width, scene.camera.height) == b]
+    return tuple(inside[:_OBJECTS])

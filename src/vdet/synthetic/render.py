@@ -1,40 +1,41 @@
-"""Scenes → pictures."""
+"""Rendering: from scenes to frames."""
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.draw.boxes import Color
 from vdet.media.images import Image
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.ground import Ground, brightness
 from vdet.synthetic.roadside import Roadside
 from vdet.synthetic.scene import Scene
-from vdet.synthetic.sky import paint_sky
-from vdet.synthetic.surface import Ground, brightness
 from vdet.synthetic.vehicle import draw_vehicle
 
-_SHIFT = 61  # pixels by which the noise picture is larger than a frame
+_SHIFT = 61  # pixels by which the noise image is larger than a frame
 
 
 class Renderer:
-    """Draws the frames of one scene; what never moves is painted once."""
+    """Draws the frames of one scene; sky and resting parts of the ground are painted once."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         camera = scene.camera
         self._ground = Ground(scene)
         self._roadside = Roadside(scene)
-        self._still: Image = np.zeros((camera.height, camera.width, 3), np.uint8)
-        paint_sky(self._still, scene)
-        self._ground.paint_base(self._still)
-        self._noise = _noise(scene)
+        self._background: Image = np.zeros((camera.height, camera.width, 3), np.uint8)
+        _paint_sky(self._background, scene)
+        self._ground.paint_base(self._background)
+        self._noise = _sensor_noise(scene)
 
     def image(self, index: int) -> Image:
         """Return frame `index`, BGR uint8 `(H, W, 3)`."""
         station = self._scene.station(index)
-        image = self._still.copy()
+        image = self._background.copy()
         self._ground.draw(image, station)
         self._roadside.draw(image, station)
         self._draw_vehicles(image, index)
-        return self._as_sensed(image, index)
+        return self._expose(image, index)
 
     def _draw_vehicles(self, image: Image, index: int) -> None:
         scene, time = self._scene, self._scene.time(index)
@@ -42,8 +43,8 @@ class Renderer:
             light = brightness(scene, scene.station(index) + ahead)
             draw_vehicle(image, vehicle, scene.camera, time, light=light, sun=scene.light.sun)
 
-    def _as_sensed(self, image: Image, index: int) -> Image:
-        """Return the picture as a lens and a sensor give it."""
+    def _expose(self, image: Image, index: int) -> Image:
+        """Return the image with the blur of a lens, and the exposure and noise of a sensor."""
         light = self._scene.light
         soft = cv2.GaussianBlur(image, (3, 3), 0.6)
         exposed = cv2.convertScaleAbs(soft, alpha=light.gain)
@@ -56,13 +57,53 @@ class Renderer:
 
 
 def render(scene: Scene, index: int) -> Image:
-    """Return one frame, BGR uint8 `(H, W, 3)`; for many of a scene, use a `Renderer`."""
+    """Return one frame, BGR uint8 `(H, W, 3)`; use a `Renderer` for many frames of a scene."""
     return Renderer(scene).image(index)
 
 
-def _noise(scene: Scene) -> npt.NDArray[np.int16]:
-    """Return a picture of noise, larger than a frame, of which each frame sees another part."""
+def _sensor_noise(scene: Scene) -> npt.NDArray[np.int16]:
+    """Return an image of noise, larger than a frame; each frame uses another part of it."""
     rng = np.random.default_rng([scene.seed, 5])
     shape = (scene.camera.height + _SHIFT, scene.camera.width + _SHIFT, 3)
     noise = rng.standard_normal(shape, dtype=np.float32) * np.float32(scene.light.noise)
     return np.asarray(np.rint(noise), np.int16)
+
+
+def _paint_sky(image: Image, scene: Scene) -> None:
+    """Paint everything above the horizon, and down to the first rows of the ground."""
+    rng = np.random.default_rng([scene.seed, 3])
+    rows = int(scene.camera.horizon) + 3
+    sky = image[:rows]
+    up = np.linspace(1, 0, rows)[:, None, None]
+    sky[:] = np.clip(up * np.array([168, 118, 78]) + (1 - up) * np.array([206, 186, 165]), 0, 255)
+    _paint_clouds(sky, rng)
+    unit = scene.camera.height / 720
+    _paint_range(sky, rng, scene.camera, (88 * unit, 30 * unit), (94, 80, 66))
+    _paint_range(sky, rng, scene.camera, (34 * unit, 26 * unit), (44, 62, 60))
+
+
+def _paint_clouds(sky: Image, rng: np.random.Generator) -> None:
+    height, width = sky.shape[:2]
+    noise = cv2.resize(rng.standard_normal((6, 10)), (width, height), interpolation=cv2.INTER_CUBIC)
+    noise = noise + 0.4 * cv2.resize(rng.standard_normal((18, 40)), (width, height))
+    share = np.clip(0.25 * (noise - rng.uniform(-0.5, 1.5)), 0, 0.7)[..., None]
+    sky[:] = (1 - share) * sky + share * 225
+
+
+def _paint_range(
+    sky: Image,
+    rng: np.random.Generator,
+    camera: PinholeCamera,
+    heights: tuple[float, float],
+    color: Color,
+) -> None:
+    """Paint a skyline of a mean height and a variation, in pixels above the horizon."""
+    height, width = sky.shape[:2]
+    mean, variation = heights
+    smooth = cv2.resize(rng.standard_normal((1, 8)), (width, 1), interpolation=cv2.INTER_CUBIC)
+    rough = cv2.resize(rng.standard_normal((1, 90)), (width, 1))
+    skyline = camera.horizon - mean - variation * (0.5 * smooth[0] + 0.22 * rough[0])
+    rows = np.arange(height)[:, None]
+    share = np.clip(rows - skyline[None, :], 0, 1)[..., None]
+    grain = 1 + 0.16 * cv2.resize(rng.standard_normal((height // 4, width // 4)), (width, height))
+    sky[:] = np.clip((1 - share) * sky + share * np.array(color) * grain[..., None], 0, 255)

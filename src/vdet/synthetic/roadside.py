@@ -1,22 +1,23 @@
-"""What stands along a road: barriers, trees, and objects that look a little like vehicles."""
+"""The roadside: barriers, plants, and objects that look a little like vehicles."""
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from vdet.draw.boxes import Color
+from vdet.geometry import Float64Array
 from vdet.media.images import Image
-from vdet.synthetic.camera import NEAR, Camera, Points, along
+from vdet.synthetic.camera import NEAR, PinholeCamera, distances
 from vdet.synthetic.painting import fill, shaded
-from vdet.synthetic.scene import PERIOD, Color, RoadsideObject, Scene, Wall
+from vdet.synthetic.scene import PERIOD, RoadsideObject, Scene, Wall
 
 _FAR = 140.0  # metres; nothing is drawn beyond
 _NEAREST = 3.0
-_SPRITE = 96  # side of a picture of foliage, pixels
+_SPRITE = 96  # side of an image of foliage, pixels
 _SPRITES = 6
 
 
 class Roadside:
-    """The roadside of a scene, ready to be drawn at any frame."""
+    """Draws the roadside of one scene."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -24,18 +25,17 @@ class Roadside:
         self._foliage = [_foliage(rng) for _ in range(_SPRITES)]
 
     def draw(self, image: Image, station: float) -> None:
-        """Draw walls and objects, far ones first, as seen from a station of the camera."""
+        """Draw objects and walls as seen from a station of the camera."""
         camera = self._scene.camera
         placed = [((item.station - station) % PERIOD, item) for item in self._scene.roadside]
-        near_last = sorted(placed, key=lambda pair: -pair[0])
-        for ahead, item in near_last:
+        for ahead, item in sorted(placed, key=lambda pair: -pair[0]):
             if _NEAREST < ahead < _FAR:
                 self._draw_object(image, camera, item, ahead)
         for wall in self._scene.road.walls:
             _draw_wall(image, camera, wall, station)
 
     def _draw_object(
-        self, image: Image, camera: Camera, item: RoadsideObject, ahead: float
+        self, image: Image, camera: PinholeCamera, item: RoadsideObject, ahead: float
     ) -> None:
         if item.kind in ("tree", "bush"):
             number = int(item.station * 10) % _SPRITES
@@ -43,11 +43,11 @@ class Roadside:
         elif item.kind == "sign":
             _draw_sign(image, camera, item, ahead)
         else:
-            _draw_box(image, camera, item, ahead)
+            _draw_container(image, camera, item, ahead)
 
 
-def _draw_wall(image: Image, camera: Camera, wall: Wall, station: float) -> None:
-    z = along(NEAR, 4 * _FAR)
+def _draw_wall(image: Image, camera: PinholeCamera, wall: Wall, station: float) -> None:
+    z = distances(NEAR, 4 * _FAR)
     dark, bright = shaded(wall.color, 0.7), shaded(wall.color, 1.35)
     fill(image, camera.outline(_strip(wall, z, wall.bottom, wall.top)), wall.color)
     fill(image, camera.outline(_strip(wall, z, wall.top - 0.08, wall.top)), bright)
@@ -56,22 +56,24 @@ def _draw_wall(image: Image, camera: Camera, wall: Wall, station: float) -> None
         fill(image, camera.outline(_strip(wall, joint, 0.0, wall.top - 0.1)), dark)
 
 
-def _strip(wall: Wall, z: npt.NDArray[np.float64], bottom: float, top: float) -> Points:
+def _strip(wall: Wall, z: Float64Array, bottom: float, top: float) -> Float64Array:
     """Return the outline of a strip of a wall between two heights, along the distances `z`."""
     y = np.repeat([bottom, top], len(z))
     return np.stack([np.full_like(y, wall.lateral), y, np.concatenate([z, z[::-1]])], axis=1)
 
 
-def _panel(item: RoadsideObject, ahead: float, part: tuple[float, float, float, float]) -> Points:
-    """Return a rectangle facing the camera; `part` is left, right, bottom, top in shares of it."""
+def _panel(
+    item: RoadsideObject, ahead: float, part: tuple[float, float, float, float]
+) -> Float64Array:
+    """Return a rectangle facing the camera; `part` is its left, right, bottom and top, 0 to 1."""
     left, right, bottom, top = part
     x0, x1 = (item.lateral + (share - 0.5) * item.width for share in (left, right))
     y0, y1 = bottom * item.height, top * item.height
     return np.array([[x0, y0, ahead], [x0, y1, ahead], [x1, y1, ahead], [x1, y0, ahead]])
 
 
-def _draw_sign(image: Image, camera: Camera, item: RoadsideObject, ahead: float) -> None:
-    """Draw two posts and a board with lines of writing."""
+def _draw_sign(image: Image, camera: PinholeCamera, item: RoadsideObject, ahead: float) -> None:
+    """Draw two posts and a board with lines of text."""
 
     def paint(part: tuple[float, float, float, float], color: Color) -> None:
         fill(image, camera.outline(_panel(item, ahead, part)), color)
@@ -84,8 +86,10 @@ def _draw_sign(image: Image, camera: Camera, item: RoadsideObject, ahead: float)
         paint((0.12, right, bottom, bottom + 0.06), (215, 218, 218))
 
 
-def _draw_box(image: Image, camera: Camera, item: RoadsideObject, ahead: float) -> None:
-    """Draw a bin or hut: a box with its side in sight, a dark slot, and a lid."""
+def _draw_container(
+    image: Image, camera: PinholeCamera, item: RoadsideObject, ahead: float
+) -> None:
+    """Draw a bin or hut: a box with a visible side, a dark slot, and a lid."""
     inner = item.lateral + (-0.5 if item.lateral > 0 else 0.5) * item.width
     depth = ahead + item.width
     side = [
@@ -104,7 +108,7 @@ def _draw_box(image: Image, camera: Camera, item: RoadsideObject, ahead: float) 
 
 
 def _foliage(rng: np.random.Generator) -> tuple[Image, Image]:
-    """Return a picture of foliage in grey, `(96, 96)`, and its mask."""
+    """Return an image of foliage in grey, `(96, 96)`, and its mask."""
     coarse = cv2.resize(rng.standard_normal((8, 8)), (_SPRITE, _SPRITE))
     fine = cv2.resize(rng.standard_normal((32, 32)), (_SPRITE, _SPRITE))
     y, x = np.mgrid[-1 : 1 : _SPRITE * 1j, -1 : 1 : _SPRITE * 1j]
@@ -116,12 +120,12 @@ def _foliage(rng: np.random.Generator) -> tuple[Image, Image]:
 
 def _draw_foliage(
     image: Image,
-    camera: Camera,
+    camera: PinholeCamera,
     item: RoadsideObject,
     ahead: float,
     sprite: tuple[Image, Image],
 ) -> None:
-    """Draw a tree or a bush; only the part in the frame is computed."""
+    """Draw the part of a tree or a bush that lies in the frame."""
     corners = camera.project(_panel(item, ahead, (0.0, 1.0, 0.0, 1.0)))
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     left, top = max(0, int(x0)), max(0, int(y0))

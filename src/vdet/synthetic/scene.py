@@ -1,8 +1,8 @@
-"""What a road scene consists of: plain values, in metres and seconds, that say everything.
+"""The description of a road scene: plain values in metres and seconds.
 
-The same scene always gives the same pictures and the same truth. Lateral positions are metres to
-the right of the camera; `station` is metres along the road from where the clip begins. What stands
-beside the road, and its surface, repeat every `PERIOD` metres, so a clip may be of any length.
+The same scene always gives the same images and the same truth. Lateral positions are metres to
+the right of the camera. A `station` is metres along the road from where the clip begins. The road's
+surface and the objects beside it repeat every `PERIOD` metres, so a clip may have any length.
 """
 
 from dataclasses import dataclass
@@ -11,10 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from vdet.synthetic.camera import Camera
-
-Color = tuple[int, int, int]
-"""Blue, green, red, 0 to 255."""
+from vdet.draw.boxes import Color
+from vdet.synthetic.camera import PinholeCamera
 
 PERIOD = 200.0
 """Metres after which roadside and surface repeat."""
@@ -22,7 +20,7 @@ PERIOD = 200.0
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A lane line along the road, solid or dashed; `strength` below 1 is a worn one."""
+    """A lane line along the road, solid or dashed; a worn line has a `strength` below 1."""
 
     lateral: float
     color: Color = (225, 230, 230)
@@ -46,8 +44,8 @@ class Wall:
 
 
 @dataclass(frozen=True, slots=True)
-class Road:
-    """The carriageway from `left` to `right`, its lines, and the walls along it."""
+class Carriageway:
+    """The paved road from `left` to `right`, its lines, and the walls along it."""
 
     left: float
     right: float
@@ -59,7 +57,7 @@ class Road:
 
 @dataclass(frozen=True, slots=True)
 class Shadow:
-    """A shadow across the road; `dappled` as under trees, else whole as under a bridge."""
+    """A shadow across the road: `dappled` as under trees, or even as under a bridge."""
 
     station: float
     length: float
@@ -69,18 +67,20 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class Light:
-    """Exposure (1 is normal), the deviation of sensor noise in grey levels, and shadows."""
+    """Exposure, sensor noise, and shadows."""
 
     gain: float = 1.0
+    """Exposure; 1 is normal."""
     noise: float = 2.0
+    """Standard deviation of the sensor noise, grey levels."""
     sun: float = 0.0
-    """Metres by which a vehicle's shadow is cast sideways, to the right if positive."""
+    """Metres by which a vehicle's shadow reaches sideways, to the right if positive."""
     shadows: tuple[Shadow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class RoadsideObject:
-    """Something beside the road that is no vehicle, though it may look like one."""
+    """An object beside the road. None is a vehicle, but some look similar to one."""
 
     kind: Literal["tree", "bush", "sign", "bin", "hut"]
     station: float
@@ -92,7 +92,7 @@ class RoadsideObject:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """The shape of a car, in metres; see `car` for the parts."""
+    """The shape of a car, in metres; `vdet.synthetic.vehicle` draws its parts."""
 
     width: float = 1.8
     length: float = 4.6
@@ -100,14 +100,14 @@ class Body:
     belt: float = 0.92
     """Height of the lower edge of the windows."""
     boot: float = 0.7
-    """From the rear to the lower edge of the rear window."""
+    """Distance from the rear to the lower edge of the rear window."""
     slope: float = 0.6
-    """Along which the rear window rises to the roof."""
+    """Distance over which the rear window rises to the roof."""
 
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """Where a vehicle is at a time: its rear `ahead` of the camera, its middle at `lateral`."""
+    """A vehicle's position at a time: its rear is `ahead` of the camera, its middle `lateral`."""
 
     time: float
     ahead: float
@@ -115,8 +115,8 @@ class Waypoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Vehicle:
-    """A car seen from behind; it is there from its first to its last waypoint, straight between."""
+class SceneVehicle:
+    """A car seen from behind. It exists from its first to its last waypoint, straight between."""
 
     id: int
     path: tuple[Waypoint, ...]
@@ -124,7 +124,7 @@ class Vehicle:
     body: Body = Body()
 
     def position(self, time: float) -> tuple[float, float] | None:
-        """Return `(ahead, lateral)` at `time`, or None while the vehicle is not there."""
+        """Return `(ahead, lateral)` at `time`, or None while the vehicle does not exist."""
         times = [point.time for point in self.path]
         if not times[0] <= time <= times[-1]:
             return None
@@ -135,13 +135,13 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A clip of `frames` frames at `rate` a second, from a camera moving at `speed` m/s."""
+    """A clip of `frames` frames at `rate` a second, from a camera that moves at `speed` m/s."""
 
-    camera: Camera
-    road: Road
+    camera: PinholeCamera
+    road: Carriageway
     light: Light = Light()
     roadside: tuple[RoadsideObject, ...] = ()
-    vehicles: tuple[Vehicle, ...] = ()
+    vehicles: tuple[SceneVehicle, ...] = ()
     speed: float = 25.0
     rate: Fraction = Fraction(25)
     frames: int = 1
@@ -153,10 +153,10 @@ class Scene:
         return float(index / self.rate)
 
     def station(self, index: int) -> float:
-        """Return how far the camera has come along the road at a frame, metres."""
+        """Return the camera's station at a frame, metres."""
         return self.speed * self.time(index)
 
-    def nearest_first(self, time: float) -> list[tuple[float, Vehicle]]:
-        """Return the vehicles that are there at a time with how far ahead, the nearest first."""
+    def nearest_first(self, time: float) -> list[tuple[float, SceneVehicle]]:
+        """Return the vehicles that exist at a time, each with its distance, the nearest first."""
         placed = [(place[0], v) for v in self.vehicles if (place := v.position(time))]
         return sorted(placed, key=lambda pair: pair[0])

@@ -1,27 +1,30 @@
-"""Scenes → where every vehicle is, from the very outlines that are drawn."""
+"""The true boxes of the vehicles in a scene, from the outlines that are drawn."""
 
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from vdet.geometry import Box
+from vdet.geometry import Box, Float64Array
 from vdet.media.images import Image
-from vdet.synthetic.camera import Camera, Points
+from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.painting import fill_mask
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
 
-_RASTER = 256  # pixels along the longer side of the picture in which a whole outline is measured
+SMALLEST = (40, 24)
+"""Least width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
+
+_RASTER = 256  # pixels along the longer side of the image in which a whole outline is measured
 
 
 @dataclass(frozen=True, slots=True)
 class TrueBox:
-    """Where a vehicle is in a frame, without its shadow on the ground.
+    """The place of a vehicle in a frame, without its shadow on the ground.
 
-    `box` bounds the vehicle inside the frame, also where nearer vehicles hide it.
+    `box` bounds the part inside the frame, also where nearer vehicles hide it.
     `visibility` is the share of its outline that is inside the frame and not hidden; `hidden` is
-    the share of what is inside the frame that nearer vehicles hide. Both are 0 to 1.
+    the share of the part inside the frame that nearer vehicles hide. Both are 0 to 1.
     """
 
     id: int
@@ -30,8 +33,8 @@ class TrueBox:
     hidden: float
 
 
-def truth(scene: Scene, index: int) -> tuple[TrueBox, ...]:
-    """Return the vehicles of which a part lies inside frame `index`, by id."""
+def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
+    """Return the vehicles of which a part lies inside frame `index`, ordered by id."""
     camera, time = scene.camera, scene.time(index)
     covered = np.zeros((camera.height, camera.width), np.uint8)
     found = []
@@ -44,6 +47,17 @@ def truth(scene: Scene, index: int) -> tuple[TrueBox, ...]:
     return tuple(sorted(found, key=lambda box: box.id))
 
 
+def must_be_found(vehicle: TrueBox, frame_height: int) -> bool:
+    """Tell whether a vehicle must be found: it is large enough, and at most half of it is hidden.
+
+    The smallest size is `SMALLEST` in a frame of 720 rows and grows with the frame. For a vehicle
+    that the frame's edge cuts, the size of the part inside decides.
+    """
+    width, height = (length * frame_height / 720 for length in SMALLEST)
+    large = vehicle.box.width >= width and vehicle.box.height >= height
+    return large and vehicle.hidden <= 0.5
+
+
 def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox:
     inside = cv2.countNonZero(mask)
     free = cv2.countNonZero(mask & ~covered)
@@ -51,18 +65,18 @@ def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox
     return TrueBox(number, box, visibility=min(1.0, free / whole), hidden=1 - free / inside)
 
 
-def _mask(parts: list[Points], camera: Camera) -> Image:
+def _mask(parts: list[Float64Array], camera: PinholeCamera) -> Image:
     mask = np.zeros((camera.height, camera.width), np.uint8)
     for part in parts:
         fill_mask(mask, part)
     return mask
 
 
-def _area(parts: list[Points]) -> float:
+def _area(parts: list[Float64Array]) -> float:
     """Return the pixels that the union of outlines covers, wherever it lies.
 
-    A vehicle beside the camera reaches thousands of pixels beyond the frame: it is measured in a
-    small picture of its own.
+    A vehicle beside the camera reaches thousands of pixels beyond the frame, so it is measured in
+    a small image of its own.
     """
     points = np.concatenate(parts)
     low = points.min(axis=0)

@@ -1,28 +1,58 @@
-"""Vehicles → outlines on the screen, and their drawing."""
+"""A vehicle as a solid of flat facets, and its drawing as seen from behind.
+
+Coordinates of a vehicle are metres: x to the right of its middle, y up from the ground, z ahead of
+its rear. The lower body is a prism, the cabin a frustum on top of it. Lights, plate, windows and
+wheels are facets painted on them.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
+from vdet.draw.boxes import Color
+from vdet.geometry import Float64Array
 from vdet.media.images import Image
-from vdet.synthetic.camera import NEAR, Camera, Points, beyond_near
-from vdet.synthetic.car import facets, footprint
-from vdet.synthetic.painting import fill, shaded
-from vdet.synthetic.scene import Color, Vehicle
+from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near
+from vdet.synthetic.painting import fill, mixed, shaded
+from vdet.synthetic.scene import Body, SceneVehicle
 
 _SHADOW: Color = (34, 32, 32)
+_GLASS: Color = (62, 52, 46)
+_TYRE: Color = (26, 25, 25)
+_RIM: Color = (150, 148, 146)
+_UNDERSIDE: Color = (20, 19, 19)
+_LIGHT: Color = (38, 26, 165)
+_PLATE: Color = (205, 208, 208)
+
+_SILL = 0.26  # height of the lower edge of the body
+_REAR_AXLE = 0.85
+_WHEEL = 0.31  # radius
 
 
-def outlines(vehicle: Vehicle, camera: Camera, time: float) -> list[tuple[Points, Color]]:
-    """Return the pixels `(n, 2)` and colour of each facet in sight, in painting order.
+@dataclass(frozen=True, slots=True)
+class _Facet:
+    """A flat polygon `(n, 3)`, its corners clockwise as seen from outside."""
 
-    Nothing is returned while the vehicle is not there.
+    corners: Float64Array
+    color: Color
+
+
+def outlines(
+    vehicle: SceneVehicle, camera: PinholeCamera, time: float
+) -> list[tuple[Float64Array, Color]]:
+    """Return the pixels `(n, 2)` and colour of each visible facet, in painting order.
+
+    The list is empty while the vehicle does not exist.
     """
     position = vehicle.position(time)
     if position is None:
         return []
     ahead, lateral = position
     offset = np.array([lateral, 0.0, ahead])
-    parts = facets(vehicle.body, vehicle.color)
+    parts = _facets(vehicle.body, vehicle.color)
     polygons = [part.corners + offset for part in parts]
     if ahead < 2 * NEAR:  # lights and plate stand out a little behind the rear
         polygons = [beyond_near(polygon) for polygon in polygons]
@@ -37,26 +67,171 @@ def outlines(vehicle: Vehicle, camera: Camera, time: float) -> list[tuple[Points
 
 
 def draw_vehicle(
-    image: Image, vehicle: Vehicle, camera: Camera, time: float, *, light: float, sun: float
+    image: Image,
+    vehicle: SceneVehicle,
+    camera: PinholeCamera,
+    time: float,
+    *,
+    light: float,
+    sun: float,
 ) -> None:
     """Draw a vehicle and the shadow below it onto a frame.
 
-    `light` scales its colours (below 1 in a shadow), `sun` is `Light.sun`.
+    `light` scales its colours (below 1 in a shadow); `sun` is `Light.sun`.
     """
     position = vehicle.position(time)
     if position is None:
         return
     ahead, lateral = position
-    shadow = footprint(vehicle.body, sun) + np.array([lateral, 0.0, ahead])
+    shadow = _footprint(vehicle.body, sun) + np.array([lateral, 0.0, ahead])
     fill(image, camera.outline(shadow), _SHADOW)
     for outline, color in outlines(vehicle, camera, time):
         fill(image, outline, shaded(color, light))
 
 
-def _signed_areas(pixels: Points, ends: npt.NDArray[np.intp]) -> Points:
-    """Return outlines' areas in pixels, positive where corners run clockwise on the screen.
+@lru_cache(maxsize=64)
+def _facets(body: Body, color: Color) -> tuple[_Facet, ...]:
+    """Return the facets of a car in painting order."""
+    return (
+        *_underside(body),
+        *_lower_body(body, color),
+        *_wheels(body, color),
+        *_rear(body, color),
+        *_cabin(body, color),
+    )
 
-    The outlines lie one after the other in `pixels`, `(n, 2)`; an empty one has the area 0.
+
+def _footprint(body: Body, sun: float) -> Float64Array:
+    """Return the outline of a car's shadow on the ground; with `sun` 0 it stays below the car."""
+    left, right = min(0.0, sun) - body.width / 2, max(0.0, sun) + body.width / 2
+    rear, front = _REAR_AXLE - _WHEEL, body.length
+    return _quad((left, 0, rear), (right, 0, rear), (right, 0, front), (left, 0, front))
+
+
+def _underside(body: Body) -> list[_Facet]:
+    half = body.width / 2
+    tyre = 0.24
+    rear = _REAR_AXLE - _WHEEL
+    tyres = [
+        _Facet(_upright(left, left + tyre, 0.0, _SILL + 0.05, rear), _TYRE)
+        for left in (-half + 0.04, half - 0.04 - tyre)
+    ]
+    below = _upright(-half + 0.1, half - 0.1, 0.1, _SILL + 0.05, rear)
+    return [_Facet(below, _UNDERSIDE), *tyres]
+
+
+def _lower_body(body: Body, color: Color) -> list[_Facet]:
+    """Extrude the outline of the rear along the car."""
+    half, belt = body.width / 2, body.belt
+    outline = [
+        (-half + 0.06, _SILL),
+        (-half, _SILL + 0.14),
+        (-half, belt - 0.2),
+        (-half + 0.1, belt),
+        (half - 0.1, belt),
+        (half, belt - 0.2),
+        (half, _SILL + 0.14),
+        (half - 0.06, _SILL),
+    ]
+    parts = []
+    for (x0, y0), (x1, y1) in pairwise(outline):
+        corners = [[x0, y0, 0], [x0, y0, body.length], [x1, y1, body.length], [x1, y1, 0]]
+        upward = (x1 - x0) / np.hypot(x1 - x0, y1 - y0)
+        parts.append(_Facet(np.array(corners, dtype=float), shaded(color, 0.78 + 0.3 * upward)))
+    parts.append(_Facet(np.array([[x, y, 0.0] for x, y in outline]), shaded(color, 0.92)))
+    return parts
+
+
+def _wheels(body: Body, color: Color) -> list[_Facet]:
+    """Paint arches, tyres and rims onto both sides."""
+    parts = []
+    for side in (-1, 1):
+        x = side * (body.width / 2 + 0.005)
+        for axle in (_REAR_AXLE, body.length - 0.9):
+            parts.append(_Facet(_disc(x, axle, _WHEEL + 0.06), shaded(color, 0.3)))
+            parts.append(_Facet(_disc(x, axle, _WHEEL), _TYRE))
+            parts.append(_Facet(_disc(x, axle, 0.62 * _WHEEL), _RIM))
+    return parts
+
+
+def _rear(body: Body, color: Color) -> list[_Facet]:
+    """Paint bumper, boot, plate and lights onto the rear."""
+    half, belt = body.width / 2, body.belt
+    bumper = _SILL + 0.32
+    parts = [
+        _Facet(_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
+        _Facet(_upright(-half, half, bumper, bumper + 0.03, -0.01), shaded(color, 0.5)),
+        _Facet(_upright(-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01), shaded(color, 1.12)),
+        _Facet(_upright(-0.27, 0.27, bumper + 0.05, bumper + 0.17, -0.02), _PLATE),
+    ]
+    for left in (-half + 0.02, half - 0.36):
+        box = (left, left + 0.34, belt - 0.24, belt - 0.06)
+        parts.append(_Facet(_upright(*box, -0.02), mixed(_LIGHT, shaded(color, 0.5), 0.2)))
+    return parts
+
+
+def _cabin(body: Body, color: Color) -> list[_Facet]:
+    """Put a frustum with windows onto the lower body."""
+    low, high = body.width / 2 - 0.12, body.width / 2 - 0.3
+    belt, roof = body.belt, body.height
+    rear_low, rear_high = body.boot, body.boot + body.slope
+    front_low = max(rear_high + 1.2, body.length - 1.3)
+    front_high = max(rear_high + 0.8, front_low - 0.8)
+    left, right = (
+        [
+            (side * low, belt, rear_low),
+            (side * high, roof, rear_high),
+            (side * high, roof, front_high),
+            (side * low, belt, front_low),
+        ]
+        for side in (-1, 1)
+    )
+    rear = _quad(left[0], left[1], right[1], right[0])
+    top = _quad(left[1], left[2], right[2], right[1])
+    parts = [_Facet(top, shaded(color, 1.1))]
+    for side in (_quad(*reversed(left)), _quad(*right)):
+        parts.append(_Facet(side, shaded(color, 0.85)))
+        parts.append(_Facet(_inset(side, 0.08, 0.47), shaded(_GLASS, 0.8)))
+        parts.append(_Facet(_inset(side, 0.53, 0.92), shaded(_GLASS, 0.8)))
+    parts.append(_Facet(rear, shaded(color, 0.95)))
+    parts.append(_Facet(_inset(rear, 0.1, 0.9), _GLASS))
+    return parts
+
+
+def _quad(*corners: tuple[float, float, float]) -> Float64Array:
+    return np.array(corners)
+
+
+def _upright(left: float, right: float, bottom: float, top: float, z: float) -> Float64Array:
+    return _quad((left, bottom, z), (left, top, z), (right, top, z), (right, bottom, z))
+
+
+def _disc(x: float, axle: float, radius: float) -> Float64Array:
+    """Return a wheel's circle on the side at `x`, clockwise as seen from that side."""
+    angles = np.linspace(0, 2 * np.pi, 16, endpoint=False) * np.sign(x)
+    y, z = _WHEEL + radius * np.sin(angles), axle + radius * np.cos(angles)
+    return np.stack([np.full(16, x), np.maximum(y, 0.0), z], axis=1)[::-1]
+
+
+def _inset(quad: Float64Array, left: float, right: float) -> Float64Array:
+    """Return the part of a quad between two shares of its width, without 14 % below and above.
+
+    The corners of a quad are lower left, upper left, upper right, lower right.
+    """
+    lower_left, upper_left, upper_right, lower_right = quad
+
+    def at(across: float, up: float) -> Float64Array:
+        lower = lower_left + across * (lower_right - lower_left)
+        upper = upper_left + across * (upper_right - upper_left)
+        return np.asarray(lower + up * (upper - lower))
+
+    return np.array([at(left, 0.14), at(left, 0.86), at(right, 0.86), at(right, 0.14)])
+
+
+def _signed_areas(pixels: Float64Array, ends: npt.NDArray[np.intp]) -> Float64Array:
+    """Return the areas of outlines in pixels, positive where corners run clockwise on the screen.
+
+    Outline i ends before row `ends[i]` of `pixels`, `(n, 2)`; an empty one has the area 0.
     """
     starts = np.concatenate([[0], ends[:-1]])
     following = np.arange(1, len(pixels) + 1)

@@ -1,16 +1,59 @@
-"""Which tracker follows a video's vehicles."""
+"""A tracker from its settings, whatever its method."""
 
-from vdet.config.scaling import scale_lengths
-from vdet.config.schema import MotionTrackerSettings, Settings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from vdet.config.schema import (
+    MotionTrackerSettings,
+    RulesTrackerSettings,
+    Settings,
+    TrackerSettings,
+)
+from vdet.config.section import scale_lengths
+from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.protocol import VideoTracker
 
 
-def make_tracker(settings: Settings, width: int, height: int) -> VideoTracker:
-    """Return a new tracker by `tracker.method`, for frames of `width` × `height` pixels."""
-    if isinstance(settings.tracker, MotionTrackerSettings):
-        from vdet.track.motion.tracker import MotionTracker  # scipy takes long to import
+@dataclass(frozen=True, slots=True)
+class TrackerKind:
+    """A method of tracking, as it is registered under its name.
 
-        return MotionTracker(settings.tracker, width, height)
+    Attributes
+    ----------
+    settings
+        Class of the section `tracker` for this method; its `method` has the name as default.
+    make
+        Takes these settings and the width and height of the frames, pixels.
+    """
+
+    settings: type[TrackerSettings]
+    make: Callable[[Any, int, int], VideoTracker]
+
+
+def make_tracker(settings: Settings, width: int, height: int) -> VideoTracker:
+    """Return a new tracker for the frames of one video, `width` × `height` pixels.
+
+    Raises
+    ------
+    ConfigError
+        There is no method of that name.
+    """
+    kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.method)
+    return kind.make(settings.tracker, width, height)
+
+
+def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
+    from vdet.track.motion.tracker import MotionTracker  # scipy takes long to import
+
+    return MotionTracker(settings, width, height)
+
+
+def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001
     from vdet.track.rules.tracker import RulesTracker
 
-    return RulesTracker(scale_lengths(settings.tracker, height / settings.reference_height))
+    return RulesTracker(scale_lengths(settings, height / settings.reference_height))
+
+
+MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
+RULES = TrackerKind(RulesTrackerSettings, _make_rules)

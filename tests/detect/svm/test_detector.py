@@ -1,209 +1,347 @@
+"""What the linear model detects in drawn pictures and videos, and how the settings change it."""
+
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, red_finder, road
-from vdet.config.schema import MotionSettings, Settings
-from vdet.detect.svm.detector import Detection, Detector, detect_still, horizon_of, still_boxes
-from vdet.errors import ImageError
-from vdet.geometry import Box
+from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
+from vdet.detect.detections import Detections
+from vdet.detect.svm.detector import SvmModel, detection_scores, horizon_of
+from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.stages import Trace
+from vdet.errors import FrameSizeError
+from vdet.geometry import Box, Float32Array
 from vdet.media.images import Image
 
 MODEL = red_finder()
+ROWS = SETTINGS.svm
+"""Window sets over fixed rows, outlines."""
+DEFAULT = PERSPECTIVE.svm
+"""Window sets by perspective, alternating; boxes from votes."""
 
 
-def watch(*images: Image, settings: Settings = SETTINGS) -> list[Detection]:
-    """Give the detections in consecutive frames."""
-    horizon = settings.search.perspective.horizon
-    detector = Detector(MODEL, settings, WIDTH, HEIGHT, horizon=horizon)
-    return [detector.accumulate(detector.search(image, i)) for i, image in enumerate(images)]
+def detect_video(*images: Image, settings: SvmSettings = ROWS) -> list[Detections]:
+    """Give the detections in consecutive frames of a video."""
+    detector = SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, images[:1])
+    return [detector.detect(detector.search(image, i)) for i, image in enumerate(images)]
 
 
-def but(settings: Settings, room: str, **changes: object) -> Settings:
-    """Replace some settings of a room."""
-    section = getattr(settings, room).model_copy(update=changes)
-    return settings.model_copy(update={room: section})
+def detect_still(image: Image, settings: SvmSettings = ROWS) -> Detections:
+    """Give the detections in a still picture."""
+    height, width = image.shape[:2]
+    detector = SvmModel(MODEL, settings).for_video(width, height, [image])
+    return detector.detect(detector.search(image, None))
 
 
-def test_a_car_in_consecutive_frames_becomes_a_region_around_it() -> None:
-    *_, detection = watch(road(CAR), road(CAR))
-    (region,) = detection.regions
-    assert region.box.intersection(CAR) == CAR
-    assert region.box.iou(CAR) > 0.35
-    assert region.peak == detection.heat.peak > 1.4
+def trace_of(detections: Detections) -> Trace:
+    assert isinstance(detections.trace, Trace)
+    return detections.trace
+
+
+def but(settings: SvmSettings, section: str, **changes: Any) -> SvmSettings:
+    """Replace some settings of a section."""
+    changed = getattr(settings, section).model_copy(update=changes)
+    return settings.model_copy(update={section: changed})
+
+
+def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
+    *_, detections = detect_video(road(CAR), road(CAR))
+    (box,) = detections.rounded
+    assert box.intersection(CAR) == CAR
+    assert box.iou(CAR) > 0.35
+    assert detections.strengths.tolist() == pytest.approx([trace_of(detections).heat.peak])
+    assert detections.strengths[0] > 1.4
+    assert box.contains((detections.centroids[0, 0], detections.centroids[0, 1]))
+
+
+def test_the_score_follows_from_the_strength_by_the_settings() -> None:
+    settings = but(ROWS, "score", middle=1.7, slope=3.0)
+    *_, detections = detect_video(road(CAR), road(CAR), settings=settings)
+    assert len(detections) == 1
+    np.testing.assert_array_equal(
+        detections.scores, detection_scores(detections.strengths, middle=1.7, slope=3.0)
+    )
 
 
 def test_the_first_frame_alone_is_half_as_hot_as_two() -> None:
-    first, second = watch(road(CAR), road(CAR))
-    np.testing.assert_allclose(second.heat.values, 2 * first.heat.values, rtol=1e-5)
+    first, second = (trace_of(each).heat for each in detect_video(road(CAR), road(CAR)))
+    np.testing.assert_allclose(second.values, 2 * first.values, rtol=1e-5)
 
 
 def test_the_heat_of_a_car_that_has_gone_is_forgotten() -> None:
-    *_, detection = watch(road(CAR), road(), road())
-    assert detection.heat.peak == 0
-    assert detection.regions == ()
+    *_, detections = detect_video(road(CAR), road(), road())
+    assert trace_of(detections).heat.peak == 0
+    assert len(detections) == 0
 
 
 def test_hits_are_the_windows_of_at_least_the_probability() -> None:
-    (detection,) = watch(road(CAR))
-    expected = detection.windows.probabilities >= SETTINGS.search.probability
-    assert 0 < expected.sum() < len(detection.windows)
-    np.testing.assert_array_equal(detection.hits.boxes, detection.windows.boxes[expected])
+    (detections,) = detect_video(road(CAR))
+    windows, hits = trace_of(detections).windows, trace_of(detections).hits
+    expected = windows.probabilities >= ROWS.search.probability
+    assert 0 < expected.sum() < len(windows)
+    np.testing.assert_array_equal(hits.boxes, windows.boxes[expected])
 
 
 def test_only_hits_make_heat() -> None:
-    (detection,) = watch(road(CAR), settings=but(SETTINGS, "search", probability=1.0))
-    assert len(detection.hits) == 0
-    assert detection.heat.peak == 0
+    (detections,) = detect_video(road(CAR), settings=but(ROWS, "search", probability=1.0))
+    assert len(trace_of(detections).hits) == 0
+    assert trace_of(detections).heat.peak == 0
 
 
-def test_an_empty_road_has_no_regions() -> None:
-    detection = detect_still(MODEL, SETTINGS, road())
-    assert detection.regions == ()
-    assert detection.heat.values.shape == (240, 320)
+def test_nothing_is_detected_on_an_empty_road() -> None:
+    detections = detect_still(road())
+    assert len(detections) == 0
+    assert trace_of(detections).heat.values.shape == (240, 320)
 
 
-def test_two_cars_apart_are_two_regions() -> None:
-    detection = detect_still(MODEL, SETTINGS, road(CAR, CAR.moved_to(224, 120)))
-    assert [region.box.x < 190 for region in detection.regions] == [True, False]
+def test_two_cars_apart_are_two_detections() -> None:
+    boxes = detect_still(road(CAR, CAR.moved_to(224, 120))).rounded
+    assert [box.x < 190 for box in boxes] == [True, False]
 
 
-@pytest.mark.parametrize("frames", [1, 2, 5])
-def test_a_still_is_as_hot_as_a_video_that_stands_still(frames: int) -> None:
-    settings = but(SETTINGS, "heat", frames=frames)
-    *_, video = watch(*[road(CAR)] * frames, settings=settings)
-    still = detect_still(MODEL, settings, road(CAR))
-    np.testing.assert_allclose(still.heat.values, video.heat.values)
-    assert [region.box for region in still.regions] == [region.box for region in video.regions]
-
-
-def test_a_coarser_heat_finds_the_same_car() -> None:
-    fine = but(SETTINGS, "heat", weight="coverage", shrink=1, threshold=0.7)
-    coarse = but(fine, "heat", shrink=Settings().heat.shrink)
-    (expected,) = detect_still(MODEL, fine, road(CAR)).regions
-    (region,) = detect_still(MODEL, coarse, road(CAR)).regions
-    assert expected.box.iou(CAR) > 0.5
-    assert region.box.iou(expected.box) > 0.8
-    assert region.peak == pytest.approx(expected.peak, rel=0.05)
-
-
-class TestTheDefaultsWay:
-    """Sets that follow the perspective, taken in turns; boxes from votes."""
-
-    def test_a_car_is_found_where_it_is(self) -> None:
-        (region,) = detect_still(MODEL, PERSPECTIVE, road(CAR)).regions
-        assert region.box.iou(CAR) > 0.6
-        assert region.box.contains(region.centroid)
-
-    def test_two_cars_that_one_hot_region_covers_are_told_apart(self) -> None:
-        cars = CAR.moved_to(60, 120), CAR.moved_to(156, 120)  # half a car between them
-        image = road(*cars)
-        outlines = detect_still(MODEL, but(PERSPECTIVE, "heat", regions="outline"), image).regions
-        assert len(outlines) == 1
-        voted = detect_still(MODEL, PERSPECTIVE, image).regions
-        assert len(voted) == 2
-        for car in cars:
-            assert max(region.box.iou(car) for region in voted) > 0.6
-
-    def test_every_frame_is_searched_at_the_sets_whose_turn_it_is(self) -> None:
-        found = watch(*[road()] * 4, settings=PERSPECTIVE)
-        sizes = [np.unique(detection.windows.boxes[:, 2]).tolist() for detection in found]
-        assert sizes == [[48], [64], [48], [64]]
-        assert [grid.size for grid in found[0].grids] == [48, 64]
-
-    @pytest.mark.parametrize("alternate", [1, 2])
-    def test_a_still_is_as_hot_as_a_video_that_stands_still(self, alternate: int) -> None:
-        settings = but(PERSPECTIVE, "search", alternate=alternate)
-        *_, video = watch(*[road(CAR)] * 4, settings=settings)
-        still = detect_still(MODEL, settings, road(CAR))
-        np.testing.assert_allclose(still.heat.values, video.heat.values, atol=1e-6)
-        assert [each.box for each in still.regions] == [each.box for each in video.regions]
-        one, other = ([region.peak for region in each.regions] for each in (still, video))
-        np.testing.assert_allclose(one, other)
-
-    def test_the_windows_of_a_still_are_all_of_them(self) -> None:
-        detection = detect_still(MODEL, PERSPECTIVE, road(CAR))
-        assert len(detection.windows) == sum(len(grid) for grid in detection.grids)
-        assert set(detection.hits.boxes[:, 2].tolist()) == {48, 64}
-
-    @pytest.mark.parametrize("x", [-32, WIDTH - 32])
-    def test_a_car_half_beyond_the_side_is_found_and_its_box_ends_there(self, x: int) -> None:
-        seen = CAR.moved_to(x, 120).clipped(WIDTH, HEIGHT)
-        (region,) = detect_still(MODEL, PERSPECTIVE, road(seen)).regions
-        assert region.box.clipped(WIDTH, HEIGHT) == region.box
-        assert region.box.iou(seen) > 0.4
-
-    def test_votes_of_frames_that_are_forgotten_are_not_heard(self) -> None:
-        *_, detection = watch(road(CAR), road(CAR), road(), road(), settings=PERSPECTIVE)
-        assert detection.regions == ()
-
-    def test_an_empty_road_has_no_regions(self) -> None:
-        assert detect_still(MODEL, PERSPECTIVE, road()).regions == ()
-
-
-class TestHorizon:
-    def test_that_is_set_is_taken(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
-        assert horizon_of(PERSPECTIVE, [road()]) == 0.35
-
-    def test_is_looked_for_in_the_pictures_otherwise(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        images = [road(), road(CAR)]
-        found = {id(images): 0.4}  # in these pictures and no others
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda asked: found[id(asked)])
-        assert horizon_of(Settings(), images) == 0.4
-
-    def test_of_a_still_is_its_own(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        for horizon in (0.35, 0.45):
-            monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda _, h=horizon: h)
-            first = detect_still(MODEL, by_perspective(0), road(CAR)).grids[0]
-            assert float(first.top) == pytest.approx(horizon * HEIGHT - 0.1 * first.size, abs=1)
+def test_a_coarser_heatmap_finds_the_same_car() -> None:
+    fine = but(ROWS, "heat", weight="coverage", shrink=1, threshold=0.7)
+    coarse = but(fine, "heat", shrink=SvmSettings().heat.shrink)
+    expected, found = detect_still(road(CAR), fine), detect_still(road(CAR), coarse)
+    (expected_box,), (box,) = expected.rounded, found.rounded
+    assert expected_box.iou(CAR) > 0.5
+    assert box.iou(expected_box) > 0.8
+    assert found.strengths[0] == pytest.approx(expected.strengths[0], rel=0.05)
 
 
 def test_lengths_scale_with_the_frame() -> None:
     image = np.repeat(np.repeat(road(CAR), 2, axis=0), 2, axis=1)
-    (small,) = detect_still(MODEL, SETTINGS, road(CAR)).regions
-    (large,) = detect_still(MODEL, SETTINGS, image).regions
-    doubled = Box(2 * small.box.x, 2 * small.box.y, 2 * small.box.width, 2 * small.box.height)
-    assert large.box.iou(doubled) > 0.9
+    (small,) = detect_still(road(CAR)).rounded
+    (large,) = detect_still(image).rounded
+    doubled = Box(2 * small.x, 2 * small.y, 2 * small.width, 2 * small.height)
+    assert large.iou(doubled) > 0.9
 
 
-class TestBoxesOfAStill:
-    """Regions that the tracker would show, were this a video."""
+class TestDefaultSettings:
+    """Window sets that follow the perspective, alternating; boxes from votes."""
 
-    def test_by_the_rules_a_region_is_large_enough_both_ways(self) -> None:
-        detection = detect_still(MODEL, SETTINGS, road(CAR))
-        (region,) = detection.regions
-        least = min(region.box.width, region.box.height)
-        enough, too_much = (but(SETTINGS, "tracker", min_region=n) for n in (least, least + 1))
-        assert still_boxes(detection, enough, WIDTH, HEIGHT) == [(region.box, region.peak)]
-        assert still_boxes(detection, too_much, WIDTH, HEIGHT) == []
+    def test_a_car_is_detected_where_it_is(self) -> None:
+        detections = detect_still(road(CAR), DEFAULT)
+        (box,) = detections.rounded
+        assert box.iou(CAR) > 0.6
+        ((x, y),) = detections.centroids.tolist()
+        assert box.contains((x, y))
 
-    def test_by_motion_a_region_is_wide_enough_and_clearly_seen(self) -> None:
-        detection = detect_still(MODEL, PERSPECTIVE, road(CAR))
-        (region,) = detection.regions
-        share, peak = region.box.width / WIDTH, region.peak
-        for smallest, still, boxes in (
-            (share, 0.5, [(region.box, peak)]),
-            (share + 1 / WIDTH, 0.5, []),
-            (share, 0.51, []),
+    def test_two_cars_that_one_hot_region_covers_are_told_apart(self) -> None:
+        cars = CAR.moved_to(60, 120), CAR.moved_to(156, 120)  # half a car between them
+        image = road(*cars)
+        outlines = detect_still(image, but(DEFAULT, "heat", regions="outline"))
+        assert len(outlines) == 1
+        voted = detect_still(image, DEFAULT).rounded
+        assert len(voted) == 2
+        for car in cars:
+            assert max(box.iou(car) for box in voted) > 0.6
+
+    def test_each_frame_is_searched_with_its_own_window_sets(self) -> None:
+        traces = [trace_of(each) for each in detect_video(*[road()] * 4, settings=DEFAULT)]
+        sizes = [np.unique(trace.windows.boxes[:, 2]).tolist() for trace in traces]
+        assert sizes == [[48], [64], [48], [64]]
+        assert [grid.size for grid in traces[0].grids] == [48, 64]
+
+    @pytest.mark.parametrize("x", [-32, WIDTH - 32])
+    def test_a_car_half_beyond_the_side_is_detected_and_its_box_ends_there(self, x: int) -> None:
+        seen = CAR.moved_to(x, 120).clipped(WIDTH, HEIGHT)
+        (box,) = detect_still(road(seen), DEFAULT).rounded
+        assert box.clipped(WIDTH, HEIGHT) == box
+        assert box.iou(seen) > 0.4
+
+    def test_votes_of_forgotten_frames_do_not_count(self) -> None:
+        *_, detections = detect_video(road(CAR), road(CAR), road(), road(), settings=DEFAULT)
+        assert len(detections) == 0
+
+    def test_nothing_is_detected_on_an_empty_road(self) -> None:
+        assert len(detect_still(road(), DEFAULT)) == 0
+
+
+class TestStillPictures:
+    """A still picture gives what a video of `heat.frames` times the same frame gives at its end."""
+
+    @pytest.mark.parametrize("frames", [1, 2, 5])
+    def test_is_as_hot_as_a_video_that_stands_still(self, frames: int) -> None:
+        settings = but(ROWS, "heat", frames=frames)
+        *_, video = detect_video(*[road(CAR)] * frames, settings=settings)
+        still = detect_still(road(CAR), settings)
+        np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
+        assert still.rounded == video.rounded
+
+    @pytest.mark.parametrize("frames", [2, 3, 4])
+    @pytest.mark.parametrize("alternate", [1, 2])
+    def test_is_as_hot_as_a_video_that_stands_still_with_alternating_sets(
+        self, alternate: int, frames: int
+    ) -> None:
+        settings = but(but(DEFAULT, "search", alternate=alternate), "heat", frames=frames)
+        *_, video = detect_video(*[road(CAR)] * frames, settings=settings)
+        still = detect_still(road(CAR), settings)
+        np.testing.assert_allclose(
+            trace_of(still).heat.values, trace_of(video).heat.values, atol=1e-6
+        )
+        assert still.rounded == video.rounded
+        for name in ("strengths", "scores", "centroids"):
+            np.testing.assert_allclose(getattr(still, name), getattr(video, name), rtol=1e-5)
+
+    @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
+    def test_is_searched_once_with_every_set(
+        self, settings: SvmSettings, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        calls = []
+        search = FrameSearch.search
+
+        def counted(self: FrameSearch, image: Image, sets: Any = None) -> Any:
+            calls.append(len(self.grids) if sets is None else len(sets))
+            return search(self, image, sets)
+
+        monkeypatch.setattr(FrameSearch, "search", counted)
+        detections = detect_still(road(CAR), but(settings, "heat", frames=6))
+        assert calls == [len(trace_of(detections).grids)]
+
+    def test_its_windows_are_those_of_every_set(self) -> None:
+        trace = trace_of(detect_still(road(CAR), DEFAULT))
+        assert len(trace.windows) == sum(len(grid) for grid in trace.grids)
+        assert set(trace.hits.boxes[:, 2].tolist()) == {48, 64}
+
+    @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
+    def test_a_detection_is_shown_if_it_is_large_and_strong_enough(
+        self, settings: SvmSettings
+    ) -> None:
+        everything = settings.model_copy(update={"stills": StillSettings(strength=0, width=0)})
+        whole = detect_still(road(CAR), everything)
+        (box,), (strength,) = whole.rounded, whole.strengths.tolist()
+        width, height = box.width / WIDTH, box.height / HEIGHT
+        least = StillSettings(strength=strength - 1e-4, width=width, height=height)
+        for stills, shown in (
+            (least, True),
+            (least.model_copy(update={"strength": strength + 0.01}), False),
+            (least.model_copy(update={"width": width + 1 / WIDTH}), False),
+            (least.model_copy(update={"height": height + 1 / HEIGHT}), False),
         ):
-            motion = MotionSettings(smallest=smallest, strong=2 * peak, still=still)
-            settings = but(PERSPECTIVE, "tracker", motion=motion)
-            assert still_boxes(detection, settings, WIDTH, HEIGHT) == boxes
+            found = detect_still(road(CAR), settings.model_copy(update={"stills": stills}))
+            assert found.rounded == ([box] if shown else [])
 
-    @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["rules", "motion"])
-    def test_the_least_size_of_a_region_scales_with_the_frame(self, settings: Settings) -> None:
-        detection = detect_still(MODEL, settings, road(CAR))
-        assert len(still_boxes(detection, settings, WIDTH, HEIGHT)) == 1
-        assert still_boxes(detection, settings, 10 * WIDTH, 10 * HEIGHT) == []
+    def test_the_least_size_is_a_share_of_the_picture(self) -> None:
+        wide = np.hstack([road(CAR), road(), road(), road()])
+        assert len(detect_still(wide, but(ROWS, "stills", width=0.0))) == 1
+        assert len(detect_still(road(CAR))) == 1
+        assert len(detect_still(wide)) == 0
+
+    def test_weak_and_small_detections_are_left_out_of_still_pictures_only(self) -> None:
+        settings = but(ROWS, "stills", strength=100.0)
+        assert len(detect_still(road(CAR), settings)) == 0
+        assert len(detect_video(road(CAR), road(CAR), settings=settings)[-1]) == 1
+
+
+class TestHorizon:
+    def test_from_the_settings_needs_no_search(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
+        assert horizon_of(DEFAULT, [road()]) == 0.35
+
+    def test_is_not_searched_for_where_no_set_depends_on_it(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
+        horizon_of(ROWS, [road()])
+
+    def test_is_found_in_the_pictures_otherwise(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        images = [road(), road(CAR)]
+        found = {id(images): 0.4}  # in these pictures and no others
+        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda asked: found[id(asked)])
+        assert horizon_of(SvmSettings(), images) == 0.4
+
+    def test_of_a_still_picture_is_its_own(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        for horizon in (0.35, 0.45):
+            monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda _, h=horizon: h)
+            first = trace_of(detect_still(road(CAR), by_perspective(0).svm)).grids[0]
+            assert float(first.top) == pytest.approx(horizon * HEIGHT - 0.1 * first.size, abs=1)
 
 
 @pytest.mark.parametrize("shape", [(240, 20, 3), (1, 1, 3), (2, 2, 3)])
 def test_a_picture_too_small_to_search_is_refused(shape: tuple[int, int, int]) -> None:
-    with pytest.raises(ImageError, match="no search window fits"):
-        detect_still(MODEL, SETTINGS, np.zeros(shape, np.uint8))
+    with pytest.raises(FrameSizeError, match="no search window fits"):
+        detect_still(np.zeros(shape, np.uint8))
 
 
 @pytest.mark.parametrize("value", [0, 128, 255])
-def test_a_picture_of_one_colour_is_searched_without_complaint(value: int) -> None:
+def test_a_picture_of_one_colour_is_searched_without_warnings(value: int) -> None:
     image = np.full((240, 320, 3), value, np.uint8)
-    assert len(detect_still(MODEL, SETTINGS, image).windows) > 0
+    assert len(trace_of(detect_still(image)).windows) > 0
+
+
+def test_a_picture_is_left_as_it_was() -> None:
+    image = road(CAR)
+    detect_still(image)
+    np.testing.assert_array_equal(image, road(CAR))
+
+
+def test_one_loaded_model_serves_frames_of_any_size() -> None:
+    model = SvmModel(replace(MODEL), DEFAULT)
+    for width, height in ((WIDTH, HEIGHT), (2 * WIDTH, 2 * HEIGHT)):
+        image = np.zeros((height, width, 3), np.uint8)
+        detector = model.for_video(width, height, [image])
+        assert len(detector.detect(detector.search(image, 0))) == 0
+        assert trace_of(detector.detect(detector.search(image, 1))).heat.values.shape == (
+            height // 4,
+            width // 4,
+        )
+
+
+# What `detection_scores` makes of the strength of the evidence.
+positive = st.floats(1e-6, 1e6)
+slopes = st.floats(0.01, 100)
+
+
+def scores_of(*strengths: float, middle: float = 0.3, slope: float = 2) -> Float32Array:
+    return detection_scores(np.array(strengths, np.float32), middle, slope)
+
+
+class TestScores:
+    def test_half_of_the_boxes_with_the_middle_strength_are_vehicles(self) -> None:
+        assert scores_of(0.3)[0] == pytest.approx(0.5)
+        assert scores_of(5, middle=5, slope=7)[0] == pytest.approx(0.5)
+
+    def test_the_score_is_a_sigmoid_of_the_logarithm_of_the_strength(self) -> None:
+        strength, middle, slope = 0.7, 0.3, 2.5
+        expected = 1 / (1 + np.exp(-slope * (np.log(strength) - np.log(middle))))
+        assert scores_of(strength, middle=middle, slope=slope)[0] == pytest.approx(
+            expected, rel=1e-6
+        )
+
+    @given(st.lists(st.floats(0, 2**100, width=32), min_size=2, max_size=20), positive, slopes)
+    def test_stronger_evidence_never_has_a_lower_score(
+        self, strengths: list[float], middle: float, slope: float
+    ) -> None:
+        scores = scores_of(*sorted(strengths), middle=middle, slope=slope)
+        assert (np.diff(scores) >= 0).all()
+        assert (scores >= 0).all()
+        assert (scores <= 1).all()
+
+    def test_no_evidence_has_the_score_0_and_endless_evidence_nears_1(self) -> None:
+        for slope in (0.5, 2, 100):
+            scores = scores_of(0, 1e-45, 1e38, slope=slope)
+            assert scores.tolist() == [0, pytest.approx(0), pytest.approx(1)]
+
+    def test_no_strengths_have_no_scores(self) -> None:
+        assert scores_of().shape == (0,)
+        assert scores_of().dtype == np.float32
+
+    @given(st.floats(0, 2**127, width=32), positive, slopes)
+    def test_no_strength_overflows_or_warns(
+        self, strength: float, middle: float, slope: float
+    ) -> None:
+        (score,) = scores_of(strength, middle=middle, slope=slope)  # warnings are errors here
+        assert np.isfinite(score)
+
+    def test_the_settings_allow_nothing_that_has_no_score(self) -> None:
+        for middle, slope in ((1e-300, 100), (1e6, 100), (1e6, 1e-300)):
+            settings = ScoreSettings(middle=middle, slope=slope)
+            assert np.isfinite(
+                scores_of(0, 1e-3, 1, 1e6, middle=settings.middle, slope=slope)
+            ).all()

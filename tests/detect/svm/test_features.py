@@ -23,7 +23,7 @@ from vdet.detect.svm.features import (
 )
 
 PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
-FEATURES = SEED.features
+FEATURES = SEED.svm.features
 NO_HOG = HogSettings(channels=())
 NO_HISTOGRAM = HistogramSettings(bins=0)
 

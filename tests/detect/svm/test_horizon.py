@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from vdet.detect.svm.horizon import USUAL, find_horizon
+from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.media.images import Image
-from vdet.synthetic import Renderer, default_clip, empty_road, frames
-from vdet.synthetic.camera import Camera
+from vdet.synthetic import Renderer, demo_scene, empty_road, frames
+from vdet.synthetic.camera import PinholeCamera
 
 STEP = 0.01  # of the rows that are looked at
 RNG = np.random.default_rng(0)
@@ -27,7 +27,9 @@ def road(
 ) -> list[Image]:
     """Draw consecutive frames of an empty road."""
     width, height = size
-    camera = Camera(width, height, 0.6 * width + 0.6 * height, horizon * height, 1.3, curvature)
+    camera = PinholeCamera(
+        width, height, 0.6 * width + 0.6 * height, horizon * height, 1.3, curvature
+    )
     scene = empty_road(np.random.default_rng(7), camera, lane=lane, lanes=lanes, seed=7)
     renderer = Renderer(replace(scene, frames=count))
     return [renderer.image(index) for index in range(count)]
@@ -55,7 +57,7 @@ def test_the_road_may_bend_and_the_camera_be_in_any_lane(
 
 
 def test_traffic_does_not_hide_it() -> None:
-    scene = replace(default_clip(1, width=640, height=360), frames=5)
+    scene = replace(demo_scene(1, width=640, height=360), frames=5)
     found = find_horizon([frame.image for frame in frames(scene)])
     assert found == pytest.approx(scene.camera.horizon / 360, abs=2 * STEP)
 
@@ -87,11 +89,11 @@ def test_a_mirrored_road_has_the_same() -> None:
     ids=["black", "white", "noise", "upright lines", "a pixel", "a row"],
 )
 def test_where_no_lines_tell_it_is_where_it_usually_is(image: Image) -> None:
-    assert find_horizon([image]) == USUAL
+    assert find_horizon([image]) == DEFAULT_HORIZON
 
 
 def test_no_frames_tell_nothing() -> None:
-    assert find_horizon([]) == USUAL
+    assert find_horizon([]) == DEFAULT_HORIZON
 
 
 def fan(*slopes: float, meeting: float = 0.45, upward: bool = False) -> Image:
@@ -113,7 +115,7 @@ LEFT = tuple(-slope for slope in RIGHT)
 
 def test_lines_from_both_sides_are_needed() -> None:
     assert find_horizon([fan(*LEFT, *RIGHT)]) == pytest.approx(0.45, abs=STEP)
-    assert find_horizon([fan(*RIGHT)]) == find_horizon([fan(*LEFT)]) == USUAL
+    assert find_horizon([fan(*RIGHT)]) == find_horizon([fan(*LEFT)]) == DEFAULT_HORIZON
 
 
 def test_lines_that_meet_below_themselves_do_not_count() -> None:
@@ -124,7 +126,7 @@ def test_lines_that_meet_below_themselves_do_not_count() -> None:
 
 def test_a_picture_far_taller_than_wide_is_not_enlarged() -> None:
     tracemalloc.start()
-    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == USUAL
+    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == DEFAULT_HORIZON
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 10_000_000

@@ -14,7 +14,7 @@ from vdet.detect.svm.patch_sheet import TILE, patch_sheet
 from vdet.media.images import Image
 
 PITCH = (TILE + 32, TILE + 8)  # of tiles with their frames, down and across
-SEED = seed.SEED.features
+SEED = seed.SEED.svm.features
 FIRST_HOG = 4
 SPACES = ["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
 

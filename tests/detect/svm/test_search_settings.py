@@ -3,28 +3,58 @@
 import pytest
 
 from vdet.config.loading import load_settings
-from vdet.config.schema import HeatSettings, PerspectiveSettings, SearchSettings, Settings
+from vdet.config.schema import HeatSettings, PerspectiveSettings, SearchSettings, SvmSettings
 from vdet.errors import ConfigError
 
-WINDOWS = "search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
+WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
 
 
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("search.perspective.sizes=[]", "search: windows or perspective.sizes must be given"),
-        ("search.perspective.lowest=0.5", "search.perspective: lowest must be at least highest"),
-        ("search.alternate=3", "heat.frames must be at least search.alternate"),
-        ("heat.frames=1", "heat.frames must be at least search.alternate"),
-        ("search.alternate=0", "search.alternate: should be greater than or equal to 1"),
-        ("search.perspective.sizes=[0.1, 0]", "search.perspective.sizes[1]: should be greater"),
-        ("search.perspective.sizes=[1.5]", "search.perspective.sizes[0]: should be less than"),
-        ("search.perspective.horizon=360", "search.perspective.horizon: should be less than"),
-        ("search.perspective.beyond=-0.1", "search.perspective.beyond: should be greater"),
-        ("search.perspective.zoom=0", "search.perspective.zoom: should be greater"),
-        ("heat.regions=boxes", "heat.regions: should be 'outline' or 'votes'"),
-        ("heat.votes.agreement=2", "heat.votes.agreement: should be less than or equal to 1"),
-        ("heat.votes.least=-1", "heat.votes.least: should be greater than or equal to 0"),
+        (
+            "detector.search.perspective.sizes=[]",
+            "detector.search: windows or perspective.sizes must be given",
+        ),
+        (
+            "detector.search.perspective.lowest=0.5",
+            "detector.search.perspective: lowest must be at least highest",
+        ),
+        ("detector.search.alternate=3", "detector: heat.frames must be at least search.alternate"),
+        ("detector.heat.frames=1", "detector: heat.frames must be at least search.alternate"),
+        (
+            "detector.search.alternate=0",
+            "detector.search.alternate: should be greater than or equal to 1",
+        ),
+        (
+            "detector.search.perspective.sizes=[0.1, 0]",
+            "detector.search.perspective.sizes[1]: should be greater",
+        ),
+        (
+            "detector.search.perspective.sizes=[1.5]",
+            "detector.search.perspective.sizes[0]: should be less than",
+        ),
+        (
+            "detector.search.perspective.horizon=360",
+            "detector.search.perspective.horizon: should be less than",
+        ),
+        (
+            "detector.search.perspective.beyond=-0.1",
+            "detector.search.perspective.beyond: should be greater",
+        ),
+        (
+            "detector.search.perspective.zoom=0",
+            "detector.search.perspective.zoom: should be greater",
+        ),
+        ("detector.heat.regions=boxes", "detector.heat.regions: should be 'outline' or 'votes'"),
+        (
+            "detector.heat.votes.agreement=2",
+            "detector.heat.votes.agreement: should be less than or equal to 1",
+        ),
+        (
+            "detector.heat.votes.least=-1",
+            "detector.heat.votes.least: should be greater than or equal to 0",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused(assignment: str, message: str) -> None:
@@ -35,16 +65,16 @@ def test_what_makes_no_sense_is_refused(assignment: str, message: str) -> None:
 
 
 def test_fixed_sets_may_stand_alone_and_beside_those_of_the_perspective() -> None:
-    both = load_settings(None, [WINDOWS]).settings.search
+    both = load_settings(None, [WINDOWS]).svm.search
     assert both.windows
     assert both.perspective.sizes
-    alone = load_settings(None, [WINDOWS, "search.perspective.sizes=[]"]).settings.search
+    alone = load_settings(None, [WINDOWS, "detector.search.perspective.sizes=[]"]).svm.search
     assert alone.windows == both.windows
     assert alone.perspective.sizes == ()
 
 
 def test_a_heat_of_as_many_frames_as_the_sets_are_dealt_out_over_is_enough() -> None:
-    settings = Settings(search=SearchSettings(alternate=3), heat=HeatSettings(frames=3))
+    settings = SvmSettings(search=SearchSettings(alternate=3), heat=HeatSettings(frames=3))
     assert settings.heat.frames == settings.search.alternate
 
 

@@ -5,14 +5,13 @@ import pytest
 
 from vdet.evaluate.clips.evaluate import RunResult, best, judge, judge_files, total
 from vdet.evaluate.clips.text import plain, run_lines, sweep_rows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, collect
+from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
 
 TEN = range(1, 11)
 
 
 def video(frames: range, x: float = 0) -> LabelledVideo:
-    return collect(Path("scene"), [Row(0, frame, 1, x, 0, 100, 100) for frame in frames])
+    return checked_video(Path("scene"), [Row(0, frame, 1, x, 0, 100, 100) for frame in frames])
 
 
 def run(assignments: tuple[str, ...], *found: range) -> RunResult:

@@ -1,21 +1,10 @@
-from pathlib import Path
-
 import pytest
 
+from evaluate.scenes import TEN, drive, video
 from vdet.evaluate.clips.losses import Loss, losses
-from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.comparison import compare
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.matching import match
-from vdet.evaluate.preprocessing import compare
-from vdet.evaluate.rows import Row, collect
-
-
-def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
-    """Return a box of 100 pixels height that stands at `x` in these frames."""
-    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
-
-
-def video(*tracks: list[Row]) -> LabelledVideo:
-    return collect(Path("scene"), [row for track in tracks for row in track])
 
 
 def found_losses(found: LabelledVideo, truth: LabelledVideo) -> list[Loss]:
@@ -23,10 +12,7 @@ def found_losses(found: LabelledVideo, truth: LabelledVideo) -> list[Loss]:
     return losses(comparison, match(comparison))
 
 
-TEN = range(1, 11)
-
-
-def test_nothing_is_lost_where_all_is_found() -> None:
+def test_nothing_is_lost_if_all_is_found() -> None:
     assert found_losses(video(drive(1, TEN)), video(drive(7, TEN))) == []
 
 
@@ -43,14 +29,14 @@ def test_a_false_alarm_is_a_loss_too() -> None:
     assert found_losses(found, video(drive(7, TEN))) == [Loss("false alarm", 2, 4, 7, 0)]
 
 
-def test_a_box_that_fits_badly_is_lost_on_both_sides_and_its_overlap_told() -> None:
+def test_a_box_that_fits_badly_is_lost_on_both_sides_with_its_overlap() -> None:
     # 100 wide against 250 wide over it: IoU 0.4
     alarm, missed = found_losses(video(drive(1, TEN, width=250)), video(drive(7, TEN)))
     assert (alarm.kind, missed.kind) == ("false alarm", "missed")
     assert alarm.overlap == missed.overlap == pytest.approx(0.4)
 
 
-def test_frames_in_which_the_vehicle_is_ignored_part_a_loss() -> None:
+def test_frames_in_which_the_vehicle_is_ignored_split_a_loss() -> None:
     ignored = [Row(0, 5, 7, 0, 0, 100, 100, ignored=True)]
     truth = video(drive(7, range(1, 5)) + ignored + drive(7, range(6, 11)))
     spans = [(loss.first, loss.last) for loss in found_losses(video(), truth)]

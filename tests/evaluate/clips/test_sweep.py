@@ -4,15 +4,15 @@ from vdet.errors import ConfigError
 from vdet.evaluate.clips.sweep import grid
 
 
-def test_nothing_swept_is_one_setting() -> None:
+def test_without_sweeps_there_is_one_setting() -> None:
     assert grid(()) == [()]
 
 
 def test_the_values_of_a_key_in_their_order() -> None:
-    assert grid(("heat.threshold=4,1, 2",)) == [
-        ("heat.threshold=4",),
-        ("heat.threshold=1",),
-        ("heat.threshold=2",),
+    assert grid(("detector.heat.threshold=4,1, 2",)) == [
+        ("detector.heat.threshold=4",),
+        ("detector.heat.threshold=1",),
+        ("detector.heat.threshold=2",),
     ]
 
 
@@ -24,10 +24,10 @@ def test_several_keys_make_a_grid() -> None:
 
 
 def test_a_comma_in_brackets_belongs_to_the_value() -> None:
-    values = "search.windows=[{size: 64, top: 1}],[{size: 96, top: 2}]"
+    values = "detector.search.windows=[{size: 64, top: 1}],[{size: 96, top: 2}]"
     assert grid((values,)) == [
-        ("search.windows=[{size: 64, top: 1}]",),
-        ("search.windows=[{size: 96, top: 2}]",),
+        ("detector.search.windows=[{size: 64, top: 1}]",),
+        ("detector.search.windows=[{size: 96, top: 2}]",),
     ]
 
 
@@ -36,7 +36,7 @@ def test_a_value_given_twice_is_run_once() -> None:
 
 
 @pytest.mark.parametrize("text", ["heat.threshold", "=1,2", "a=", "a=1,,2", "a=1,"])
-def test_what_is_no_sweep_is_refused(text: str) -> None:
+def test_other_text_than_a_sweep_is_refused(text: str) -> None:
     with pytest.raises(ConfigError, match="expected KEY=VALUE,VALUE"):
         grid((text,))
 

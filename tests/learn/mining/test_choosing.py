@@ -3,8 +3,7 @@ import numpy.typing as npt
 
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.rows import Row, in_memory
+from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.geometry import Box
 from vdet.learn.mining.choosing import Choice, Kind, choose
 
@@ -17,7 +16,7 @@ GENEROUS = MiningSettings(probability=0.2, per_vehicle=1000, false_alarms=1000, 
 def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> LabelledVideo:
     rows = [(i, box, False) for i, box in enumerate(vehicles)]
     rows += [(-1, box, True) for box in ignored]
-    return in_memory(
+    return LabelledVideo.from_rows(
         Row(0, 1, number, box.x, box.y, box.width, box.height, ignored=flag)
         for number, box, flag in rows
     )

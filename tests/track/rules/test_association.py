@@ -2,7 +2,7 @@
 
 import pytest
 
-from seed import SEED, tracker_but
+from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from vdet.config.schema import RulesTrackerSettings
 from vdet.geometry import Box
@@ -16,7 +16,7 @@ from vdet.track.rules.association import (
 )
 from vdet.track.rules.car import Car, Region
 
-SETTINGS = SEED.tracker
+SETTINGS = SEED_TRACKER
 LEFT, RIGHT = Box(100, 200, 100, 80), Box(320, 200, 100, 80)
 
 

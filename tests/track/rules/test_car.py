@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from seed import SEED, tracker_but
+from seed import SEED_TRACKER, tracker_but
 from vdet.geometry import Box
 from vdet.media.images import Image
 from vdet.track.rules.car import Car, MatchMethod, Region, find_template
@@ -117,7 +117,7 @@ def test_the_latest_image_is_searched_around_the_latest_box() -> None:
     car = Car(needed=10, history=10)
     car.see(Region(Box(0, 0, 60, 60), (30, 30), 2.0), FRAME)
     car.see(Region(BOX, (140, 90), 2.0), FRAME)
-    assert car.find_in(shifted(FRAME, 7, -4), SEED.tracker) == BOX.moved_to(107, 56)
+    assert car.find_in(shifted(FRAME, 7, -4), SEED_TRACKER) == BOX.moved_to(107, 56)
 
 
 def test_the_settings_limit_the_search() -> None:

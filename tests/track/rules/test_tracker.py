@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from seed import SEED, tracker_but
+from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from track.rules.scenes import detections
 from vdet.detect.detections import NO_DETECTIONS, Detections
@@ -80,7 +80,7 @@ def test_a_region_outside_the_frame_is_ignored_whatever_the_setting() -> None:
 
 def test_a_region_has_the_strength_of_its_detection_as_its_peak() -> None:
     found = Detections([[10, 20, 90.4, 99.6]], [0.5], centroids=[[44, 55]], strengths=[3.5])
-    (region,) = large_enough(found, 640, 360, SEED.tracker)
+    (region,) = large_enough(found, 640, 360, SEED_TRACKER)
     assert region == Region(Box(10, 20, 80, 80), (44, 55), 3.5, 0.5)
 
 
@@ -161,7 +161,7 @@ def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
 
 
 def test_a_match_counts_in_the_average_box() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     show(cars, SEDAN)
     (track,) = update(cars, road(SEDAN.moved_to(140, 200)))
     assert track.box == SEDAN.moved_to(104, 200)
@@ -191,7 +191,7 @@ def test_the_method_of_the_match_is_a_setting() -> None:
 
 
 def test_a_car_that_was_never_shown_is_not_searched() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     for _ in range(8):
         update(cars, road(SEDAN), SEDAN)
     assert update(cars, road(SEDAN)) == []
@@ -212,7 +212,7 @@ def test_a_car_shown_before_is_still_searched_after_a_miss() -> None:
 def test_a_car_is_shown_after_ten_detections_in_a_row_or_three_confident_ones(
     peak: float, first_shown: int
 ) -> None:
-    shown = see(RulesTracker(SEED.tracker), SEDAN, frames=12, peak=peak)
+    shown = see(RulesTracker(SEED_TRACKER), SEDAN, frames=12, peak=peak)
     assert [bool(tracks) for tracks in shown].index(True) == first_shown - 1
     assert all(shown[first_shown - 1 :])
 
@@ -227,7 +227,7 @@ def test_how_many_detections_are_enough_is_a_setting() -> None:
 
 
 def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     show(cars, SEDAN)
     assert see(cars) == [[]]
     shown = see(cars, SEDAN, frames=10)
@@ -284,12 +284,12 @@ def test_a_car_missed_five_frames_in_a_row_is_deleted(
 
 def test_ids_start_at_1_in_every_video() -> None:
     for _ in range(2):
-        shown = see(RulesTracker(SEED.tracker), SEDAN, VAN, frames=10)
+        shown = see(RulesTracker(SEED_TRACKER), SEDAN, VAN, frames=10)
         assert ids(shown[-1]) == [1, 2]
 
 
 def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     see(cars, SEDAN, frames=5)
     see(cars, SEDAN, VAN, frames=5)
     shown = see(cars, VAN, SEDAN, frames=5)
@@ -297,21 +297,21 @@ def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
 
 
 def test_a_shown_box_is_the_average_of_the_last_ten() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     for x in range(100, 124, 2):
         tracks = update(cars, road(), SEDAN.moved_to(x, 200))
     assert tracks == [Track(1, SEDAN.moved_to(113, 200), 1.0, predicted=False)]
 
 
 def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     see(cars, Box(100, 200, 260, 100), frames=10)
     (tracks,) = see(cars, Box(70, 200, 120, 100), Box(250, 200, 110, 100))
     assert [(track.id, track.box.x) for track in tracks] == [(1, 250), (2, 70)]
 
 
 def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     behind = Box(150, 200, 100, 80)
     frame = road(SEDAN, behind)
     for _ in range(10):
@@ -325,7 +325,7 @@ def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() ->
 
 
 def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> None:
-    cars = RulesTracker(SEED.tracker)
+    cars = RulesTracker(SEED_TRACKER)
     shown = [cars.update(detections([SEDAN], score=0.05 * n), 0.0, GREY) for n in range(12)]
     assert [track.score for track in shown[-1]] == pytest.approx([0.05 * 6.5])
 
@@ -350,4 +350,4 @@ def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
 
 def test_without_the_frame_it_says_that_it_needs_it() -> None:
     with pytest.raises(ValueError, match="needs the frame"):
-        RulesTracker(SEED.tracker).update(NO_DETECTIONS, 0.0)
+        RulesTracker(SEED_TRACKER).update(NO_DETECTIONS, 0.0)

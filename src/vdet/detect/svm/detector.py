@@ -1,133 +1,169 @@
-"""One frame → its windows, heat and regions: what still pictures and video have in common."""
+"""The linear model as a detector: windows → heat → hot regions → detections."""
 
+import logging
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from vdet.config.scaling import scale_lengths
-from vdet.config.schema import Settings
-from vdet.detect.svm.heat import Heat, HeatMap, Region, find_regions
-from vdet.detect.svm.horizon import USUAL, find_horizon
+import numpy as np
+
+from vdet.config.schema import StillSettings, SvmSettings
+from vdet.config.section import scale_lengths
+from vdet.detect.detections import Detections
+from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
+from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
-from vdet.detect.svm.windows import NO_WINDOWS, WindowGrid, Windows
-from vdet.geometry import Box
+from vdet.detect.svm.windows import Windows, join_windows
+from vdet.geometry import Float32Array
 from vdet.media.images import Image
+
+log = logging.getLogger("vdet")
 
 
 @dataclass(frozen=True, slots=True)
-class Detection:
-    """What was found in a frame, before any memory of cars.
+class Candidates:
+    """What the search of one frame gives.
 
-    `windows` are the searched ones, `hits` those of at least `search.probability`, `heat` is
-    the heatmap of the last frames, `regions` is what is hot in it (`heat.threshold`,
-    `heat.regions`), `grids` are the window sets.
+    `windows` are all that were searched. `by_frame` are the windows that each of one or more
+    consecutive frames adds to the heat: for a frame of a video there is one; a still picture counts
+    as several, each of which adds the sets that it would search in a video.
     """
 
     windows: Windows
-    hits: Windows
-    heat: Heat
-    regions: tuple[Region, ...]
-    grids: tuple[WindowGrid, ...]
+    by_frame: tuple[Windows, ...]
+    is_still: bool
 
 
-class Detector:
-    """Finds regions in consecutive frames of one size.
+class SvmModel:
+    """A linear model with its settings: a `DetectorModel`."""
+
+    def __init__(self, model: LinearModel, settings: SvmSettings) -> None:
+        self._model = model
+        self._settings = settings
+
+    def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
+        """Return a detector for frames of one size; `images` show where the horizon is."""
+        horizon = horizon_of(self._settings, images)
+        log.info("the horizon lies at %.2f of the height", horizon)
+        return SvmDetector(self._model, self._settings, width, height, horizon=horizon)
+
+
+class SvmDetector:
+    """Finds vehicles in consecutive frames of one size: a `VideoDetector`.
 
     Parameters
     ----------
     width, height
         Size of the frames, pixels.
     horizon
-        Its row, share of the frames' height (`horizon_of`).
+        Row of the horizon, share of the frames' height (`horizon_of`).
 
     Raises
     ------
-    ImageError
+    FrameSizeError
         No search window fits into such a frame.
+    ImageError
+        Too many windows fit into such a frame.
+    ConfigError
+        The dense engine is asked for, and cannot compute the model's features.
     """
 
     def __init__(
         self,
         model: LinearModel,
-        settings: Settings,
+        settings: SvmSettings,
         width: int,
         height: int,
         *,
-        horizon: float = USUAL,
+        horizon: float = DEFAULT_HORIZON,
     ) -> None:
         self._search = FrameSearch(model, settings, width, height, horizon=horizon)
+        self._features = model.features
         self._size = width, height
-        self._probability = settings.search.probability
+        self._settings = settings
         self._heat = scale_lengths(settings.heat, height / settings.reference_height)
         self._map = HeatMap(width, height, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
 
-    def search(self, image: Image, turn: int | None = None) -> Windows:
-        """Search a frame, BGR uint8 `(H, W, 3)`; may be called from threads, in any order.
+    def search(self, image: Image, index: int | None) -> Candidates:
+        """Search the windows of a frame; several threads may call this at once."""
+        if index is not None:
+            windows = join_windows(self._search.search(image, self._search.sets_of(index)))
+            return Candidates(windows, (windows,), is_still=False)
+        by_set = self._search.search(image)
+        by_frame = tuple(
+            join_windows([by_set[number] for number in self._search.sets_of(frame)])
+            for frame in range(self._heat.frames)
+        )
+        return Candidates(join_windows(by_set), by_frame, is_still=True)
 
-        `turn` is the number of a video's frame; None searches all window sets at once.
+    def detect(self, candidates: Candidates) -> Detections:
+        """Add the hits of the next frame to the heat, and return what is hot.
+
+        A still picture counts as `heat.frames` frames that all show it, so that thresholds mean the
+        same as in video.
         """
-        return self._search.search(image, turn)
+        for windows in candidates.by_frame:
+            hits = windows.hits(self._settings.search.probability)
+            heat = self._map.update(hits)
+            self._recent.append(hits)
+        regions = self._regions(heat)
+        if candidates.is_still:
+            regions = [each for each in regions if self._is_shown(each, self._settings.stills)]
+            hits = candidates.windows.hits(self._settings.search.probability)
+        trace = Trace(candidates.windows, hits, heat, self._search.grids)
+        return self._detections(regions, trace)
 
-    def accumulate(self, windows: Windows) -> Detection:
-        """Add the windows of the next frame to the heat."""
-        hits = windows.detected(self._probability)
-        heat = self._map.update(hits)
-        self._recent.append(hits)
+    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+        """Return pictures of patches and their features, the windows, the hits and the heat."""
+        return stage_pictures(image, detections.trace, self._features)
+
+    def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
         if self._heat.regions == "votes":
             votes = Votes.of(self._recent, self._size, self._heat.votes)
             regions = split_regions(regions, votes, self._heat.votes)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
-        visible = tuple(region for region in inside if region.box.area)
-        return Detection(windows, hits, heat, visible, self._search.grids)
+        return [region for region in inside if region.box.area]
+
+    def _is_shown(self, region: HotRegion, stills: StillSettings) -> bool:
+        width, height = self._size
+        return (
+            region.strength >= stills.strength
+            and region.box.width >= stills.width * width
+            and region.box.height >= stills.height * height
+        )
+
+    def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Detections:
+        strengths = np.array([region.strength for region in regions], np.float32)
+        boxes = [(b.x, b.y, b.right, b.bottom) for b in (region.box for region in regions)]
+        score = self._settings.score
+        return Detections(
+            np.reshape(boxes, (-1, 4)),
+            detection_scores(strengths, score.middle, score.slope),
+            centroids=np.reshape([region.centroid for region in regions], (-1, 2)),
+            strengths=strengths,
+            trace=trace,
+        )
 
 
-def horizon_of(settings: Settings, images: Sequence[Image]) -> float:
-    """Return the horizon's row, share of the height: the set one, or that which `images` show."""
+def horizon_of(settings: SvmSettings, images: Sequence[Image]) -> float:
+    """Return the row of the horizon, share of the height: from the settings, or from `images`."""
     perspective = settings.search.perspective
     if not perspective.sizes:
-        return USUAL  # nothing depends on it
+        return DEFAULT_HORIZON  # no window set depends on it
     return perspective.horizon or find_horizon(images)
 
 
-def nothing_detected(settings: Settings, width: int, height: int) -> Detection:
-    """Return what is found in a frame of that size, pixels, where nothing is searched."""
-    scaled = scale_lengths(settings.heat, height / settings.reference_height)
-    heat = HeatMap(width, height, scaled).update(NO_WINDOWS)
-    return Detection(NO_WINDOWS, NO_WINDOWS, heat, (), ())
+def detection_scores(strengths: Float32Array, middle: float, slope: float) -> Float32Array:
+    """Return 1 / (1 + (middle / strength) ** slope), float32 `(n,)`, 0 to 1.
 
-
-def detect_still(model: LinearModel, settings: Settings, image: Image) -> Detection:
-    """Search a single picture as if it stood still for `heat.frames` frames.
-
-    So the threshold means the same as in video. Raises `ImageError` like `Detector`.
+    This is a sigmoid of the strength's logarithm (Platt 1999, "Probabilistic outputs for support
+    vector machines"). A strength of 0 has the score 0.
     """
-    height, width = image.shape[:2]
-    detector = Detector(model, settings, width, height, horizon=horizon_of(settings, [image]))
-    for turn in range(settings.heat.frames):
-        detection = detector.accumulate(detector.search(image, turn))
-    windows = detector.search(image)
-    return replace(detection, windows=windows, hits=windows.detected(settings.search.probability))
-
-
-def still_boxes(
-    detection: Detection, settings: Settings, width: int, height: int
-) -> list[tuple[Box, float]]:
-    """Return box and peak of the regions of a picture that the tracker would take for vehicles.
-
-    By the rules these are the large enough ones (`min_region`); by motion those that are large
-    enough (`motion.smallest`) and seen clearly enough for one look (`motion.still`).
-    """
-    regions = ((region.box, region.peak) for region in detection.regions)
-    if settings.tracker.method == "rules":
-        least = scale_lengths(settings.tracker, height / settings.reference_height).min_region
-        return [each for each in regions if min(each[0].width, each[0].height) >= least]
-    motion = settings.tracker.motion
-    return [
-        (box, peak)
-        for box, peak in regions
-        if box.width >= motion.smallest * width and peak >= motion.still * motion.strong
-    ]
+    with np.errstate(divide="ignore", over="ignore"):
+        odds = (middle / strengths.astype(np.float64)) ** slope
+    return np.asarray(1 / (1 + odds), np.float32)

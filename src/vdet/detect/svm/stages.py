@@ -1,71 +1,55 @@
-"""A picture of every stage of the detection, as the original's report shows them."""
+"""A picture of each stage of the detection, as in the report of the original."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.detector import Detection
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.patch_sheet import patch_sheet
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
-from vdet.files import check_output, make_folder
 from vdet.geometry import Box
-from vdet.media.images import Image, write_image
-
-LAST_STAGE = "5-boxes"
-
-LabelledBox = tuple[Box, str]
+from vdet.media.images import Image
 
 
-def check_stages(folder: Path, *, overwrite: bool) -> None:
-    """Make the folder, and refuse to write over earlier stages. Raises `OutputError`."""
-    make_folder(folder)
-    check_output(folder / f"{LAST_STAGE}.png", overwrite=overwrite)
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """What the stage pictures of a frame need.
+
+    `windows` are all that were searched, `hits` those of at least `detector.search.probability`,
+    `heat` is the heatmap of the last frames, `grids` are the window sets.
+    """
+
+    windows: Windows
+    hits: Windows
+    heat: Heat
+    grids: tuple[WindowGrid, ...]
 
 
-def write_stages(
-    folder: Path,
-    image: Image,
-    detection: Detection,
-    boxes: Sequence[LabelledBox],
-    *,
-    features: FeatureSettings,
-) -> None:
-    """Write `1-patches.png` … `5-boxes.png` into `folder`, which is made where it is missing.
+def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dict[str, Image]:
+    """Return four pictures by name: patches and their features, windows, hits, heat.
 
     Parameters
     ----------
     image
-        The frame searched, BGR uint8 `(H, W, 3)`.
-    boxes
-        The final boxes with their labels, full-frame pixels.
+        The searched frame, BGR uint8 `(H, W, 3)`.
     features
-        Those of the model.
+        The features of the model.
     """
-    pictures = {
-        "1-patches": patch_sheet(_examples(image, detection.windows), features),
-        "2-windows": _draw_window_sets(image, detection.grids),
-        "3-hits": _draw_hits(image, detection.hits),
-        "4-heat": _draw_heat(image, detection),
-        LAST_STAGE: _draw_boxes(image, detection, boxes),
+    return {
+        "patches": patch_sheet(_examples(image, trace.windows), features),
+        "windows": _draw_window_sets(image, trace.grids),
+        "hits": _draw_hits(image, trace.hits),
+        "heat": _draw_heat(image, trace.heat),
     }
-    write_pictures(folder, pictures)
-
-
-def write_pictures(folder: Path, pictures: dict[str, Image]) -> None:
-    """Write each picture as `name.png` into `folder`, which is made where it is missing."""
-    make_folder(folder)
-    for name, picture in pictures.items():
-        write_image(folder / f"{name}.png", picture)
 
 
 def _examples(image: Image, windows: Windows) -> dict[str, Image]:
-    """Return the likeliest and the unlikeliest window of the frame, with captions."""
+    """Return the most and the least probable window of the frame, by caption."""
     best, worst = int(windows.probabilities.argmax()), int(windows.probabilities.argmin())
     frame = FramePyramid(image, margin=int(windows.boxes[:, 2].max()))
     examples = {}
@@ -76,7 +60,7 @@ def _examples(image: Image, windows: Windows) -> dict[str, Image]:
 
 
 def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
-    """Draw each set's windows as a fine grid with one whole window, and its count."""
+    """Draw a row of lines for each row of windows, and one whole window with size and count."""
     picture = (image * 0.6).astype(np.uint8)
     for number, grid in enumerate(grids):
         for x, y, width, height in grid.boxes.tolist():
@@ -99,25 +83,14 @@ def _draw_hits(image: Image, hits: Windows) -> Image:
     return picture
 
 
-def _draw_heat(image: Image, detection: Detection) -> Image:
-    picture = blend_heat(image, detection.heat)
-    draw_label(picture, f"peak {detection.heat.peak:.1f}", (0, 0), WHITE)
-    return picture
-
-
-def _draw_boxes(image: Image, detection: Detection, boxes: Sequence[LabelledBox]) -> Image:
-    """Draw the regions thin and white with their peak, the final boxes over them."""
-    picture = image.copy()
-    for region in detection.regions:
-        draw_box(picture, region.box, WHITE)
-        draw_label(picture, f"heat {region.peak:.1f}", (region.box.x, region.box.bottom), WHITE)
-    for number, (box, label) in enumerate(boxes, start=1):
-        draw_box(picture, box, color_of(number), label)
+def _draw_heat(image: Image, heat: Heat) -> Image:
+    picture = blend_heat(image, heat)
+    draw_label(picture, f"peak {heat.peak:.1f}", (0, 0), WHITE)
     return picture
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:
-    """Return the image with the heat over it, from black over red to white at its peak."""
+    """Return the darkened image with the heat over it: black, red, white at the peak."""
     scale = 255 / heat.peak if heat.peak > 0 else 0
     shade = (heat.values * scale).astype(np.uint8)
     large = np.kron(shade, np.ones((heat.shrink, heat.shrink), np.uint8))

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel
 from vdet.evaluate.clips.clip import Clip, Progress, detect
 from vdet.evaluate.clips.losses import Loss, losses
-from vdet.evaluate.clips.timeline import Timeline, timelines
-from vdet.evaluate.comparison import Comparison
+from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
-from vdet.evaluate.pooling import pool
 from vdet.evaluate.predictions import read_predictions
-from vdet.evaluate.preprocessing import compare
 from vdet.evaluate.scores import Scores, score_comparison
+from vdet.evaluate.timelines import Timeline, timelines
 from vdet.evaluate.truth import read_truth
+from vdet.pipeline.sinks.protocol import Output
 
 log = logging.getLogger("vdet")
 
@@ -59,14 +57,20 @@ class Variant:
 
 def evaluate_clips(
     clips: Sequence[Clip],
-    model: LinearModel,
+    model: Path | None,
     variants: Sequence[Variant],
     progress: Progress = lambda _: lambda _: None,
+    *,
+    outputs: Sequence[Output] = (),
 ) -> list[RunResult]:
     """Run detection on every clip, once for all settings, and score each.
 
     Parameters
     ----------
+    model
+        Model file of the detector; None for the shipped one.
+    outputs
+        What else gets the results: only with one clip and one variant.
     progress
         As `detect` takes it, called for each clip.
 
@@ -76,7 +80,7 @@ def evaluate_clips(
         As `detect`.
     """
     settings = [variant.settings for variant in variants]
-    found = [detect(clip, model, settings, progress) for clip in clips]
+    found = [detect(clip, settings, model, progress, outputs) for clip in clips]
     results = []
     for number, variant in enumerate(variants):
         of_clips = [

@@ -1,17 +1,17 @@
-"""Where the boxes are lost: runs of frames in which a vehicle is missed or a track is wrong."""
+"""Losses: runs of frames in which a vehicle is missed or a track is wrong."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from vdet.evaluate.comparison import ComparedFrame, Comparison
-from vdet.evaluate.labelled_video import Integers
+from vdet.evaluate.comparison import Comparison
 from vdet.evaluate.matching import MatchedFrame
-from vdet.geometry import Float64Array
+from vdet.geometry import Int64Array
 
-Kind = Literal["missed", "false alarm"]
+LossKind = Literal["missed", "false alarm"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,15 +21,15 @@ class Loss:
     Attributes
     ----------
     kind
-        `missed`: the vehicle `id` of the truth; `false alarm`: the track `id`.
+        `missed`: of the vehicle `id` of the truth; `false alarm`: of the track `id`.
     first, last
         Numbers of the frames, from 1.
     overlap
-        Mean over the frames of the best IoU with any box of the other side: near 0 where there is
-        none at all, below 0.5 where there is one that fits badly, above where that one is taken.
+        Mean over the frames of the best IoU with any box of the other side. Near 0: there is no
+        such box. Below 0.5: the box fits badly. Above: the box is matched with another one.
     """
 
-    kind: Kind
+    kind: LossKind
     id: int
     first: int
     last: int
@@ -37,59 +37,48 @@ class Loss:
 
     @property
     def boxes(self) -> int:
-        """How many boxes were lost."""
+        """Number of boxes lost."""
         return self.last - self.first + 1
 
     @property
     def middle(self) -> int:
-        """Number of the frame that stands for all of them."""
+        """Number of the middle frame."""
         return (self.first + self.last) // 2
 
 
-@dataclass(frozen=True, slots=True)
-class _Mistake:
-    kind: Kind
-    id: int
-    frame: int
-    overlap: float
+_Misses = list[tuple[int, float]]
+"""Number of the frame and best IoU of each mistake, in order."""
 
 
 def losses(comparison: Comparison, matched: Sequence[MatchedFrame]) -> list[Loss]:
-    """Return the losses of one video, the largest first; `matched` is `match(comparison)`."""
-    mistakes: list[_Mistake] = []
+    """Return the losses of one video, the longest first; `matched` is `match(comparison)`."""
+    misses: dict[tuple[LossKind, int], _Misses] = defaultdict(list)
     for pairs in matched:
         frame = pairs.frame
-        mistakes += _unpaired(
-            "missed", frame, comparison.vehicle_ids[frame.vehicles], frame.iou, pairs.vehicle_rows
-        )
-        mistakes += _unpaired(
-            "false alarm", frame, comparison.track_ids[frame.tracks], frame.iou.T, pairs.track_rows
-        )
-    found = [_loss(run) for run in _runs(mistakes)]
+        vehicle_ids = comparison.vehicle_ids[frame.vehicles]
+        for row in _others(len(vehicle_ids), pairs.vehicle_rows):
+            overlap = float(frame.iou[row].max(initial=0))
+            misses["missed", int(vehicle_ids[row])].append((frame.number, overlap))
+        track_ids = comparison.track_ids[frame.tracks]
+        for row in _others(len(track_ids), pairs.track_rows):
+            overlap = float(frame.iou[:, row].max(initial=0))
+            misses["false alarm", int(track_ids[row])].append((frame.number, overlap))
+    found = [
+        Loss(kind, id_, run[0][0], run[-1][0], sum(overlap for _, overlap in run) / len(run))
+        for (kind, id_), each in misses.items()
+        for run in _runs(each)
+    ]
     return sorted(found, key=lambda loss: (-loss.boxes, loss.first, loss.kind, loss.id))
 
 
-def _unpaired(
-    kind: Kind, frame: ComparedFrame, ids: Integers, overlaps: Float64Array, paired: Integers
-) -> Iterable[_Mistake]:
-    for row in np.setdiff1d(np.arange(len(ids)), paired).tolist():
-        yield _Mistake(kind, int(ids[row]), frame.number, float(overlaps[row].max(initial=0)))
+def _others(count: int, rows: Int64Array) -> list[int]:
+    """Return the rows 0 … `count` - 1 that are not in `rows`."""
+    others: list[int] = np.setdiff1d(np.arange(count), rows).tolist()
+    return others
 
 
-def _runs(mistakes: Iterable[_Mistake]) -> Iterable[list[_Mistake]]:
-    """Join mistakes of one kind and id in consecutive frames."""
-    open_runs: dict[tuple[Kind, int], list[_Mistake]] = {}
-    for mistake in mistakes:
-        key = mistake.kind, mistake.id
-        if key in open_runs and open_runs[key][-1].frame == mistake.frame - 1:
-            open_runs[key].append(mistake)
-            continue
-        if key in open_runs:
-            yield open_runs[key]
-        open_runs[key] = [mistake]
-    yield from open_runs.values()
-
-
-def _loss(run: list[_Mistake]) -> Loss:
-    overlap = sum(mistake.overlap for mistake in run) / len(run)
-    return Loss(run[0].kind, run[0].id, run[0].frame, run[-1].frame, overlap)
+def _runs(misses: _Misses) -> Iterable[_Misses]:
+    """Split mistakes where their frames are not consecutive."""
+    starts = [i for i in range(1, len(misses)) if misses[i][0] != misses[i - 1][0] + 1]
+    for start, end in zip([0, *starts], [*starts, len(misses)], strict=True):
+        yield misses[start:end]

@@ -1,4 +1,4 @@
-"""Settings to be compared: `heat.threshold=1,2,4` → one assignment each; several make a grid."""
+"""Combinations of settings to compare: `heat.threshold=1,2,4` gives one assignment per value."""
 
 import itertools
 from collections.abc import Sequence
@@ -14,12 +14,12 @@ def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
     Parameters
     ----------
     sweeps
-        `KEY=VALUE,VALUE…` each; a comma inside brackets belongs to its value.
+        `KEY=VALUE,VALUE…` each. A comma inside brackets belongs to its value.
 
     Returns
     -------
-    In the order of the values, the last key's changing fastest; a single empty combination where
-    nothing is swept.
+    The combinations in the order of the values; the last key changes fastest. A single empty
+    combination if there are no sweeps.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def _axis(text: str) -> list[str]:
 
 
 def _split(values: str) -> list[str]:
-    """Split at the commas that stand outside all brackets."""
+    """Split at the commas outside brackets."""
     parts, depth = [""], 0
     for letter in values:
         depth += (letter in _OPENING) - (letter in _CLOSING)

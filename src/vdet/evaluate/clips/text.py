@@ -6,11 +6,11 @@ from typing import Any
 
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
 from vdet.evaluate.clips.losses import Loss
+from vdet.evaluate.output import ABSENT, share, table
 from vdet.evaluate.scores import Scores
-from vdet.evaluate.table import ABSENT, share, table
 
 LARGEST = 10
-"""Losses of a video that are listed."""
+"""Most losses listed for a video."""
 
 HEADINGS = (
     *("precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
@@ -27,7 +27,7 @@ def key_figures(scores: Scores) -> list[str]:
 
 
 def run_lines(runs: Sequence[RunResult]) -> Iterator[str]:
-    """Give runs as lines: one in full, several (a sweep) a row each."""
+    """Yield runs as lines: one run in full, several (a sweep) with a row each."""
     if len(runs) > 1:
         yield from sweep_lines(runs)
         return
@@ -40,7 +40,7 @@ def run_lines(runs: Sequence[RunResult]) -> Iterator[str]:
 
 
 def clip_rows(run: RunResult) -> Iterator[list[str]]:
-    """Give a row of text for each video, and one for the total of several."""
+    """Yield a row of text for each video, and one for the total of several."""
     for clip in run.clips:
         yield [clip.name, *key_figures(clip.scores)]
     if len(run.clips) > 1:
@@ -48,7 +48,7 @@ def clip_rows(run: RunResult) -> Iterator[list[str]]:
 
 
 def sweep_lines(runs: Sequence[RunResult]) -> Iterator[str]:
-    """Give a row for each setting, and the best by F1."""
+    """Yield a row for each setting, and the best one by F1."""
     yield from table(("setting", *HEADINGS), sweep_rows(runs))
     top = best(runs)
     yield ""
@@ -61,12 +61,12 @@ def sweep_rows(runs: Iterable[RunResult]) -> list[list[str]]:
 
 
 def setting_name(run: RunResult) -> str:
-    """Name a run by what sets it apart."""
+    """Return the assignments that tell a run from the others."""
     return " ".join(run.assignments)
 
 
 def detail_lines(scores: Scores) -> list[str]:
-    """Return everything that the key figures leave out."""
+    """Return the numbers that are not key figures."""
     delay = ABSENT if scores.mean_delay is None else f"{scores.mean_delay:.1f} frames"
     rate = scores.false_tracks_per_minute
     per_minute = "" if rate is None else f" ({rate:.1f} a minute)"
@@ -91,7 +91,7 @@ def detail_lines(scores: Scores) -> list[str]:
 
 
 def loss_lines(clip: ClipResult) -> Iterator[str]:
-    """Give the largest losses of a video as a table; nothing where there is none."""
+    """Yield the largest losses of a video as a table; nothing if there are none."""
     if clip.losses:
         yield ""
         yield f"largest of {len(clip.losses)} losses in {clip.name}"
@@ -110,12 +110,12 @@ def frame_span(loss: Loss) -> str:
 
 
 def loss_name(loss: Loss) -> str:
-    """Say what was lost."""
+    """Name what was lost."""
     return f"vehicle {loss.id} missed" if loss.kind == "missed" else f"false alarm, track {loss.id}"
 
 
 def plain(runs: Sequence[RunResult]) -> dict[str, Any]:
-    """Return runs as values that JSON knows.
+    """Return runs as values for JSON.
 
     One run has `total` and `videos`; several have these each, with their `settings`, in `sweep`.
     """
@@ -135,6 +135,6 @@ def _plain_run(run: RunResult) -> dict[str, Any]:
 
 
 def plain_clip(clip: ClipResult) -> dict[str, Any]:
-    """Return the scores of a video and its losses as values that JSON knows."""
+    """Return the scores of a video and its losses as values for JSON."""
     lost = [{**asdict(loss), "boxes": loss.boxes} for loss in clip.losses]
     return {**asdict(clip.scores), "losses": lost}

@@ -1,16 +1,53 @@
-"""The HTML page around a report: no scripts, nothing fetched, all text escaped."""
+"""The parts of a report: sections of one HTML file without links, charts as SVG in one style.
+
+Charts need matplotlib.
+"""
+
+from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+import io
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import TYPE_CHECKING, Any
 
 import cv2
 
 import vdet
 from vdet.media.images import Image
 
-_STYLE = """
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK = "#1d2733"
+SOFT = "#94a3b8"
+GOOD = "#0f9d8a"
+BAD = "#e4572e"
+COLORS = ("#0f766e", "#d97706", "#4f46e5", "#be185d")
+
+_CHART_STYLE: Any = {
+    "font.family": "sans-serif",
+    "font.size": 10,
+    "axes.titlesize": 11,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": SOFT,
+    "axes.labelcolor": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e2e8f0",
+    "text.color": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "legend.frameon": False,
+    "svg.hashsalt": "vdet",  # makes the file reproducible
+}
+
+_PAGE_STYLE = """
 :root { --ink: #1d2733; --soft: #64748b; --line: #e2e8f0; --mark: #0f766e; }
 * { box-sizing: border-box; }
 body { margin: 0; background: #f4f6f8; color: var(--ink);
@@ -49,7 +86,7 @@ footer { color: var(--soft); font-size: 12.5px; text-align: center; padding: 0 0
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A BGR uint8 image for a contact sheet, with a title and a caption below it."""
+    """A BGR uint8 image for a contact sheet, with the title and the caption below it."""
 
     image: Image
     title: str
@@ -57,11 +94,11 @@ class Picture:
 
 
 def page(title: str, subtitle: str, sections: Iterable[str]) -> str:
-    """Return a whole page; `sections` are what `section` returns."""
+    """Return a whole page; `sections` come from `section`."""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
+        f"<title>{escape(title)}</title>\n<style>{_PAGE_STYLE}</style>\n</head>\n<body>\n"
         f"<header><h1>{escape(title)}</h1><p>{escape(subtitle)}</p></header>\n<main>\n"
         + "\n".join(sections)
         + f"\n</main>\n<footer>vdet {escape(vdet.__version__)}</footer>\n</body>\n</html>\n"
@@ -69,7 +106,7 @@ def page(title: str, subtitle: str, sections: Iterable[str]) -> str:
 
 
 def section(title: str, *parts: str) -> str:
-    """Return a titled section; the parts are HTML already."""
+    """Return a section with a title; the parts are HTML."""
     return f"<section><h2>{escape(title)}</h2>\n" + "\n".join(parts) + "\n</section>"
 
 
@@ -90,7 +127,7 @@ def cards(figures: Iterable[tuple[str, str]]) -> str:
 def html_table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], best: int | None = None
 ) -> str:
-    """Return a table; the row numbered `best`, from 0, is marked."""
+    """Return a table; the row with index `best` is highlighted."""
     head = "".join(f"<th>{escape(text)}</th>" for text in headings)
     body = "".join(
         ('<tr class="best">' if number == best else "<tr>")
@@ -102,7 +139,7 @@ def html_table(
 
 
 def charts(svgs: Iterable[tuple[str, str]]) -> str:
-    """Return drawings, `(what it shows, SVG)` each, side by side where there is room."""
+    """Return charts, `(what it shows, SVG)` each, side by side if the page is wide enough."""
     images = "".join(
         f'<img alt="{escape(alt)}" src="{_uri("image/svg+xml", svg.encode())}">'
         for alt, svg in svgs
@@ -127,3 +164,25 @@ def _jpeg_uri(image: Image) -> str:
 
 def _uri(kind: str, data: bytes) -> str:
     return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def draw(plot: Callable[[Axes], object], width: float, height: float) -> str:
+    """Return what `plot` draws on its axes as SVG; width and height are in inches."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    with rc_context(_CHART_STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        plot(figure.add_subplot())
+        return _svg(figure)
+
+
+def _svg(figure: Figure) -> str:
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()
+
+
+def unit_axis(axes: Axes, title: str, x: str, y: str) -> None:
+    """Label the axes and let both run from 0 to 1."""
+    axes.set(title=title, xlabel=x, ylabel=y, xlim=(-0.01, 1.01), ylim=(-0.01, 1.02))

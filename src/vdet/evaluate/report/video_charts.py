@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vdet.evaluate.average_precision import IOU_THRESHOLDS, average_precisions
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
-from vdet.evaluate.clips.timeline import Timeline
-from vdet.evaluate.pooling import pool
-from vdet.evaluate.report.drawing import BAD, COLORS, GOOD, INK, SOFT, draw
+from vdet.evaluate.comparison import pool
+from vdet.evaluate.detection_metrics import IOU_THRESHOLDS, average_precisions
+from vdet.evaluate.report.page import BAD, COLORS, GOOD, INK, SOFT, draw
+from vdet.evaluate.timelines import Timeline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MOST_LINES = 12  # that a legend can tell apart
+_MOST_LINES = 12  # more would not be told apart in a legend
 _WIDTH = 11.2
 
 
 def timeline_chart(clip: ClipResult) -> str:
-    """Return as SVG when each vehicle was seen, missed, switched; and the false alarms."""
+    """Return as SVG when each vehicle was found, missed or switched, and the false alarms."""
     height = 1.4 + 0.42 * (len(clip.timelines) + 1)
     return draw(lambda axes: _timelines(axes, clip), _WIDTH, height)
 
@@ -32,7 +32,7 @@ def sweep_chart(runs: Sequence[RunResult]) -> str:
 
 
 def tightness_chart(run: RunResult) -> str:
-    """Return as SVG the average precision by the IoU that is asked for."""
+    """Return as SVG the average precision at each IoU threshold."""
     return draw(lambda axes: _tightness(axes, run), 4.4, 3.6)
 
 
@@ -67,7 +67,7 @@ def _bars(axes: Axes, row: int, timeline: Timeline) -> None:
 
 
 def _shortest_named(timeline: Timeline) -> float:
-    """Return how many frames a stretch needs for its name to fit."""
+    """Return the fewest frames of a stretch into which its name fits."""
     frames = timeline.stretches[-1].last - timeline.stretches[0].first + 1
     return frames / 40
 
@@ -82,10 +82,10 @@ def _sweep(axes: Axes, runs: Sequence[RunResult]) -> None:
     top = best(runs)
     colors = colormaps["viridis"](np.linspace(0, 0.85, len(lines)))
     for (others, along), color in zip(lines.items(), colors, strict=True):
-        axes.plot(*_places(along), "o-", color=color, markersize=5, label=" ".join(others) or None)
+        axes.plot(*_points(along), "o-", color=color, markersize=5, label=" ".join(others) or None)
         if top in along:
             _name_points(axes, along)
-    axes.plot(*_places([top]), "o", color=BAD, markersize=10, zorder=3)
+    axes.plot(*_points([top]), "o", color=BAD, markersize=10, zorder=3)
     key = top.assignments[0].partition("=")[0]
     axes.set(title=f"Along {key} (best F1 in red)", xlabel="recall", ylabel="precision")
     _f1_lines(axes)
@@ -93,18 +93,18 @@ def _sweep(axes: Axes, runs: Sequence[RunResult]) -> None:
         axes.legend(fontsize=8)
 
 
-def _places(runs: Sequence[RunResult]) -> tuple[list[float], list[float]]:
+def _points(runs: Sequence[RunResult]) -> tuple[list[float], list[float]]:
     return [run.total.recall for run in runs], [run.total.precision for run in runs]
 
 
 def _name_points(axes: Axes, runs: Sequence[RunResult]) -> None:
-    for run, x, y in zip(runs, *_places(runs), strict=True):
+    for run, x, y in zip(runs, *_points(runs), strict=True):
         value = run.assignments[0].partition("=")[2]
         axes.annotate(value, (x, y), xytext=(7, 6), textcoords="offset points", size=9)
 
 
 def _f1_lines(axes: Axes) -> None:
-    """Draw the curves of equal F1 = 2pr / (p + r) into what is shown, and a little around it."""
+    """Draw the curves of equal F1 = 2pr / (p + r) in the visible range and a little around it."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     left, right = max(0.0, left - 0.05), min(1.0, right + 0.05)
     bottom, top = max(0.0, bottom - 0.05), min(1.01, top + 0.05)

@@ -1,15 +1,17 @@
-"""Shown boxes, frame by frame, as text: MOTChallenge, CSV or JSON lines, by the file's suffix.
+"""The sink `tracks`: shown boxes, frame by frame, as text; the file's suffix names the format.
 
 | suffix   | a line is          | columns                                                          |
 |----------|--------------------|------------------------------------------------------------------|
-| `.txt`   | a box              | `frame, id, left, top, width, height, 1, -1, -1, -1`, no heading |
-| `.csv`   | a box              | `frame,time,id,x,y,width,height,from_match`, with heading        |
+| `.txt`   | a box              | `frame, id, left, top, width, height, score, -1, -1, -1`         |
+| `.csv`   | a box              | `frame,time,id,x,y,width,height,score,predicted`, with heading   |
 | `.jsonl` | a frame, even if   | `frame`, `time`, `tracks`: a list of objects with `id`, `x`, `y`,|
-|          | nothing is in it   | `width`, `height`, `from_match`; with `--lanes` also `lane`      |
+|          | nothing is in it   | `width`, `height`, `score`, `predicted`; with lanes also `lane`  |
 
 In `.csv` and `.jsonl` frames count from 0 from the start of the file, `time` is in seconds, and
-`x, y` is the top-left pixel of the box, counted from 0. In `.txt` frames and pixels count from 1,
-as MOTChallenge has it (Milan et al., "MOT16", 2016).
+`x, y` is the top-left pixel of the box, counted from 0. In `.txt`, which has no heading, frames and
+pixels count from 1, as MOTChallenge has it (Milan et al., "MOT16", 2016). `score` is 0 to 1, the
+share of such boxes that are vehicles. `predicted` tells that the detector did not see the vehicle
+in this frame.
 
 Boxes are in pixels of the input frame, also where the frame is drawn undistorted, so they can be
 compared with labels of the input. `lane` is null where none is shown, else an object with `radius`
@@ -20,114 +22,95 @@ undistorted frame counted from 0, the nearest point first.
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol, TextIO
+from typing import Any, Self, TextIO
 
-from vdet.errors import OutputError
-from vdet.files import replacing
-from vdet.lanes.record import lane_record
-from vdet.lanes.road import Road
-from vdet.media import Frame
-from vdet.track.track import Track
+from vdet.lanes.lane import lane_record
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 
-
-class TrackWriter(Protocol):
-    """Takes the shown tracks of one frame after the other."""
-
-    def write(self, frame: Frame, tracks: Sequence[Track], road: Road | None = None, /) -> None:
-        """Add the tracks of a frame, and its lane where the format has a place for it."""
+Write = Callable[[FrameResult], None]
 
 
-class NoTracks:
-    """Takes tracks and writes nothing."""
-
-    def write(self, frame: Frame, tracks: Sequence[Track], road: Road | None = None, /) -> None:
-        """Do nothing."""
-
-
-class _Mot:
-    def __init__(self, file: TextIO) -> None:
-        self._file = file
-
-    def write(self, frame: Frame, tracks: Sequence[Track], *_: object) -> None:
-        for track in tracks:
+def _mot(file: TextIO) -> Write:
+    def write(result: FrameResult) -> None:
+        for track in result.tracks:
             box = track.box
-            self._file.write(
-                f"{frame.index + 1},{track.id},{box.x + 1},{box.y + 1},{box.width},{box.height},"
-                "1,-1,-1,-1\n"
+            place = f"{box.x + 1},{box.y + 1},{box.width},{box.height}"
+            number = result.frame.index + 1
+            file.write(f"{number},{track.id},{place},{track.score:.4f},-1,-1,-1\n")
+
+    return write
+
+
+def _csv(file: TextIO) -> Write:
+    rows = csv.writer(file, lineterminator="\n")
+    place = ("x", "y", "width", "height")
+    rows.writerow(["frame", "time", "id", *place, "score", "predicted"])
+
+    def write(result: FrameResult) -> None:
+        time = f"{float(result.frame.time):.6f}"
+        for track in result.tracks:
+            values = [getattr(track.box, name) for name in place]
+            score = f"{track.score:.4f}"
+            rows.writerow(
+                [result.frame.index, time, track.id, *values, score, int(track.predicted)]
             )
 
-
-class _Csv:
-    def __init__(self, file: TextIO) -> None:
-        self._rows = csv.writer(file, lineterminator="\n")
-        self._rows.writerow(["frame", "time", "id", "x", "y", "width", "height", "from_match"])
-
-    def write(self, frame: Frame, tracks: Sequence[Track], *_: object) -> None:
-        for track in tracks:
-            box = track.box
-            place = (box.x, box.y, box.width, box.height)
-            time = f"{float(frame.time):.6f}"
-            self._rows.writerow([frame.index, time, track.id, *place, int(track.from_match)])
+    return write
 
 
-class _JsonLines:
-    def __init__(self, file: TextIO) -> None:
-        self._file = file
-
-    def write(self, frame: Frame, tracks: Sequence[Track], road: Road | None = None, /) -> None:
-        boxes = [
-            {
-                "id": track.id,
-                "x": track.box.x,
-                "y": track.box.y,
-                "width": track.box.width,
-                "height": track.box.height,
-                "from_match": track.from_match,
-            }
-            for track in tracks
-        ]
+def _json_lines(file: TextIO) -> Write:
+    def write(result: FrameResult) -> None:
         record: dict[str, Any] = {
-            "frame": frame.index,
-            "time": round(float(frame.time), 6),
-            "tracks": boxes,
+            "frame": result.frame.index,
+            "time": round(float(result.frame.time), 6),
+            "tracks": [
+                {
+                    "id": track.id,
+                    "x": track.box.x,
+                    "y": track.box.y,
+                    "width": track.box.width,
+                    "height": track.box.height,
+                    "score": round(track.score, 4),
+                    "predicted": track.predicted,
+                }
+                for track in result.tracks
+            ],
         }
-        if road:
-            record["lane"] = lane_record(road.lane)
-        self._file.write(json.dumps(record) + "\n")
+        if result.road:
+            record["lane"] = lane_record(result.road.lane)
+        file.write(json.dumps(record) + "\n")
+
+    return write
 
 
-_FORMATS: dict[str, Callable[[TextIO], TrackWriter]] = {
-    ".txt": _Mot,
-    ".csv": _Csv,
-    ".jsonl": _JsonLines,
+_FORMATS: dict[str, Callable[[TextIO], Write]] = {
+    ".txt": _mot,
+    ".csv": _csv,
+    ".jsonl": _json_lines,
 }
-SUFFIXES = tuple(_FORMATS)
 
 
-def check_suffix(path: Path) -> None:
-    """Raise `OutputError` where the suffix names no format of tracks."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise OutputError(f"{path}: tracks are written as {', '.join(SUFFIXES)}")
+class TrackSink:
+    """Writes the shown tracks of each frame."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self._path = path
+        self._files = context.files
+
+    def __enter__(self) -> Self:
+        self._file = self._files.stage(self._path).open("w", encoding="utf-8", newline="")
+        self._write = _FORMATS[self._path.suffix.lower()](self._file)
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._file.close()
+
+    def write(self, result: FrameResult) -> None:
+        """Add the tracks of a frame, and its lane where the format has a place for it."""
+        self._write(result)
 
 
-@contextmanager
-def track_writer(path: Path | None) -> Iterator[TrackWriter]:
-    """Give a writer for `path` (None: of nothing); the file appears when the block ends well.
-
-    Raises
-    ------
-    OutputError
-        The suffix is unknown, or the file cannot be written.
-    """
-    if path is None:
-        yield NoTracks()
-        return
-    check_suffix(path)
-    with (
-        replacing(path) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        yield _FORMATS[path.suffix.lower()](file)
+TRACKS = SinkKind(TrackSink, tuple(_FORMATS), "tracks")

@@ -1,0 +1,17 @@
+"""The section `input`: the video that is read."""
+
+from pydantic import Field
+
+from vdet.config.section import Fraction, Section
+
+
+class InputSettings(Section):
+    """The video that is read."""
+
+    max_damaged: Fraction = Field(
+        0.05,
+        description="share of damaged or lost frames that is tolerated; above it the video fails",
+    )
+    frame_rate: float = Field(
+        25.0, ge=0.01, le=1000, description="frames a second of numbered pictures (img_%04d.png)"
+    )

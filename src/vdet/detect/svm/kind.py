@@ -1,0 +1,51 @@
+"""The linear model under its name `svm`: its settings, its model file, how it is loaded."""
+
+from pathlib import Path
+
+from vdet.config.schema import FeatureSettings, SvmSettings
+from vdet.detect.factory import DetectorKind
+from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.model import load_model
+from vdet.errors import ModelError
+
+_MODELS = Path(__file__).parents[2] / "models"
+
+
+def shipped_model(settings: SvmSettings) -> Path:
+    """Return the shipped model that was trained with the features in the settings.
+
+    Raises
+    ------
+    ModelError
+        There is none.
+    """
+    for path in sorted(_MODELS.glob("*.npz")):
+        if load_model(path).features == settings.features:
+            return path
+    raise ModelError(
+        "no shipped model was trained with the features in the settings; give --model, or train "
+        "one with these settings"
+    )
+
+
+def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
+    """Load a linear model.
+
+    Features that differ from the default must be those that the model was trained with; else the
+    model's own are taken.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be used, or was trained with other features than the settings ask for.
+    """
+    model = load_model(path or shipped_model(settings), asked_features(settings))
+    return SvmModel(model, settings)
+
+
+def asked_features(settings: SvmSettings) -> FeatureSettings | None:
+    """Return the features that a model must have; None where the default ones were left."""
+    return None if settings.features == FeatureSettings() else settings.features
+
+
+SVM = DetectorKind(SvmSettings, load_svm, shipped_model)

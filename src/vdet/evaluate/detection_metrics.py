@@ -1,0 +1,106 @@
+"""How well vehicles are found, without regard to their ids."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdet.evaluate.comparison import ComparedFrame, Comparison
+from vdet.evaluate.matching import MatchedFrame
+from vdet.geometry import BoolArray, Float64Array
+
+IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
+
+_RECALLS = np.linspace(0, 1, 101)
+
+
+@dataclass(frozen=True, slots=True)
+class DetectionMetrics:
+    """Counts of boxes over all frames and their ratios, 0 to 1.
+
+    `matches` are true boxes found at IoU 0.5, `false_positives` predictions that found nothing,
+    `misses` true boxes that were not found. `mean_iou` is the mean over the matches.
+    """
+
+    matches: int
+    false_positives: int
+    misses: int
+    precision: float
+    recall: float
+    f1: float
+    ap50: float
+    ap50_95: float
+    mean_iou: float
+
+
+def detection_metrics(comparison: Comparison, matched: Sequence[MatchedFrame]) -> DetectionMetrics:
+    """Return the detection metrics; `matched` is `match(comparison)`."""
+    matches = sum(len(frame) for frame in matched)
+    vehicles = int(comparison.vehicle_lengths().sum())
+    predictions = int(comparison.track_lengths().sum())
+    precisions = average_precisions(comparison)
+    return DetectionMetrics(
+        matches=matches,
+        false_positives=predictions - matches,
+        misses=vehicles - matches,
+        precision=ratio(matches, predictions),
+        recall=ratio(matches, vehicles),
+        f1=ratio(2 * matches, predictions + vehicles),
+        ap50=float(precisions[0]),
+        ap50_95=float(precisions.mean()),
+        mean_iou=ratio(sum(float(frame.iou.sum()) for frame in matched), matches),
+    )
+
+
+def ratio(part: float, whole: float) -> float:
+    """Return `part / whole`; 0 if `whole` is 0, as in TrackEval."""
+    return float(part / whole) if whole else 0.0
+
+
+def average_precisions(comparison: Comparison) -> Float64Array:
+    """Return the average precision at each of `IOU_THRESHOLDS`, float64 `(10,)`, 0 to 1.
+
+    At each threshold the predictions are taken by descending score. Each finds the vehicle of its
+    frame that it overlaps most among those not found yet. The precision at the 101 recalls
+    0, 0.01 … 1 is averaged. Predictions of equal score are taken in the order of the frames, so
+    that without scores AP describes a single operating point. 0 if there are no vehicles.
+    Source: the COCO detection evaluation (pycocotools).
+    """
+    vehicles = int(comparison.vehicle_lengths().sum())
+    if not vehicles or not len(comparison.track_ids):
+        return np.zeros(len(IOU_THRESHOLDS))
+    scores = np.concatenate([np.sort(-frame.scores) for frame in comparison.frames])
+    right = np.concatenate([_right_predictions(frame) for frame in comparison.frames], axis=1)
+    order = np.argsort(scores, kind="stable")
+    return np.array([_average_precision(row[order], vehicles) for row in right])
+
+
+def _right_predictions(frame: ComparedFrame) -> BoolArray:
+    """Return whether each prediction finds a vehicle, `(10, m)`: by threshold and score."""
+    order = np.argsort(-frame.scores, kind="stable")
+    right = np.zeros((len(IOU_THRESHOLDS), len(order)), np.bool_)
+    for row, threshold in zip(right, IOU_THRESHOLDS, strict=True):
+        free = frame.iou[:, order].copy()
+        for column in range(len(order)):
+            row[column] = _take(free, column, threshold)
+    return right
+
+
+def _take(free: Float64Array, column: int, threshold: float) -> bool:
+    """Take the best free vehicle for a prediction, if one overlaps enough."""
+    if not len(free):
+        return False
+    best = len(free) - 1 - int(np.argmax(free[::-1, column]))  # the last of equals, as in COCO
+    if free[best, column] < threshold:
+        return False
+    free[best] = -1
+    return True
+
+
+def _average_precision(right: BoolArray, vehicles: int) -> float:
+    found = np.cumsum(right)
+    recall = found / vehicles
+    precision = found / np.arange(1, len(right) + 1)
+    highest_from_here = np.maximum.accumulate(precision[::-1])[::-1]
+    reached = np.searchsorted(recall, _RECALLS, side="left")
+    return float(np.append(highest_from_here, 0)[reached].mean())

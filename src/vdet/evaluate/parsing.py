@@ -1,0 +1,73 @@
+"""Text files and the numbers in them, read strictly."""
+
+import io
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from vdet.errors import TruthError
+from vdet.files import read_whole
+
+LIMIT = 10_000_000
+"""Largest frame number, id or pixel. A larger number is damage, and would overflow later."""
+
+MAX_BYTES = 64_000_000
+"""Largest size of a file of boxes."""
+
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file.
+
+    Raises
+    ------
+    TruthError
+        The file cannot be read, is larger than `MAX_BYTES` or is not text.
+    """
+    data = read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes") from error
+    if "\0" in text:
+        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
+    return text
+
+
+def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
+    """Yield every line that is not blank, stripped, with its number from 1."""
+    for number, line in enumerate(io.StringIO(text, newline=None), start=1):
+        if stripped := line.strip():
+            yield number, stripped
+
+
+def parse_number(text: str) -> float:
+    """Return the decimal number in `text`.
+
+    Raises
+    ------
+    ValueError
+        The text is no decimal number (words, NaN, infinity), or the number is beyond `LIMIT`.
+    """
+    stripped = text.strip()
+    if not _NUMBER.fullmatch(stripped):
+        raise ValueError(f"{stripped!r:.40} is not a number")
+    value = float(stripped)
+    if abs(value) > LIMIT:
+        raise ValueError(f"{stripped!r:.40} is beyond {LIMIT}")
+    return value
+
+
+def parse_whole(text: str) -> int:
+    """Return the whole number in `text`; `3` and `3.0` are both 3.
+
+    Raises
+    ------
+    ValueError
+        The text is no whole number, or the number is beyond `LIMIT`.
+    """
+    value = parse_number(text)
+    if not value.is_integer():
+        raise ValueError(f"{text.strip()!r:.40} is not a whole number")
+    return int(value)

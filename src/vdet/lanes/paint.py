@@ -1,0 +1,131 @@
+"""Painted pixels of the top view: which pixels are paint, and which may belong to the lane.
+
+A painted line has the same width at all distances in the top view. A pixel counts as paint if it
+is lighter or yellower than the road a little to its left *and* a little to its right. At the edge
+of a shadow, a kerb or pale concrete only one side is darker. Lightness is compared relative to the
+road's own, so a line in a shadow is found too. Yellow paint differs from pale concrete by colour.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from vdet.config.lanes import LaneSettings, MaskSettings
+from vdet.geometry import Float64Array
+from vdet.lanes.top_view import TopView
+from vdet.media.images import Image
+
+LinePositions = tuple[Float64Array, Float64Array]
+"""x of the left and of the right line at each row of the top view, metres, each `(rows,)`."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinePaint:
+    """Painted rows that may belong to one line: distances and lateral positions, metres `(n,)`."""
+
+    z: Float64Array
+    x: Float64Array
+
+
+NO_PAINT = LinePaint(np.empty(0), np.empty(0))
+
+
+def paint_mask(top: Image, settings: MaskSettings, across: float) -> Image:
+    """Return 255 for paint and 0 for the rest, uint8 `(rows, columns)`.
+
+    Parameters
+    ----------
+    top
+        The road from above, BGR uint8 `(rows, columns, 3)`.
+    across
+        Pixels per metre, across the road.
+    """
+    width = round(settings.line_width * across) | 1  # odd, so that the blur does not shift lines
+    reach = max(1, round(settings.reach * across))
+    smooth = cv2.blur(cv2.cvtColor(top, cv2.COLOR_BGR2Lab), (width, 3))
+    lightness, yellow = (np.asarray(cv2.extractChannel(smooth, i), np.uint8) for i in (0, 2))
+    road = _larger_side(lightness, reach)
+    rise = cv2.subtract(lightness, road)  # saturates at 0
+    least = np.maximum(road * np.float32(settings.lightness), settings.least_lightness)
+    tint = cv2.subtract(yellow, _larger_side(yellow, reach))
+    paint = (rise > least) | (tint > settings.yellow)
+    return np.where(paint, np.uint8(255), np.uint8(0))
+
+
+def _larger_side(channel: Image, reach: int) -> Image:
+    """Return the larger of the values `reach` columns to the left and to the right."""
+    padded = cv2.copyMakeBorder(channel, 0, 0, reach, reach, cv2.BORDER_CONSTANT, value=(255,))
+    columns = channel.shape[1]
+    return np.maximum(padded[:, :columns], padded[:, 2 * reach :])
+
+
+def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) -> LinePaint:
+    """Return the middle of the paint in each row, within `margin` metres of `x` `(rows,)`."""
+    half = max(1, round(margin * top_view.across))
+    around = np.arange(-half, half + 1)
+    middles = np.clip(np.rint(top_view.columns(x)), -half - 1, mask.shape[1] + half).astype(np.intp)
+    padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
+    columns = (middles + 2 * half + 1)[:, None] + around
+    band = np.take_along_axis(padded, columns, axis=1) != 0
+    counts = band.sum(axis=1)
+    rows = np.flatnonzero(counts)
+    middle = middles[rows] + (band[rows] @ around) / counts[rows]
+    return LinePaint(top_view.distances[rows], top_view.laterals[0] + middle / top_view.across)
+
+
+def find_base(mask: Image, top_view: TopView, settings: LaneSettings) -> tuple[float, float] | None:
+    """Return x of both lines near the camera, metres: the best pair of peaks in the histogram.
+
+    The pair has one line on each side of the camera, about a lane's width apart. None if there is
+    no such pair.
+    """
+    histogram = _histogram(mask, top_view, settings)
+    expected, tolerance = settings.view.lane_width, settings.check.width
+    least = max(1, round((expected - tolerance) * top_view.across))
+    most = min(len(histogram) - 1, round((expected + tolerance) * top_view.across))
+    best, base = 0.0, None
+    for gap in range(least, most + 1):
+        left, right = top_view.laterals[:-gap], top_view.laterals[gap:]
+        score = histogram[:-gap] * histogram[gap:] * ((left < 0) & (right > 0))
+        peak = int(score.argmax())
+        if score[peak] > best:
+            best, base = float(score[peak]), (float(left[peak]), float(right[peak]))
+    return base
+
+
+def _histogram(mask: Image, top_view: TopView, settings: LaneSettings) -> Float64Array:
+    """Return how many of the nearest rows have paint in each column, smoothed, `(columns,)`."""
+    near = top_view.distances < top_view.distances[-1] + settings.search.base
+    counts = np.count_nonzero(mask[near], axis=0).astype(np.float64)
+    spread = round(settings.search.fine_margin * top_view.across) | 1
+    return np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
+
+
+def slide_windows(
+    mask: Image, top_view: TopView, base: tuple[float, float], settings: LaneSettings
+) -> LinePositions:
+    """Follow both lines with sliding windows, from near to far; return the windows' middles.
+
+    The lines of a lane run in parallel, so both windows of a step move together, by the paint in
+    either. Windows without paint move on as before.
+    """
+    rows = max(1, round(settings.search.window * top_view.along))
+    middles = np.array(base)
+    positions = np.empty((2, len(mask)))
+    step = 0.0
+    for end in range(len(mask), 0, -rows):
+        part = np.s_[max(0, end - rows) : end]
+        middles += step
+        shift = _mean_offset(mask[part], top_view, middles, settings.search.margin)
+        middles += shift
+        step += shift / 2  # damped: part of the shift may be noise
+        positions[:, part] = middles[:, None]
+    return positions[0], positions[1]
+
+
+def _mean_offset(part: Image, top_view: TopView, middles: Float64Array, margin: float) -> float:
+    """Return the mean offset of the paint in both windows from their middles, metres."""
+    offsets = top_view.laterals - middles[:, None]
+    counts = np.count_nonzero(part, axis=0) * (np.abs(offsets) <= margin)
+    return float((counts * offsets).sum() / max(1, counts.sum()))

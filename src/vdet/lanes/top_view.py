@@ -1,0 +1,107 @@
+"""The top view: the road as seen from straight above.
+
+The ground is taken as flat. Its coordinates are x, metres to the right of the camera, and z,
+metres ahead of it. The column of the vanishing point is x = 0 at every distance; that is exact if
+the camera looks along the road and does not roll.
+"""
+
+import cv2
+import numpy as np
+
+from vdet.config.lanes import TopViewSettings
+from vdet.geometry import Float64Array
+from vdet.media.images import Image
+
+
+class TopView:
+    """Converts between ground, undistorted frames of one size, and pictures from above."""
+
+    def __init__(self, settings: TopViewSettings, width: int, height: int) -> None:
+        self._to_frame = _ground_to_frame(settings, width, height)
+        near = _nearest(settings)
+        rows = round(settings.length * settings.along)
+        columns = round((settings.lane_width + 2 * settings.margin) * settings.across)
+        self.across = settings.across
+        """Pixels per metre, across the road."""
+        self.along = settings.along
+        """Pixels per metre, along the road."""
+        self.distances = near + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / self.along
+        """z of each row, metres; the first row is the farthest."""
+        self.laterals = (np.arange(columns, dtype=np.float64) + 0.5 - columns / 2) / self.across
+        """x of each column, metres."""
+        self._warp = self._to_frame @ self._to_ground_matrix()
+
+    def image(self, frame: Image) -> Image:
+        """Warp an undistorted frame, uint8 `(H, W, 3)`, to the top view, `(rows, columns, 3)`."""
+        size = (len(self.laterals), len(self.distances))
+        flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        return np.asarray(cv2.warpPerspective(frame, self._warp, size, flags=flags), np.uint8)
+
+    def ground_to_frame(self, x: Float64Array, z: Float64Array) -> Float64Array:
+        """Return the pixels `(n, 2)` in the undistorted frame of ground points, metres `(n,)`."""
+        return _transform(self._to_frame, np.asarray(np.column_stack([x, z]), np.float64))
+
+    def frame_to_top(self, pixels: Float64Array) -> Float64Array:
+        """Return where pixels `(n, 2)` of the undistorted frame lie in the top view, `(n, 2)`."""
+        return _transform(np.asarray(np.linalg.inv(self._warp), np.float64), pixels)
+
+    def columns(self, x: Float64Array) -> Float64Array:
+        """Return the columns of the top view at lateral positions x, metres."""
+        return np.asarray((x - self.laterals[0]) * self.across)
+
+    @property
+    def outline(self) -> Float64Array:
+        """The corners of the top view in the undistorted frame, pixels `(4, 2)`."""
+        right, bottom = len(self.laterals) - 0.5, len(self.distances) - 0.5
+        corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]]
+        return _transform(self._warp, np.array(corners))
+
+    def _to_ground_matrix(self) -> Float64Array:
+        """Return the matrix `(3, 3)` from `(column, row, 1)` of the top view to `(x, z, 1)`."""
+        return np.array(
+            [
+                [1 / self.across, 0, self.laterals[0]],
+                [0, -1 / self.along, self.distances[0]],
+                [0, 0, 1],
+            ]
+        )
+
+
+def _transform(matrix: Float64Array, points: Float64Array) -> Float64Array:
+    """Apply a homography to points `(n, 2)`."""
+    moved = points @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(moved[:, :2] / moved[:, 2:])
+
+
+def _nearest(settings: TopViewSettings) -> float:
+    """Return z of the nearer row of the trapezoid: widths in the frame are proportional to 1/z."""
+    far, near = _widths(settings)
+    return settings.length * far / (near - far)
+
+
+def _widths(settings: TopViewSettings) -> tuple[float, float]:
+    """Return the width of the lane at the farther and the nearer row, share of the frame's."""
+    far = settings.top_right - settings.top_left
+    return far, settings.bottom_right - settings.bottom_left
+
+
+def _ground_to_frame(settings: TopViewSettings, width: int, height: int) -> Float64Array:
+    """Return the homography `(3, 3)` from `(x, z, 1)`, metres, to undistorted pixels."""
+    far, near = _widths(settings)
+    slope = (settings.top_left - settings.bottom_left) / (near - far)
+    vanishing = settings.bottom_left + slope * near  # column at which the lines meet
+    left = (settings.bottom_left - vanishing) / near * settings.lane_width
+    right = left + settings.lane_width
+    start = _nearest(settings)
+    end = start + settings.length
+    ground = np.array([[left, start], [right, start], [right, end], [left, end]], np.float32)
+    frame = np.array(
+        [
+            [settings.bottom_left * width, settings.bottom * height],
+            [settings.bottom_right * width, settings.bottom * height],
+            [settings.top_right * width, settings.top * height],
+            [settings.top_left * width, settings.top * height],
+        ],
+        np.float32,
+    )
+    return np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)

@@ -1,0 +1,255 @@
+"""The loop: frames → detector → tracker → sinks."""
+
+import itertools
+import logging
+import os
+import time
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from vdet.config.schema import Settings
+from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
+from vdet.files import OutputFiles
+from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
+from vdet.media import Frame, VideoInfo, VideoReader
+from vdet.media.images import Image
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sink, open_sink
+from vdet.pipeline.threads import (
+    StalledError,
+    map_ordered,
+    prefetch,
+    run_in_thread,
+    single_threaded_libraries,
+)
+from vdet.track.factory import make_tracker
+
+log = logging.getLogger("vdet")
+
+FIRST_FRAMES = 5
+"""Frames that a detector is made with."""
+
+IO_TIMEOUT = 120.0  # seconds
+
+Advance = Callable[[int], object]
+Progress = Callable[[int | None], Advance]
+
+
+def no_progress(_: int | None) -> Advance:
+    """Take progress and show none."""
+    return lambda _: None
+
+
+@dataclass(frozen=True, slots=True)
+class VideoJob:
+    """A video to be searched, which part of it, and the outputs that are asked for.
+
+    `start` and `end` are seconds from the first frame; frames with start ≤ time < end are taken,
+    at most `frames` of them. `at` is the moment, in seconds from the first frame, of which stage
+    pictures are made. With `lanes` the lane is found too, and all is drawn on undistorted frames.
+    """
+
+    source: Path
+    outputs: tuple[Output, ...] = ()
+    start: Fraction | None = None
+    end: Fraction | None = None
+    frames: int | None = None
+    at: Fraction = Fraction(0)
+    lanes: LaneRequest | None = None
+
+    @property
+    def is_part(self) -> bool:
+        """Whether only a part of the video is asked for."""
+        return (self.start, self.end, self.frames) != (None, None, None)
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a run did: upright frames of which size, shown tracks (ids), seconds of wall time."""
+
+    width: int
+    height: int
+    frames: int
+    tracks: int
+    seconds: float
+
+
+def check_job(job: VideoJob, *, overwrite: bool) -> None:
+    """Refuse, before any work, a job whose outputs could not be written. Raises `OutputError`."""
+    for output in job.outputs:
+        check_sink(output, overwrite=overwrite, inputs=[job.source])
+
+
+def run_video(
+    job: VideoJob,
+    model: DetectorModel,
+    settings: Settings,
+    *,
+    threads: int | None = None,
+    codec_threads: int | None = None,
+    timeout: float = IO_TIMEOUT,
+    progress: Progress = no_progress,
+) -> Summary:
+    """Run a job; its outputs appear under their names together, when all is done.
+
+    Reading, searching and encoding overlap in threads; tracking and drawing lie between them.
+
+    Parameters
+    ----------
+    threads
+        Threads of the search; None for one a core.
+    codec_threads
+        Threads of the decoder, and of the encoder; None lets them choose.
+    timeout
+        Seconds in which the next frame must be read or written, else the job is given up: a disk
+        or a network that hangs must not stop a batch. What lies before `job.start` has as long
+        again as it lasts.
+    progress
+        Called once with the expected number of frames (None: unknown); what it returns is called
+        with the number of frames done since the last call.
+
+    Raises
+    ------
+    VideoError, OutputError
+        The video cannot be read, too much of it is damaged, or the camera of `job.lanes` took
+        frames of another shape; an output cannot be written. No output is left then.
+    """
+    began = time.perf_counter()
+    ids: set[int] = set()
+    frames = 0
+    timeout += float(job.start or 0)
+    with ExitStack() as stack:
+        files = stack.enter_context(OutputFiles())
+        stack.enter_context(_stalls_named(job, timeout))
+        stack.enter_context(single_threaded_libraries())
+        reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)
+        info = reader.info
+        read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
+        context = SinkContext(files, settings, info, job.is_part, job.at, codec_threads, timeout)
+        sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
+        advance = progress(reader.expected)
+        threads = threads or os.cpu_count() or 1
+        results = _results(read, job, model, settings, video=info, threads=threads)
+        for result in stack.enter_context(closing(results)):
+            for sink in sinks:
+                sink.write(result)
+            ids.update(track.id for track in result.tracks)
+            frames += 1
+            advance(1)
+        if not frames:
+            raise VideoError(f"{job.source}: no frame lies in the times given; check them")
+    return Summary(info.width, info.height, frames, len(ids), time.perf_counter() - began)
+
+
+def follow_frames(
+    frames: Iterable[Frame],
+    detector: VideoDetector,
+    settings: Settings,
+    video: VideoInfo,
+    *,
+    threads: int = 1,
+    roads: RoadFinder | None = None,
+) -> Generator[FrameResult]:
+    """Find and follow the vehicles, and with `roads` the lane, through the frames of a video.
+
+    Several frames may be searched in `threads` at once; what follows the search, frame by frame,
+    gives the same result whatever their number.
+    """
+    tracker = make_tracker(settings, video.width, video.height)
+
+    def search(frame: Frame) -> tuple[Any, FrameView | None]:
+        candidates = detector.search(frame.image, frame.index)
+        return candidates, roads.observe(frame.image) if roads else None
+
+    with map_ordered(search, frames, threads) as searched:
+        for frame, (candidates, view) in searched:
+            detections = detector.detect(candidates)
+            tracks = tracker.update(detections, float(frame.time), frame.image)
+            road = roads.update(view) if roads and view else None
+            yield FrameResult(video.path, frame, detections, tuple(tracks), road, detector)
+
+
+def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
+    """Return the first images, which a detector is made with, and all of the frames."""
+    rest = iter(frames)
+    first = list(itertools.islice(rest, FIRST_FRAMES))
+    return [frame.image for frame in first], itertools.chain(first, rest)
+
+
+class BlindDetector:
+    """A `VideoDetector` for frames that are too small to be searched: it finds nothing."""
+
+    def search(self, image: Image, index: int | None) -> None:
+        """Do nothing."""
+
+    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
+        """Return no detections."""
+        return NO_DETECTIONS
+
+    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
+        """Return no pictures."""
+        return {}
+
+
+def _results(
+    read: Iterable[Frame],
+    job: VideoJob,
+    model: DetectorModel,
+    settings: Settings,
+    *,
+    video: VideoInfo,
+    threads: int,
+) -> Generator[FrameResult]:
+    """Follow the vehicles; put the video's name before an error."""
+    size = video.width, video.height
+    images, frames = peek(read)
+    try:
+        roads = RoadFinder(job.lanes, settings.lanes, *size) if job.lanes else None
+        detector = _detector(images, job.source, model, size)
+        yield from follow_frames(frames, detector, settings, video, threads=threads, roads=roads)
+    except (ConfigError, ImageError) as error:
+        raise VideoError(f"{job.source}: {error}") from error
+
+
+def _detector(
+    images: Sequence[Image], source: Path, model: DetectorModel, size: tuple[int, int]
+) -> VideoDetector:
+    try:
+        return model.for_video(*size, images)
+    except FrameSizeError as error:
+        log.warning("%s: gets no boxes: %s", source, error)
+        return BlindDetector()
+
+
+def _open(job: VideoJob, settings: Settings, threads: int | None) -> VideoReader:
+    return VideoReader(
+        job.source,
+        start=job.start,
+        end=job.end,
+        frames=job.frames,
+        threads=threads,
+        settings=settings.input,
+    )
+
+
+def _frames(reader: VideoReader) -> Generator[Frame]:
+    """Give all frames, and close the reader in the thread that took them."""
+    with reader:
+        yield from reader
+
+
+@contextmanager
+def _stalls_named(job: VideoJob, timeout: float) -> Iterator[None]:
+    try:
+        yield
+    except StalledError as error:
+        raise VideoError(
+            f"{job.source}: nothing could be read or written for {timeout:g} s; given up; look at "
+            "the disk or network"
+        ) from error

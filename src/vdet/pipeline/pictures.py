@@ -1,0 +1,189 @@
+"""Vehicles, and the lane, in still pictures: read, detected, handed to sinks."""
+
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.schema import Settings
+from vdet.detect.detections import Detections
+from vdet.detect.protocol import DetectorModel
+from vdet.errors import ConfigError, ImageError, OutputError
+from vdet.files import OutputFiles, make_folder
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.media import Frame
+from vdet.media.images import PICTURE_SUFFIXES, Image, read_image
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sink, open_sink
+from vdet.pipeline.threads import single_threaded_libraries
+from vdet.track.track import Track
+
+
+@dataclass(frozen=True, slots=True)
+class PictureJob:
+    """A picture to be searched, and the outputs that are its own."""
+
+    source: Path
+    outputs: tuple[Output, ...]
+
+
+def find_images(paths: Sequence[Path]) -> list[Path]:
+    """Return the pictures among `paths`, those in folders included (not in folders of these).
+
+    Raises
+    ------
+    ImageError
+        A path does not exist, or a folder holds no picture.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if _is_picture(p))
+            if not inside:
+                names = ", ".join(sorted(PICTURE_SUFFIXES))
+                raise ImageError(f"{path}: holds no pictures ({names})")
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise ImageError(f"{path}: no such file or folder")
+    return list(dict.fromkeys(found))
+
+
+def _is_picture(path: Path) -> bool:
+    return (
+        path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".") and path.is_file()
+    )
+
+
+def plan_pictures(
+    sources: Sequence[Path], out: Path | None, stages: Path | None, *, overwrite: bool
+) -> list[PictureJob]:
+    """Decide where each picture's results go, and refuse what cannot be, before any work.
+
+    `out` is a file for a single picture where it has a picture's suffix, else a folder, which is
+    made; pictures keep their names in it. Stage pictures of several sources go to one folder each.
+
+    Raises
+    ------
+    OutputError
+        An output is there already (and not `overwrite`), equals a source, or is wanted twice.
+    """
+    is_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
+    jobs = []
+    for source in sources:
+        picture = out if is_file or out is None else out / source.name
+        folder = stages / source.stem if stages and len(sources) > 1 else stages
+        named = {"picture": picture, "stages": folder}
+        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
+        jobs.append(PictureJob(source, own))
+    outputs = [output for job in jobs for output in job.outputs]
+    for output, count in Counter(outputs).items():
+        if count > 1:
+            raise OutputError(
+                f"{output.path}: wanted by two inputs of one name; run them separately"
+            )
+    if out is not None and not is_file:
+        make_folder(out)
+    for output in outputs:
+        check_sink(output, overwrite=overwrite, inputs=sources)
+    return jobs
+
+
+def run_pictures(
+    jobs: Sequence[PictureJob],
+    shared: Sequence[Output],
+    model: DetectorModel,
+    settings: Settings,
+    lanes: LaneRequest | None = None,
+) -> list[ImageError]:
+    """Search pictures; return the errors of those that cannot be read or searched.
+
+    The outputs of one picture appear together, the `shared` ones when all pictures are done.
+    Raises `OutputError`.
+    """
+    failures: list[ImageError] = []
+    with ExitStack() as stack:
+        context = SinkContext(stack.enter_context(OutputFiles()), settings)
+        sinks = [stack.enter_context(open_sink(output, context)) for output in shared]
+        for job in jobs:
+            try:
+                run_picture(job, model, settings, lanes, shared=sinks)
+            except ImageError as error:
+                failures.append(error)
+    return failures
+
+
+def run_picture(
+    job: PictureJob,
+    model: DetectorModel,
+    settings: Settings,
+    lanes: LaneRequest | None = None,
+    *,
+    shared: Sequence[Sink] = (),
+) -> FrameResult:
+    """Search a picture, write its outputs together, and hand the result to the shared sinks.
+
+    Raises
+    ------
+    ImageError
+        The picture cannot be read or searched.
+    OutputError
+        An output cannot be written.
+    """
+    result = detect_picture(job.source, read_image(job.source), model, settings, lanes)
+    with ExitStack() as stack:
+        context = SinkContext(stack.enter_context(OutputFiles()), settings)
+        own = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
+        for sink in (*own, *shared):
+            sink.write(result)
+    return result
+
+
+def detect_picture(
+    source: Path,
+    image: Image,
+    model: DetectorModel,
+    settings: Settings,
+    lanes: LaneRequest | None = None,
+) -> FrameResult:
+    """Search a picture, BGR uint8 `(H, W, 3)`; `source` is its name in messages.
+
+    Each detection becomes a track of its own, numbered from 1. Raises `ImageError`.
+    """
+    height, width = image.shape[:2]
+    try:
+        with single_threaded_libraries():
+            detector = model.for_video(width, height, [image])
+            detections = detector.detect(detector.search(image, None))
+        road = _road(image, settings, lanes) if lanes else None
+    except (ConfigError, ImageError) as error:
+        raise ImageError(f"{source}: {error}") from error
+    frame = Frame(0, Fraction(0), image)
+    return FrameResult(source, frame, detections, _tracks(detections), road, detector)
+
+
+def _tracks(detections: Detections) -> tuple[Track, ...]:
+    classes = detections.classes
+    return tuple(
+        Track(
+            number + 1,
+            box,
+            float(np.float64(score)),
+            predicted=False,
+            class_id=None if classes is None else int(classes[number]),
+        )
+        for number, (box, score) in enumerate(
+            zip(detections.rounded, detections.scores.tolist(), strict=True)
+        )
+    )
+
+
+def _road(image: Image, settings: Settings, lanes: LaneRequest) -> Road:
+    height, width = image.shape[:2]
+    roads = RoadFinder(lanes, settings.lanes, width, height)
+    return roads.update(roads.observe(image))

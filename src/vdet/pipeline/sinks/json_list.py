@@ -1,0 +1,63 @@
+"""The sink `json`: the vehicles of still pictures as one JSON list."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, Self
+
+from vdet.lanes.lane import lane_record
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
+
+STANDARD_OUTPUT = Path("-")
+
+
+class JsonSink:
+    """Gathers an item a picture, and writes the list at the end; nothing where there is no item.
+
+    Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
+    `height` (pixels of the input picture) and `score`; where lanes are looked for also `lane`, as
+    in `.jsonl` tracks.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self._path = path
+        self._context = context
+        self._items: list[dict[str, Any]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        if kind is not None or not self._items:
+            return
+        text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
+        if self._path == STANDARD_OUTPUT:
+            sys.stdout.write(text)
+        else:
+            self._context.files.stage(self._path).write_text(text, encoding="utf-8")
+
+    def write(self, result: FrameResult) -> None:
+        """Add the item of a picture."""
+        height, width = result.frame.image.shape[:2]
+        item: dict[str, Any] = {
+            "image": str(result.source),
+            "width": width,
+            "height": height,
+            "boxes": [
+                {
+                    "x": track.box.x,
+                    "y": track.box.y,
+                    "width": track.box.width,
+                    "height": track.box.height,
+                    "score": round(track.score, 4),
+                }
+                for track in result.tracks
+            ],
+        }
+        if result.road:
+            item["lane"] = lane_record(result.road.lane)
+        self._items.append(item)
+
+
+JSON = SinkKind(JsonSink, what="lists of boxes")

@@ -1,0 +1,136 @@
+"""What the rest of the program knows of an output, and how outputs are opened by name."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+from vdet.config.schema import Settings
+from vdet.errors import OutputError
+from vdet.files import OutputFiles, check_output, make_folder
+from vdet.media import VideoInfo
+from vdet.pipeline.result import FrameResult
+from vdet.plugins import SINKS, load_plugin
+
+
+class Sink(Protocol):
+    """Takes the results of a run, frame by frame; a context manager.
+
+    It writes into files that it gets from `SinkContext.files`: these appear under their names when
+    the whole run ends well, and not at all otherwise. It leaves its files complete when it is left
+    without an error.
+    """
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+        /,
+    ) -> None: ...
+
+    def write(self, result: FrameResult) -> None:
+        """Take the next result. It must not change the frame's image."""
+
+
+@dataclass(frozen=True, slots=True)
+class SinkContext:
+    """What a sink is opened with.
+
+    Attributes
+    ----------
+    files
+        Gives temporary files: `files.stage(path)`.
+    video
+        The video that is read; None where pictures are.
+    is_part
+        Whether only a part of the video is read.
+    at
+        Time of the moment that is asked for (`--at`), seconds from the first frame.
+    codec_threads
+        Threads of an encoder; None lets it choose.
+    timeout
+        Seconds after which a write that does not end is given up.
+    """
+
+    files: OutputFiles
+    settings: Settings
+    video: VideoInfo | None = None
+    is_part: bool = False
+    at: Fraction = Fraction(0)
+    codec_threads: int | None = None
+    timeout: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SinkKind:
+    """A kind of sink, as it is registered under its name.
+
+    Attributes
+    ----------
+    open
+        Takes the path of the output and a `SinkContext`.
+    suffixes
+        Those that the output may have, lower case; empty for any.
+    what
+        What it writes, for messages: "tracks".
+    marker
+        For an output that is a folder, which is made: a pattern of the files in it that tell that
+        it was written before.
+    """
+
+    open: Callable[[Path, SinkContext], Sink]
+    suffixes: Sequence[str] = ()
+    what: str = "outputs"
+    marker: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """An output that is asked for: the name of a sink, and where it writes."""
+
+    sink: str
+    path: Path
+
+
+def sink_kind(name: str) -> SinkKind:
+    """Return the kind of sink of a name. Raises `ConfigError` where there is none."""
+    kind: SinkKind = load_plugin(SINKS, name)
+    return kind
+
+
+def check_sink(
+    output: Output, *, overwrite: bool, inputs: Iterable[Path] = (), makes_folder: bool = False
+) -> None:
+    """Refuse, before any work, an output that could not be written; arguments as `check_output`.
+
+    Raises
+    ------
+    OutputError
+        The suffix is not one of the sink's, or the output cannot be written or is there already.
+    ConfigError
+        There is no sink of that name.
+    """
+    kind, path = _kind_for(output), output.path
+    if kind.marker:
+        make_folder(path)
+        path = next(path.glob(kind.marker), path / kind.marker)
+    check_output(path, overwrite=overwrite, inputs=inputs, makes_folder=makes_folder)
+
+
+def open_sink(output: Output, context: SinkContext) -> Sink:
+    """Open the sink of an output. Raises `ConfigError`, `OutputError`, `VideoError`."""
+    return _kind_for(output).open(output.path, context)
+
+
+def _kind_for(output: Output) -> SinkKind:
+    """Return the kind of an output's sink; refuse a suffix that is not one of the sink's."""
+    kind, path = sink_kind(output.sink), output.path
+    if kind.suffixes and path.suffix.lower() not in kind.suffixes:
+        names = ", ".join(kind.suffixes)
+        raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
+    return kind

@@ -1,0 +1,63 @@
+"""The sink `stages`: a folder with a picture of every stage, for one moment."""
+
+import logging
+from pathlib import Path
+from typing import Any, Self
+
+from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
+from vdet.files import make_folder
+from vdet.media.images import Image, encode_image
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
+from vdet.pipeline.sinks.video import track_label
+
+log = logging.getLogger("vdet")
+
+_BOXES = "boxes"
+
+
+class StagesSink:
+    """Writes the pictures of the first frame at or after the moment that is asked for."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self._folder = path
+        self._context = context
+        start = context.video.start if context.video else 0
+        self._time = start + context.at
+        self._is_done = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        if kind is None and not self._is_done:
+            log.warning("%s: no frame at or after --at; no stage pictures", self._folder)
+
+    def write(self, result: FrameResult) -> None:
+        """Write the pictures if this is the frame."""
+        if self._is_done or result.frame.time < self._time:
+            return
+        self._is_done = True
+        make_folder(self._folder)
+        pictures = {**result.stage_pictures(), _BOXES: _with_boxes(result)}
+        if result.road:
+            pictures |= result.road.pictures()
+        for number, (name, picture) in enumerate(pictures.items(), start=1):
+            path = self._folder / f"{number}-{name}.png"
+            self._context.files.stage(path).write_bytes(encode_image(picture, path))
+
+
+def _with_boxes(result: FrameResult) -> Image:
+    """Draw the detections in white with their scores, and over them the shown vehicles."""
+    picture = result.frame.image.copy()
+    detections = result.detections
+    for box, score in zip(detections.rounded, detections.scores.tolist(), strict=True):
+        draw_box(picture, box, WHITE)
+        draw_label(picture, f"{score:.2f}", (box.x, box.bottom), WHITE)
+    for track in result.tracks:
+        label = track_label(track, scores=True)
+        draw_box(picture, track.box, color_of(track.id), label, dashed=track.predicted)
+    return picture
+
+
+STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png")

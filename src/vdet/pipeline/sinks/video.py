@@ -1,0 +1,89 @@
+"""The sink `video`: the video with its vehicles, and its lane, drawn in."""
+
+from collections.abc import Iterable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Self
+
+from vdet.draw.boxes import color_of, draw_box
+from vdet.errors import OutputError
+from vdet.lanes.drawing import draw_lane
+from vdet.media import Frame, VideoWriter
+from vdet.media.images import Image
+from vdet.media.writer import SUFFIXES
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
+from vdet.pipeline.threads import write_async
+from vdet.track.track import Track
+
+
+class VideoSink:
+    """Draws into the frames, and encodes them in a thread."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        if context.video is None:
+            raise OutputError(f"{path}: the sink video is for videos; use the sink picture")
+        self._path = path
+        self._context = context
+        self._video = context.video
+        self._scores = context.settings.output.scores
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        context = self._context
+        writer = VideoWriter(
+            context.files.stage(self._path),
+            self._video,
+            context.settings.output,
+            name=self._path,
+            whole_sound=not context.is_part,
+            threads=context.codec_threads,
+        )
+        with ExitStack() as stack:
+            self._encode = stack.enter_context(
+                write_async(writer.write, within=writer, timeout=context.timeout)
+            )
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        self._stack.__exit__(*raised)
+
+    def write(self, result: FrameResult) -> None:
+        """Draw the vehicles that are shown, and hand the frame to the encoder."""
+        image = annotated(result, scores=self._scores)
+        self._encode(Frame(result.frame.index, result.frame.time, image))
+
+
+VIDEO = SinkKind(VideoSink, SUFFIXES, "videos")
+
+
+def annotated(result: FrameResult, *, scores: bool) -> Image:
+    """Return the frame with its vehicles; itself where nothing is drawn.
+
+    Where lanes are looked for, it is the undistorted frame with the lane, and the vehicles' boxes
+    are carried through the same undistortion.
+    """
+    road, tracks = result.road, result.tracks
+    if road is None:
+        image = result.frame.image
+        return _with_tracks(image.copy(), tracks, scores=scores) if tracks else image
+    image = road.image.copy()
+    if road.lane:
+        draw_lane(image, road.lane)
+    placed = (replace(track, box=road.place(track.box)) for track in tracks)
+    return _with_tracks(image, (track for track in placed if track.box.area), scores=scores)
+
+
+def _with_tracks(image: Image, tracks: Iterable[Track], *, scores: bool) -> Image:
+    """Draw vehicles into an image, each id in its own colour, predicted ones dashed."""
+    for track in tracks:
+        label = track_label(track, scores=scores)
+        draw_box(image, track.box, color_of(track.id), label, dashed=track.predicted)
+    return image
+
+
+def track_label(track: Track, *, scores: bool) -> str:
+    """Name a vehicle on a picture."""
+    return f"#{track.id} {track.score:.2f}" if scores else f"#{track.id}"

@@ -1,0 +1,56 @@
+"""Detectors, trackers and sinks by name: those of vdet, and those of other installed packages.
+
+Another package registers its own as entry points of these groups. Nothing of it is imported before
+it is asked for by name.
+"""
+
+from importlib.metadata import entry_points
+from pkgutil import resolve_name
+from typing import Any
+
+from vdet.errors import ConfigError
+from vdet.files import printable
+
+DETECTORS = "vdet.detectors"
+TRACKERS = "vdet.trackers"
+SINKS = "vdet.sinks"
+
+_BUILT_IN = {
+    DETECTORS: {"svm": "vdet.detect.svm.kind:SVM"},
+    TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
+    SINKS: {
+        "video": "vdet.pipeline.sinks.video:VIDEO",
+        "tracks": "vdet.pipeline.sinks.tracks:TRACKS",
+        "stages": "vdet.pipeline.sinks.stages:STAGES",
+        "picture": "vdet.pipeline.sinks.picture:PICTURE",
+        "json": "vdet.pipeline.sinks.json_list:JSON",
+    },
+}
+
+
+def plugin_names(group: str) -> list[str]:
+    """Return all names of a group, those of vdet first."""
+    own = list(_BUILT_IN[group])
+    return own + sorted({point.name for point in entry_points(group=group)} - set(own))
+
+
+def load_plugin(group: str, name: str) -> Any:
+    """Import what a name of a group stands for.
+
+    Raises
+    ------
+    ConfigError
+        There is no such name, or what it stands for cannot be imported.
+    """
+    if name in _BUILT_IN[group]:
+        return resolve_name(_BUILT_IN[group][name])
+    for point in entry_points(group=group, name=name):
+        try:
+            return point.load()
+        except Exception as error:  # another package's code may raise anything
+            raise ConfigError(
+                f"{name}: cannot be loaded from {point.value} ({type(error).__name__}: {error}); "
+                "mend or reinstall that package"
+            ) from error
+    known = ", ".join(plugin_names(group))
+    raise ConfigError(f"{printable(name)}: is not known; known are {known}")

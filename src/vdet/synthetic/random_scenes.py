@@ -1,0 +1,211 @@
+"""Random scenes from a seed: empty roads, roads with traffic, and the road of the demo."""
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from vdet.draw.boxes import Color
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.scene import (
+    PERIOD,
+    Body,
+    Carriageway,
+    Light,
+    Line,
+    RoadsideObject,
+    Scene,
+    SceneVehicle,
+    Shadow,
+    Wall,
+    Waypoint,
+)
+
+LANE_WIDTH = 3.7
+"""Metres."""
+
+_YELLOW: Color = (60, 180, 225)
+_PAINTS: tuple[Color, ...] = (
+    (228, 228, 226), (170, 168, 165), (112, 110, 108), (34, 32, 32), (40, 34, 128), (110, 62, 34),
+    (70, 84, 60), (128, 140, 150), (52, 46, 44), (150, 110, 74),
+)  # fmt: skip
+_SHAPES: tuple[Body, ...] = (
+    Body(),
+    Body(length=4.2, boot=0.15, slope=0.5, height=1.48),
+    Body(width=1.88, length=4.7, boot=0.12, slope=0.35, height=1.72, belt=1.04),
+    Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12),
+    Body(width=1.82, length=4.8, boot=0.1, slope=0.7, height=1.46),
+)
+_LOOKALIKES: tuple[tuple[Literal["sign", "bin", "hut"], float, float], ...] = (
+    ("sign", 2.4, 2.6),
+    ("bin", 1.2, 1.3),
+    ("hut", 2.4, 2.0),
+    ("bin", 0.8, 1.1),
+)  # kind, width, height
+
+
+def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
+    """Return the scene of the demo: 10 s at 25 frames a second.
+
+    The camera drives in the left lane. Vehicle 1 drives far ahead in the same lane, vehicle 2 two
+    lanes to the right. The camera overtakes vehicle 3, which leaves at the right edge. Vehicle 4
+    enters at the right edge, overtakes, and hides vehicle 2 for about two seconds.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)
+    near, far = LANE_WIDTH, 2 * LANE_WIDTH
+    paths = (
+        ((0.0, 25.0, 0.0), (4.0, 29.0, 0.1), (10.0, 26.0, -0.1)),
+        ((0.0, 20.0, far), (10.0, 30.0, far)),
+        ((0.0, 24.0, near), (2.0, 10.0, near), (4.5, -8.0, near)),
+        ((3.0, -8.0, near), (5.0, 7.0, near), (6.5, 13.0, near), (10.0, 26.0, near)),
+    )
+    paints = rng.permutation(len(_PAINTS))
+    vehicles = tuple(
+        SceneVehicle(
+            id=number,
+            path=tuple(Waypoint(*point) for point in path),
+            color=_PAINTS[paints[number]],
+            body=random_body(rng),
+        )
+        for number, path in enumerate(paths, start=1)
+    )
+    return replace(scene, vehicles=vehicles, rate=Fraction(25), frames=250)
+
+
+def traffic_scene(
+    camera: PinholeCamera,
+    *,
+    lane: int,
+    lanes: int,
+    frames: int,
+    seed: int,
+    light: Light | None = None,
+) -> Scene:
+    """Return a scene at 25 frames a second with a near and a far vehicle in each lane.
+
+    All vehicles drive at constant speeds, a little faster than the camera. The camera is in lane
+    `lane` of `lanes`, counted from 0 at the left. Ids count from 1 at the left, near before far.
+    Without `light`, the light is random like the rest.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
+    rate = Fraction(25)
+    end = float(frames / rate)
+    paths = [
+        (Waypoint(0.0, ahead, lateral), Waypoint(end, ahead + gained, lateral))
+        for lateral in ((number - lane) * LANE_WIDTH for number in range(lanes))
+        for ahead, gained in ((9 + 1.2 * abs(lateral), 2 * end), (24 + abs(lateral), 3 * end))
+    ]
+    vehicles = tuple(
+        SceneVehicle(number, path, random_paint(rng), random_body(rng))
+        for number, path in enumerate(paths, start=1)
+    )
+    return replace(scene, light=light or scene.light, vehicles=vehicles, rate=rate, frames=frames)
+
+
+def empty_road(
+    rng: np.random.Generator, camera: PinholeCamera, *, lane: int, lanes: int, seed: int
+) -> Scene:
+    """Return a road without vehicles, with random colours, light and roadside.
+
+    The camera drives in the middle of lane `lane` of `lanes`, counted from 0 at the left.
+    """
+    left = -(lane + 0.5) * LANE_WIDTH
+    right = left + lanes * LANE_WIDTH
+    dashed = [Line(left + number * LANE_WIDTH, dash=3.0, gap=9.0) for number in range(1, lanes)]
+    asphalt = int(rng.integers(58, 120))
+    road = Carriageway(
+        left=left - 1.5,
+        right=right + 2.0,
+        lines=(Line(left, _YELLOW), *dashed, Line(right)),
+        walls=_random_walls(rng, left - 1.8, right + 2.6),
+        asphalt=(asphalt + 4, asphalt, asphalt - 3),
+        verge=((92, 132, 150), (60, 104, 96), (100, 122, 128))[rng.integers(3)],
+    )
+    return Scene(
+        camera=camera,
+        road=road,
+        light=_random_light(rng),
+        roadside=_random_roadside(rng, left - 3.0, right + 4.0),
+        seed=seed,
+    )
+
+
+def random_body(rng: np.random.Generator) -> Body:
+    """Return a saloon, hatchback, off-roader, van or coupé of a random size."""
+    shape = _SHAPES[rng.integers(len(_SHAPES))]
+    return replace(
+        shape,
+        width=shape.width * float(rng.uniform(0.96, 1.04)),
+        height=shape.height * float(rng.uniform(0.96, 1.04)),
+        length=shape.length * float(rng.uniform(0.96, 1.04)),
+    )
+
+
+def random_paint(rng: np.random.Generator) -> Color:
+    """Return a random colour that is usual for cars."""
+    paint = np.array(_PAINTS[rng.integers(len(_PAINTS))]) + rng.integers(-12, 13, 3)
+    blue, green, red = (int(value) for value in np.clip(paint, 8, 245))
+    return blue, green, red
+
+
+def _random_light(rng: np.random.Generator) -> Light:
+    stations = np.arange(15.0, PERIOD - 20, 45.0) + rng.uniform(0, 15)
+    shadows = tuple(
+        Shadow(
+            station=float(station),
+            length=float(rng.uniform(4, 14)),
+            strength=float(rng.uniform(0.25, 0.5)),
+            dappled=bool(rng.random() < 0.7),
+        )
+        for station in stations
+    )
+    return Light(
+        gain=float(rng.uniform(0.75, 1.2)),
+        noise=float(rng.uniform(1.5, 4.0)),
+        sun=float(rng.uniform(-0.8, 0.8)),
+        shadows=shadows,
+    )
+
+
+def _random_walls(rng: np.random.Generator, left: float, right: float) -> tuple[Wall, ...]:
+    grey = int(rng.integers(60, 150))
+    concrete = Wall(left, 0.0, 0.85, (grey, grey + 3, grey + 5), spacing=6.0)
+    rail = Wall(right, 0.45, 0.75, (150, 152, 152), spacing=4.0)
+    return (concrete, rail) if rng.random() < 0.7 else (concrete,)
+
+
+def _random_roadside(
+    rng: np.random.Generator, left: float, right: float
+) -> tuple[RoadsideObject, ...]:
+    trees = [_random_plant(rng, side, edge) for side, edge in ((-1, left), (1, right)) * 28]
+    others = [_random_lookalike(rng, right) for _ in range(14)]
+    return (*trees, *others)
+
+
+def _random_plant(rng: np.random.Generator, side: int, edge: float) -> RoadsideObject:
+    tall = rng.random() < 0.6
+    height = float(rng.uniform(4, 9) if tall else rng.uniform(1.0, 2.0))
+    green = int(rng.integers(60, 110))
+    return RoadsideObject(
+        kind="tree" if tall else "bush",
+        station=float(rng.uniform(0, PERIOD)),
+        lateral=edge + side * float(rng.uniform(6, 28) if tall else rng.uniform(1, 12)),
+        width=height * float(rng.uniform(0.6, 1.1) if tall else rng.uniform(1.0, 1.8)),
+        height=height,
+        color=(green - int(rng.integers(10, 40)), green, green - int(rng.integers(-10, 30))),
+    )
+
+
+def _random_lookalike(rng: np.random.Generator, edge: float) -> RoadsideObject:
+    kind, width, height = _LOOKALIKES[rng.integers(len(_LOOKALIKES))]
+    return RoadsideObject(
+        kind=kind,
+        station=float(rng.uniform(0, PERIOD)),
+        lateral=edge + width + float(rng.uniform(0, 7)),
+        width=width,
+        height=height,
+        color=((60, 96, 40), (110, 60, 30), (80, 84, 88), (70, 110, 130))[rng.integers(4)],
+    )

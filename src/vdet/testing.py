@@ -1,0 +1,217 @@
+"""Checks that every detector, tracker and sink passes; for those of other packages too.
+
+Each check raises `AssertionError` with what is wrong.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.schema import Settings
+from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.files import OutputFiles
+from vdet.geometry import Box
+from vdet.media import Frame, VideoInfo
+from vdet.media.images import Image
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
+from vdet.track.protocol import VideoTracker
+from vdet.track.track import Track
+
+RATE = 25
+"""Frames a second of the scenes that the checks make."""
+
+
+def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
+    """Check a detector on consecutive frames of one video, BGR uint8 `(H, W, 3)`, two or more.
+
+    * Detections lie in the frame, and the frame is left as it is.
+    * A second detector gives the same for the same frames, also when frames are searched in
+      threads and another video is searched in between: nothing is shared.
+    * A still picture, and a frame of one colour, can be searched.
+    * Stage pictures are BGR uint8 images.
+    """
+    assert len(images) > 1, "give two frames or more"
+    before = [image.copy() for image in images]
+    height, width = images[0].shape[:2]
+    alone = _detect_all(model.for_video(width, height, images), images)
+    for image, copy in zip(images, before, strict=True):
+        assert np.array_equal(image, copy), "the detector changed a frame"
+    for found in alone:
+        _check_detections(found, width, height)
+    detector, other = (model.for_video(width, height, images) for _ in range(2))
+    with ThreadPoolExecutor(2) as pool:
+        candidates = list(pool.map(detector.search, images, range(len(images))))
+    for index, (one, image, expected) in enumerate(zip(candidates, images, alone, strict=True)):
+        other.detect(other.search(255 - image, index))
+        _check_equal(detector.detect(one), expected)
+    still = model.for_video(width, height, images[:1])
+    found = still.detect(still.search(images[0], None))
+    _check_detections(found, width, height)
+    for name, picture in still.stage_pictures(images[0], found).items():
+        assert picture.dtype == np.uint8, f"stage picture {name} is {picture.dtype}, not uint8"
+        assert picture.ndim == 3, f"stage picture {name} has the shape {picture.shape}"
+    plain = np.full_like(images[0], 128)
+    blank = model.for_video(width, height, [plain])
+    _check_detections(blank.detect(blank.search(plain, 0)), width, height)
+
+
+def _detect_all(detector: VideoDetector, images: Sequence[Image]) -> list[Detections]:
+    return [detector.detect(detector.search(image, index)) for index, image in enumerate(images)]
+
+
+def _check_detections(found: Detections, width: int, height: int) -> None:
+    assert isinstance(found, Detections), f"detect returned {type(found).__name__}"
+    inside = (found.boxes >= 0).all() and (found.boxes <= [width, height, width, height]).all()
+    assert inside, "a box lies outside the frame"
+
+
+def _check_equal(found: Detections, expected: Detections) -> None:
+    for name in ("boxes", "scores", "centroids", "strengths"):
+        assert np.allclose(getattr(found, name), getattr(expected, name), atol=1e-4), (
+            f"{name} differ from those of the first detector for the same frame"
+        )
+
+
+def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
+    """Check a tracker; `make` returns a new one for frames of a width and height.
+
+    * Two vehicles that are always detected keep one id each, boxes lie in the frame, ids are
+      positive and in order, scores are 0 to 1, what is detected is not `predicted`.
+    * The detections and the frame are left as they are.
+    * Without detections there is nothing to show after some seconds.
+    * Ids belong to a tracker: a second one gives the same, also in between.
+    """
+    first, second = make(640, 360), make(640, 360)
+    shown: list[list[Track]] = []
+    for index in range(3 * RATE):
+        image = _scene(index)
+        found, before = _detections(index), image.copy()
+        shown.append(list(first.update(found, index / RATE, image)))
+        again = list(second.update(_detections(index), index / RATE, image))
+        assert again == shown[-1], "two trackers with the same input differ: they share something"
+        assert np.array_equal(image, before), "the tracker changed the frame"
+        _check_tracks(shown[-1])
+    last = shown[-1]
+    assert len(last) == len(_boxes(0)), f"{len(last)} of {len(_boxes(0))} vehicles are shown"
+    assert not any(track.predicted for track in last), "a detected vehicle is called predicted"
+    ids = {track.id for tracks in shown for track in tracks}
+    assert ids == {track.id for track in last}, "a vehicle that is always detected changed its id"
+    for index in range(3 * RATE, 30 * RATE):
+        last = list(first.update(NO_DETECTIONS, index / RATE, _scene(0) // 2))
+    assert last == [], "vehicles are shown long after the last detection"
+
+
+def _check_tracks(tracks: Sequence[Track]) -> None:
+    ids = [track.id for track in tracks]
+    assert ids == sorted(set(ids)), f"ids {ids} are not in order, or one comes twice"
+    for track in tracks:
+        assert track.id > 0, f"id {track.id} is not positive"
+        assert 0 <= track.score <= 1, f"score {track.score} is not in 0 to 1"
+        assert track.box.area, "a track has a box without an area"
+        assert track.box == track.box.clipped(640, 360), "a track's box lies outside the frame"
+
+
+def _boxes(index: int) -> list[Box]:
+    """Return two vehicles that drive in lanes of their own."""
+    return [Box(60 + 2 * index, 180, 90, 70), Box(500 - 3 * index, 40, 80, 60)]
+
+
+def _detections(index: int) -> Detections:
+    boxes = [(box.x, box.y, box.right, box.bottom) for box in _boxes(index)]
+    return Detections(np.array(boxes), [0.9, 0.95], strengths=[9.0, 9.5])
+
+
+def _scene(index: int) -> Image:
+    """Draw the vehicles with a texture of their own on a grey road."""
+    image = np.full((360, 640, 3), 90, np.uint8)
+    for number, box in enumerate(_boxes(index)):
+        texture = np.random.default_rng(number).integers(0, 256, (box.height, box.width, 3))
+        image[box.y : box.bottom, box.x : box.right] = texture
+    return image
+
+
+def check_sink(kind: SinkKind, path: Path, settings: Settings | None = None) -> None:
+    """Check a sink that writes to `path`, which must not be there yet.
+
+    * Nothing is there before the run ends, nor after a run that ends with an error.
+    * After a run that ends well the output is there, and no temporary file is left.
+    * The frame's image is left as it is.
+    * The same output can be written again after a failed run.
+    """
+    run = _SinkRun(kind, path, settings or Settings())
+    try:
+        run.write(frames=3, error=ZeroDivisionError())
+    except ZeroDivisionError:
+        pass
+    else:
+        raise AssertionError("the sink hid the error that ended the run")
+    assert not _content(path), "a failed run left its output"
+    run.write(frames=3)
+    assert _content(path), "a run that ended well left no output"
+
+
+@dataclass(frozen=True)
+class _SinkRun:
+    kind: SinkKind
+    path: Path
+    settings: Settings
+
+    def write(self, frames: int, error: Exception | None = None) -> None:
+        """Write some frames through the sink; raise `error` after them."""
+        folder = self.path if self.kind.marker else self.path.parent
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with OutputFiles() as files, self.kind.open(self.path, self._context(files)) as sink:
+                for index in range(frames):
+                    result = _result(index)
+                    before = result.frame.image.copy()
+                    sink.write(result)
+                    assert np.array_equal(result.frame.image, before), "the sink changed the frame"
+                assert not _content(self.path), "the output is there before the run has ended"
+                if error is not None:
+                    raise error
+        finally:
+            left = [path.name for path in folder.iterdir() if ".vdet-" in path.name]
+            assert not left, f"temporary files are left: {', '.join(left)}"
+
+    def _context(self, files: OutputFiles) -> SinkContext:
+        rate = Fraction(RATE)
+        video = VideoInfo(Path("check.mp4"), 640, 360, rate, 1 / rate, frames=3)
+        return SinkContext(files, self.settings, video)
+
+
+def _content(path: Path) -> list[Path]:
+    """Return the files that an output consists of, temporary ones left out."""
+    if path.is_dir():
+        return [inside for inside in path.iterdir() if ".vdet-" not in inside.name]
+    return [path] if path.exists() else []
+
+
+class _Blind:
+    """A detector without stage pictures."""
+
+    def search(self, image: Image, index: int | None) -> None:
+        """Do nothing."""
+
+    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
+        """Return no detections."""
+        return NO_DETECTIONS
+
+    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
+        """Return a picture of the frame."""
+        return {"frame": image}
+
+
+def _result(index: int) -> FrameResult:
+    frame = Frame(index, Fraction(index, RATE), _scene(index))
+    tracks = tuple(
+        Track(number, box, 0.9, predicted=number == 2)
+        for number, box in enumerate(_boxes(index), start=1)
+    )
+    return FrameResult(Path("check.mp4"), frame, _detections(index), tracks, None, _Blind())

@@ -1,0 +1,84 @@
+from typing import Any
+
+import pytest
+
+from seed import SEED
+from vdet.config.schema import (
+    HeatSettings,
+    RulesTrackerSettings,
+    SearchSettings,
+    Settings,
+    SvmSettings,
+    WindowSettings,
+)
+from vdet.config.section import scale_lengths
+
+WINDOWS = (WindowSettings(size=64, step=1, top=400, bottom=500),)
+BOTH = Settings(
+    detector=SvmSettings(search=SearchSettings(windows=WINDOWS)), tracker=RulesTrackerSettings()
+)
+"""Settings with every frame length: window sets over fixed rows, and the rules."""
+LENGTHS = {
+    *(f"detector.search.windows.0.{key}" for key in ("size", "top", "bottom")),
+    "detector.heat.blur",
+    "tracker.min_region",
+    "tracker.near",
+    "tracker.wide",
+    "tracker.max_combined",
+    "tracker.merge_overlap",
+    "tracker.match_distance",
+}
+
+
+def leaves(value: Any, key: str = "") -> dict[str, Any]:
+    if isinstance(value, dict):
+        items = value.items()
+    elif isinstance(value, (list, tuple)):
+        items = {str(i): item for i, item in enumerate(value)}.items()
+    else:
+        return {key: value}
+    return {k: v for n, item in items for k, v in leaves(item, f"{key}.{n}".lstrip(".")).items()}
+
+
+def scaled(rows: int, settings: Settings = BOTH) -> Settings:
+    return scale_lengths(settings, rows / 720)
+
+
+def test_at_the_reference_height_nothing_changes() -> None:
+    assert scaled(720) == BOTH
+
+
+def test_every_frame_length_is_scaled_and_nothing_else() -> None:
+    before, after = leaves(BOTH.model_dump()), leaves(scaled(1440).model_dump())
+    assert {key for key in before if before[key] != after[key]} == LENGTHS
+    for key in LENGTHS:
+        assert after[key] == 2 * before[key]
+
+
+@pytest.mark.parametrize(
+    ("rows", "large", "small"),
+    [
+        (360, (64, 190, 360), (32, 200, 250)),
+        (1080, (192, 570, 1080), (96, 600, 750)),
+        (2160, (384, 1140, 2160), (192, 1200, 1500)),
+        (480, (85, 253, 480), (43, 267, 333)),
+    ],
+)
+def test_windows_keep_their_place_in_a_frame_of_another_height(
+    rows: int, large: tuple[int, ...], small: tuple[int, ...]
+) -> None:
+    windows = scaled(rows, SEED).svm.search.windows
+    assert [(w.size, w.top, w.bottom) for w in windows] == [large, small]
+    assert [w.overlap for w in windows] == [0.8, 0.8]
+
+
+@pytest.mark.parametrize(("blur", "factor", "expected"), [(15, 0.5, 8), (5, 0.5, 3), (1, 0.4, 0)])
+def test_products_are_rounded_halves_up(blur: int, factor: float, expected: int) -> None:
+    assert scale_lengths(HeatSettings(blur=blur), factor).blur == expected
+
+
+def test_a_part_of_the_settings_is_scaled_alone() -> None:
+    window = WindowSettings(size=10, overlap=0.5, top=20, bottom=40)
+    (result,) = scale_lengths(SearchSettings(windows=(window,)), 3).windows
+    assert result == WindowSettings(size=30, overlap=0.5, top=60, bottom=120)
+    assert window.size == 10

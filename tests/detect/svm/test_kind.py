@@ -1,0 +1,51 @@
+"""The linear model under its name: which file is shipped, and which features it must have."""
+
+from pathlib import Path
+
+import pytest
+
+from red_cars import red_finder
+from vdet.config.loading import find_config, load_settings
+from vdet.config.schema import FeatureSettings, HeatSettings, SvmSettings
+from vdet.detect.factory import load_detector, model_file
+from vdet.detect.svm.kind import asked_features, shipped_model
+from vdet.detect.svm.model import load_model, save_model
+from vdet.errors import ModelError
+
+HSV = FeatureSettings(color_space="HSV")
+
+
+@pytest.fixture(autouse=True)
+def _somewhere_else(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(("name", "length"), [("default", 4800), ("seed", 4800)])
+def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> None:
+    settings = load_settings(find_config(name)).svm
+    path = shipped_model(settings)
+    assert path.stem == name
+    assert model_file(settings) == path
+    model = load_model(path, settings.features)
+    assert model.weights.shape[1] == length
+    assert "data_sha256" in model.provenance
+
+
+def test_features_that_no_shipped_model_has_are_refused_with_advice() -> None:
+    with pytest.raises(ModelError, match=r"no shipped model .* give --model, or train one"):
+        shipped_model(SvmSettings(features=HSV))
+
+
+def test_features_are_asked_for_where_they_differ_from_the_default() -> None:
+    assert asked_features(SvmSettings(features=HSV)) == HSV
+    assert asked_features(SvmSettings(features=FeatureSettings(patch=32))) is None
+    assert asked_features(SvmSettings(heat=HeatSettings(frames=3))) is None
+
+
+def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for() -> None:
+    path = Path("red.npz")
+    save_model(red_finder(), path)
+    load_detector(SvmSettings(), path)
+    load_detector(SvmSettings(features=red_finder().features), path)
+    with pytest.raises(ModelError, match=r"red\.npz: was trained with other features"):
+        load_detector(SvmSettings(features=HSV), path)

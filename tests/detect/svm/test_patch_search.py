@@ -1,0 +1,106 @@
+from dataclasses import replace
+from fractions import Fraction
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from seed import SEED
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.detect.svm import dense_search, patch_search
+from vdet.detect.svm.dense_search import LocatedSearch
+from vdet.detect.svm.features import FeatureExtractor, Layout, to_patch
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.patch_search import PatchSearch
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.windows import WindowGrid
+
+FRAME = np.random.default_rng(0).integers(0, 256, (120, 160, 3), dtype=np.uint8)
+GRID = WindowGrid(63, Fraction(25, 2), Fraction(1), Fraction(2), columns=7, rows=4)
+ONE = WindowGrid(64, Fraction(8), Fraction(0), Fraction(0), columns=1, rows=1)
+COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+
+
+def model_of(features: FeatureSettings, members: int = 2) -> LinearModel:
+    rng = np.random.default_rng(1)
+    length = Layout.of(features).length
+    weights = rng.normal(scale=1e-2, size=(members, length)).astype(np.float32)
+    biases = rng.normal(size=members).astype(np.float32)
+    ones = np.ones(members, np.float32)
+    return LinearModel(features, weights, biases, -ones, 0 * ones)
+
+
+@pytest.mark.parametrize(
+    "features",
+    [SEED.svm.features, FeatureSettings(), COLOUR, FeatureSettings(patch=16, color_space="HSV")],
+    ids=["seed", "default", "colour only", "smaller patch"],
+)
+def test_every_window_is_cropped_resized_described_and_scored(features: FeatureSettings) -> None:
+    model, extractor = model_of(features), FeatureExtractor(features)
+    found = PatchSearch(model, GRID).search(FramePyramid(FRAME)).probabilities
+    assert len(found) == 28
+    for (x, y, w, h), probability in zip(GRID.boxes.tolist(), found, strict=True):
+        crop = to_patch(FRAME[y : y + h, x : x + w], features.patch)
+        expected = model.probabilities(extractor.describe(crop)[np.newaxis])[0]
+        assert probability == pytest.approx(expected, abs=1e-6)
+
+
+def test_probabilities_differ_from_window_to_window() -> None:
+    found = PatchSearch(model_of(COLOUR), GRID).search(FramePyramid(FRAME)).probabilities
+    assert found.shape == (28,)
+    assert found.dtype == np.float32
+    assert len(np.unique(found)) == 28
+
+
+def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing() -> None:
+    engine, frame = PatchSearch(model_of(COLOUR), GRID), FRAME.copy()
+    first = engine.search(FramePyramid(frame)).probabilities
+    engine.search(FramePyramid(255 - frame))
+    np.testing.assert_array_equal(frame, FRAME)
+    np.testing.assert_array_equal(engine.search(FramePyramid(frame)).probabilities, first)
+
+
+@pytest.mark.parametrize(
+    ("engine", "module"), [(PatchSearch, patch_search), (LocatedSearch, dense_search)]
+)
+def test_windows_scored_some_at_a_time_are_scored_alike(
+    engine: type[PatchSearch | LocatedSearch],
+    module: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search = engine(model_of(FeatureSettings()), GRID)
+    together = search.search(FramePyramid(FRAME)).probabilities
+    monkeypatch.setattr(module, "BATCH", 3)
+    np.testing.assert_allclose(
+        search.search(FramePyramid(FRAME)).probabilities, together, atol=1e-6
+    )
+
+
+def test_what_lies_outside_a_window_does_not_matter() -> None:
+    other = np.zeros_like(FRAME)
+    other[0:64, 0:64] = FRAME[0:64, 0:64]
+    engine = PatchSearch(model_of(SEED.svm.features), ONE)
+    one, two = (engine.search(FramePyramid(image)).probabilities for image in (FRAME, other))
+    assert one == two
+
+
+def test_the_hog_of_chosen_windows_is_given_without_the_other_features() -> None:
+    features = FeatureSettings(patch=16)
+    model, extractor = model_of(features), FeatureExtractor(features)
+    numbers = np.array([27, 3, 3])
+    hogs = PatchSearch(model, GRID).search(FramePyramid(FRAME)).hogs(numbers)
+    assert hogs.shape == (3, extractor.layout.hog_length)
+    for (x, y, w, h), hog in zip(GRID.boxes[numbers].tolist(), hogs, strict=True):
+        vector = extractor.describe(to_patch(FRAME[y : y + h, x : x + w], 16))
+        np.testing.assert_array_equal(hog, vector[: len(hog)])
+
+
+def test_a_window_beyond_the_side_sees_the_outermost_columns_repeated() -> None:
+    features = FeatureSettings(patch=16)
+    model = model_of(features)
+    beyond = WindowGrid(32, Fraction(8), Fraction(-16), Fraction(8), columns=19, rows=2)
+    inside = replace(beyond, left=Fraction(0))
+    padded = np.pad(FRAME, ((0, 0), (16, 16), (0, 0)), mode="edge")
+    ours = PatchSearch(model, beyond).search(FramePyramid(FRAME, margin=16))
+    expected = PatchSearch(model, inside).search(FramePyramid(padded))
+    np.testing.assert_array_equal(ours.probabilities, expected.probabilities)

@@ -1,0 +1,384 @@
+import logging
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+
+import seed
+from vdet.config.schema import (
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    PerspectiveSettings,
+    SearchSettings,
+    SpatialSettings,
+    SvmSettings,
+    WindowSettings,
+)
+from vdet.detect.svm.features import Layout
+from vdet.detect.svm.model import BoxRegression, LinearModel
+from vdet.detect.svm.perspective import lay_perspective
+from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.detect.svm.windows import Int32Array, Windows, join_windows
+from vdet.errors import ConfigError, FrameSizeError, ImageError
+from vdet.media.images import Image
+
+Sides = tuple[float, float, float, float]
+
+SEED = seed.SEED.svm
+COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+SMALL = FeatureSettings(patch=16, hog=HogSettings(channels=(0,)))
+FRAME = np.random.default_rng(0).integers(0, 256, (120, 160, 3), dtype=np.uint8)
+SETS = (
+    WindowSettings(size=32, step=1, top=24, bottom=88),
+    WindowSettings(size=48, overlap=0.5, top=8, bottom=120),
+)
+
+
+def model_of(features: FeatureSettings) -> LinearModel:
+    weights = np.random.default_rng(1).normal(scale=0.02, size=(1, Layout.of(features).length))
+    one = np.ones(1, np.float32)
+    return LinearModel(features, weights.astype(np.float32), 0 * one, -one, 0 * one)
+
+
+def laid(
+    width: int, height: int, settings: SvmSettings = SEED, *, horizon: float = 0.5
+) -> Int32Array:
+    grids = lay_grids(settings, settings.features, width, height, horizon=horizon)
+    return np.concatenate([grid.boxes for grid in grids])
+
+
+def search_of(
+    features: FeatureSettings, engine: Literal["auto", "dense", "patch"] = "auto"
+) -> FrameSearch:
+    settings = SvmSettings(
+        reference_height=120, features=features, search=fixed(*SETS, engine=engine)
+    )
+    return FrameSearch(model_of(features), settings, 160, 120)
+
+
+def fixed(
+    *sets: WindowSettings, engine: Literal["auto", "dense", "patch"] = "auto"
+) -> SearchSettings:
+    """Search by these sets and no others."""
+    none = PerspectiveSettings(sizes=())
+    return SearchSettings(engine=engine, windows=sets, perspective=none)
+
+
+PERSPECTIVE = SvmSettings(
+    features=SMALL,
+    search=SearchSettings(
+        perspective=PerspectiveSettings(sizes=(0.1, 0.15, 0.2, 0.3), beyond=0.34)
+    ),
+)
+
+
+def by_perspective(alternate: int = 2) -> FrameSearch:
+    """Search by four sets that follow the perspective."""
+    search = PERSPECTIVE.search.model_copy(update={"alternate": alternate})
+    settings = PERSPECTIVE.model_copy(update={"search": search})
+    return FrameSearch(model_of(SMALL), settings, 160, 120, horizon=0.3)
+
+
+def with_sides(
+    sides: Sides,
+    engine: Literal["auto", "dense", "patch"] = "auto",
+    probability: float | None = None,
+) -> FrameSearch:
+    """Search with a regression that gives the same sides for all windows; half are detections."""
+    length = Layout.of(SMALL).hog_length
+    boxes = BoxRegression(np.zeros((4, length), np.float32), np.array(sides, np.float32))
+    search = fixed(*SETS, engine=engine).model_copy(
+        update={"probability": MEDIAN if probability is None else probability}
+    )
+    settings = SvmSettings(reference_height=120, features=SMALL, search=search)
+    return FrameSearch(replace(model_of(SMALL), boxes=boxes), settings, 160, 120)
+
+
+def search_all(search: FrameSearch, image: Image = FRAME) -> Windows:
+    """Search an image with all window sets."""
+    return join_windows(search.search(image))
+
+
+def search_frame(search: FrameSearch, index: int) -> Windows:
+    """Search a video's frame with the window sets of its number."""
+    return join_windows(search.search(FRAME, search.sets_of(index)))
+
+
+MEDIAN = float(np.median(search_all(search_of(SMALL)).probabilities))
+
+
+def rows_of(windows: Windows) -> list[tuple[float, ...]]:
+    """Give what is known of each window, in the windows' order."""
+    columns = [windows.boxes, windows.probabilities[:, np.newaxis], windows.vehicles]
+    return [tuple(row) for row in np.hstack(columns).round(4).tolist()]
+
+
+def band(size: int, top: int, bottom: int) -> WindowSettings:
+    return WindowSettings(size=size, overlap=0.5, top=top, bottom=bottom)
+
+
+class TestLayingGrids:
+    def test_the_seed_has_831_windows_on_a_720p_frame_the_large_ones_first(self) -> None:
+        assert laid(1280, 720)[:, 2].tolist() == [128] * 423 + [64] * 408
+
+    def test_all_default_sets_find_room_on_a_720p_frame(self) -> None:
+        settings = SvmSettings()
+        grids = lay_grids(settings, settings.features, 1280, 720)
+        shares = settings.search.perspective.sizes
+        assert [grid.size for grid in grids] == [round(1280 * share) for share in shares]
+
+    def test_sets_over_fixed_rows_come_before_those_of_the_perspective(self) -> None:
+        perspective = PerspectiveSettings(sizes=(0.1, 0.2))
+        both = SvmSettings(
+            search=SearchSettings(windows=(band(64, 400, 500),), perspective=perspective)
+        )
+        grids = lay_grids(both, SMALL, 1280, 720, horizon=0.5)
+        assert [grid.size for grid in grids] == [64, 128, 256]
+        assert (
+            grids[0]
+            == lay_grids(SvmSettings(search=fixed(band(64, 400, 500))), SMALL, 1280, 720)[0]
+        )
+        assert grids[1:] == lay_perspective(perspective, SMALL, 1280, 720, horizon=0.5)
+
+    def test_a_horizon_moves_the_perspective_alone(self) -> None:
+        assert laid(1280, 720, SEED).tolist() == laid(1280, 720, SEED, horizon=0.4).tolist()
+        high, low = (laid(1280, 720, SvmSettings(), horizon=horizon) for horizon in (0.25, 0.35))
+        assert (low[:, 1] - high[:, 1]).tolist() == [72] * len(high)
+
+    @pytest.mark.parametrize(
+        ("width", "height"), [(640, 360), (1920, 1080), (1279, 721), (853, 480)]
+    )
+    def test_the_sets_scale_with_the_rows_of_the_frame(self, width: int, height: int) -> None:
+        large, small = lay_grids(SEED, SEED.features, width, height)
+        factor = height / 720
+        assert large.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (380, 128, 128)]]
+        assert small.boxes[0].tolist() == [0, *[int(n * factor + 0.5) for n in (400, 64, 64)]]
+
+    @pytest.mark.parametrize("settings", [SEED, SvmSettings()], ids=["seed", "default"])
+    @pytest.mark.parametrize(
+        ("width", "height"), [(1280, 720), (1277, 719), (1281, 721), (129, 720), (333, 77)]
+    )
+    def test_all_windows_lie_inside_the_frame_but_for_what_is_asked_for(
+        self, settings: SvmSettings, width: int, height: int
+    ) -> None:
+        x, y, w, h = laid(width, height, settings).T
+        beyond = settings.search.perspective.beyond if settings.search.perspective.sizes else 0
+        assert (x >= -beyond * w).all()
+        assert (y >= 0).all()
+        assert (x + w <= width + beyond * w).all()
+        assert (y + h <= height).all()
+
+    def test_steps_are_counted_in_cells_of_the_features(self) -> None:
+        settings = SvmSettings(search=fixed(WindowSettings(size=64, step=1, top=0, bottom=64)))
+        for cell, step in ((4, 8), (8, 16)):
+            features = FeatureSettings(patch=32, hog=HogSettings(cell=cell))
+            (grid,) = lay_grids(settings, features, 1280, 720)
+            assert grid.step == step
+
+    def test_windows_below_the_frame_are_left_out(self) -> None:
+        settings = SvmSettings(search=fixed(band(64, 600, 900), band(64, 700, 800)))
+        (grid,) = lay_grids(settings, COLOUR, 640, 720)
+        assert {y for _, y, _, _ in grid.boxes.tolist()} == {600, 632}
+
+    def test_a_set_that_does_not_fit_leaves_the_others(self) -> None:
+        # the large windows are wider than the frame, the small ones are not
+        assert [grid.size for grid in lay_grids(SEED, COLOUR, 100, 720)] == [64]
+
+    def test_no_window_is_ever_smaller_than_a_pixel(self) -> None:
+        settings = SEED.model_copy(update={"reference_height": 100_000})
+        assert lay_grids(settings, COLOUR, 400, 300) == []
+
+
+class TestSearching:
+    @pytest.mark.parametrize("engine", ["dense", "patch"])
+    def test_every_window_of_every_set_has_a_probability_and_its_share(
+        self, engine: Literal["dense", "patch"]
+    ) -> None:
+        found = search_all(search_of(SMALL, engine))
+        # 4 cells across: the first set's step is 8 pixels of 32, the second's 24 of 48
+        assert len(found) == 17 * 5 + 5 * 3
+        assert found.boxes[0].tolist() == [0, 24, 32, 32]
+        assert found.boxes[-1, 2:].tolist() == [48, 48]
+        assert found.shares.tolist() == [1 / 16] * (17 * 5) + [1 / 4] * (5 * 3)
+        assert found.probabilities.shape == found.shares.shape
+        assert found.probabilities.dtype == found.shares.dtype == np.float32
+        assert len(np.unique(found.probabilities)) > len(found) / 2
+
+    def test_the_engines_agree(self) -> None:
+        dense = search_all(search_of(SMALL, "dense"))
+        patch = search_all(search_of(SMALL, "patch"))
+        np.testing.assert_array_equal(dense.boxes, patch.boxes)
+        assert np.corrcoef(dense.probabilities, patch.probabilities)[0, 1] > 0.9
+
+    def test_nothing_outside_the_search_rows_matters(self) -> None:
+        search = search_of(SMALL)
+        other = FRAME.copy()
+        other[:8] = 0
+        np.testing.assert_array_equal(
+            search_all(search, other).probabilities, search_all(search).probabilities
+        )
+
+    def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing(self) -> None:
+        search, frame = search_of(SMALL), FRAME.copy()
+        first = search_all(search, frame)
+        search_all(search, 255 - frame)
+        np.testing.assert_array_equal(frame, FRAME)
+        np.testing.assert_array_equal(search_all(search, frame).probabilities, first.probabilities)
+
+    def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:
+        wide = np.pad(FRAME, ((0, 0), (24, 24), (0, 0)), mode="edge")
+        perspective = PERSPECTIVE.search.perspective.model_copy(update={"zoom": 160 / 208})
+        settings = PERSPECTIVE.model_copy(
+            update={"search": SearchSettings(perspective=perspective)}
+        )
+        found = search_all(FrameSearch(model_of(SMALL), settings, 208, 120, horizon=0.3), wide)
+        moved = (found.boxes - [24, 0, 0, 0]).tolist()
+        expected = dict(zip(map(tuple, moved), found.probabilities.tolist(), strict=True))
+        ours = search_all(by_perspective())
+        assert ours.boxes[:, 0].min() == -12
+        for box, probability in zip(ours.boxes.tolist(), ours.probabilities.tolist(), strict=True):
+            assert expected[tuple(box)] == pytest.approx(probability, abs=1e-5)
+
+
+class TestAlternatingSets:
+    """In a video, `alternate` frames together are searched like a single picture."""
+
+    def test_each_set_has_its_own_windows_in_the_order_of_the_grids(self) -> None:
+        search = by_perspective()
+        found = search.search(FRAME)
+        assert [each.boxes.tolist() for each in found] == [
+            grid.boxes.tolist() for grid in search.grids
+        ]
+        for number, expected in enumerate(found):
+            (alone,) = search.search(FRAME, [number])
+            assert rows_of(alone) == rows_of(expected)
+
+    @pytest.mark.parametrize("alternate", [1, 2, 3, 4, 9])
+    def test_alternate_frames_together_search_every_set_once(self, alternate: int) -> None:
+        search = by_perspective(alternate)
+        frames = min(alternate, 4)
+        found = [search_frame(search, index) for index in range(frames)]
+        sizes = [{int(size) for size in each.boxes[:, 2]} for each in found]
+        assert sum(len(each) for each in sizes) == len(set().union(*sizes)) == 4
+        assert all(sizes)
+        assert sorted(row for each in found for row in rows_of(each)) == sorted(
+            rows_of(search_all(search))
+        )
+
+    def test_sets_repeat_after_alternate_frames(self) -> None:
+        search = by_perspective(3)
+        for index in range(3):
+            assert rows_of(search_frame(search, index)) == rows_of(search_frame(search, index + 3))
+
+    def test_a_single_set_is_searched_in_every_frame(self) -> None:
+        settings = SvmSettings(features=SMALL, search=fixed(SETS[0]), reference_height=120)
+        search = FrameSearch(model_of(SMALL), settings, 160, 120)
+        assert rows_of(search_frame(search, 0)) == rows_of(search_frame(search, 1))
+
+    def test_neighbouring_sizes_are_searched_in_different_frames(self) -> None:
+        search = by_perspective(2)
+        sizes = [np.unique(search_frame(search, index).boxes[:, 2]).tolist() for index in (0, 1)]
+        assert sizes == [[16, 32], [24, 48]]
+
+
+class TestVehicles:
+    def test_are_the_windows_without_a_regression(self) -> None:
+        found = search_all(by_perspective())
+        np.testing.assert_array_equal(found.vehicles, found.boxes)
+        assert found.vehicles.dtype == np.float32
+
+    @pytest.mark.parametrize("engine", ["dense", "patch"])
+    def test_are_where_the_regression_says_in_detections(
+        self, engine: Literal["dense", "patch"]
+    ) -> None:
+        # left, top, right, bottom from the middle, in windows: the same for all
+        found = search_all(with_sides((-0.25, 0, 0.5, 0.375), engine))
+        hits = found.probabilities >= MEDIAN
+        assert 10 < hits.sum() < len(found) - 10
+        expected = [
+            [x + size / 2 - size / 4, y + size / 2, 0.75 * size, 0.375 * size]
+            for x, y, size, _ in found.boxes[hits].tolist()
+        ]
+        np.testing.assert_allclose(found.vehicles[hits], expected, rtol=1e-6)
+        np.testing.assert_array_equal(found.vehicles[~hits], found.boxes[~hits])
+
+    def test_may_reach_beyond_their_window(self) -> None:
+        found = search_all(with_sides((-1, -0.5, 1, 0.5)))
+        hits = found.probabilities >= MEDIAN
+        expected = found.boxes[hits] * [1, 1, 2, 1] - found.boxes[hits][:, 2:3] * [0.5, 0, 0, 0]
+        np.testing.assert_allclose(found.vehicles[hits], expected)
+
+    @pytest.mark.parametrize("sides", [(0.3, 0.4, 0.1, 0.2), (0.2, 0.3, 0.2, 0.3)])
+    def test_have_a_size_whatever_the_regression_says(self, sides: Sides) -> None:
+        found = search_all(with_sides(sides))
+        hits = found.probabilities >= MEDIAN
+        x, y, size, _ = found.boxes[hits].T
+        np.testing.assert_allclose(found.vehicles[hits][:, 2], 0.2 * size, rtol=1e-6)
+        np.testing.assert_allclose(found.vehicles[hits][:, 3], 0.2 * size, rtol=1e-6)
+        middle = found.vehicles[hits][:, :2] + found.vehicles[hits][:, 2:] / 2
+        np.testing.assert_allclose(middle[:, 0], x + size / 2 + 0.2 * size, rtol=1e-6)
+        np.testing.assert_allclose(middle[:, 1], y + size / 2 + 0.3 * size, rtol=1e-6)
+
+    def test_of_no_detection_at_all_are_the_windows(self) -> None:
+        found = search_all(with_sides((-1, -1, 1, 1), probability=1))
+        np.testing.assert_array_equal(found.vehicles, found.boxes)
+
+
+class TestTheChoiceOfAnEngine:
+    def test_auto_takes_the_dense_one_where_it_can(self) -> None:
+        auto, dense = (search_all(search_of(SMALL, engine)) for engine in ("auto", "dense"))
+        np.testing.assert_array_equal(auto.probabilities, dense.probabilities)
+
+    @pytest.mark.parametrize(
+        ("features", "missing"),
+        [
+            (COLOUR, "features without HOG"),
+            (
+                SMALL.model_copy(update={"spatial": SpatialSettings(size=4)}),
+                "detector.features.spatial",
+            ),
+        ],
+        ids=["colour only", "spatial"],
+    )
+    def test_what_the_dense_one_cannot_compute_goes_to_the_other(
+        self, features: FeatureSettings, missing: str, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        with caplog.at_level(logging.INFO, "vdet"):
+            auto = search_all(search_of(features))
+        assert (
+            f"the patch engine searches, because the dense one cannot compute {missing}"
+            in caplog.text
+        )
+        patch = search_all(search_of(features, "patch"))
+        np.testing.assert_array_equal(auto.probabilities, patch.probabilities)
+        with pytest.raises(
+            ConfigError,
+            match=rf"^detector\.search\.engine: dense cannot compute {missing}; take auto or",
+        ):
+            search_of(features, "dense")
+
+
+@pytest.mark.parametrize(("width", "height"), [(63, 720), (1, 1), (2, 2), (40, 2000)])
+def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int) -> None:
+    with pytest.raises(
+        FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels; give"
+    ):
+        FrameSearch(model_of(COLOUR), SEED, width, height)
+
+
+def test_a_frame_that_ends_above_the_search_rows_is_refused() -> None:
+    settings = SvmSettings(search=fixed(band(64, 800, 900)))
+    with pytest.raises(FrameSizeError, match="no search window fits"):
+        FrameSearch(model_of(COLOUR), settings, 1280, 720)
+
+
+def test_a_frame_with_too_many_windows_is_refused() -> None:
+    settings = SvmSettings(search=fixed(WindowSettings(size=8, overlap=0.8, top=0, bottom=720)))
+    with pytest.raises(
+        ImageError, match=r"^907,649 search windows .* 1280×720 .* 100,000"
+    ) as error:
+        FrameSearch(model_of(COLOUR), settings, 1280, 720)
+    assert not isinstance(error.value, FrameSizeError)
+    assert "give larger steps or fewer rows in detector.search.windows" in str(error.value)

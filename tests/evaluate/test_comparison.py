@@ -1,0 +1,113 @@
+from dataclasses import asdict
+
+import pytest
+
+from evaluate.scenes import TEN, drive, video
+from vdet.evaluate.comparison import compare, pool
+from vdet.evaluate.labelled_video import NO_ID, LabelledVideo, Row
+from vdet.evaluate.scores import score, score_comparison
+
+
+def box(id_: int, x: float, width: float = 100, frame: int = 1) -> Row:
+    return Row(0, frame, id_, x, 0, width, 100)
+
+
+def region(x: float, width: float, id_: int = NO_ID) -> Row:
+    return Row(0, 1, id_, x, 0, width, 100, ignored=True)
+
+
+def kept_tracks(prediction: LabelledVideo, truth: LabelledVideo) -> list[int]:
+    comparison = compare(prediction, truth)
+    return [int(comparison.track_ids[track]) for f in comparison.frames for track in f.tracks]
+
+
+def test_a_prediction_in_an_ignore_region_is_dropped() -> None:
+    assert kept_tracks(video([box(5, 300)]), video([region(250, 500)])) == []
+
+
+def test_half_of_the_own_area_in_the_region_is_enough() -> None:
+    assert kept_tracks(video([box(5, 150)]), video([region(200, 500)])) == []
+
+
+def test_less_than_half_of_the_own_area_is_not_enough() -> None:
+    assert kept_tracks(video([box(5, 149)]), video([region(200, 500)])) == [5]
+
+
+def test_parts_in_two_regions_are_not_added_up() -> None:
+    regions = video([region(0, 140), region(160, 140)])
+    assert kept_tracks(video([box(5, 100)]), regions) == [5]
+
+
+def test_a_prediction_that_finds_a_vehicle_in_a_region_is_kept() -> None:
+    assert kept_tracks(video([box(5, 300)]), video([box(1, 310), region(250, 500)])) == [5]
+
+
+def test_of_two_predictions_on_a_vehicle_in_a_region_the_worse_one_is_dropped() -> None:
+    found = video([box(5, 320), box(6, 300)])
+    assert kept_tracks(found, video([box(1, 300), region(250, 500)])) == [6]
+
+
+def test_a_region_of_another_frame_does_not_count() -> None:
+    assert kept_tracks(video([box(5, 300, frame=2)]), video([region(250, 500)])) == [5]
+
+
+def test_ignore_regions_are_not_vehicles() -> None:
+    comparison = compare(video(), video([region(250, 500, id_=9), box(1, 0)]))
+    assert comparison.vehicle_ids.tolist() == [1]
+    assert comparison.vehicle_lengths().tolist() == [1]
+
+
+def test_vehicles_and_tracks_are_numbered_from_0_in_order_of_their_ids() -> None:
+    comparison = compare(video([box(30, 0), box(20, 200)]), video([box(8, 0), box(9, 200)]))
+    (frame,) = comparison.frames
+    assert frame.tracks.tolist() == [1, 0]
+    assert comparison.track_ids[frame.tracks].tolist() == [30, 20]
+    assert frame.vehicles.tolist() == [0, 1]
+    assert frame.iou.tolist() == [[1, 0], [0, 1]]
+
+
+def test_frames_with_nothing_that_counts_are_left_out() -> None:
+    comparison = compare(video([box(5, 300), box(6, 0, frame=4)]), video([region(250, 500)]))
+    assert [frame.number for frame in comparison.frames] == [4]
+
+
+@pytest.mark.parametrize(
+    ("own", "given", "seconds"), [(25, None, 4), (25, 50, 2), (None, 50, 2), (None, None, None)]
+)
+def test_the_length_comes_from_the_last_frame_and_the_rate(
+    own: float | None, given: float | None, seconds: float | None
+) -> None:
+    found = video([box(5, 0, frame=100)], rate=own)
+    assert compare(found, video([box(1, 0)]), rate=given).seconds == seconds
+
+
+def test_two_empty_videos_compare_to_nothing() -> None:
+    comparison = compare(video(), video())
+    assert comparison.frames == ()
+    assert comparison.vehicle_lengths().tolist() == []
+
+
+GOOD = compare(video(drive(1, TEN)), video(drive(1, TEN)), rate=25)
+POOR = compare(video(drive(1, range(6, 11))), video(drive(1, TEN)), rate=25)
+
+
+def test_the_pool_of_one_video_scores_as_the_video() -> None:
+    found, truth = video(drive(1, range(3, 11), x=10)), video(drive(1, TEN))
+    assert asdict(score_comparison(pool([compare(found, truth)]))) == asdict(score(found, truth))
+
+
+def test_the_same_id_in_two_videos_is_two_vehicles() -> None:
+    total = score_comparison(pool([GOOD, POOR]))
+    assert (total.vehicles, total.tracks, total.id_switches) == (2, 2, 0)
+    assert total.idf1 == pytest.approx(2 * 15 / (20 + 15))  # either track is right throughout
+    assert [each.delay for each in total.first_detections] == [0, 5]
+
+
+def test_pooled_ratios_are_over_all_boxes() -> None:
+    assert score_comparison(pool([GOOD, POOR])).recall == pytest.approx(15 / 20)
+
+
+def test_the_pooled_length_is_the_sum_if_every_length_is_known() -> None:
+    unknown = compare(video(), video(drive(1, TEN)))
+    assert pool([GOOD, POOR]).seconds == pytest.approx(0.8)
+    assert pool([GOOD, unknown]).seconds is None

@@ -1,0 +1,174 @@
+"""Painted pixels in the top view, and those that may belong to both lines."""
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.config.lanes import LaneSettings, MaskSettings
+from vdet.geometry import Float64Array
+from vdet.lanes.curves import LaneCurves
+from vdet.lanes.paint import find_base, paint_along, paint_mask, slide_windows
+from vdet.lanes.top_view import TopView
+from vdet.media.images import Image
+
+SETTINGS = LaneSettings()
+ACROSS = 30.0
+WHITE, YELLOW = (215, 215, 215), (60, 180, 225)
+
+
+def asphalt(color: int | tuple[int, int, int]) -> Image:
+    image = np.zeros((80, 300, 3), np.uint8)
+    image[:] = color
+    return image
+
+
+def painted(image: Image, color: tuple[int, int, int], left: int = 148, width: int = 5) -> Image:
+    image[:, left : left + width] = color
+    return image
+
+
+def mask_of(image: Image) -> Image:
+    return paint_mask(image, MaskSettings(), ACROSS)
+
+
+@pytest.mark.parametrize("gray", [30, 60, 90, 130])
+@pytest.mark.parametrize("color", [WHITE, YELLOW])
+def test_lines_are_paint_and_the_road_is_not(gray: int, color: tuple[int, int, int]) -> None:
+    found = mask_of(painted(asphalt(gray), color))
+    assert found.dtype == np.uint8
+    assert (found[:, 149:152] == 255).all()
+    assert not found[:, :144].any()
+    assert not found[:, 157:].any()
+
+
+def test_yellow_is_paint_even_if_it_is_not_lighter_than_the_road() -> None:
+    pale = asphalt((168, 172, 176))
+    found = mask_of(painted(pale, (100, 170, 195)))
+    assert found[:, 149:152].all()
+
+
+def test_a_line_in_shadow_is_paint() -> None:
+    image = painted(asphalt(90), WHITE)
+    image[20:60] = (image[20:60] * 0.3).astype(np.uint8)
+    assert mask_of(image)[:, 149:152].all()
+
+
+@pytest.mark.parametrize("levels", [(40, 120), (120, 40), (130, 190)])
+def test_the_edge_of_a_shadow_or_of_another_surface_is_not_paint(levels: tuple[int, int]) -> None:
+    image = asphalt(levels[0])
+    image[:, 150:] = levels[1]
+    assert not mask_of(image).any()
+
+
+def test_a_dark_stripe_is_not_paint() -> None:
+    assert not mask_of(painted(asphalt(150), (40, 40, 40))).any()
+
+
+def test_a_stripe_much_wider_than_a_line_is_not_paint() -> None:
+    assert not mask_of(painted(asphalt(80), WHITE, left=120, width=60))[:, 130:170].any()
+
+
+def test_sensor_noise_gives_almost_no_paint() -> None:
+    noise = np.random.default_rng(0).normal(90, 4, (80, 300, 3))
+    assert np.count_nonzero(mask_of(noise.clip(0, 255).astype(np.uint8))) < 20
+
+
+def test_noise_in_the_dark_is_not_paint() -> None:
+    noise = np.random.default_rng(0).integers(0, 6, (80, 300, 3), dtype=np.uint8)
+    assert not mask_of(noise).any()
+
+
+def test_paint_at_the_border_is_left_out() -> None:
+    image = asphalt(90)
+    cv2.rectangle(image, (0, 0), (4, 80), WHITE, cv2.FILLED)
+    assert not mask_of(image).any()
+
+
+@pytest.fixture
+def top_view() -> TopView:
+    return TopView(SETTINGS.view, 1280, 720)
+
+
+def drawn(top_view: TopView, *lines: Float64Array, rows: slice = slice(None)) -> Image:
+    """Draw lines, given by x at each row, five columns wide."""
+    mask = np.zeros((len(top_view.distances), len(top_view.laterals)), np.uint8)
+    for line in lines:
+        columns = np.rint(top_view.columns(line)).astype(int)
+        for row in range(len(mask))[rows]:
+            mask[row, max(0, columns[row] - 2) : columns[row] + 3] = 255
+    return mask
+
+
+def constant(top_view: TopView, *laterals: float) -> list[Float64Array]:
+    return [np.full(len(top_view.distances), lateral) for lateral in laterals]
+
+
+def test_the_base_is_where_both_lines_start(top_view: TopView) -> None:
+    mask = drawn(top_view, *constant(top_view, -1.6, 2.0))
+    assert find_base(mask, top_view, SETTINGS) == pytest.approx((-1.6, 2.0), abs=0.05)
+
+
+def test_the_base_is_the_pair_of_lines_around_the_camera(top_view: TopView) -> None:
+    mask = drawn(top_view, *constant(top_view, -3.9, -0.4, 3.3))
+    assert find_base(mask, top_view, SETTINGS) == pytest.approx((-0.4, 3.3), abs=0.05)
+
+
+def test_lines_too_close_together_have_no_base(top_view: TopView) -> None:
+    assert find_base(drawn(top_view, *constant(top_view, -1.0, 1.0)), top_view, SETTINGS) is None
+
+
+def test_an_empty_mask_has_no_base(top_view: TopView) -> None:
+    assert find_base(drawn(top_view), top_view, SETTINGS) is None
+
+
+def test_a_top_view_as_narrow_as_a_lane_has_a_base() -> None:
+    narrow = SETTINGS.view.model_copy(update={"margin": 0.0})
+    top_view = TopView(narrow, 1280, 720)
+    mask = np.full((len(top_view.distances), len(top_view.laterals)), 255, np.uint8)
+    base = find_base(mask, top_view, SETTINGS)
+    assert base is not None
+    assert base[1] - base[0] == pytest.approx(3.4, abs=0.4)
+
+
+def test_sliding_windows_follow_a_bend(top_view: TopView) -> None:
+    lines = LaneCurves(bend=1 / 500, heading=-0.02, left=-1.85, right=1.85, pitch=0).at(
+        top_view.distances
+    )
+    base = float(lines[0][-1]), float(lines[1][-1])
+    positions = slide_windows(drawn(top_view, *lines), top_view, base, SETTINGS)
+    for found, line in zip(positions, lines, strict=True):
+        assert np.abs(found - line).max() < SETTINGS.search.margin
+
+
+def test_a_window_without_paint_moves_with_the_other_line(top_view: TopView) -> None:
+    left, right = LaneCurves(1 / 500, 0, -1.85, 1.85, 0).at(top_view.distances)
+    mask = drawn(top_view, left) | drawn(top_view, right, rows=slice(-40, None))
+    positions = slide_windows(mask, top_view, (float(left[-1]), float(right[-1])), SETTINGS)
+    assert np.abs(positions[1] - right).max() < SETTINGS.search.margin
+
+
+def test_paint_along_a_line_is_the_middle_of_each_row(top_view: TopView) -> None:
+    line = np.linspace(1.0, 2.0, len(top_view.distances))
+    paint = paint_along(drawn(top_view, line), top_view, line + 0.1, margin=0.3)
+    assert (paint.z == top_view.distances).all()
+    assert np.abs(paint.x - line).max() < 0.02
+
+
+def test_paint_along_a_line_leaves_out_empty_rows(top_view: TopView) -> None:
+    line = constant(top_view, 1.0)[0]
+    paint = paint_along(drawn(top_view, line, rows=slice(10, 30)), top_view, line, margin=0.3)
+    assert (paint.z == top_view.distances[10:30]).all()
+
+
+def test_paint_along_a_line_leaves_out_what_is_beyond_the_margin(top_view: TopView) -> None:
+    mask = drawn(top_view, *constant(top_view, 1.0))
+    assert len(paint_along(mask, top_view, constant(top_view, 1.5)[0], margin=0.3).z) == 0
+
+
+@pytest.mark.parametrize("lateral", [-4.8, 4.8, -20.0, 20.0])
+def test_paint_along_a_line_outside_the_top_view_stays_inside_it(
+    top_view: TopView, lateral: float
+) -> None:
+    mask = np.full((len(top_view.distances), len(top_view.laterals)), 255, np.uint8)
+    paint = paint_along(mask, top_view, constant(top_view, lateral)[0], margin=0.3)
+    assert ((paint.x >= top_view.laterals[0]) & (paint.x <= top_view.laterals[-1])).all()

@@ -1,0 +1,215 @@
+"""Lanes on generated roads, compared with the lines that were drawn."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.config.lanes import LaneSettings
+from vdet.geometry import Float64Array
+from vdet.lanes.lane import Lane
+from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.media.images import Image
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.render import render
+from vdet.synthetic.scene import Light, Line, Scene, Shadow
+
+MakeRoad = Callable[..., Scene]
+Drive = Callable[..., list[Lane | None]]
+
+YELLOW = (60, 180, 225)
+SHADOWS = tuple(
+    Shadow(station, 8.0, 0.45, dappled)
+    for station, dappled in ((0.0, True), (14.0, False), (30.0, True), (44.0, False))
+)
+
+
+def lateral_ends(line: Float64Array, camera: PinholeCamera) -> tuple[float, float]:
+    """Return the lateral position of a line at its nearest and farthest point, metres."""
+    distance = camera.focal * camera.above_ground / (line[[0, -1], 1] - camera.horizon)
+    lateral = (line[[0, -1], 0] - camera.width / 2) * distance / camera.focal
+    near, far = (lateral - camera.curvature * distance**2 / 2).tolist()
+    return near, far
+
+
+def check(
+    lane: Lane | None, camera: PinholeCamera, left: float = -1.85, right: float = 1.85
+) -> None:
+    assert lane is not None
+    for line, truth in ((lane.left, left), (lane.right, right)):
+        near, far = lateral_ends(line, camera)
+        assert near == pytest.approx(truth, abs=0.10)
+        assert far == pytest.approx(truth, abs=0.30)
+    assert lane.width == pytest.approx(right - left, abs=0.10)
+    assert lane.offset == pytest.approx(-(left + right) / 2, abs=0.10)
+    if camera.curvature:
+        assert lane.curvature == pytest.approx(camera.curvature, rel=0.2)
+        assert lane.radius == pytest.approx(1 / abs(camera.curvature), rel=0.25)
+    else:
+        assert lane.radius is None
+
+
+@pytest.mark.parametrize("radius", [np.inf, 2000, -2000, 800, -800, 300, -300])
+def test_finds_straight_roads_and_bends_to_both_sides(
+    make_road: MakeRoad, drive: Drive, radius: float
+) -> None:
+    scene = make_road(curvature=1 / radius)
+    lanes = drive(scene)
+    assert all(lanes)
+    check(lanes[-1], scene.camera)
+
+
+@pytest.mark.parametrize("radius", [np.inf, 1000, -400])
+def test_finds_a_lane_between_two_dashed_lines(
+    make_road: MakeRoad, drive: Drive, radius: float
+) -> None:
+    dashed = (Line(-1.85, dash=3.0), Line(1.85, dash=3.0))
+    scene = make_road(curvature=1 / radius, lines=dashed)
+    check(drive(scene)[-1], scene.camera)
+
+
+@pytest.mark.parametrize("strength", [0.5, 0.3])
+def test_finds_worn_lines(make_road: MakeRoad, drive: Drive, strength: float) -> None:
+    lines = (Line(-1.85, strength=strength), Line(1.85, dash=3.0, strength=strength))
+    scene = make_road(curvature=-1 / 800, lines=lines)
+    check(drive(scene)[-1], scene.camera)
+
+
+@pytest.mark.parametrize("radius", [np.inf, 1500, -500])
+def test_shadow_bands_across_the_road_are_not_lines(
+    make_road: MakeRoad, drive: Drive, radius: float
+) -> None:
+    scene = make_road(curvature=1 / radius, light=Light(noise=3.0, shadows=SHADOWS))
+    check(drive(scene)[-1], scene.camera)
+
+
+def test_finds_yellow_and_white_on_pale_concrete(make_road: MakeRoad, drive: Drive) -> None:
+    light = Light(noise=3.0, shadows=SHADOWS)
+    scene = make_road(curvature=1 / 1000, asphalt=(170, 178, 182), light=light)
+    check(drive(scene)[-1], scene.camera)
+
+
+@pytest.mark.parametrize("size", [(640, 360), (960, 540), (1920, 1080)])
+def test_works_at_any_frame_size(make_road: MakeRoad, drive: Drive, size: tuple[int, int]) -> None:
+    scene = make_road(curvature=-1 / 700, size=size, frames=3)
+    check(drive(scene)[-1], scene.camera)
+
+
+@pytest.mark.parametrize("shift", [-0.8, 0.8])
+def test_offset_is_the_distance_from_the_middle_of_the_lane(
+    make_road: MakeRoad, drive: Drive, shift: float
+) -> None:
+    scene = make_road(lines=(Line(-1.85 - shift), Line(1.85 - shift, dash=3.0)))
+    lane = drive(scene)[-1]
+    check(lane, scene.camera, -1.85 - shift, 1.85 - shift)
+    assert lane is not None
+    assert lane.offset == pytest.approx(shift, abs=0.1)  # positive: the camera is to the right
+
+
+@pytest.mark.parametrize("missing", [-1.85, 1.85])
+def test_no_lane_is_found_if_one_line_was_never_seen(
+    make_road: MakeRoad, drive: Drive, missing: float
+) -> None:
+    scene = make_road(lines=(Line(-missing),))
+    assert drive(scene) == [None] * scene.frames
+
+
+@pytest.mark.parametrize("missing", [-1.85, 1.85])
+def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost(
+    make_road: MakeRoad, drive: Drive, missing: float
+) -> None:
+    whole = make_road(curvature=1 / 900)
+    carry = LaneSettings().track.carry
+    half = make_road(curvature=1 / 900, lines=(Line(-missing),), frames=carry + 3)
+    lanes = drive(whole, half)
+    check(lanes[whole.frames + carry - 1], whole.camera)
+    assert lanes[-3:] == [None] * 3
+
+
+def test_a_lane_that_reappears_is_found_again(make_road: MakeRoad, drive: Drive) -> None:
+    whole = make_road()
+    bare = make_road(lines=(), frames=LaneSettings().track.carry + 1)
+    lanes = drive(whole, bare, whole)
+    assert lanes[whole.frames + bare.frames - 1] is None
+    check(lanes[-1], whole.camera)
+
+
+def test_a_lane_change_ends_in_the_other_lane(make_road: MakeRoad, drive: Drive) -> None:
+    moves = np.arange(0, 3.75, 0.15)  # metres a frame; a quick change at ten frames a second
+    scenes = []
+    for moved in moves.tolist():
+        lines = tuple(Line(lateral - moved) for lateral in (-1.85, 1.85, 5.55))
+        scenes.append(make_road(lines=lines, size=(640, 360), frames=1))
+    offsets = np.array([lane.offset for lane in drive(*scenes) if lane])
+    lag = np.mod(moves - offsets + 1.85, 3.7) - 1.85
+    assert np.abs(lag).max() < 0.3
+    assert np.abs(offsets).max() < 2.0
+    assert offsets[-1] < 0 < offsets[1]
+
+
+def test_a_pitching_camera_keeps_the_lane_and_its_width(
+    make_road: MakeRoad, settings_for: Callable[[PinholeCamera], LaneSettings]
+) -> None:
+    scene = make_road(curvature=1 / 800)
+    camera = scene.camera
+    finder = RoadFinder(LaneRequest(), settings_for(camera), camera.width, camera.height)
+    for shift in (0, 3, 6, 8, 4, -3, -6, -3):  # pixels by which the horizon moves
+        pitched = replace(camera, horizon=camera.horizon + shift)
+        view = finder.observe(render(replace(scene, camera=pitched), 0))
+        check(finder.update(view).lane, pitched)
+
+
+@pytest.fixture
+def pictures() -> dict[str, Image]:
+    rng = np.random.default_rng(0)
+    room = np.full((720, 1280, 3), 150, np.uint8)
+    for _ in range(40):
+        x, y, width, height = rng.integers(0, (1280, 720, 400, 400)).tolist()
+        color = rng.integers(0, 256, 3).tolist()
+        cv2.rectangle(room, (x, y), (x + width, y + height), color, cv2.FILLED)
+    ramp = np.linspace(0, 255, 1280).astype(np.uint8)
+    return {
+        "black": np.zeros((720, 1280, 3), np.uint8),
+        "white": np.full((720, 1280, 3), 255, np.uint8),
+        "noise": rng.integers(0, 256, (720, 1280, 3), dtype=np.uint8),
+        "blobs": np.asarray(
+            cv2.resize(rng.integers(0, 256, (45, 80, 3), dtype=np.uint8), (1280, 720)), np.uint8
+        ),
+        "ramp": np.ascontiguousarray(np.broadcast_to(ramp[None, :, None], (720, 1280, 3))),
+        "room": room,
+    }
+
+
+@pytest.mark.parametrize("name", ["black", "white", "noise", "blobs", "ramp", "room"])
+def test_a_picture_without_a_lane_has_none(pictures: dict[str, Image], name: str) -> None:
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 1280, 720)
+    for _ in range(3):
+        assert finder.update(finder.observe(pictures[name])).lane is None
+
+
+def test_a_dark_road_has_no_lane(make_road: MakeRoad, drive: Drive) -> None:
+    assert drive(make_road(light=Light(gain=0.03), frames=3)) == [None] * 3
+
+
+@pytest.mark.parametrize("size", [(16, 16), (64, 36), (50, 400)])
+def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
+    image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
+    finder = RoadFinder(LaneRequest(), LaneSettings(), *size)
+    assert finder.update(finder.observe(image)).lane is None
+
+
+def test_all_frames_may_be_observed_before_the_first_update(
+    make_road: MakeRoad,
+    drive: Drive,
+    settings_for: Callable[[PinholeCamera], LaneSettings],
+) -> None:
+    scene = make_road(curvature=1 / 900, frames=3)
+    finder = RoadFinder(LaneRequest(), settings_for(scene.camera), 1280, 720)
+    views = [finder.observe(render(scene, index)) for index in range(3)]
+    for view, other in zip(views, drive(scene), strict=True):
+        lane = finder.update(view).lane
+        assert lane is not None
+        assert other is not None
+        assert (lane.left == other.left).all()

@@ -1,0 +1,113 @@
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import LANE_WIDTH, demo_scene, traffic_scene
+from vdet.synthetic.scene import Light, Scene
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
+
+
+def history(scene: Scene, number: int) -> list[tuple[int, TrueBox]]:
+    """Return the frame numbers and boxes of a vehicle, for every fifth frame."""
+    return [
+        (index, box)
+        for index in range(0, scene.frames, 5)
+        for box in true_boxes(scene, index)
+        if box.id == number
+    ]
+
+
+@pytest.fixture(params=[0, 1, 2])
+def scene(request: pytest.FixtureRequest) -> Scene:
+    return demo_scene(request.param)
+
+
+def test_ids_count_from_1(scene: Scene) -> None:
+    assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4]
+
+
+def test_one_vehicle_leaves_at_the_right_edge(scene: Scene) -> None:
+    seen = history(scene, 3)
+    assert seen[0][0] == 0
+    assert seen[0][1].visibility > 0.99
+    assert seen[-1][0] < scene.frames - 50
+    assert seen[-1][1].box.right == scene.camera.width
+
+
+def test_one_vehicle_enters_at_the_right_edge_and_stays(scene: Scene) -> None:
+    seen = history(scene, 4)
+    assert seen[0][0] > 25
+    assert seen[0][1].box.right == scene.camera.width
+    assert seen[0][1].visibility < 0.5
+    assert seen[-1][0] == scene.frames - 5
+
+
+def test_one_vehicle_is_hidden_while_another_passes(scene: Scene) -> None:
+    late = [box.hidden for index, box in history(scene, 2) if index > 110]
+    assert late[0] < 0.1
+    assert max(late) > 0.9
+    assert late[-1] < 0.1
+
+
+def test_vehicles_in_full_view_have_the_sizes_that_the_window_sets_cover(scene: Scene) -> None:
+    unit = scene.camera.height / 720
+    for index in range(0, scene.frames, 5):
+        for vehicle in true_boxes(scene, index):
+            box = vehicle.box
+            if vehicle.visibility > 0.99:
+                assert 55 * unit < box.width < 420 * unit
+                assert 330 * unit < box.y
+                assert box.bottom < 640 * unit
+
+
+def test_the_same_seed_gives_the_same_scene() -> None:
+    assert demo_scene(5) == demo_scene(5)
+    assert demo_scene(5) != demo_scene(6)
+
+
+CAMERAS = (PinholeCamera.dashboard(1280, 720), PinholeCamera(1242, 375, 721, 172.5, 1.65))
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("lane", [0, 1, 2])
+def test_each_lane_has_a_near_and_a_far_vehicle(camera: PinholeCamera, lane: int) -> None:
+    scene = traffic_scene(camera, lane=lane, lanes=3, frames=30, seed=1)
+    lanes: dict[int, list[float]] = {0: [], 1: [], 2: []}
+    for vehicle in scene.vehicles:
+        ahead, lateral = vehicle.position(0.0) or (0.0, 0.0)
+        lanes[round(lateral / LANE_WIDTH) + lane].append(ahead)
+    assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4, 5, 6]
+    assert all(8 < near < 20 < far < 40 for near, far in lanes.values())
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize(("lane", "hidden"), [(0, {2, 6}), (1, {4}), (2, {2, 6})])
+def test_all_vehicles_must_be_found_except_those_that_nearer_ones_hide(
+    camera: PinholeCamera, lane: int, hidden: set[int]
+) -> None:
+    scene = traffic_scene(camera, lane=lane, lanes=3, frames=30, seed=1)
+    for index in (0, 15, 29):
+        boxes = true_boxes(scene, index)
+        assert {box.id for box in boxes} == {1, 2, 3, 4, 5, 6}
+        assert {box.id for box in boxes if not must_be_found(box, camera.height)} == hidden
+
+
+def test_traffic_keeps_its_speed_and_lane_to_the_last_frame() -> None:
+    scene = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
+    for vehicle in scene.vehicles:
+        places = [vehicle.position(scene.time(index)) or (0.0, 0.0) for index in (0, 14, 28)]
+        steps = [after[0] - before[0] for before, after in pairwise(places)]
+        assert steps[0] == pytest.approx(steps[1])
+        assert 0.5 < steps[0] < 2.5
+        assert len({lateral for _, lateral in places}) == 1
+
+
+def test_traffic_uses_the_light_that_it_is_given() -> None:
+    dusk = Light(gain=0.5)
+    given = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1, light=dusk)
+    drawn = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
+    assert given == replace(drawn, light=dusk)
+    assert drawn.light != dusk
+    assert drawn != traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=2)

@@ -1,0 +1,113 @@
+"""The public API: docs/api.md runs as it stands, and `import vdet` does nothing else."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vdet
+from pages import blocks
+from red_cars import drive
+from running import frames_of
+from vdet.media.images import write_image
+from vdet.synthetic.render import render
+from vdet.synthetic.scene import Scene
+
+
+@pytest.fixture(scope="module")
+def page(
+    tmp_path_factory: pytest.TempPathFactory, scene: Scene, clip_path: Path
+) -> tuple[Path, dict[str, Any]]:
+    """Run the page's code from top to bottom in a folder with a clip and a picture."""
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "in.mp4").write_bytes(clip_path.read_bytes())
+    write_image(folder / "road.png", render(scene, 10))
+    names: dict[str, Any] = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for block in blocks("api.md"):
+            exec(compile(block, "docs/api.md", "exec"), names)
+    return folder, names
+
+
+def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -> None:
+    folder, names = page
+    assert sorted(path.name for path in folder.iterdir()) == [
+        *("found.png", "in.mp4", "out.csv", "out.mp4", "road.png")
+    ]
+    assert frames_of(folder / "out.mp4") == frames_of(folder / "in.mp4")
+    assert isinstance(names["detections"], vdet.Detections)
+    (track,) = names["tracks"]
+    assert (track.id, track.predicted) == (1, False)
+    assert abs(track.box.x - 657) <= 10
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    for name in vdet.__all__:
+        assert getattr(vdet, name).__doc__, f"vdet.{name} has no docstring"
+
+
+def test_a_name_that_is_not_there_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'Dedector'"):
+        _ = vdet.Dedector
+
+
+def test_importing_vdet_has_no_side_effect() -> None:
+    code = (
+        "import os, sys, logging\n"
+        "before = dict(os.environ), logging.root.handlers[:]\n"
+        "import vdet\n"
+        "assert (dict(os.environ), logging.root.handlers) == before\n"
+        "assert not {'cv2', 'av', 'numpy'} & set(sys.modules), 'it loads what nobody asked for'\n"
+        "vdet.Detector\n"
+        "new = set(os.environ) - set(before[0])\n"
+        "assert not [name for name in new if not name.startswith('LD_')], new  # OpenCV's own\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.zeros((90, 160), np.uint8),
+        np.zeros((90, 160, 4), np.uint8),
+        np.zeros((90, 160, 3), np.float32),
+    ],
+)
+def test_what_is_no_bgr_image_is_refused(image: Any) -> None:
+    with pytest.raises(ValueError, match="give BGR uint8 of shape"):
+        vdet.Detector().detect(image)
+
+
+def test_a_picture_too_small_is_an_image_error() -> None:
+    with pytest.raises(vdet.VdetError, match="no search window fits"):
+        vdet.Detector().detect(np.zeros((8, 8, 3), np.uint8))
+
+
+def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> None:
+    one, three = (
+        [(r.frame.index, r.tracks) for r in vdet.follow(clip_path, frames=9, threads=threads)]
+        for threads in (1, 3)
+    )
+    assert one == three
+    assert len(one) == 9
+
+
+def test_follow_can_be_left_early(clip_path: Path) -> None:
+    results = vdet.follow(clip_path)
+    assert next(results).frame.index == 0
+    results.close()
+
+
+def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
+    settings = vdet.load_settings(None, ["tracker.method=rules"])
+    tracker = vdet.Tracker(320, 240, settings)
+    found = vdet.Detections([[96, 120, 160, 168]], [0.9])
+    with pytest.raises(ValueError, match="image"):
+        tracker.update(found, 0.0)
+    (frame,) = drive(1)
+    assert tracker.update(found, 0.0, frame.image) == []

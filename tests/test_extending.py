@@ -1,0 +1,184 @@
+"""The package of docs/extending.md: its detector, tracker and sink run through every command."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from pages import blocks
+from red_cars import HEIGHT, WIDTH, car_at, drive
+from running import frames_of, write_drive
+from vdet.config.schema import Settings
+from vdet.media.images import write_image
+from vdet.testing import check_detector, check_sink, check_tracker
+
+FRAMES = 30
+CHOSEN = ("--set", "detector.kind=red", "--set", "tracker.method=nearest")
+
+
+@pytest.fixture(scope="session")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page's package, as an installer lays it out: the module and its metadata."""
+    folder = tmp_path_factory.mktemp("site")
+    *code, tests = blocks("extending.md")
+    (folder / "my_vdet.py").write_text("\n\n".join(code), encoding="utf-8")
+    (folder / "test_my_vdet.py").write_text(tests, encoding="utf-8")
+    (project,) = (tomllib.loads(text)["project"] for text in blocks("extending.md", "toml"))
+    info = folder / "my_vdet-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: 1.0\n"
+    )
+    lines = [
+        line
+        for group, points in project["entry-points"].items()
+        for line in (f"[{group}]", *(f"{name} = {place}" for name, place in points.items()))
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A red car that drives along."""
+    return write_drive(tmp_path_factory.mktemp("red") / "red.mp4", FRAMES)
+
+
+def vdet(package: Path, *arguments: str | Path) -> "subprocess.CompletedProcess[str]":
+    """Run vdet in a process of its own that finds the package."""
+    path = os.pathsep.join([str(package), *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-m", "vdet", *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, env=os.environ | {"PYTHONPATH": path}
+    )
+
+
+def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path: Path) -> None:
+    out, tracks, counts = (tmp_path / name for name in ("out.mp4", "out.jsonl", "counts.txt"))
+    done = vdet(
+        package,
+        *("detect-video", clip, out, *CHOSEN),
+        *("--tracks", tracks, "--sink", f"counts={counts}"),
+        *("--stages", tmp_path / "stages", "--at", "0.5"),
+    )
+    assert done.returncode == 0, done.stderr
+    assert frames_of(out) == FRAMES
+    assert counts.read_text() == "".join(f"{number} 1\n" for number in range(FRAMES))
+    records = [json.loads(line) for line in tracks.read_text().splitlines()]
+    for number, record in enumerate(records):
+        (track,) = record["tracks"]
+        assert (track["id"], track["score"], track["predicted"]) == (1, 0.9, False)
+        assert abs(track["x"] - car_at(number).x) <= 2
+    names = sorted(path.name for path in (tmp_path / "stages").iterdir())
+    assert names == ["1-red.png", "2-boxes.png"]
+
+
+def test_the_detector_and_the_sink_run_through_detect_image(package: Path, tmp_path: Path) -> None:
+    picture, boxes, counts = (tmp_path / name for name in ("red.png", "boxes.json", "counts.txt"))
+    (frame,) = drive(1)
+    write_image(picture, frame.image)
+    done = vdet(
+        package,
+        *("detect-image", picture, "--set", "detector.kind=red"),
+        *("--json", boxes, "--sink", f"counts={counts}"),
+    )
+    assert done.returncode == 0, done.stderr
+    (item,) = json.loads(boxes.read_text())
+    (box,) = item["boxes"]
+    car = car_at(0)
+    assert (box["x"], box["y"], box["width"], box["height"]) == (
+        car.x,
+        car.y,
+        car.width,
+        car.height,
+    )
+    assert box["score"] == pytest.approx(0.9)
+    assert counts.read_text() == "0 1\n"
+
+
+def test_all_three_run_through_eval_video(package: Path, clip: Path, tmp_path: Path) -> None:
+    truth, counts = tmp_path / "gt.txt", tmp_path / "counts.txt"
+    cars = [car_at(number) for number in range(FRAMES)]
+    truth.write_text(
+        "".join(
+            f"{number},7,{car.x + 1},{car.y + 1},{car.width},{car.height},1,3,1\n"
+            for number, car in enumerate(cars, start=1)
+        )
+    )
+    done = vdet(
+        package,
+        *("eval", "video", clip, "--truth", truth, *CHOSEN),
+        *("--sink", f"counts={counts}", "--json", "-"),
+    )
+    assert done.returncode == 0, done.stderr
+    total = json.loads(done.stdout)["total"]
+    assert (total["f1"], total["ap50"], total["id_switches"]) == (1, pytest.approx(1), 0)
+    assert len(counts.read_text().splitlines()) == FRAMES
+
+
+def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    for name in ("a", "b"):
+        os.link(clip, tmp_path / "in" / f"{name}.mp4")
+    done = vdet(
+        package,
+        *("detect-video", tmp_path / "in", "-d", tmp_path / "out", *CHOSEN),
+        *("--sink", "counts=.txt"),
+    )
+    assert done.returncode == 0, done.stderr
+    for name in ("a", "b"):
+        assert len((tmp_path / "out" / f"{name}.txt").read_text().splitlines()) == FRAMES
+        assert frames_of(tmp_path / "out" / f"{name}.mp4") == FRAMES
+    record = json.loads((tmp_path / "out" / "manifest.jsonl").read_text().splitlines()[0])
+    assert set(record["outputs"]) == {"video", "counts"}
+    assert (record["model"], record["error"]) == (None, None)
+
+
+def test_mine_takes_the_detector(package: Path, clip: Path, tmp_path: Path) -> None:
+    truth = tmp_path / "gt.txt"
+    truth.write_text(f"1,1,1,1,20,20,1,3,1\n{FRAMES},1,1,1,20,20,1,3,1\n")
+    wide = ("--set", "mining.probability=0.5", "--set", "detector.kind=red", "--every", "10")
+    done = vdet(
+        package, "mine", clip, "--truth", truth, "-o", tmp_path / "mined.zip", "--from", "1", *wide
+    )
+    assert done.returncode == 0, done.stderr
+    assert "false alarms" in done.stdout
+    assert " 0 false alarms" not in done.stdout, "the red car is one where the truth has none"
+
+
+def test_its_settings_are_printed_and_checked(package: Path) -> None:
+    printed = vdet(package, "config", "--set", "detector.kind=red", "--set", "detector.level=7")
+    assert "kind: red" in printed.stdout
+    assert "level: 7" in printed.stdout
+    wrong = vdet(package, "config", "--set", "detector.kind=red", "--set", "detector.level=999")
+    assert (wrong.returncode, "detector.level" in wrong.stderr) == (1, True)
+    other = vdet(package, "config", "--set", "detector.level=7")
+    assert "detector.level: belongs to detector.kind: red" in other.stderr
+    unknown = vdet(package, "config", "--set", "tracker.method=none")
+    assert "known are motion, rules, nearest" in unknown.stderr
+
+
+@pytest.fixture(scope="session")
+def module(package: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location("my_vdet", package / "my_vdet.py")
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+def test_all_three_pass_the_checks(module: ModuleType, tmp_path: Path) -> None:
+    images = [frame.image for frame in drive(5)]
+    assert images[0].shape == (HEIGHT, WIDTH, 3)
+    check_detector(module.RED.load(module.RedSettings(), None), images)
+    check_tracker(
+        lambda width, height: module.NEAREST.make(module.NearestSettings(), width, height)
+    )
+    check_sink(module.COUNTS, tmp_path / "counts.txt", Settings())

@@ -1,0 +1,185 @@
+"""The checks of `vdet.testing`: ours pass them, and what is wrong is found."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
+from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, Settings
+from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.detect.svm.detector import SvmModel
+from vdet.media.images import Image
+from vdet.pipeline.sinks.protocol import SinkContext, SinkKind, sink_kind
+from vdet.testing import check_detector, check_sink, check_tracker
+from vdet.track.factory import make_tracker
+from vdet.track.track import Track
+
+IMAGES = [frame.image for frame in drive(6)]
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["outlines", "votes"])
+def test_the_linear_model_passes(settings: Settings) -> None:
+    check_detector(SvmModel(red_finder(), settings.svm), IMAGES)
+
+
+@pytest.mark.parametrize(
+    "settings", [MotionTrackerSettings(), RulesTrackerSettings()], ids=["motion", "rules"]
+)
+def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettings) -> None:
+    check_tracker(lambda *size: make_tracker(Settings(tracker=settings), *size))
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("video", "out.mp4"),
+        ("video", "out.mkv"),
+        ("tracks", "out.txt"),
+        ("tracks", "out.csv"),
+        ("tracks", "out.jsonl"),
+        ("stages", "stages"),
+        ("picture", "out.png"),
+        ("json", "out.json"),
+    ],
+)
+def test_every_sink_passes(name: str, file: str, tmp_path: Path) -> None:
+    check_sink(sink_kind(name), tmp_path / file)
+
+
+class Wrong:
+    """A detector that finds one box; each subclass breaks one rule."""
+
+    def for_video(self, width: int, height: int, images: Sequence[Image]) -> "Wrong":  # noqa: ARG002
+        return self
+
+    def search(self, image: Image, index: int | None) -> Any:  # noqa: ARG002
+        return None
+
+    def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
+        return Detections([[1, 1, 9, 9]], [0.5])
+
+    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
+        return {}
+
+
+class Paints(Wrong):
+    def search(self, image: Image, index: int | None) -> None:  # noqa: ARG002
+        image[:] = 0
+
+
+class Outside(Wrong):
+    def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
+        return Detections([[-5, 1, 9, 9]], [0.5])
+
+
+class Counts(Wrong):
+    def __init__(self) -> None:
+        self.calls = count(1)
+
+    def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
+        return Detections([[1, 1, 9 + next(self.calls), 9]], [0.5])
+
+
+class FloatPictures(Wrong):
+    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Any]:  # noqa: ARG002
+        return {"gray": image.astype(np.float32)}
+
+
+@pytest.mark.parametrize(
+    ("detector", "message"),
+    [
+        (Paints(), "changed a frame"),
+        (Outside(), "lies outside the frame"),
+        (Counts(), "boxes differ"),
+        (FloatPictures(), "not uint8"),
+    ],
+)
+def test_a_detector_that_breaks_a_rule_is_found(detector: Wrong, message: str) -> None:
+    check_detector(Wrong(), IMAGES)
+    with pytest.raises(AssertionError, match=message):
+        check_detector(detector, [image.copy() for image in IMAGES])
+
+
+class Shares:
+    """A tracker whose ids go on from one video to the next."""
+
+    ids = count(1)
+
+    def __init__(self) -> None:
+        self.own = [next(self.ids), next(self.ids)]
+
+    def update(
+        self,
+        detections: Detections,
+        time: float,  # noqa: ARG002
+        image: Image | None = None,  # noqa: ARG002
+    ) -> list[Track]:
+        pairs = zip(self.own, detections.rounded, strict=False)
+        return [Track(number, box, 0.5, predicted=False) for number, box in pairs]
+
+
+class Forgets(Shares):
+    """A tracker that gives new ids in every frame."""
+
+    def update(
+        self, detections: Detections, time: float, image: Image | None = None
+    ) -> list[Track]:
+        first = 1 + 2 * round(time * 25)
+        tracks = super().update(detections, time, image)
+        return [replace(track, id=first + number) for number, track in enumerate(tracks)]
+
+
+@pytest.mark.parametrize(
+    ("tracker", "message"), [(Shares, "share something"), (Forgets, "changed its id")]
+)
+def test_a_tracker_that_breaks_a_rule_is_found(tracker: type[Shares], message: str) -> None:
+    with pytest.raises(AssertionError, match=message):
+        check_tracker(lambda *_: tracker())
+
+
+class Early:
+    """A sink that writes where everybody sees it at once."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:  # noqa: ARG002
+        self.path = path
+
+    def __enter__(self) -> "Early":
+        return self
+
+    def __exit__(self, *raised: object) -> None: ...
+
+    def write(self, result: Any) -> None:  # noqa: ARG002
+        self.path.touch()
+
+
+class Draws(Early):
+    def write(self, result: Any) -> None:
+        result.frame.image[:] = 0
+
+
+class Nothing(Early):
+    def write(self, result: Any) -> None: ...
+
+
+@pytest.mark.parametrize(
+    ("sink", "message"),
+    [
+        (Early, "before the run has ended"),
+        (Draws, "changed the frame"),
+        (Nothing, "left no output"),
+    ],
+)
+def test_a_sink_that_breaks_a_rule_is_found(
+    sink: type[Early], message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(AssertionError, match=message):
+        check_sink(SinkKind(sink), tmp_path / "out.txt")
+
+
+def test_no_detections_are_none() -> None:
+    assert len(NO_DETECTIONS) == 0

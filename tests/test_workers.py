@@ -1,0 +1,127 @@
+"""Calls in parallel: numbered results, one process for each item in work, and killed processes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from running import until
+from vdet.workers import (
+    DaskCluster,
+    LocalProcesses,
+    ThisProcess,
+    WorkerKilledError,
+    Workers,
+    make_workers,
+)
+
+MAPS = pytest.mark.parametrize("workers", [ThisProcess(), LocalProcesses(1), LocalProcesses(2)])
+
+
+def negative(item: int) -> int:
+    return -item
+
+
+def process_of(_: int) -> int:
+    return os.getpid()
+
+
+def kill_process_at_2(file: Path, number: int) -> int:
+    """Kill this process at item 2, when `file` is there."""
+    if number == 2:
+        until(file.exists)
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def end_after_item_1_began(folder: Path, number: int) -> None:
+    """End item 0 when item 1 is in work; the other items do not end."""
+    (folder / str(number)).write_text(str(os.getpid()))
+    while number or not (folder / "1").exists():
+        time.sleep(0.02)
+
+
+@MAPS
+def test_each_item_is_called_once_and_its_result_numbered(workers: Workers) -> None:
+    assert sorted(workers.map(negative, [5, 6, 7, 5])) == [(0, -5), (1, -6), (2, -7), (3, -5)]
+    assert list(workers.map(negative, [])) == []
+
+
+@MAPS
+def test_an_error_of_the_function_is_raised(workers: Workers) -> None:
+    with pytest.raises(ZeroDivisionError):
+        list(workers.map(partial(divmod, 1), [1, 0]))
+
+
+def test_in_this_process_results_come_in_order() -> None:
+    assert list(ThisProcess().map(process_of, range(2))) == [(0, os.getpid()), (1, os.getpid())]
+
+
+def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
+    results = list(LocalProcesses(1).map(process_of, range(4)))
+    assert [number for number, _ in results] == [0, 1, 2, 3]
+    assert os.getpid() not in {process for _, process in results}
+
+
+def test_the_items_that_were_in_work_when_a_process_was_killed_are_lost(tmp_path: Path) -> None:
+    file = tmp_path / "item 1 has arrived"
+    results = LocalProcesses(1).map(partial(kill_process_at_2, file), range(5))
+    assert [next(results), next(results)] == [(0, 0), (1, 1)]
+    file.touch()
+    with pytest.raises(WorkerKilledError) as caught:
+        next(results)
+    assert caught.value.lost == {2}
+
+
+def test_closing_the_generator_ends_the_processes_without_a_warning(tmp_path: Path) -> None:
+    with closing(
+        LocalProcesses(2).map(partial(end_after_item_1_began, tmp_path), range(10))
+    ) as results:
+        assert next(results) == (0, None)
+        process = int((tmp_path / "1").read_text())
+        os.kill(process, 0)  # it is there
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+    assert {path.name for path in tmp_path.iterdir()} <= {"0", "1", "2"}
+
+
+def test_processes_import_no_module_from_the_current_folder(tmp_path: Path) -> None:
+    (tmp_path / "queue.py").write_text("raise SystemExit('a module of the current folder')")
+    code = "from vdet.workers import *; print(*LocalProcesses(1).map(abs, [-3]))"
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("(0, 3)\n", "")
+
+
+@pytest.mark.parametrize(
+    ("jobs", "scheduler", "expected"),
+    [
+        (1, None, ThisProcess()),
+        (3, None, LocalProcesses(3)),
+        (None, "tcp://x:1", DaskCluster("tcp://x:1")),
+    ],
+)
+def test_workers_are_chosen_by_the_options(
+    jobs: int | None, scheduler: str | None, expected: Workers
+) -> None:
+    assert make_workers(jobs, scheduler) == expected
+
+
+def test_without_options_there_is_one_process_for_each_core(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("joblib.cpu_count", lambda: 7)
+    assert make_workers() == LocalProcesses(7)
+    monkeypatch.setattr("joblib.cpu_count", lambda: 1)
+    assert make_workers() == ThisProcess()
