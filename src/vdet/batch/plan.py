@@ -119,7 +119,7 @@ def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
 
 
 def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
-    """Refuse an output that is another job's too, or the manifest, or an input."""
+    """Refuse an output that is another output too, or the manifest, or an input."""
     inputs = {job.source.resolve() for job in jobs}
     owners: dict[Path, Path] = {}
     for job in jobs:
@@ -130,8 +130,11 @@ def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
                 raise BatchError(
                     f"{job.source}: one of its outputs would be {path}, which is the manifest"
                 )
-            other = owners.setdefault(path, job.source)
-            if other != job.source:
+            if path not in owners:
+                owners[path] = job.source
+            elif (other := owners[path]) == job.source:
+                raise BatchError(f"{path}: two outputs of {job.source} would have this name")
+            else:
                 raise BatchError(
                     f"{other} and {job.source}: both would become {path}; rename one, or take "
                     "them from a folder above both"

@@ -223,7 +223,7 @@ def _detector(
     try:
         return model.for_video(*size, images)
     except FrameSizeError as error:
-        log.warning("%s: %s; it gets no boxes", source, error)
+        log.warning("%s: gets no boxes: %s", source, error)
         return BlindDetector()
 
 

@@ -1,5 +1,6 @@
 """Vehicles, and the lane, in still pictures: read, detected, handed to sinks."""
 
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -73,26 +74,24 @@ def plan_pictures(
         An output is there already (and not `overwrite`), equals a source, or is wanted twice.
     """
     is_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
-    if out is not None and not is_file:
-        make_folder(out)
     jobs = []
     for source in sources:
         picture = out if is_file or out is None else out / source.name
         folder = stages / source.stem if stages and len(sources) > 1 else stages
         named = {"picture": picture, "stages": folder}
-        outputs = (Output(sink, path) for sink, path in named.items() if path is not None)
-        jobs.append(PictureJob(source, tuple(outputs)))
-    _check_outputs([output for job in jobs for output in job.outputs], sources, overwrite=overwrite)
-    return jobs
-
-
-def _check_outputs(outputs: Sequence[Output], sources: Sequence[Path], *, overwrite: bool) -> None:
-    for output in outputs:
-        if outputs.count(output) > 1:
+        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
+        jobs.append(PictureJob(source, own))
+    outputs = [output for job in jobs for output in job.outputs]
+    for output, count in Counter(outputs).items():
+        if count > 1:
             raise OutputError(
                 f"{output.path}: wanted by two inputs of one name; run them separately"
             )
+    if out is not None and not is_file:
+        make_folder(out)
+    for output in outputs:
         check_sink(output, overwrite=overwrite, inputs=sources)
+    return jobs
 
 
 def run_pictures(

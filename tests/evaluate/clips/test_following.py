@@ -1,23 +1,27 @@
+"""Labelled videos under several settings: what is shared, and which frames are read."""
+
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from quick import QUICK
 from vdet.config.loading import load_settings
-from vdet.config.schema import Settings
+from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
 from vdet.evaluate.clips.clip import detect, open_clip
 from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
 from vdet.evaluate.clips.following import follow_under_all
-from vdet.media import VideoReader
+from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
-from vdet.pipeline.loop import follow_frames, peek
+from vdet.pipeline.loop import follow_frames, no_progress, peek
+from vdet.pipeline.result import FrameResult
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
-from vdet.track.track import Track
 
 FRAMES = 10
 
@@ -33,17 +37,6 @@ def truth_path(scene: Scene, tmp_path: Path) -> Path:
     return path
 
 
-def tracks_alone(clip_path: Path, model_path: Path, variant: Settings) -> list[tuple[Track, ...]]:
-    """Return the tracks of each frame under one of the settings."""
-    with VideoReader(clip_path, frames=FRAMES) as reader:
-        info = reader.info
-        images, frames = peek(reader)
-        detector = load_detector(variant.detector, model_path)
-        video_detector = detector.for_video(info.width, info.height, images)
-        results = list(follow_frames(frames, video_detector, variant, info))
-    return [result.tracks for result in results]
-
-
 def test_settings_side_by_side_give_what_each_gives_alone(
     clip_path: Path, model_path: Path
 ) -> None:
@@ -55,37 +48,61 @@ def test_settings_side_by_side_give_what_each_gives_alone(
         settings("detector.search.perspective.sizes=[0.25]", "detector.search.alternate=2"),
         settings("detector.search.perspective={sizes: [0.25], horizon: 0.5}"),
         settings("detector.heat.regions=votes", "detector.heat.votes.least=0.02"),
-        load_settings(None, [text for text in QUICK if not text.startswith("tracker")]),
+        settings().model_copy(update={"tracker": MotionTrackerSettings()}),
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
-        together = list(follow_under_all(reader, variants, model_path, reader.info))
-    assert [results[0].frame.index for results in together] == list(range(FRAMES))
-    alone = [tracks_alone(clip_path, model_path, each) for each in variants]
-    assert [[result.tracks for result in results] for results in together] == [
-        list(tracks) for tracks in zip(*alone, strict=True)
-    ]
-    assert len({str(each) for each in alone}) > 1, "the settings should differ in what they find"
+        frames, info = list(reader), reader.info
+    together = list(follow_under_all(frames, variants, model_path, info))
+    for results, frame in zip(together, frames, strict=True):
+        assert all(result.frame is frame for result in results)
+        assert all(result.source == info.path for result in results)
+    alone = [follow_alone(frames, each, model_path, info) for each in variants]
+    for each, others in zip(zip(*together, strict=True), alone, strict=True):
+        assert [result.tracks for result in each] == [result.tracks for result in others]
+        for one, other in zip(each, others, strict=True):
+            np.testing.assert_array_equal(one.detections.boxes, other.detections.boxes)
+            np.testing.assert_array_equal(one.detections.scores, other.detections.scores)
+    found = {str([result.tracks for result in each]) for each in alone}
+    assert len(found) > 1, "the settings should differ in what they find"
 
 
-def test_settings_with_the_same_detector_share_the_search(
-    clip_path: Path, model_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def follow_alone(
+    frames: Sequence[Frame], settings: Settings, model_path: Path, info: VideoInfo
+) -> list[FrameResult]:
+    """Follow the vehicles under one of the settings, as a run of the pipeline does."""
+    images, frames_again = peek(frames)
+    model = load_detector(settings.detector, model_path)
+    detector = model.for_video(info.width, info.height, images)
+    return list(follow_frames(frames_again, detector, settings, info))
+
+
+@pytest.fixture
+def searched(monkeypatch: pytest.MonkeyPatch) -> list[int | None]:
+    """The numbers of the frames that are searched, one for each search."""
     searched: list[int | None] = []
+    search = SvmDetector.search
 
-    def search(self: SvmDetector, image: Image, index: int | None) -> Candidates:
+    def counted(self: SvmDetector, image: Image, index: int | None) -> Candidates:
         searched.append(index)
-        return whole(self, image, index)
+        return search(self, image, index)
 
-    whole = SvmDetector.search
-    monkeypatch.setattr(SvmDetector, "search", search)
+    monkeypatch.setattr(SvmDetector, "search", counted)
+    return searched
+
+
+def test_settings_that_search_alike_share_the_search(
+    clip_path: Path, model_path: Path, searched: list[int | None]
+) -> None:
     variants = [
         settings(),
+        settings("detector.heat.threshold=1"),
         settings("tracker.history=2"),
         settings("detector.search.probability=0.9"),
     ]
     with VideoReader(clip_path, frames=3) as reader:
-        assert len(list(follow_under_all(reader, variants, model_path, reader.info))) == 3
-    assert searched == [0, 0, 1, 1, 2, 2]
+        results = list(follow_under_all(reader, variants, model_path, reader.info))
+    assert [len(each) for each in results] == [4, 4, 4]
+    assert searched == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(
@@ -110,17 +127,17 @@ def test_truth_beyond_the_video_is_refused_with_its_line(
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
-        detect(open_clip(clip_path, truth), [settings()], model_path, lambda _: lambda _: None)
+        detect(open_clip(clip_path, truth), [settings()], model_path, no_progress)
 
 
 def test_clips_are_pooled_under_each_setting(
     clip_path: Path, truth_path: Path, model_path: Path
 ) -> None:
     clips = [open_clip(clip_path, truth_path, until=3), open_clip(clip_path, truth_path, until=2)]
-    texts = ["detector.heat.threshold=1", "detector.heat.threshold=2"]
-    variants = [Variant((text,), settings(text)) for text in texts]
+    swept = [f"detector.heat.threshold={threshold}" for threshold in (1, 2)]
+    variants = [Variant((assignment,), settings(assignment)) for assignment in swept]
     runs = evaluate_clips(clips, model_path, variants)
-    assert [run.assignments for run in runs] == [(text,) for text in texts]
+    assert [run.assignments for run in runs] == [(assignment,) for assignment in swept]
     for run in runs:
         boxes = [clip.scores.vehicle_boxes for clip in run.clips]
         assert run.total.vehicle_boxes == sum(boxes) > 0

@@ -18,8 +18,8 @@ from track.motion.traffic import (
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
 from vdet.geometry import Box
-from vdet.synthetic import default_clip
-from vdet.synthetic.truth import truth
+from vdet.synthetic import demo_scene
+from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker
 
 RATES = (5, 10, 25, 50)
@@ -136,7 +136,7 @@ def test_traffic_with_real_differences_of_speed_is_followed_alike(seed: int, rat
 
 @cache
 def drawn_clip() -> list[list[TrueVehicle]]:
-    scene = default_clip(1, width=1280, height=720)
+    scene = demo_scene(1, width=1280, height=720)
     return [
         [
             TrueVehicle(
@@ -144,7 +144,7 @@ def drawn_clip() -> list[list[TrueVehicle]]:
                 np.array([each.box.x, each.box.y, each.box.width, each.box.height], np.float64),
                 each.hidden,
             )
-            for each in truth(scene, index)
+            for each in true_boxes(scene, index)
         ]
         for index in range(scene.frames)
     ]

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from vdet.evaluate.rows import NO_ID, Row, in_memory
 
 from track.motion.scenes import HEIGHT, WIDTH
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
+from vdet.evaluate.labelled_video import NO_ID, LabelledVideo, Row
 from vdet.evaluate.scores import Scores, score
 from vdet.geometry import Float64Array, coverage
 from vdet.track.motion.tracker import MotionTracker
@@ -144,10 +144,14 @@ def track_scores(
     for number, vehicles in enumerate(clip, start=1):
         for vehicle in vehicles:
             id_ = vehicle.id if vehicle.counts else NO_ID
-            true.append(Row(0, number, id_, *vehicle.box.tolist(), ignored=not vehicle.counts))
+            x, y, width, height = vehicle.box.tolist()
+            counts = vehicle.counts
+            true.append(Row(0, number, id_, x, y, width, height, ignored=not counts))
         for track in tracker.update(detect(vehicles, noise, rng), number / rate):
             box = track.box
             row = Row(0, number, track.id, box.x, box.y, box.width, box.height, track.score)
             shown.append(row)
-    videos = [in_memory(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)]
+    videos = [
+        LabelledVideo.from_rows(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)
+    ]
     return score(*videos)

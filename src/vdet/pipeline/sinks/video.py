@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from vdet.draw.boxes import color_of, draw_box
+from vdet.errors import OutputError
 from vdet.lanes.drawing import draw_lane
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
@@ -21,7 +22,8 @@ class VideoSink:
     """Draws into the frames, and encodes them in a thread."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        assert context.video is not None  # pictures have a sink of their own
+        if context.video is None:
+            raise OutputError(f"{path}: the sink video is for videos; use the sink picture")
         self._path = path
         self._context = context
         self._video = context.video

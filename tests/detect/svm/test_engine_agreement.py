@@ -1,4 +1,4 @@
-"""Dense and patch engine on the same windows: the promise that lets the fast one be the default."""
+"""The dense and the patch engine give nearly the same results for the same windows."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -8,9 +8,9 @@ import av
 import numpy as np
 import pytest
 
-from detect.svm.dense.reference import (
+from detect.svm.engine_comparison import (
     SEED_FEATURES,
-    Scores,
+    EngineResults,
     cars,
     compare,
     fitted,
@@ -27,18 +27,20 @@ from vdet.config.schema import (
     SearchSettings,
     SvmSettings,
 )
-from vdet.detect.svm.dense import dense_search
-from vdet.detect.svm.dense.aligned import AlignedSearch, PhasedSearch
-from vdet.detect.svm.dense.hog import describe_blocks
-from vdet.detect.svm.dense.located import LocatedSearch
-from vdet.detect.svm.dense.strips import Strip
+from vdet.detect.svm.dense_search import (
+    AlignedSearch,
+    LocatedSearch,
+    PhasedSearch,
+    dense_search,
+)
 from vdet.detect.svm.features import FeatureExtractor, Layout, to_patch
 from vdet.detect.svm.horizon import find_horizon
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import FrameSearch, lay_grids
-from vdet.detect.svm.windows import WindowGrid, Windows, every_nth, join_windows
+from vdet.detect.svm.strips import Strip, describe_blocks
+from vdet.detect.svm.windows import WindowGrid, Windows, join_windows
 from vdet.geometry import iou_matrix
 from vdet.media.images import Image
 
@@ -82,10 +84,10 @@ FEW = 0.92
 """Decisions of so small a grid that one or two near 0.5 are a few percent."""
 
 
-def assert_agree(scores: Scores, correlation: float = 0.99, same: float = 0.99) -> None:
-    assert (scores.patch > 0).any(), "nothing is found: decisions cannot differ"
-    assert scores.correlation >= correlation
-    assert scores.same >= same
+def assert_agree(results: EngineResults, correlation: float = 0.99, same: float = 0.99) -> None:
+    assert (results.patch > 0).any(), "nothing is found: decisions cannot differ"
+    assert results.correlation >= correlation
+    assert results.same >= same
 
 
 @pytest.mark.parametrize(("name", "members"), [("seed", 3), ("default", 1), ("default", 3)])
@@ -117,7 +119,7 @@ def _a_car_cut_off(side: str) -> Image:
 
 
 def _right_of_the_middle(grids: list[WindowGrid]) -> list[WindowGrid]:
-    return [every_nth(grid, 1, grid.columns * 2 // 5, 0) for grid in grids]  # the cars are there
+    return [grid.every_nth(1, grid.columns * 2 // 5, 0) for grid in grids]  # the cars are there
 
 
 @pytest.mark.parametrize(("width", "height"), [(640, 360), (960, 540), (1920, 1080), (1277, 719)])
@@ -165,9 +167,10 @@ def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image])
     settings = SHIPPED[name]
     model = load_model(shipped_model(settings))
     grids = lay_grids(settings, model.features, 1280, 720, horizon=find_horizon(real_frames))
-    scores = [compare(model, grids, image) for image in real_frames]
-    dense, patch = (np.concatenate([getattr(s, e) for s in scores]) for e in ("dense", "patch"))
-    assert_agree(Scores(dense, patch))
+    results = [compare(model, grids, image) for image in real_frames]
+    dense = np.concatenate([result.dense for result in results])
+    patch = np.concatenate([result.patch for result in results])
+    assert_agree(EngineResults(dense, patch))
 
 
 def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -> Windows:

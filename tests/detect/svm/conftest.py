@@ -1,4 +1,4 @@
-"""The searches run as in the pipeline: a thread each, the libraries kept from starting more."""
+"""The tests search as the pipeline does: one thread, and the libraries start no others."""
 
 from collections.abc import Iterator
 
