@@ -420,7 +420,7 @@ def test_groups_of_one_patch_each_leave_nothing_to_test_the_tail_on(
 
 def test_without_boxes_a_model_finds_no_sides(files: list[PatchFile]) -> None:
     model, report = train(files, SETTINGS, jobs=1)
-    assert model.boxes is None
+    assert model.box_regression is None
     assert report.boxed == 0
     assert {split.boxes for split in report.splits} == {None}
 
@@ -429,12 +429,12 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
     settings = but(split="tail", boxes=BoxSettings(penalty=1e-3))
     files, boxed = find_patches([mined]), find_boxed([mined])
     model, report = train(files, settings, boxed=boxed, jobs=1)
-    assert model.boxes is not None
+    assert model.box_regression is not None
     last = boxed[-1]
     assert last.sides is not None
     described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
     hogs = described[: Layout.of(SETTINGS.svm.features).hog_length]
-    found = model.boxes.sides(hogs[np.newaxis])[0]
+    found = model.box_regression.sides(hogs[np.newaxis])[0]
     np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
     np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)
     error = report.splits[0].boxes
@@ -466,13 +466,13 @@ def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     settings = but(boxes=BoxSettings(penalty=100, assumed=assumed))
     files = find_patches([small, data])
     model, _ = train(files, settings, jobs=1)
-    assert model.boxes is not None
+    assert model.box_regression is not None
     vehicles = [file for file in files if file.vehicle]
     described = extract(
         vehicles, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()
     ).vectors
     hogs = described[:, : Layout.of(SETTINGS.svm.features).hog_length]
-    left, top, right, bottom = model.boxes.sides(hogs).mean(axis=0).tolist()
+    left, top, right, bottom = model.box_regression.sides(hogs).mean(axis=0).tolist()
     if assumed:
         assert max(left, -right) < -0.25
         assert max(top, -bottom) < -0.15
