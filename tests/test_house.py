@@ -91,8 +91,7 @@ def test_a_module_imports_only_what_stands_below_its_room() -> None:
         f"{module} imports {used}"
         for module, path in NAMES.items()
         for used in imports_of(path)
-        if ROOMS.index(room_of(used)) < ROOMS.index(room_of(module))
-        and (module, used) != RE_EXPORT
+        if ROOMS.index(room_of(used)) < ROOMS.index(room_of(module)) and (module, used) != RE_EXPORT
     ]
     assert upward == []
 
