@@ -14,15 +14,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks.material import config, frames, video
+from benchmarks.material import find_video, read_frames, shipped_config
 from benchmarks.runs import peak_memory, run_times, seconds_of_video
 from benchmarks.searches import search_times, times_per_megapixel
 from vdet.pipeline.threads import single_threaded_libraries
 
 
 @dataclass(frozen=True)
-class Row:
-    """A ratio measured, what it must and should be, and what it was made of."""
+class Measurement:
+    """A measured ratio, the bound that it must keep, the aim, and the times that it is made of."""
 
     name: str
     ratio: float
@@ -46,10 +46,10 @@ def main() -> None:
     options.json.write_text(json.dumps(record, indent=2) + "\n", encoding="utf-8")
 
 
-def measure_all(folder: Path, rounds: int) -> list[Row]:
-    path = video(folder)
-    default, seed = config("default"), config("seed")
-    images = frames(path)
+def measure_all(folder: Path, rounds: int) -> list[Measurement]:
+    path = find_video(folder)
+    default, seed = shipped_config("default"), shipped_config("seed")
+    images = read_frames(path)
     print(f"measuring on {path.name} …", file=sys.stderr)
     with single_threaded_libraries():
         searched = search_times(path, images, default, seed, rounds)
@@ -60,7 +60,7 @@ def measure_all(folder: Path, rounds: int) -> list[Row]:
         *_search_rows(searched),
         *_run_rows(ran, seconds_of_video(path)),
         _size_row(by_height),
-        Row(
+        Measurement(
             "peak memory, whole video / its first 40 frames",
             memory[0] / memory[1], "≤ 1.15", "–",
             f"{memory[0]:.0f} and {memory[1]:.0f} MB",
@@ -68,47 +68,53 @@ def measure_all(folder: Path, rounds: int) -> list[Row]:
     ]  # fmt: skip
 
 
-def _search_rows(times: dict[str, float]) -> list[Row]:
+def _search_rows(times: dict[str, float]) -> list[Measurement]:
     dense = times["default dense"]
     beside = times["default dense beside decoding"]
 
-    def against(name: str, reference: str, fast: float, must: str, aim: str) -> Row:
+    def against(name: str, reference: str, fast: float, must: str, aim: str) -> Measurement:
         detail = f"{1000 * times[reference]:.1f} and {1000 * fast:.1f} ms a frame"
-        return Row(name, times[reference] / fast, must, aim, detail)
+        return Measurement(name, times[reference] / fast, must, aim, detail)
 
     return [
         against("patch (seed.yaml) / dense (default.yaml)", "seed patch", dense, "≥ 20", "60"),
         against("patch / dense, both seed.yaml", "seed patch", times["seed dense"], "≥ 2", "4"),
         against("detectMultiScale / dense", "detectMultiScale", dense, "≥ 3", "8"),
-        Row(
+        Measurement(
             "dense / decoding a frame", beside / times["decoding"], "≤ 2.5", "1",
             f"{1000 * beside:.1f} and {1000 * times['decoding']:.1f} ms",
         ),
     ]  # fmt: skip
 
 
-def _run_rows(times: dict[str, float], played: float) -> list[Row]:
+def _run_rows(times: dict[str, float], played: float) -> list[Measurement]:
     through, detect, only = times["pass through"], times["detect"], times["detect only"]
     lanes = times["detect with lanes"]
     return [
-        Row("detect-video / passing frames through", detect / through, "≤ 1.4", "1.1",
-            f"{detect:.2f} and {through:.2f} s for {played:.0f} s of video"),
-        Row("detect-video --lanes --camera / without", lanes / detect, "≤ 1.35", "–",
-            f"{lanes:.2f} and {detect:.2f} s"),
-        Row("video's length / detect-video --no-video", played / only, "≥ 3", "6",
-            f"{played:.1f} and {only:.2f} s"),
+        Measurement(
+            "detect-video / passing frames through", detect / through, "≤ 1.4", "1.1",
+            f"{detect:.2f} and {through:.2f} s for {played:.0f} s of video",
+        ),
+        Measurement(
+            "detect-video --lanes --camera / without", lanes / detect, "≤ 1.35", "–",
+            f"{lanes:.2f} and {detect:.2f} s",
+        ),
+        Measurement(
+            "video's length / detect-video --no-video", played / only, "≥ 3", "6",
+            f"{played:.1f} and {only:.2f} s",
+        ),
     ]  # fmt: skip
 
 
-def _size_row(times: dict[int, float]) -> Row:
-    """Windows scale with the frame, so a larger frame costs little more: less a megapixel."""
+def _size_row(times: dict[int, float]) -> Measurement:
+    """Windows scale with the frame, so the time a megapixel does not grow with the frame."""
     detail = ", ".join(f"{height}p {1000 * t:.1f}" for height, t in times.items())
     growth = max(after / before for before, after in itertools.pairwise(times.values()))
     name = "dense per megapixel, a size / the next smaller one, at most"
-    return Row(name, growth, "≤ 1.5", "–", f"{detail} ms")
+    return Measurement(name, growth, "≤ 1.5", "–", f"{detail} ms")
 
 
-def _table(rows: Sequence[Row]) -> list[str]:
+def _table(rows: Sequence[Measurement]) -> list[str]:
     lines = ["| | ratio | must | aim | |", "|---|---|---|---|---|"]
     return lines + [
         f"| {row.name} | {row.ratio:.2f} | {row.must} | {row.aim} | {row.detail} |" for row in rows

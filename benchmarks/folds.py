@@ -1,59 +1,69 @@
-"""The five-fold check of `make folds`: thresholds on frames that the model has not seen.
+"""`make folds`: a five-fold check of the thresholds, on frames that the model has not seen.
 
-The labelled frames are cut into five blocks; the vehicles and false alarms mined from a block are
-kept from the model that searches it. Every threshold is then chosen on four blocks and scored on
+The labelled frames are cut into five blocks. The model that searches a block was trained without
+the vehicles and false alarms mined from it. Each threshold is chosen on four blocks and scored on
 the fifth.
 """
 
 import argparse
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 import joblib
 import numpy as np
 import numpy.typing as npt
-from vdet.pipeline.following import seek_horizon
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.detect.svm.detector import Detector
+from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.scores import score
 from vdet.evaluate.truth import read_truth
-from vdet.learn.augmentation import views_of
-from vdet.learn.boxes import describe_boxes, learn_boxes
+from vdet.learn.augmentation import augment
+from vdet.learn.box_regression import extract_box_patches, fit_boxes
 from vdet.learn.dataset import PatchFile, find_boxed, find_patches
 from vdet.learn.extraction import extract
 from vdet.learn.fitting import fit
-from vdet.learn.training_set import lesson_of
+from vdet.learn.training_set import training_set
 from vdet.media import VideoReader
+from vdet.pipeline.loop import peek
 from vdet.pipeline.threads import single_threaded_libraries
-from vdet.track.factory import Follow, tracker_of
+from vdet.track.factory import make_tracker
 from vdet.workers import make_workers
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
 SETTINGS = (
-    f"search.probability={LEAST}",
+    f"detector.search.probability={LEAST}",
     "training.calibration.folds=2",
-    "training.views.mirror=false",  # half the memory and a third of the time of the shipped model
+    "training.augmentation.mirror=false",  # half the memory, a third of the time
 )
 SWEEPS = {
-    "search.probability": (0.2, 0.3, 0.4, 0.5),
-    "heat.votes.least": (0.04, 0.08, 0.12),
-    "heat.votes.sharpness": (2.0, 3.0, 4.0, 6.0),
-    "heat.votes.agreement": (0.25, 0.35, 0.45),
-    "tracker.motion.strong": (0.3, 0.5, 0.6, 0.7, 0.8),
-    "tracker.motion.leak": (0.1, 0.2, 0.3),
-    "tracker.motion.needed": (1.5, 2.5, 4.0),
+    "detector.search.probability": (0.2, 0.3, 0.4, 0.5),
+    "detector.heat.votes.least": (0.04, 0.08, 0.12),
+    "detector.heat.votes.sharpness": (2.0, 3.0, 4.0, 6.0),
+    "detector.heat.votes.agreement": (0.25, 0.35, 0.45),
+    "detector.score.middle": (0.15, 0.25, 0.3, 0.35, 0.4),
+    "tracker.leak": (0.1, 0.2, 0.3),
+    "tracker.needed": (0.06, 0.1, 0.16),
 }
 
 Numbers = npt.NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class SearchedVideo:
+    """The likely windows of each frame, from a model that has not seen it."""
+
+    width: int
+    height: int
+    rate: float
+    windows: list[Windows]
 
 
 def main() -> None:
@@ -67,12 +77,9 @@ def main() -> None:
     settings = load_settings(None, SETTINGS)
     models = _models(options.patches, truth.last_frame, settings)
     with single_threaded_libraries():
-        searched, size = _search(options.video, truth.last_frame, models, settings)
+        searched = _search(options.video, truth.last_frame, models, settings)
         for key, values in SWEEPS.items():
-            print(
-                "\n".join(_sweep(key, values, searched, models[0], size=size, truth=truth)),
-                flush=True,
-            )
+            print("\n".join(_sweep(key, values, searched, models[0], truth)), flush=True)
 
 
 def _block_of(frames: Numbers, last: int) -> Numbers:
@@ -91,26 +98,28 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
     workers = make_workers()
     data = extract(
         files,
-        settings.features,
+        settings.svm.features,
         max_broken=0,
         workers=workers,
-        look=partial(views_of, settings=training.views),
+        augmenter=partial(augment, settings=training.augmentation),
         seed=training.seed,
     )
-    boxes = describe_boxes(files, boxed, settings, workers=workers, progress=lambda _: None)
+    boxes = extract_box_patches(files, boxed, settings, workers=workers, progress=lambda _: None)
     assert boxes is not None
     boxed_data = boxes.boxed
     assert boxed_data is not None
-    assert boxes.filled is not None
-    filled = lesson_of(boxes.filled, np.ones(len(boxes.filled.vectors), bool))
+    assert boxes.assumed is not None
+    assumed = training_set(boxes.assumed, np.ones(len(boxes.assumed.vectors), bool))
     blocks = _block_of(_frames_of(files), last), _block_of(_frames_of(boxed), last)
 
     def without(block: int) -> LinearModel:
         kept, kept_boxed = (each != block for each in blocks)
-        lesson = lesson_of(data, kept)
-        model = fit(lesson.vectors, lesson.vehicle, settings.features, training, lesson.origins)
-        told = [lesson, lesson_of(boxed_data, kept_boxed)]
-        return replace(model, boxes=learn_boxes(told, filled, settings))
+        samples = training_set(data, kept)
+        model = fit(
+            samples.vectors, samples.vehicle, settings.svm.features, training, samples.origins
+        )
+        told = [samples, training_set(boxed_data, kept_boxed)]
+        return replace(model, boxes=fit_boxes(told, assumed, settings))
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))
@@ -118,35 +127,34 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
 
 def _search(
     video: Path, last: int, models: Sequence[LinearModel], settings: Settings
-) -> tuple[list[Windows], tuple[int, int]]:
-    """Return the likely windows of each frame, searched by the model that has not seen it."""
+) -> SearchedVideo:
+    """Search each frame with the model that was trained without its block."""
     found = []
     with VideoReader(video, frames=last) as reader:
-        size = reader.info.width, reader.info.height
-        frames, horizon = seek_horizon(reader, settings)
-        detectors = [Detector(model, settings, *size, horizon=horizon) for model in models]
+        info = reader.info
+        images, frames = peek(reader)
+        horizon = horizon_of(settings.svm, images)
+        detectors = [
+            SvmDetector(model, settings.svm, info.width, info.height, horizon=horizon)
+            for model in models
+        ]
         for frame in frames:
             block = int(_block_of(np.array([frame.index + 1]), last)[0])
-            windows = detectors[block].search(frame.image, frame.index)
-            found.append(windows.detected(LEAST))
-    return found, size
+            candidates = detectors[block].search(frame.image, frame.index)
+            found.append(candidates.windows.hits(LEAST))
+    return SearchedVideo(info.width, info.height, float(info.rate), found)
 
 
 def _sweep(
     key: str,
     values: Sequence[float],
-    searched: Sequence[Windows],
+    searched: SearchedVideo,
     model: LinearModel,
-    *,
-    size: tuple[int, int],
     truth: LabelledVideo,
 ) -> Iterator[str]:
-    """Give the lines of a table: the F1 of each value, whole and block by block."""
+    """Give the lines of a table: the F1 of each value, over all blocks and block by block."""
     variants = [load_settings(None, [f"{key}={value}"]) for value in values]
-    found = [
-        _tracks(Detector(model, each, *size), tracker_of(each, *size), searched)
-        for each in variants
-    ]
+    found = [_tracks(searched, model, settings) for settings in variants]
     by_block = np.array([_f1_by_block(each, truth) for each in found])
     yield f"\n{key}: F1, id switches, false tracks; F1 of the blocks"
     for value, each, blocks in zip(values, found, by_block, strict=True):
@@ -161,14 +169,17 @@ def _sweep(
     yield f"  chosen without each block: {picks}; F1 on the one left out {held:.3f}"
 
 
-def _tracks(detector: Detector, track: Follow, searched: Sequence[Windows]) -> LabelledVideo:
-    blank = np.zeros((1, 1, 3), np.uint8)
+def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> LabelledVideo:
+    """Detect and follow vehicles in windows that are searched already; any model will do."""
+    detector = SvmDetector(model, settings.svm, searched.width, searched.height)
+    tracker = make_tracker(settings, searched.width, searched.height)
     rows = []
-    for number, windows in enumerate(searched, start=1):
-        for each in track(blank, detector.accumulate(windows).regions):
-            box = each.box
-            rows.append(Row(0, number, each.id, box.x, box.y, box.width, box.height))
-    return LabelledVideo.from_rows(rows, frame_count=len(searched), rate=25.0)
+    for number, windows in enumerate(searched.windows, start=1):
+        detections = detector.detect(Candidates(windows, (windows,), is_still=False))
+        for track in tracker.update(detections, number / searched.rate):
+            box = track.box
+            rows.append(Row(0, number, track.id, box.x, box.y, box.width, box.height))
+    return LabelledVideo.from_rows(rows, frame_count=len(searched.windows), rate=searched.rate)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

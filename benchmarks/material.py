@@ -1,11 +1,12 @@
-"""What is measured on: the real project video where it is found, else the generated clip."""
+"""What is measured: shipped settings with their models, and frames of the project video."""
 
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.loading import find_config, load_settings
-from vdet.config.schema import Settings
+from vdet.config.schema import Settings, SvmSettings
+from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.media import VideoReader
@@ -16,24 +17,30 @@ FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its l
 
 
 @dataclass(frozen=True)
-class Config:
-    """Shipped settings with the shipped model that fits them."""
+class ShippedConfig:
+    """Shipped settings with the shipped model for them."""
 
     settings: Settings
     model: LinearModel
 
-    def with_engine(self, engine: str) -> Settings:
-        search = self.settings.search.model_copy(update={"engine": engine})
-        return self.settings.model_copy(update={"search": search})
+    @property
+    def detector(self) -> SvmModel:
+        return SvmModel(self.model, self.settings.svm)
+
+    def with_engine(self, engine: str) -> SvmSettings:
+        """Return the detector's settings with another search engine."""
+        settings = self.settings.svm
+        search = settings.search.model_copy(update={"engine": engine})
+        return settings.model_copy(update={"search": search})
 
 
-def config(name: str) -> Config:
+def shipped_config(name: str) -> ShippedConfig:
     settings = load_settings(find_config(name))
-    return Config(settings, load_model(shipped_model(settings.features)))
+    return ShippedConfig(settings, load_model(shipped_model(settings.svm)))
 
 
-def video(folder: Path) -> Path:
-    """Return the project video, or make a 720p clip in `folder`."""
+def find_video(folder: Path) -> Path:
+    """Return the project video; where it is not found, draw a 720p clip in `folder`."""
     root = Path(__file__).parents[1]
     places = [os.environ.get("VDET_DATA"), root / "data", root.parent / "shared" / "data"]
     for place in places:
@@ -44,7 +51,8 @@ def video(folder: Path) -> Path:
     return path
 
 
-def frames(path: Path) -> list[Image]:
+def read_frames(path: Path) -> list[Image]:
+    """Return the images of the frames that are searched."""
     with VideoReader(path, frames=max(FRAMES_SEARCHED) + 1) as reader:
         read = [frame.image for frame in reader if frame.index % 10 == 0]
     return [read[index // 10 % len(read)] for index in FRAMES_SEARCHED]

@@ -1,27 +1,31 @@
-"""Whole runs of detect-video: passed frames, real time, lanes, and memory, to compare with."""
+"""Whole runs of detect-video: wall time with and without outputs and lanes, and peak memory."""
 
 import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks.material import Config
-from benchmarks.rounds import Subject, measure
+from benchmarks.material import ShippedConfig
+from benchmarks.rounds import Task, measure
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
 from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.sinks.protocol import Output
 from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250
 CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
-"""Like the one of the project video; its maps cost the same whatever the numbers."""
+"""Similar to the project video's camera; the numbers do not change the time of undistortion."""
 
 
-def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[str, float]:
-    """Return seconds for the first frames: passed through, detected and written, the same with
-    lanes, detected only.
+def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> dict[str, float]:
+    """Return the seconds that the first `FRAMES` frames take.
+
+    Keys: `pass through` (read and written), `detect` (vehicles detected, drawn and written),
+    `detect with lanes`, `detect only` (nothing written).
     """
     out = folder / "out.mp4"
+    model = default.detector
 
     def pass_through() -> None:
         with (
@@ -34,26 +38,26 @@ def run_times(path: Path, default: Config, folder: Path, rounds: int) -> dict[st
                 encode(frame)
 
     def detect(lanes: LaneRequest | None = None) -> None:
-        job = VideoJob(path, out, frames=FRAMES, lanes=lanes)
-        run_video(job, default.model, default.settings)
+        job = VideoJob(path, (Output("video", out),), frames=FRAMES, lanes=lanes)
+        run_video(job, model, default.settings)
 
     def detect_with_lanes() -> None:
         detect(LaneRequest(CAMERA))
 
     def detect_only() -> None:
-        run_video(VideoJob(path, frames=FRAMES), default.model, default.settings)
+        run_video(VideoJob(path, frames=FRAMES), model, default.settings)
 
-    subjects: dict[str, Subject] = {
+    tasks: dict[str, Task] = {
         "pass through": pass_through,
         "detect": detect,
         "detect with lanes": detect_with_lanes,
         "detect only": detect_only,
     }
-    return measure(subjects, rounds)
+    return measure(tasks, rounds)
 
 
 def seconds_of_video(path: Path) -> float:
-    """Return how long the measured frames play."""
+    """Return the playing time of the measured frames."""
     with VideoReader(path, frames=FRAMES) as reader:
         count = sum(1 for _ in reader)
         return float(count / reader.info.rate)

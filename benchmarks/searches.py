@@ -1,4 +1,4 @@
-"""One thread, one frame after the other: the search against other ways to look at a frame."""
+"""The search of a frame on one thread, against OpenCV's detector and against decoding."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,8 +7,8 @@ import av
 import cv2
 import numpy as np
 
-from benchmarks.material import Config
-from benchmarks.rounds import Subject, measure
+from benchmarks.material import ShippedConfig
+from benchmarks.rounds import Task, measure
 from vdet.detect.svm.search import FrameSearch
 from vdet.media.images import Image
 
@@ -17,7 +17,7 @@ DECODED = 60
 
 
 def search_times(
-    path: Path, images: Sequence[Image], default: Config, seed: Config, rounds: int
+    path: Path, images: Sequence[Image], default: ShippedConfig, seed: ShippedConfig, rounds: int
 ) -> dict[str, float]:
     """Return seconds a frame for the dense searches and their references."""
     searches = {
@@ -31,19 +31,19 @@ def search_times(
     return per_frame | _decoding(path, default, images, rounds)
 
 
-def _search(config: Config, engine: str, images: Sequence[Image]) -> Subject:
-    """Search as in a video, where not every frame is searched for every size."""
+def _search(config: ShippedConfig, engine: str, images: Sequence[Image]) -> Task:
+    """Search the images as frames of a video, with alternating window sets."""
     height, width = images[0].shape[:2]
     search = FrameSearch(config.model, config.with_engine(engine), width, height)
 
     def run() -> None:
-        for turn, image in enumerate(images):
-            search.search(image, turn)
+        for index, image in enumerate(images):
+            search.search(image, search.sets_of(index))
 
     return run
 
 
-def _detect_multi_scale(images: Sequence[Image]) -> Subject:
+def _detect_multi_scale(images: Sequence[Image]) -> Task:
     """OpenCV's own sliding-window detector: 64×64, stride 8, scale 1.1, rows 380-660."""
     hog = cv2.HOGDescriptor((64, 64), (16, 16), (8, 8), (8, 8), 9)
     weights = np.random.default_rng(0).normal(0, 0.01, hog.getDescriptorSize() + 1)
@@ -58,9 +58,9 @@ def _detect_multi_scale(images: Sequence[Image]) -> Subject:
 
 
 def _decoding(
-    path: Path, default: Config, images: Sequence[Image], rounds: int
+    path: Path, default: ShippedConfig, images: Sequence[Image], rounds: int
 ) -> dict[str, float]:
-    """Decode with one thread to BGR, in turn with the search that it is compared with."""
+    """Time decoding to BGR with one thread, interleaved with the search."""
 
     def decode() -> None:
         with av.open(str(path)) as container:
@@ -71,22 +71,24 @@ def _decoding(
                 if number + 1 == DECODED:
                     return
 
-    subjects = {"decoding": decode, "default dense": _search(default, "dense", images)}
-    times = measure(subjects, rounds)
+    tasks = {"decoding": decode, "default dense": _search(default, "dense", images)}
+    times = measure(tasks, rounds)
     return {
         "decoding": times["decoding"] / DECODED,
         "default dense beside decoding": times["default dense"] / len(images),
     }
 
 
-def times_per_megapixel(images: Sequence[Image], default: Config, rounds: int) -> dict[int, float]:
+def times_per_megapixel(
+    images: Sequence[Image], default: ShippedConfig, rounds: int
+) -> dict[int, float]:
     """Return the default search's seconds a megapixel for frames of several heights."""
-    subjects: dict[str, Subject] = {}
+    tasks: dict[str, Task] = {}
     areas: dict[str, float] = {}
     for height in HEIGHTS:
         width = images[0].shape[1] * height // images[0].shape[0]
         scaled = [np.asarray(cv2.resize(image, (width, height)), np.uint8) for image in images[:2]]
-        subjects[str(height)] = _search(default, "dense", scaled)
+        tasks[str(height)] = _search(default, "dense", scaled)
         areas[str(height)] = 2 * width * height / 1e6
-    times = measure(subjects, rounds)
+    times = measure(tasks, rounds)
     return {int(name): seconds / areas[name] for name, seconds in times.items()}

@@ -1,4 +1,4 @@
-"""`make soak`: one run over 20,000 frames, watched for what creeps up: memory, files, time."""
+"""`make soak`: one run over 20,000 frames; memory, open files, threads and time must not grow."""
 
 import argparse
 import sys
@@ -6,17 +6,20 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
 
-from benchmarks.looping import loop_video
-from benchmarks.material import config, video
+import av
+
+from benchmarks.material import find_video, shipped_config
 from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.sinks.protocol import Output
 
 FRAMES = 20_000
 FEWEST = 1000
-WARM = 500  # frames after which nothing should grow any more
-ENDING = 50  # last frames, in which the reader has read all and gone
+WARM = 500  # frames after which nothing may grow
+ENDING = 50  # last frames, in which the reader may have closed its files and threads
 EVERY = 50  # frames between samples
 MEMORY_GROWTH = 0.10
 LEAST_SPEED = 0.85  # of the last tenth, against the first
@@ -25,7 +28,11 @@ ROWS = 11
 
 @dataclass(frozen=True)
 class Sample:
-    """The state of the process after so many frames: memory in MB now and at most so far."""
+    """The state of the process after `frames` frames.
+
+    `seconds` since the first frame; `memory` and `peak` in MB, now and at most so far; counts of
+    open files and of threads.
+    """
 
     frames: int
     seconds: float
@@ -35,8 +42,8 @@ class Sample:
     threads: int
 
 
-class Watch:
-    """Takes a sample every `EVERY` frames."""
+class ResourceMonitor:
+    """Takes a sample every `EVERY` frames; it is the `progress` of a run."""
 
     def __init__(self) -> None:
         self.samples: list[Sample] = []
@@ -44,7 +51,7 @@ class Watch:
         self._began = time.perf_counter()
 
     def __call__(self, _: int | None) -> Callable[[int], None]:
-        """Be the `progress` of a run."""
+        """Take the first sample; return what is called with the number of frames done."""
         self._began = time.perf_counter()
         self.samples.append(self._sample())
         return self._advance
@@ -71,14 +78,14 @@ def _megabytes(status: str, field: str) -> float:
     return int(status.partition(field)[2].split()[0]) / 1024
 
 
-def complaints(samples: Sequence[Sample]) -> list[str]:
-    """Return what crept up, or nothing; `samples` begin with the run and end with it."""
+def find_growth(samples: Sequence[Sample]) -> list[str]:
+    """Say what grew in a run, a line each; the first and last sample are its start and its end."""
     warm = next(sample for sample in samples if sample.frames >= WARM)
     later = [sample for sample in samples if sample.frames >= WARM]
     found = []
-    if (grown := later[-1].peak / warm.peak - 1) > MEMORY_GROWTH:
+    if (growth := later[-1].peak / warm.peak - 1) > MEMORY_GROWTH:
         found.append(
-            f"peak memory grew by {grown:.1%} after the first {WARM} frames, from {warm.peak:.0f} "
+            f"peak memory grew by {growth:.1%} after the first {WARM} frames, from {warm.peak:.0f} "
             f"to {later[-1].peak:.0f} MB"
         )
     running = [s for s in later if s.frames <= later[-1].frames - ENDING]
@@ -93,7 +100,7 @@ def complaints(samples: Sequence[Sample]) -> list[str]:
 
 
 def tenths(samples: Sequence[Sample]) -> tuple[float, float]:
-    """Return frames/s over the first and the last tenth of the run."""
+    """Return the frames/s of the first and of the last tenth of the run."""
     tenth = samples[-1].frames / 10
     first = next(sample for sample in samples if sample.frames >= tenth)
     last = next(sample for sample in samples if sample.frames >= 9 * tenth)
@@ -105,7 +112,7 @@ def _speed(start: Sample, end: Sample) -> float:
 
 
 def table(samples: Sequence[Sample]) -> list[str]:
-    """Return a few of the samples as lines, with the speed since the one before."""
+    """Return some of the samples as lines, each with the speed since the line before."""
     step = max(1, (len(samples) - 1) // (ROWS - 1))
     shown = [*samples[:-1:step], samples[-1]]
     lines = ["frames  frames/s  memory MB  peak MB  files  threads"]
@@ -117,30 +124,59 @@ def table(samples: Sequence[Sample]) -> list[str]:
     return lines
 
 
+def loop_video(source: Path, target: Path, frames: int) -> None:
+    """Repeat the packets of a video until it has at least `frames` frames; sound is left out."""
+    written, offset = 0, 0
+    with av.open(str(target), "w") as output:
+        stream: av.VideoStream | None = None
+        while written < frames:
+            with av.open(str(source)) as reader:
+                video = reader.streams.video[0]
+                stream = stream or output.add_stream_from_template(video)
+                length = 0
+                for packet in reader.demux(video):
+                    if packet.dts is None or packet.pts is None:
+                        continue
+                    length = max(length, packet.pts + _duration(packet, video))
+                    packet.pts += offset
+                    packet.dts += offset
+                    packet.stream = stream
+                    output.mux(packet)
+                    written += 1
+            offset += length
+
+
+def _duration(packet: "av.Packet[av.VideoStream]", video: av.VideoStream) -> int:
+    rate, base = video.average_rate or Fraction(25), packet.time_base or Fraction(1, 25)
+    return packet.duration or round(1 / (rate * base))
+
+
 def main() -> None:
-    """Run, print the table and the verdict; the exit code is 1 where something crept up."""
+    """Run, print the samples and what grew; the exit code is 1 where something grew."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=main.__doc__)
     parser.add_argument("--frames", type=int, default=FRAMES, help="at least 1000")
     frames = parser.parse_args().frames
     if frames < FEWEST:
         parser.error(f"--frames must be at least {FEWEST}")
-    watch = Watch()
+    monitor = ResourceMonitor()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        loop_video(video(folder), folder / "long.mp4", frames)
-        job = VideoJob(
-            folder / "long.mp4", folder / "out.mp4", tracks=folder / "out.jsonl", frames=frames
+        loop_video(find_video(folder), folder / "long.mp4", frames)
+        outputs = (
+            Output("video", folder / "out.mp4"),
+            Output("tracks", folder / "out.jsonl"),
         )
-        default = config("default")
-        summary = run_video(job, default.model, default.settings, progress=watch)
+        job = VideoJob(folder / "long.mp4", outputs, frames=frames)
+        default = shipped_config("default")
+        summary = run_video(job, default.detector, default.settings, progress=monitor)
     print(file=sys.stderr)
-    print("\n".join(table(watch.samples)))
-    first, last = tenths(watch.samples)
+    print("\n".join(table(monitor.samples)))
+    first, last = tenths(monitor.samples)
     print(f"\n{summary.frames} frames in {summary.seconds:.0f} s, {summary.tracks} tracks")
     print(f"first tenth {first:.1f} frames/s, last tenth {last:.1f}")
-    found = complaints(watch.samples)
-    print("\n".join(found) or "nothing crept up")
-    sys.exit(1 if found else 0)
+    grown = find_growth(monitor.samples)
+    print("\n".join(grown) or "nothing grew")
+    sys.exit(1 if grown else 0)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 
+from vdet.batch.task import Work
 from vdet.config.schema import (
     FeatureSettings,
     HeatSettings,
@@ -21,7 +23,7 @@ from vdet.config.schema import (
     WindowSettings,
 )
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.model import LinearModel, save_model
 from vdet.geometry import Box
 from vdet.media import Frame
 from vdet.media.images import Image
@@ -91,6 +93,12 @@ def red_finder() -> LinearModel:
 def red_model() -> SvmModel:
     """Give the detector that finds red cars the original's way."""
     return SvmModel(red_finder(), SETTINGS.svm)
+
+
+def red_work(folder: Path) -> Work:
+    """Give the same for a worker, which reads the model from a file in `folder`."""
+    save_model(red_finder(), folder / "red.npz")
+    return Work(SETTINGS, folder / "red.npz", threads=1)
 
 
 def road(*boxes: Box) -> Image:

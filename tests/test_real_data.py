@@ -21,7 +21,7 @@ from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.geometry import Box
 from vdet.learn.dataset import find_patches, read_patches
-from vdet.learn.splits import hold_out
+from vdet.learn.training_set import hold_out
 from vdet.media import VideoReader
 from vdet.media.images import Image, read_image
 

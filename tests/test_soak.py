@@ -1,10 +1,10 @@
-"""What `make soak` says of a run."""
+"""The report of `make soak`."""
 
 from dataclasses import replace
 from typing import Any
 
 import pytest
-from benchmarks.soak import Sample, complaints, table, tenths
+from benchmarks.soak import Sample, find_growth, table, tenths
 
 STEADY = [
     Sample(frames, frames / 100, 290 + frames % 7, min(300, 200 + frames), 20, 12)
@@ -13,18 +13,18 @@ STEADY = [
 
 
 def ending_with(**changes: Any) -> list[Sample]:
-    """Give a steady run but for its last 100 frames."""
+    """Return a run that is steady but for its last 100 frames."""
     return [*STEADY[:-2], *(replace(sample, **changes) for sample in STEADY[-2:])]
 
 
-def test_of_a_steady_run_there_is_nothing_to_say() -> None:
-    assert complaints(STEADY) == []
+def test_nothing_grows_in_a_steady_run() -> None:
+    assert find_growth(STEADY) == []
     assert tenths(STEADY) == pytest.approx((100, 100))
 
 
-def test_what_comes_before_the_500th_frame_does_not_count() -> None:
+def test_growth_before_the_500th_frame_does_not_count() -> None:
     cold = [replace(s, files=3, threads=1) if s.frames < 500 else s for s in STEADY]
-    assert complaints(cold) == []
+    assert find_growth(cold) == []
 
 
 @pytest.mark.parametrize(
@@ -39,12 +39,12 @@ def test_what_comes_before_the_500th_frame_does_not_count() -> None:
         ({"threads": 11}, ["the number of threads went from 11 to 12"]),
     ],
 )
-def test_what_creeps_up_is_named(changes: dict[str, Any], words: list[str]) -> None:
-    assert complaints(ending_with(**changes)) == words
+def test_what_grows_is_named(changes: dict[str, Any], words: list[str]) -> None:
+    assert find_growth(ending_with(**changes)) == words
 
 
-def test_the_reader_may_go_when_it_has_read_all() -> None:
-    assert complaints([*STEADY[:-1], replace(STEADY[-1], files=19, threads=11)]) == []
+def test_the_reader_may_close_its_files_and_threads_at_the_end() -> None:
+    assert find_growth([*STEADY[:-1], replace(STEADY[-1], files=19, threads=11)]) == []
 
 
 @pytest.mark.parametrize(("speed", "slow"), [(84.0, True), (86.0, False)])
@@ -54,10 +54,10 @@ def test_a_run_that_gets_slower_is_named(speed: float, slow: bool) -> None:
         for s in STEADY
     ]
     words = [f"the last tenth ran at {speed:.1f} frames/s, the first at 100.0"]
-    assert complaints(slowing) == (words if slow else [])
+    assert find_growth(slowing) == (words if slow else [])
 
 
-def test_the_table_has_a_line_a_tenth() -> None:
+def test_the_table_has_a_line_for_each_tenth() -> None:
     lines = table(STEADY)
     assert len(lines) == 11
     assert lines[-1].split() == ["20000", "100.0", "291", "300", "20", "12"]

@@ -1,4 +1,4 @@
-"""The door of the program: from here on a signal ends it in order, while it is loaded too."""
+"""Process entry point: signals end the program in order, also while its modules are loaded."""
 
 import os
 import signal
@@ -8,13 +8,13 @@ from typing import NoReturn
 
 from vdet.errors import INTERRUPTED
 
-_SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-_LONGEST = 5.0  # seconds that an end in order may take
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+CLEANUP_TIMEOUT = 5.0  # seconds between a signal and a forced exit
 
 
 def main() -> NoReturn:
-    """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP are taken as Ctrl-C is."""
-    for number in _heard():
+    """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
+    for number in _signals():
         signal.signal(number, _interrupt)
     try:
         from vdet.cli import main as run
@@ -24,27 +24,27 @@ def main() -> NoReturn:
         sys.stderr.write("vdet: interrupted\n")
         sys.exit(INTERRUPTED)
     except SystemExit as end:
-        _leave_what_hangs(end.code)
+        _exit_if_a_thread_hangs(end.code)
         raise
 
 
-def _heard() -> list[signal.Signals]:
-    """Return the signals of this system that nobody wants ignored, as `nohup` does."""
-    numbers = [signal.Signals[name] for name in _SIGNALS if name in signal.Signals.__members__]
+def _signals() -> list[signal.Signals]:
+    """Return those of `SIGNALS` that this system has and that are not ignored, as by `nohup`."""
+    numbers = [signal.Signals[name] for name in SIGNALS if name in signal.Signals.__members__]
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 def _interrupt(*_: object) -> NoReturn:
-    for number in _heard():
-        signal.signal(number, signal.SIG_IGN)  # cleaning up is not interrupted
-    last = threading.Timer(_LONGEST, os._exit, (INTERRUPTED,))
-    last.daemon = True
-    last.start()
+    for number in _signals():
+        signal.signal(number, signal.SIG_IGN)  # a second signal must not interrupt the clean-up
+    forced_exit = threading.Timer(CLEANUP_TIMEOUT, os._exit, (INTERRUPTED,))
+    forced_exit.daemon = True
+    forced_exit.start()
     raise KeyboardInterrupt
 
 
-def _leave_what_hangs(code: object) -> None:
-    """End at once if a thread hangs in a read or write: libraries do not unload under it."""
+def _exit_if_a_thread_hangs(code: object) -> None:
+    """Exit at once if a thread hangs in a read or write; unloading its libraries could crash it."""
     if any(thread.daemon and thread.name.startswith("vdet-") for thread in threading.enumerate()):
         sys.stdout.flush()
         sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""A real Dask scheduler and two worker processes, started here."""
+"""Work on a real Dask scheduler and two worker processes, started here."""
 
 import json
 import os
@@ -6,19 +6,28 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from conftest import Run
-from running import frames_of, names, start, unfinished, until, write_drive
+from running import Gate, frames_of, names, start, until, with_modules, write_drive
 from vdet.detect.svm.model import load_model
 from vdet.errors import ClusterError
 from vdet.synthetic import write_patches
-from vdet.workers import DaskCluster
+from vdet.workers import DaskCluster, WorkerKilledError
 
-pytest.importorskip("distributed")
+distributed = pytest.importorskip("distributed")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A scheduler at `address`; videos of its workers are held at the `gate`."""
+
+    address: str
+    gate: Gate
 
 
 def dask(kind: str, *options: str, folder: Path) -> "subprocess.Popen[bytes]":
@@ -29,42 +38,89 @@ def dask(kind: str, *options: str, folder: Path) -> "subprocess.Popen[bytes]":
             stdout=log,
             stderr=log,
             cwd=folder,
-            env=os.environ
+            env=with_modules(folder)
             | {
                 "DASK_TEMPORARY_DIRECTORY": str(folder),
-                # Dask itself does not try again: so vdet has to.
+                # Dask itself does not repeat an item whose worker was killed: so vdet has to.
                 "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
             },
         )
 
 
 @contextmanager
-def scheduler(folder: Path) -> "Iterator[tuple[str, subprocess.Popen[bytes]]]":
-    """Give the address of a scheduler, and its process."""
+def scheduler(folder: Path) -> "Iterator[tuple[Cluster, subprocess.Popen[bytes]]]":
+    """Start a scheduler; give its cluster, and its process."""
+    gate = Gate(folder)
     process = dask("scheduler", "--host", "127.0.0.1", "--port", "0", folder=folder)
     try:
         until((folder / "scheduler.json").exists)
         until(lambda: (folder / "scheduler.json").read_text().endswith("}"))
-        yield json.loads((folder / "scheduler.json").read_text())["address"], process
+        address = json.loads((folder / "scheduler.json").read_text())["address"]
+        yield Cluster(address, gate), process
     finally:
         process.terminate()
         process.wait()
 
 
 @pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """The scheduler of two workers."""
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    """A scheduler with two workers."""
     folder = tmp_path_factory.mktemp("cluster")
-    with scheduler(folder) as (address, _):
+    with scheduler(folder) as (cluster, _):
         options = ("--nworkers", "2", "--nthreads", "1")
         workers = dask("worker", *options, folder=folder)
         try:
             log = folder / "worker.log"
             until(lambda: log.read_text().count("Registered to") == 2)
-            yield address
+            yield cluster
         finally:
             workers.terminate()
             workers.wait()
+
+
+@pytest.fixture(scope="module")
+def address(cluster: Cluster) -> str:
+    return cluster.address
+
+
+def test_each_item_is_called_once_and_its_result_numbered(address: str) -> None:
+    results = DaskCluster(address).map(abs, range(-300, 0))
+    assert sorted(results) == [(number, 300 - number) for number in range(300)]
+
+
+@pytest.mark.parametrize(
+    ("expression", "error"), [("1 / 0", ZeroDivisionError), ("open('/')", IsADirectoryError)]
+)
+def test_an_error_of_the_function_is_raised(
+    address: str, expression: str, error: type[Exception]
+) -> None:
+    with pytest.raises(error):
+        list(DaskCluster(address).map(eval, [expression]))
+
+
+def test_when_a_worker_is_killed_the_other_items_have_their_results(address: str) -> None:
+    """An item that waited at that worker may be lost too."""
+    items = ["10", "__import__('os')._exit(1)", *(str(number) for number in range(12, 20))]
+    results: dict[int, int] = {}
+    with pytest.raises(WorkerKilledError) as caught:
+        results.update(pair for pair in DaskCluster(address).map(eval, items))
+    lost = caught.value.lost
+    assert 1 in lost
+    assert len(lost) <= 2
+    assert results == {number: 10 + number for number in range(10) if number not in lost}
+
+
+def test_when_the_generator_is_closed_the_scheduler_forgets_the_items(
+    address: str, tmp_path: Path
+) -> None:
+    path = f"{str(tmp_path / 'go')!r}"
+    wait = f"[None for _ in iter(lambda: __import__('os').path.exists({path}), True)]"
+    with distributed.Client(address, set_as_default=False) as observer:
+        with closing(DaskCluster(address).map(eval, ["0", *[wait] * 20])) as results:
+            assert next(results) == (0, 0)
+            until(lambda: any(observer.processing().values()))
+        until(lambda: not any(observer.processing().values()))
+        (tmp_path / "go").touch()
 
 
 @pytest.fixture
@@ -90,30 +146,20 @@ def test_a_batch_is_done_by_the_workers(
     assert frames == {"a": 40, "b": 40, "c": 40, "bad": None}
 
 
-def test_when_a_worker_is_killed_its_file_is_done_again(address: str, tmp_path: Path) -> None:
+def test_when_a_worker_is_killed_its_file_is_done_again(cluster: Cluster, tmp_path: Path) -> None:
     clip = write_drive(tmp_path / "long.mp4", 150)
     out = tmp_path / "out"
-    running = start(("detect-video", clip, "-d", out, "--scheduler", address))
+    running = start(("detect-video", clip, "-d", out, "--scheduler", cluster.address))
     try:
-        until(lambda: bool(unfinished(out)))
-        os.kill(holder_of(unfinished(out)[0]), signal.SIGKILL)
+        until(lambda: bool(cluster.gate.held()))
+        os.kill(cluster.gate.held()[0], signal.SIGKILL)
+        cluster.gate.open()
         result = running.finish()
     finally:
         running.stop()
     assert result.code == 0, result.err
     assert names(out) == ["long.mp4", "manifest.jsonl"]
     assert frames_of(out / "long.mp4") == 150
-
-
-def holder_of(file: Path) -> int:
-    """Give the process that has a file open."""
-    for descriptor in Path("/proc").glob("[0-9]*/fd/*"):
-        try:
-            if descriptor.samefile(file):
-                return int(descriptor.parts[2])
-        except OSError:
-            continue
-    pytest.fail("nobody has it open")
 
 
 def test_training_on_a_cluster_gives_the_same_model(run: Run, address: str, tmp_path: Path) -> None:
@@ -138,18 +184,16 @@ def test_workers_with_another_version_are_refused(
     assert "here is vdet 9.9; install the same version everywhere" in result.err
 
 
-def test_a_scheduler_that_has_no_worker_and_one_that_ends(
-    tmp_path: Path,
-) -> None:
-    clip = write_drive(tmp_path / "clip.mp4", 600)
+def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> None:
+    clip = write_drive(tmp_path / "clip.mp4", 150)
     out = tmp_path / "out"
-    with scheduler(tmp_path) as (address, process):
+    with scheduler(tmp_path) as (cluster, process):
         with pytest.raises(ClusterError, match="the scheduler has no worker"):
-            next(DaskCluster(address, worker_timeout=0.1).map(abs, [1]))
+            next(DaskCluster(cluster.address, worker_timeout=0.1).map(abs, [1]))
         worker = dask("worker", "--no-nanny", folder=tmp_path)
-        running = start(("detect-video", clip, "-d", out, "--scheduler", address))
+        running = start(("detect-video", clip, "-d", out, "--scheduler", cluster.address))
         try:
-            until(lambda: bool(unfinished(out)))
+            until(lambda: bool(cluster.gate.held()))
             process.kill()
             result = running.finish()
         finally:
@@ -158,7 +202,7 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(
             worker.wait()
     assert result.code == 1
     assert result.err == (
-        f"vdet: {address}: the scheduler has ended; start it again, and run this again\n"
+        f"vdet: {cluster.address}: the scheduler has ended; start it again, and run this again\n"
     )
 
 

@@ -116,7 +116,7 @@ class TestRefused:
             plan("clips", tracks=".txt")
 
     def test_two_outputs_of_one_input_with_one_name(self) -> None:
-        two = {"tracks": ".txt", "json": ".txt"}
+        two: dict[str, str | None] = {"tracks": ".txt", "json": ".txt"}
         with pytest.raises(BatchError, match=r"^out/a\.txt: two outputs of clips/a\.mp4 would"):
             plan_outputs("clips/a.mp4", suffixes=two)
 

@@ -124,8 +124,7 @@ def test_keeps_what_is_there(run: Run, clip_path: Path, tmp_path: Path) -> None:
 def test_never_writes_over_its_input(
     run: Run, clip_path: Path, tmp_path: Path, option: str, suffix: str
 ) -> None:
-    clip = tmp_path / f"clip{suffix}"
-    shutil.copy(clip_path, clip)
+    clip = Path(shutil.copy(clip_path, tmp_path / f"clip{suffix}"))
     target = (clip,) if option == "out" else ("--no-video", "--tracks", clip)
     result = run("detect-video", clip, *target, "--overwrite")
     assert result.code == 1

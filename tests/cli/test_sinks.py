@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +97,17 @@ class TestDetectVideo:
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
             ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
             ("picture=a.png", "a.png: the sink picture is for still pictures"),
-            ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one of them"),
+            ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one"),
         ],
     )
     def test_an_output_that_cannot_be_is_refused_before_any_work(
-        self, run: Run, clip: Path, out: Path, sink: str, words: str, monkeypatch: pytest.MonkeyPatch
+        self,
+        run: Run,
+        clip: Path,
+        out: Path,
+        sink: str,
+        words: str,
+        monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         monkeypatch.chdir(out)
         (out / "old.csv").write_text("precious")
@@ -196,7 +201,7 @@ class TestTogether:
 
         def look(sink: TrackSink, result: Any) -> None:
             write(sink, result)
-            seen.extend(name for name in names(out) if not os.path.basename(name).startswith("."))
+            seen.extend(name for name in names(out) if not name.startswith("."))
 
         monkeypatch.setattr(TrackSink, "write", look)
         command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv", *red)
@@ -226,8 +231,13 @@ class TestDetectImage:
         sink = ("--sink", f"picture={out}/a.png", *red)
         assert run("detect-image", picture, *sink).code == 0
         assert (read_image(out / "a.png") != read_image(picture)).any()
-        more = run("detect-image", picture, picture.parent, *sink, "--overwrite")
-        assert more.code in (0, 1)
+        before = (out / "a.png").read_bytes()
+        twin = picture.with_name("twin.png")
+        write_image(twin, road())
+        several = run("detect-image", twin, picture, *sink, "--overwrite")
+        assert several.code == 1
+        assert "a.png: takes one picture; for several give the name of a folder" in several.err
+        assert (out / "a.png").read_bytes() == before
 
     @pytest.mark.parametrize(
         ("sink", "code", "words"),
@@ -265,11 +275,11 @@ class TestDetectImage:
 
 class TestEvalVideo:
     def test_a_sink_gets_the_results_of_the_video(
-        self, run: Run, clip_path: Path, model_path: Path, scene_truth: Path, out: Path
+        self, run: Run, clip_path: Path, model_path: Path, truth_path: Path, out: Path
     ) -> None:
         common = ("--model", model_path, *QUICK_OPTIONS)
         sinks = ("--sink", f"tracks={out}/a.csv", "--sink", f"video={out}/a.mp4")
-        done = run("eval", "video", clip_path, "--truth", scene_truth, *sinks, *common)
+        done = run("eval", "video", clip_path, "--truth", truth_path, *sinks, *common)
         assert done.code == 0, done.err
         assert frames_of(out / "a.mp4") == 8
         tracks = ("--no-video", "--tracks", out / "b.csv", "--frames", "8")
@@ -293,7 +303,7 @@ class TestEvalVideo:
         self,
         run: Run,
         clip_path: Path,
-        scene_truth: Path,
+        truth_path: Path,
         out: Path,
         arguments: tuple[str, ...],
         code: int,
@@ -301,7 +311,7 @@ class TestEvalVideo:
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
         monkeypatch.chdir(out)
-        result = run("eval", "video", clip_path, "--truth", scene_truth, *arguments)
+        result = run("eval", "video", clip_path, "--truth", truth_path, *arguments)
         assert (result.code, result.out) == (code, "")
         assert words in result.err
         assert names(out) == []
@@ -316,7 +326,9 @@ class TestBatch:
         result = run("detect-video", clip.parent, "-d", out, *sinks)
         assert result.code == 0, result.err
         assert names(out) == ["a.csv", "a.mkv", "b.csv", "b.mkv", "manifest.jsonl"]
-        outputs = {record["input"]: record["outputs"] for record in lines_of(out / "manifest.jsonl")}
+        outputs = {
+            record["input"]: record["outputs"] for record in lines_of(out / "manifest.jsonl")
+        }
         assert outputs[str(clip)] == {"video": str(out / "a.mkv"), "tracks": str(out / "a.csv")}
 
     @pytest.mark.parametrize(

@@ -11,11 +11,12 @@ import av
 import pytest
 
 from faults.conftest import Start
-from red_cars import SETTINGS, red_finder
+from red_cars import SETTINGS, red_model, red_work
 from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
 from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.sinks.protocol import Output
 
 COUNT = 60
 
@@ -30,7 +31,10 @@ def clip(tmp_path: Path) -> Path:
 @pytest.fixture
 def job(clip: Path, tmp_path: Path) -> VideoJob:
     (tmp_path / "out").mkdir()
-    return VideoJob(clip, tmp_path / "out" / "clip.mp4", tmp_path / "out" / "clip.csv")
+    outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
+    return VideoJob(
+        clip, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
+    )
 
 
 def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Callable[[int], None]]:
@@ -45,13 +49,13 @@ def after(frames: int, happens: Callable[[], object]) -> Callable[[object], Call
 
 
 def test_a_file_that_is_removed_while_it_is_read_is_read_to_its_end(job: VideoJob) -> None:
-    run_video(job, red_finder(), SETTINGS, progress=after(5, job.source.unlink))
-    assert frames_of(job.video) == COUNT
+    run_video(job, red_model(), SETTINGS, progress=after(5, job.source.unlink))
+    assert frames_of(job.outputs[0].path) == COUNT
 
 
-def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob) -> None:
+def test_a_file_that_is_removed_before_its_turn_is_recorded(job: VideoJob, tmp_path: Path) -> None:
     job.source.unlink()
-    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
+    record = process_file(job, work=red_work(tmp_path))
     assert record.error == f"{job.source}: there is no such file; check the name"
     assert record.frames is None
 
@@ -61,9 +65,9 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    summary = run_video(job, red_finder(), SETTINGS, progress=shrink)
+    summary = run_video(job, red_model(), SETTINGS, progress=shrink)
     assert COUNT // 4 < summary.frames < COUNT * 3 // 4
-    assert frames_of(job.video) == summary.frames
+    assert frames_of(job.outputs[0].path) == summary.frames
     assert f"ends early: {summary.frames} of {COUNT} frames could be read" in caplog.text
 
 
@@ -108,7 +112,7 @@ def pipe(clip: Path, tmp_path: Path) -> Iterator[Pipe]:
 def test_an_input_that_stalls_is_given_up(pipe: Pipe, job: VideoJob, tmp_path: Path) -> None:
     stalling = replace(job, source=pipe.path)
     with pytest.raises(VideoError, match=r"pipe\.ts: nothing could be read or written for 1 s"):
-        run_video(stalling, red_finder(), SETTINGS, timeout=1)
+        run_video(stalling, red_model(), SETTINGS, timeout=1)
     assert names(tmp_path / "out") == []
     pipe.close()
     until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))

@@ -9,14 +9,15 @@ import pytest
 
 from conftest import Run
 from faults.conftest import Start
-from red_cars import SETTINGS, red_finder
+from red_cars import red_work
 from running import names, write_drive
 from vdet.batch.task import process_file
 from vdet.media import Frame
 from vdet.media.encoder import Encoder
 from vdet.pipeline.loop import VideoJob
-from vdet.track.motion import MotionTracker
-from vdet.track.rules.tracker import Cars
+from vdet.pipeline.sinks.protocol import Output
+from vdet.track.motion.tracker import MotionTracker
+from vdet.track.rules.tracker import RulesTracker
 
 LIMIT = 5_000  # bytes: the short clip is smaller, the others are not
 CAP_DAC_OVERRIDE = 1
@@ -57,7 +58,10 @@ def test_a_folder_that_cannot_be_written_is_refused_before_any_work(
 @pytest.fixture
 def job(tmp_path: Path) -> VideoJob:
     source = write_drive(tmp_path / "clip.mp4", 150)
-    return VideoJob(source, tmp_path / "out" / "clip.mp4", tmp_path / "out" / "clip.csv")
+    outputs = {"video": "clip.mp4", "tracks": "clip.csv"}
+    return VideoJob(
+        source, tuple(Output(sink, tmp_path / "out" / name) for sink, name in outputs.items())
+    )
 
 
 def test_a_writer_that_fails_at_the_100th_frame(
@@ -73,8 +77,8 @@ def test_a_writer_that_fails_at_the_100th_frame(
         write(encoder, frame)
 
     monkeypatch.setattr(Encoder, "write", write_99)
-    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
-    assert record.error == f"{job.video}: cannot be written: Input/output error"
+    record = process_file(job, work=red_work(tmp_path))
+    assert record.error == f"{job.outputs[0].path}: cannot be written: Input/output error"
     assert written == list(range(99))
     assert names(tmp_path / "out") == []
 
@@ -85,9 +89,9 @@ def test_a_tracker_that_raises(
     def update(*_: object) -> None:
         raise ZeroDivisionError("no\nscale")
 
-    for tracker in (Cars, MotionTracker):
+    for tracker in (RulesTracker, MotionTracker):
         monkeypatch.setattr(tracker, "update", update)
-    record = process_file(job, model=red_finder(), settings=SETTINGS, threads=1)
+    record = process_file(job, work=red_work(tmp_path))
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
     result = run("detect-video", job.source, tmp_path / "out" / "single.mp4")

@@ -103,7 +103,7 @@ def test_any_picture_format_counts_whatever_the_case_of_its_suffix(tmp_path: Pat
 
 
 @pytest.mark.parametrize("make", [make_folder, make_zip])
-def test_what_is_no_patch_is_passed_over(tmp_path: Path, make: Maker) -> None:
+def test_other_files_than_patches_are_skipped(tmp_path: Path, make: Maker) -> None:
     junk = [
         "__MACOSX/vehicles/far/._1.png",
         "vehicles/far/._1.png",
@@ -255,9 +255,7 @@ def test_a_patch_of_unreasonable_size_is_not_unpacked(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_a_zip_file_with_a_name_that_no_data_set_has_is_refused(
-    tmp_path: Path, name: str, words: str
-) -> None:
+def test_a_zip_file_with_an_unsafe_name_is_refused(tmp_path: Path, name: str, words: str) -> None:
     archive = make_zip(tmp_path / "set.zip", [*BOTH, name])
     with pytest.raises(DataError, match=r"set\.zip: its member .*" + re.escape(words)):
         find_patches([archive])
@@ -273,13 +271,13 @@ def test_a_symbolic_link_in_a_zip_file_is_refused(tmp_path: Path) -> None:
         find_patches([archive])
 
 
-def test_a_name_from_a_zip_file_is_shown_without_what_a_terminal_obeys(tmp_path: Path) -> None:
+def test_a_name_from_a_zip_file_is_shown_without_control_characters(tmp_path: Path) -> None:
     archive = make_zip(tmp_path / "set.zip", [*BOTH, "vehicles/far/\x1b[2J\n.png"])
     shown = [str(file) for file in find_patches([archive])]
     assert shown[2] == rf"{archive}: 'vehicles/far/\x1b[2J\n.png'"
 
 
-def test_a_folder_whose_name_is_no_text_is_a_group_all_the_same(tmp_path: Path) -> None:
+def test_a_folder_whose_name_is_no_text_is_a_group(tmp_path: Path) -> None:
     make_folder(tmp_path, [*BOTH, os.fsdecode(b"vehicles/\xff\x1b[2J/1.png")])
     groups = [file.group for file in find_patches([tmp_path])]
     assert groups == [r"'vehicles/\udcff\x1b[2J'", "non-vehicles/road", "vehicles/far"]
@@ -294,7 +292,7 @@ def test_a_number_in_a_name_may_have_any_number_of_digits(tmp_path: Path) -> Non
 
 
 @given(st.lists(st.integers(0, 10**30), min_size=2, max_size=6, unique=True), st.integers(0, 3))
-def test_numbers_of_any_length_come_in_their_order(
+def test_numbers_of_any_length_are_ordered_by_value(
     tmp_path_factory: pytest.TempPathFactory, numbers: list[int], zeros: int
 ) -> None:
     names = [f"vehicles/{'0' * zeros}{number}.png" for number in numbers]
@@ -336,7 +334,7 @@ def with_table(tmp_path: Path, make: Maker, names: Iterable[str], *rows: str) ->
 
 
 @pytest.mark.parametrize("make", [make_folder, make_zip])
-def test_a_table_says_where_in_a_patch_the_vehicle_is(tmp_path: Path, make: Maker) -> None:
+def test_a_table_has_the_sides_of_the_vehicle_in_a_patch(tmp_path: Path, make: Maker) -> None:
     source = with_table(tmp_path, make, BOXED, *ROWS)
     assert [(file.group, file.vehicle, file.sides) for file in find_patches([source])] == [
         ("non-vehicles/road", False, None),
@@ -348,7 +346,7 @@ def test_a_table_says_where_in_a_patch_the_vehicle_is(tmp_path: Path, make: Make
     ]
 
 
-def test_a_table_is_of_its_own_source_alone(tmp_path: Path) -> None:
+def test_a_table_applies_to_its_own_source_alone(tmp_path: Path) -> None:
     mined = with_table(tmp_path, make_folder, BOXED, *ROWS)
     other = make_folder(tmp_path / "other", BOTH)
     vehicles = [file for file in find_patches([mined, other]) if file.vehicle]
@@ -359,13 +357,13 @@ def test_a_table_is_of_its_own_source_alone(tmp_path: Path) -> None:
     assert {file.source for file in find_boxed([other, mined])} == {mined}
 
 
-def test_a_picture_in_boxes_of_which_the_table_says_nothing_is_passed_over(tmp_path: Path) -> None:
+def test_a_picture_in_boxes_that_is_not_in_the_table_is_skipped(tmp_path: Path) -> None:
     source = with_table(tmp_path, make_folder, BOXED, *ROWS[:3])
     assert [file.name for file in find_boxed([source])] == ["boxes/far/1.png"]
     assert len(find_patches([source])) == 2
 
 
-def test_without_a_table_boxes_is_a_folder_as_any_other(tmp_path: Path) -> None:
+def test_without_a_table_boxes_is_an_ordinary_folder(tmp_path: Path) -> None:
     make_folder(tmp_path, ["vehicles/boxes/1.png", "non-vehicles/1.png"])
     assert listed(tmp_path)[1] == ("vehicles/boxes/1.png", "vehicles/boxes")
     assert find_boxed([tmp_path]) == []
@@ -385,11 +383,9 @@ def test_without_a_table_boxes_is_a_folder_as_any_other(tmp_path: Path) -> None:
     ],
 )
 @pytest.mark.parametrize("make", [make_folder, make_zip])
-def test_a_table_that_is_none_is_refused(
-    tmp_path: Path, make: Maker, rows: tuple[str, ...]
-) -> None:
+def test_a_damaged_table_is_refused(tmp_path: Path, make: Maker, rows: tuple[str, ...]) -> None:
     source = with_table(tmp_path, make, BOXED, *rows)
-    with pytest.raises(DataError, match=r"mined: boxes\.csv is damaged .*; mine it anew"):
+    with pytest.raises(DataError, match=r"mined: boxes\.csv is damaged .*; mine it again"):
         find_patches([source])
 
 

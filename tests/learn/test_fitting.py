@@ -16,15 +16,15 @@ from vdet.config.schema import (
     HogSettings,
     TrainingSettings,
 )
-from vdet.detect.svm.features import Vectors
 from vdet.errors import DataError
+from vdet.geometry import Float32Array
 from vdet.learn.fitting import fit
 
 COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
 
 
-def clouds(count: int = 300) -> tuple[Vectors, npt.NDArray[np.bool_]]:
-    """Give two overlapping clouds of features of very different scale, one of them constant."""
+def clouds(count: int = 300) -> tuple[Float32Array, npt.NDArray[np.bool_]]:
+    """Return two overlapping clouds of features of very different scale, one of them constant."""
     rng = np.random.default_rng(0)
     vehicle = rng.random(count) < 0.4
     vectors = rng.normal(size=(count, 24)) + 0.6 * vehicle[:, np.newaxis]
@@ -97,7 +97,7 @@ def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, ot
         fit(vectors, vehicle, COLOUR, training())
 
 
-def test_an_svm_that_has_not_converged_is_said_in_a_warning(
+def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     with caplog.at_level(logging.WARNING, "vdet"):
@@ -105,17 +105,17 @@ def test_an_svm_that_has_not_converged_is_said_in_a_warning(
     assert "the SVM has not converged; raise training.max_iterations" in caplog.text
 
 
-def test_an_svm_that_has_converged_is_not_worth_a_word(caplog: pytest.LogCaptureFixture) -> None:
+def test_an_svm_that_has_converged_gives_no_warning(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, "vdet"):
         fit(*clouds(), COLOUR, training())
     assert caplog.text == ""
 
 
-def test_a_patch_and_its_views_are_calibrated_together() -> None:
-    """A view of a patch that was learnt from would be known: its score would be too good."""
+def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
+    """Otherwise the SVM knows a sample like the patch, and the score of the patch is too good."""
     rng = np.random.default_rng(0)
     vehicle = np.arange(90) % 2 == 0
-    noise = rng.normal(size=(90, 24)).astype(np.float32)  # nothing to be learnt, only by heart
+    noise = rng.normal(size=(90, 24)).astype(np.float32)  # can only be learned by heart
     twice = np.concatenate([noise, noise])
     origins = np.tile(np.arange(90), 2)
     loose = training(ensemble=False, C=10.0)
@@ -125,12 +125,12 @@ def test_a_patch_and_its_views_are_calibrated_together() -> None:
     assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
 
 
-def test_views_have_no_say_in_the_calibration() -> None:
-    """Half of the patches are vehicles and no view is: the probabilities are of the patches."""
+def test_augmented_samples_do_not_count_in_the_calibration() -> None:
+    """They are all non-vehicles; the probabilities are those of the patches."""
     vectors, vehicle = clouds(400)
-    views = vectors[~vehicle]
-    rows = np.concatenate([vectors, views])
-    labels = np.concatenate([vehicle, np.zeros(len(views), bool)])
+    augmented = vectors[~vehicle]
+    rows = np.concatenate([vectors, augmented])
+    labels = np.concatenate([vehicle, np.zeros(len(augmented), bool)])
     origins = np.concatenate([np.arange(400), np.flatnonzero(~vehicle)])
     model = fit(rows, labels, COLOUR, training(ensemble=False), origins)
     assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
@@ -143,7 +143,7 @@ def test_rows_that_are_their_own_origins_are_patches() -> None:
     np.testing.assert_array_equal(plain.weights, told.weights)
 
 
-def test_views_do_not_make_up_for_patches_that_are_missing() -> None:
+def test_augmented_samples_do_not_replace_missing_patches() -> None:
     vectors, _ = clouds(40)
     vehicle = np.arange(40) % 20 == 0
     origins = np.where(vehicle, 0, np.arange(40))

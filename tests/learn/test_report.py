@@ -13,7 +13,7 @@ def split_report(name: str) -> SplitReport:
     return SplitReport(
         split=name,
         train_patches=80,
-        train_views=90,
+        train_augmented=90,
         test_patches=20,
         train_accuracy=1.0,
         test_accuracy=0.9,
@@ -55,7 +55,7 @@ def test_the_report_has_both_splits_with_accuracies_confusion_and_groups() -> No
     assert text.index("random split") < text.index("tail split (leak-free")
     assert (
         text.count(
-            "train accuracy 1.0000 (80 patches + 90 views), test accuracy 0.9000 (20 patches)"
+            "train accuracy 1.0000 (80 patches + 90 augmented), test accuracy 0.9000 (20 patches)"
         )
         == 2
     )
@@ -74,11 +74,11 @@ def test_the_report_counts_the_patches_of_each_group_and_those_with_boxes() -> N
     assert rows.count(["vehicles/far", "60", "patches"]) == 1
 
 
-def test_without_boxes_and_views_there_is_no_word_of_them() -> None:
-    bare = replace(split_report("tail"), train_views=0, boxes=None)
+def test_without_boxes_and_augmentation_the_report_does_not_mention_them() -> None:
+    bare = replace(split_report("tail"), train_augmented=0, boxes=None)
     text = "\n".join(replace(report(), boxed=0, splits=(bare,)).lines())
     assert "box" not in text.replace("boxes/mined", "")
-    assert "views" not in text
+    assert "augmented" not in text
 
 
 def test_the_report_says_how_far_boxes_are_off() -> None:

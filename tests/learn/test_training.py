@@ -13,23 +13,24 @@ import pytest
 
 import vdet
 from vdet.config.schema import (
+    AugmentationSettings,
     BoxSettings,
     FeatureSettings,
     HistogramSettings,
     HogSettings,
     Settings,
+    SvmSettings,
     TrainingSettings,
-    ViewSettings,
 )
 from vdet.detect.svm.features import FeatureExtractor, Layout
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
-from vdet.learn.augmentation import views_of
+from vdet.learn.augmentation import augment
 from vdet.learn.dataset import PatchFile, find_boxed, find_patches
 from vdet.learn.extraction import MAX_NAMED, extract
 from vdet.learn.fitting import fit
-from vdet.learn.splits import hold_out
 from vdet.learn.training import train
+from vdet.learn.training_set import hold_out
 from vdet.media.images import Image, read_image, write_image
 from vdet.workers import LocalProcesses, ThisProcess
 
@@ -41,12 +42,16 @@ GROUPS = {
     "non-vehicles/sky": 10,
 }
 SETTINGS = Settings(
-    features=FeatureSettings(
-        patch=SIZE,
-        hog=HogSettings(cell=4, channels=(0,)),
-        histogram=HistogramSettings(bins=8),
+    detector=SvmSettings(
+        features=FeatureSettings(
+            patch=SIZE,
+            hog=HogSettings(cell=4, channels=(0,)),
+            histogram=HistogramSettings(bins=8),
+        )
     ),
-    training=TrainingSettings(C=0.1, views=ViewSettings(mirror=True, cut=0.5, parts=0.5)),
+    training=TrainingSettings(
+        C=0.1, augmentation=AugmentationSettings(mirror=True, cut=0.5, parts=0.5)
+    ),
 )
 
 
@@ -72,7 +77,7 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def mined(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Give the same set, with boxes: the bars of `vehicles/near`, and more in `boxes/`."""
+    """Return the same set with boxes: the bars of `vehicles/near`, and more in `boxes/`."""
     folder = tmp_path_factory.mktemp("mined") / "set"
     shutil.copytree(data, folder)
     rng = np.random.default_rng(1)
@@ -104,13 +109,13 @@ def with_broken(files: list[PatchFile], folder: Path, count: int) -> list[PatchF
 
 
 def but(**changes: object) -> Settings:
-    """Give the settings with some of `training` replaced."""
+    """Return the settings with some of `training` replaced."""
     training = SETTINGS.training.model_copy(update=changes)
     return SETTINGS.model_copy(update={"training": training})
 
 
-NO_VIEWS = ViewSettings(mirror=False, cut=0, parts=0)
-LOOK = partial(views_of, settings=SETTINGS.training.views)
+NO_AUGMENTATION = AugmentationSettings(mirror=False, cut=0, parts=0)
+AUGMENTER = partial(augment, settings=SETTINGS.training.augmentation)
 
 
 def tolerant(share: float) -> Settings:
@@ -118,21 +123,21 @@ def tolerant(share: float) -> Settings:
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
-    vectors = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess())
+    vectors = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
     assert vectors.groups.tolist() == [file.group for file in files]
     assert vectors.vehicle.tolist() == [file.vehicle for file in files]
     assert vectors.vehicle.sum() == 32
     assert vectors.broken == 0
     last = cv2.imread(str(files[-1].source / files[-1].name))
     assert last is not None
-    extractor = FeatureExtractor(SETTINGS.features)
+    extractor = FeatureExtractor(SETTINGS.svm.features)
     assert vectors.vectors.shape == (57, extractor.layout.length)
     expected = extractor.describe(np.asarray(last, np.uint8))
     np.testing.assert_array_equal(vectors.vectors[-1], expected)
 
 
 def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
-    larger = SETTINGS.features.model_copy(update={"patch": 32})
+    larger = SETTINGS.svm.features.model_copy(update={"patch": 32})
     vectors = extract(files, larger, max_broken=0, workers=ThisProcess()).vectors
     np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
 
@@ -141,38 +146,47 @@ def test_several_processes_give_the_same_as_one(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
-    one = extract(files, SETTINGS.features, max_broken=0, look=LOOK, workers=ThisProcess())
-    two = extract(files, SETTINGS.features, max_broken=0, look=LOOK, workers=LocalProcesses(2))
+    one = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=ThisProcess()
+    )
+    two = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=LocalProcesses(2)
+    )
     np.testing.assert_array_equal(one.vectors, two.vectors)
     np.testing.assert_array_equal(one.groups, two.groups)
     assert one.digest == two.digest
-    assert one.views is not None
-    assert two.views is not None
+    assert one.augmented is not None
+    assert two.augmented is not None
     for name in ("vectors", "vehicle", "origins"):
-        np.testing.assert_array_equal(getattr(one.views, name), getattr(two.views, name))
+        np.testing.assert_array_equal(getattr(one.augmented, name), getattr(two.augmented, name))
 
 
-def test_views_are_described_with_the_row_of_their_patch(
+def test_augmented_samples_have_the_row_of_their_patch(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
-    mirror = partial(views_of, settings=ViewSettings(mirror=True, cut=0, parts=0))
-    views = extract(
-        files, SETTINGS.features, max_broken=0, look=mirror, workers=ThisProcess()
-    ).views
-    assert views is not None
-    assert views.origins.tolist() == list(range(57))
-    assert views.vehicle.tolist() == [file.vehicle for file in files]
+    mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
+    augmented = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=mirror, workers=ThisProcess()
+    ).augmented
+    assert augmented is not None
+    assert augmented.origins.tolist() == list(range(57))
+    assert augmented.vehicle.tolist() == [file.vehicle for file in files]
     last = read_image(files[-1].source / files[-1].name)
-    expected = FeatureExtractor(SETTINGS.features).describe(np.ascontiguousarray(last[:, ::-1]))
-    np.testing.assert_array_equal(views.vectors[-1], expected)
+    expected = FeatureExtractor(SETTINGS.svm.features).describe(np.ascontiguousarray(last[:, ::-1]))
+    np.testing.assert_array_equal(augmented.vectors[-1], expected)
 
 
-def test_a_patch_has_the_same_views_in_whatever_set_it_is(files: list[PatchFile]) -> None:
+def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile]) -> None:
     whole, one = (
         extract(
-            some, SETTINGS.features, max_broken=0, look=LOOK, seed=7, workers=ThisProcess()
-        ).views
+            some,
+            SETTINGS.svm.features,
+            max_broken=0,
+            augmenter=AUGMENTER,
+            seed=7,
+            workers=ThisProcess(),
+        ).augmented
         for some in (files, files[40:41])
     )
     assert whole is not None
@@ -189,7 +203,7 @@ def test_a_process_that_is_killed_is_an_error(
 
     monkeypatch.setattr("vdet.learn.extraction._describe_chunk", be_killed)
     with pytest.raises(DataError, match="a process that described patches was killed"):
-        extract(files, SETTINGS.features, max_broken=0, workers=LocalProcesses(2))
+        extract(files, SETTINGS.svm.features, max_broken=0, workers=LocalProcesses(2))
 
 
 def test_progress_adds_up_to_the_number_of_patches(
@@ -197,13 +211,15 @@ def test_progress_adds_up_to_the_number_of_patches(
 ) -> None:
     monkeypatch.setattr("vdet.learn.extraction.CHUNK", 10)
     steps: list[int] = []
-    extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess(), progress=steps.append)
+    extract(
+        files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess(), progress=steps.append
+    )
     assert steps == [10, 10, 10, 10, 10, 7]
 
 
-def test_the_digest_tells_data_sets_apart(files: list[PatchFile]) -> None:
+def test_different_data_sets_have_different_digests(files: list[PatchFile]) -> None:
     whole, same, fewer, renamed = (
-        extract(some, SETTINGS.features, max_broken=0, workers=ThisProcess()).digest
+        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
         for some in (
             files,
             files,
@@ -216,7 +232,7 @@ def test_the_digest_tells_data_sets_apart(files: list[PatchFile]) -> None:
     assert len(whole) == 64
 
 
-def test_a_file_whose_name_is_no_text_is_part_of_the_digest(tmp_path: Path) -> None:
+def test_a_file_name_that_is_no_text_is_part_of_the_digest(tmp_path: Path) -> None:
     picture = texture(np.random.default_rng(0), vehicle=True)
     digests = set()
     for name in (b"\xff.png", b"\xfe.png"):
@@ -224,7 +240,9 @@ def test_a_file_whose_name_is_no_text_is_part_of_the_digest(tmp_path: Path) -> N
         path.parent.mkdir(parents=True)
         write_image(path, picture)
         odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
-        digests.add(extract([odd], SETTINGS.features, max_broken=0, workers=ThisProcess()).digest)
+        digests.add(
+            extract([odd], SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+        )
     assert len(digests) == 2
 
 
@@ -233,22 +251,22 @@ def test_broken_patches_are_named_skipped_and_counted(
 ) -> None:
     mixed = with_broken(files, tmp_path, 2)
     with caplog.at_level(logging.WARNING, "vdet"):
-        vectors = extract(mixed, SETTINGS.features, max_broken=0.1, workers=ThisProcess())
+        vectors = extract(mixed, SETTINGS.svm.features, max_broken=0.1, workers=ThisProcess())
     assert vectors.broken == 2
     assert vectors.groups.tolist() == [file.group for file in files]
-    whole = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess())
+    whole = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
     np.testing.assert_array_equal(vectors.vectors, whole.vectors)
     assert [record.message for record in caplog.records] == [
         f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(2)
     ]
 
 
-def test_of_many_broken_patches_the_first_are_named(
+def test_only_the_first_broken_patches_are_named(
     files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     mixed = with_broken(files, tmp_path, MAX_NAMED + 3)
     with caplog.at_level(logging.WARNING, "vdet"):
-        extract(mixed, SETTINGS.features, max_broken=0.5, workers=ThisProcess())
+        extract(mixed, SETTINGS.svm.features, max_broken=0.5, workers=ThisProcess())
     assert len(caplog.records) == MAX_NAMED + 1
     assert caplog.records[-1].message == "… and 3 more"
 
@@ -264,7 +282,7 @@ def test_more_broken_patches_than_are_tolerated_are_an_error(
     assert report.broken == 3
 
 
-def test_nothing_but_broken_patches_is_an_error_however_tolerant(
+def test_only_broken_patches_are_an_error_at_any_tolerance(
     tmp_path: Path,
 ) -> None:
     with pytest.raises(DataError, match="patches"):
@@ -274,11 +292,11 @@ def test_nothing_but_broken_patches_is_an_error_however_tolerant(
 def test_the_report_counts_patches_and_features(files: list[PatchFile]) -> None:
     _, report = train(files, SETTINGS, jobs=1)
     assert (report.vehicles, report.non_vehicles, report.broken) == (32, 25, 0)
-    assert report.features == FeatureExtractor(SETTINGS.features).layout.length
+    assert report.features == FeatureExtractor(SETTINGS.svm.features).layout.length
     assert report.milliseconds_per_prediction > 0
 
 
-def test_a_separable_set_is_learnt(files: list[PatchFile]) -> None:
+def test_a_separable_set_is_learned(files: list[PatchFile]) -> None:
     _, report = train(files, SETTINGS, jobs=1)
     for split in report.splits:
         assert split.train_accuracy == 1
@@ -309,23 +327,23 @@ def test_the_tail_split_is_reported_by_group(files: list[PatchFile]) -> None:
 
 
 @pytest.mark.parametrize("name", ["random", "tail"])
-def test_without_views_the_model_is_fitted_to_the_patches_that_are_not_held_out(
+def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_held_out(
     files: list[PatchFile], name: Literal["random", "tail"]
 ) -> None:
-    settings = but(split=name, views=NO_VIEWS)
+    settings = but(split=name, augmentation=NO_AUGMENTATION)
     model, report = train(files, settings, jobs=1)
-    data = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess())
+    data = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
     kept = ~hold_out(data.groups, name, settings.training.test_fraction, settings.training.seed)
-    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.features, settings.training)
+    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.svm.features, settings.training)
     np.testing.assert_array_equal(model.weights, expected.weights)
-    assert [split.train_views for split in report.splits] == [0, 0]
+    assert [split.train_augmented for split in report.splits] == [0, 0]
 
 
 @pytest.mark.parametrize("name", ["random", "tail"])
-def test_neither_the_patches_of_the_test_nor_views_of_them_are_learnt_from(
+def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
     mined: Path, tmp_path: Path, name: Literal["random", "tail"]
 ) -> None:
-    """With other pictures in place of those held out, the very same model comes out."""
+    """Other pictures in place of the held-out ones give the same model."""
     settings = but(split=name)
     lists = find_patches([mined]), find_boxed([mined])
     spoilt = tmp_path / "spoilt"
@@ -343,7 +361,7 @@ def test_neither_the_patches_of_the_test_nor_views_of_them_are_learnt_from(
     assert one.boxes is not None
     assert other.boxes is not None
     np.testing.assert_array_equal(one.boxes.weights, other.boxes.weights)
-    assert report.splits[0].train_views > report.splits[0].train_patches
+    assert report.splits[0].train_augmented > report.splits[0].train_patches
 
 
 @pytest.mark.parametrize(("split", "order"), [("random", "random tail"), ("tail", "tail random")])
@@ -353,7 +371,7 @@ def test_the_model_is_that_of_the_configured_split_which_comes_first(
     settings = but(split=split)
     model, report = train(files, settings, jobs=1)
     assert [part.split for part in report.splits] == order.split()
-    vectors = extract(files, settings.features, max_broken=0, workers=ThisProcess())
+    vectors = extract(files, settings.svm.features, max_broken=0, workers=ThisProcess())
     right = (model.probabilities(vectors.vectors) >= 0.5) == vectors.vehicle
     first = report.splits[0]
     accuracy = first.train_patches * first.train_accuracy + first.test_patches * first.test_accuracy
@@ -371,17 +389,17 @@ def test_the_same_seed_gives_the_same_model_and_another_seed_another(
     assert (one.weights != different.weights).any()
 
 
-def test_a_trained_model_says_where_it_is_from_and_can_be_kept(
+def test_a_trained_model_has_its_provenance_and_can_be_saved(
     files: list[PatchFile], tmp_path: Path
 ) -> None:
     model, report = train(files, SETTINGS, jobs=1)
     save_model(model, tmp_path / "model.npz")
-    loaded = load_model(tmp_path / "model.npz", SETTINGS.features)
+    loaded = load_model(tmp_path / "model.npz", SETTINGS.svm.features)
     provenance = loaded.provenance
     assert provenance["program"] == f"vdet {vdet.__version__}"
     assert provenance["training"] == SETTINGS.training.model_dump(mode="json")
     assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
-    digest = extract(files, SETTINGS.features, max_broken=0, workers=ThisProcess()).digest
+    digest = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
     assert provenance["data_sha256"] == digest
     np.testing.assert_array_equal(loaded.weights, model.weights)
 
@@ -414,8 +432,8 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
     assert model.boxes is not None
     last = boxed[-1]
     assert last.sides is not None
-    described = FeatureExtractor(SETTINGS.features).describe(read_image(mined / last.name))
-    hogs = described[: Layout.of(SETTINGS.features).hog_length]
+    described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
+    hogs = described[: Layout.of(SETTINGS.svm.features).hog_length]
     found = model.boxes.sides(hogs[np.newaxis])[0]
     np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
     np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)
@@ -429,7 +447,7 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
     assert model.provenance["boxes_sha256"] != model.provenance["data_sha256"]
 
 
-def test_patches_of_boxes_are_not_learnt_from_as_vehicles(mined: Path) -> None:
+def test_patches_of_boxes_are_not_learned_from_as_vehicles(mined: Path) -> None:
     files = find_patches([mined])
     with_them, _ = train(files, SETTINGS, boxed=find_boxed([mined]), jobs=1)
     without, _ = train(files, SETTINGS, jobs=1)
@@ -437,10 +455,10 @@ def test_patches_of_boxes_are_not_learnt_from_as_vehicles(mined: Path) -> None:
 
 
 @pytest.mark.parametrize("assumed", [0.0, 0.5])
-def test_vehicles_from_sets_without_boxes_are_taken_to_fill_their_patch(
+def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     data: Path, mined: Path, tmp_path: Path, assumed: float
 ) -> None:
-    """The mined vehicles are said to be small; those of the other set pull to all four sides."""
+    """The boxes of the mined vehicles are small; the other set makes the boxes larger."""
     small = tmp_path / "small"
     shutil.copytree(mined, small)
     table = small / "boxes.csv"
@@ -450,8 +468,10 @@ def test_vehicles_from_sets_without_boxes_are_taken_to_fill_their_patch(
     model, _ = train(files, settings, jobs=1)
     assert model.boxes is not None
     vehicles = [file for file in files if file.vehicle]
-    described = extract(vehicles, SETTINGS.features, max_broken=0, workers=ThisProcess()).vectors
-    hogs = described[:, : Layout.of(SETTINGS.features).hog_length]
+    described = extract(
+        vehicles, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()
+    ).vectors
+    hogs = described[:, : Layout.of(SETTINGS.svm.features).hog_length]
     left, top, right, bottom = model.boxes.sides(hogs).mean(axis=0).tolist()
     if assumed:
         assert max(left, -right) < -0.25
@@ -463,16 +483,16 @@ def test_vehicles_from_sets_without_boxes_are_taken_to_fill_their_patch(
 
 def test_without_hog_no_sides_are_found(mined: Path) -> None:
     colour = FeatureSettings(patch=SIZE, hog=HogSettings(channels=()))
-    settings = SETTINGS.model_copy(update={"features": colour})
+    settings = SETTINGS.model_copy(update={"detector": SvmSettings(features=colour)})
     files, boxed = find_patches([mined]), find_boxed([mined])
     assert train(files, settings, boxed=boxed, jobs=1)[0].boxes is None
 
 
-def test_the_digest_tells_boxes_apart(mined: Path) -> None:
+def test_different_boxes_have_different_digests(mined: Path) -> None:
     boxed = find_boxed([mined])
     moved = [replace(boxed[0], sides=(None, 0.0, None, 0.1)), *boxed[1:]]
     one, other = (
-        extract(some, SETTINGS.features, max_broken=0, workers=ThisProcess()).digest
+        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
         for some in (boxed, moved)
     )
     assert one != other

@@ -1,16 +1,17 @@
-"""Threads that keep order and end with their block, whatever happens in it."""
+"""Threads keep the order of items, and end with their block, also after an error in it."""
 
 import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from itertools import islice
+from itertools import chain, islice
 
 import cv2
 import pytest
 from threadpoolctl import threadpool_info
 
+from running import SOON, until
 from vdet.pipeline.threads import (
     StalledError,
     map_ordered,
@@ -25,48 +26,53 @@ Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemE
 
 
 @pytest.fixture(autouse=True)
-def no_thread_is_left() -> Iterator[None]:
+def no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr("vdet.pipeline.threads.JOIN_TIMEOUT", SOON)
     yield
-    assert [thread.name for thread in threading.enumerate() if "vdet-" in thread.name] == []
+    assert threads_of_vdet() == []
 
 
 @pytest.fixture
 def ctrl_c() -> Iterator[Callable[[], None]]:
-    """Interrupt the main thread as the keyboard does, from any thread."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    """A call interrupts the main thread, as the keyboard does, and returns when that is done."""
+    interrupted = threading.Event()
+
+    def interrupt(*_: object) -> None:
+        interrupted.set()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
     main = threading.main_thread().ident
     assert main is not None
-    yield lambda: signal.pthread_kill(main, signal.SIGINT)
+
+    def press() -> None:
+        signal.pthread_kill(main, signal.SIGINT)
+        assert interrupted.wait(SOON)
+
+    yield press
     signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture
 def hang(no_thread_is_left: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
-    """What a thread can wait for as if for ever: the end of the test."""
+    """An event that lets a thread wait until the end of the test; nobody waits for that thread."""
     assert no_thread_is_left is None
     monkeypatch.setattr("vdet.pipeline.threads.JOIN_TIMEOUT", 0.1)
     event = threading.Event()
     yield event
     event.set()
-    until(lambda: not any("vdet-" in thread.name for thread in threading.enumerate()))
+    until(lambda: threads_of_vdet() == [])
 
 
-def until(condition: Callable[[], bool]) -> None:
-    """Wait for another thread, five seconds at most."""
-    for _ in range(500):
-        if condition():
-            return
-        time.sleep(0.01)
-    pytest.fail("it never came to that")
+def threads_of_vdet() -> list[str]:
+    return [thread.name for thread in threading.enumerate() if "vdet-" in thread.name]
 
 
-def settled(values: list[int]) -> list[int]:
-    """Wait until another thread has added nothing for a while."""
-    size = -1
-    while size != len(values):
-        size = len(values)
-        time.sleep(0.05)
-    return values
+def stays(count: Callable[[], int], expected: int) -> bool:
+    """Wait until a count has the expected value; then return whether it still has it later."""
+    until(lambda: count() >= expected)
+    time.sleep(0.05)
+    return count() == expected
 
 
 def failing(error: BaseException, after: int) -> Iterator[int]:
@@ -84,33 +90,43 @@ def hand_all(items: Iterable[int], hand_over: Callable[[int], None]) -> None:
         hand_over(item)
 
 
-def noting(items: Iterable[int], seen: list[int]) -> Iterator[int]:
+def recording(items: Iterable[int], seen: list[int]) -> Iterator[int]:
     for item in items:
         seen.append(item)
         yield item
 
 
-class TestAhead:
+def after(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
+    assert event.wait(SOON)
+    yield from items
+
+
+def setting(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
+    event.set()
+    yield from items
+
+
+class TestPrefetch:
     @pytest.mark.parametrize("depth", [1, 4, 100])
     def test_gives_all_items_in_order(self, depth: int) -> None:
         with prefetch(range(50), depth) as items:
             assert list(items) == list(range(50))
 
-    def test_gives_nothing_where_there_is_nothing(self) -> None:
+    def test_without_items_it_gives_nothing(self) -> None:
         with prefetch(range(0)) as items:
             assert list(items) == []
 
-    def test_works_before_it_is_asked(self) -> None:
+    def test_takes_items_before_they_are_asked_for(self) -> None:
         made: list[int] = []
-        with prefetch(noting(range(3), made)):
+        with prefetch(recording(range(3), made)):
             until(lambda: made == [0, 1, 2])
 
     @pytest.mark.parametrize("depth", [1, 3])
-    def test_lets_so_many_wait_and_holds_one_more(self, depth: int) -> None:
+    def test_depth_items_wait_and_one_more_is_held(self, depth: int) -> None:
         made: list[int] = []
-        with prefetch(noting(range(50), made), depth) as items:
+        with prefetch(recording(range(50), made), depth) as items:
             for taken in range(4):
-                assert len(settled(made)) - taken == depth + 1
+                assert stays(lambda: len(made), taken + depth + 1)
                 next(items)
 
     @Errors
@@ -128,7 +144,7 @@ class TestAhead:
     def test_an_error_of_the_reader_ends_the_source(self, kind: type[BaseException]) -> None:
         error = kind("reader")
         made: list[int] = []
-        with pytest.raises(kind) as caught, prefetch(noting(range(10**9), made), 2) as items:
+        with pytest.raises(kind) as caught, prefetch(recording(range(10**9), made), 2) as items:
             fail(error, after=next(items))
         assert caught.value is error
         assert len(made) <= 1 + 2 + 1
@@ -153,29 +169,35 @@ class TestAhead:
         opened, closed = threads
         assert opened is closed is not threading.current_thread()
 
-    def test_a_source_that_hangs_is_given_up_and_left_alone(self, hang: threading.Event) -> None:
+    def test_a_source_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
+        first_waits = threading.Event()
+
         def items() -> Iterator[int]:
             yield 1
+            first_waits.set()
             hang.wait()
 
         read: list[int] = []
         with pytest.raises(StalledError), prefetch(items(), timeout=0.2) as given:
-            read.extend(given)
+            read.extend(after(first_waits, given))
         assert read == [1]
 
     def test_ctrl_c_ends_the_wait_for_a_source_that_hangs(
         self, hang: threading.Event, ctrl_c: Callable[[], None]
     ) -> None:
+        asked = threading.Event()
+
         def items() -> Iterator[int]:
+            asked.wait()
             ctrl_c()
             hang.wait()
             yield 1
 
         with pytest.raises(KeyboardInterrupt), prefetch(items()) as given:
-            next(given)
+            next(setting(asked, given))
 
 
-class TestAside:
+class TestRunInThread:
     def test_gives_what_the_call_gives(self) -> None:
         assert run_in_thread(lambda: threading.current_thread().name) == "vdet-prefetch"
 
@@ -185,26 +207,26 @@ class TestAside:
             run_in_thread(lambda: fail(error, after=1))
         assert caught.value is error
 
-    def test_a_call_that_hangs_is_given_up(self, hang: threading.Event) -> None:
+    def test_a_call_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
         with pytest.raises(StalledError):
             run_in_thread(hang.wait, timeout=0.1)
 
 
-class TestBehind:
+class TestWriteAsync:
     @pytest.mark.parametrize("depth", [1, 4, 100])
-    def test_hands_all_items_over_in_order(self, depth: int) -> None:
+    def test_passes_all_items_on_in_order(self, depth: int) -> None:
         taken: list[int] = []
         with write_async(taken.append, depth) as hand_over:
             hand_all(range(50), hand_over)
         assert taken == list(range(50))
 
-    def test_nothing_may_be_handed_over(self) -> None:
+    def test_there_may_be_no_items(self) -> None:
         taken: list[int] = []
         with write_async(taken.append):
             pass
         assert taken == []
 
-    def test_lets_so_many_wait_beside_the_one_that_is_taken(self) -> None:
+    def test_depth_items_wait_while_another_is_taken(self) -> None:
         gate = threading.Event()
         handed: list[int] = []
 
@@ -213,11 +235,11 @@ class TestBehind:
                 hand_over(item)
                 handed.append(item)
 
-        with write_async(lambda _: gate.wait(5), depth=3) as hand_over:
+        with write_async(lambda _: gate.wait(), depth=3) as hand_over:
             giver = threading.Thread(target=give_all)
             giver.start()
             try:
-                assert len(settled(handed)) == 3 + 1
+                assert stays(lambda: len(handed), 3 + 1)
             finally:
                 gate.set()
                 giver.join()
@@ -264,7 +286,7 @@ class TestBehind:
         assert seen == ["vdet-write", 1, "left"]
 
     @Errors
-    def test_an_error_of_the_giver_is_one_in_the_context_too(
+    def test_an_error_of_the_giver_is_an_error_in_the_context_too(
         self, kind: type[BaseException]
     ) -> None:
         error = kind("giver")
@@ -299,8 +321,13 @@ class TestBehind:
         with pytest.raises(ValueError, match=place), write_async(int, within=within()) as hand_over:
             hand_over(0)
 
-    def test_a_taker_that_hangs_is_given_up_and_left_alone(self, hang: threading.Event) -> None:
+    def test_a_taker_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
         left: list[str] = []
+        first_is_taken = threading.Event()
+
+        def take(_: int) -> None:
+            first_is_taken.set()
+            hang.wait()
 
         @contextmanager
         def within() -> Iterator[None]:
@@ -312,15 +339,15 @@ class TestBehind:
 
         with (
             pytest.raises(StalledError),
-            write_async(lambda _: hang.wait(), 1, within=within(), timeout=0.2) as hand_over,
+            write_async(take, 1, within=within(), timeout=0.2) as hand_over,
         ):
-            hand_all(range(10), hand_over)
-        assert left == [], "the thread hangs: what it has open is not touched"
+            hand_all(chain([0], after(first_is_taken, range(10))), hand_over)
+        assert left == [], "the context of a thread that hangs must not be left"
         hang.set()
         until(lambda: left == ["_ClosedError"])
 
     @Errors
-    def test_after_an_error_of_the_giver_what_was_given_is_still_taken(
+    def test_after_an_error_of_the_giver_earlier_items_are_still_taken(
         self, kind: type[BaseException]
     ) -> None:
         error = kind("giver")
@@ -331,35 +358,39 @@ class TestBehind:
         assert taken == [0, 1]
 
 
-class TestEachWith:
+class TestMapOrdered:
     @pytest.mark.parametrize("threads", [1, 2, 5])
-    def test_pairs_come_in_order_whichever_is_done_first(self, threads: int) -> None:
-        def slow_at_first(item: int) -> int:
-            time.sleep(0.003 * (10 - item))
+    def test_pairs_come_in_order_although_later_ones_end_first(self, threads: int) -> None:
+        ended = [threading.Event() for _ in range(10)]
+
+        def odd_ones_end_first(item: int) -> int:
+            if threads > 1 and item % 2 == 0:
+                assert ended[item + 1].wait(SOON)
+            ended[item].set()
             return item**2
 
-        with map_ordered(slow_at_first, range(10), threads) as pairs:
+        with map_ordered(odd_ones_end_first, range(10), threads) as pairs:
             assert list(pairs) == [(item, item**2) for item in range(10)]
 
-    def test_nothing_gives_no_pairs(self) -> None:
+    def test_without_items_there_are_no_pairs(self) -> None:
         with map_ordered(str, range(0), 2) as pairs:
             assert list(pairs) == []
 
-    def test_so_many_threads_work_at_once(self) -> None:
-        together = threading.Barrier(3, timeout=5)
+    def test_all_threads_work_at_once(self) -> None:
+        together = threading.Barrier(3, timeout=SOON)
         with map_ordered(lambda _: together.wait(), range(3), threads=3) as pairs:
             assert sorted(turn for _, turn in pairs) == [0, 1, 2]
 
     @pytest.mark.parametrize("threads", [1, 3])
-    def test_no_more_items_are_taken_than_threads_and_one(self, threads: int) -> None:
+    def test_at_most_one_item_more_than_threads_is_taken(self, threads: int) -> None:
         taken: list[int] = []
-        with map_ordered(str, noting(range(50), taken), threads) as pairs:
+        with map_ordered(str, recording(range(50), taken), threads) as pairs:
             for received, _ in enumerate(pairs, start=1):
                 assert len(taken) - received <= threads
 
     @Errors
     @pytest.mark.parametrize("threads", [1, 3])
-    def test_an_error_of_the_function_comes_in_the_place_of_its_pair(
+    def test_an_error_of_the_function_is_raised_instead_of_its_pair(
         self, kind: type[BaseException], threads: int
     ) -> None:
         error = kind("function")
@@ -386,9 +417,7 @@ class TestEachWith:
         assert caught.value is error
 
     @Errors
-    def test_after_an_error_of_the_reader_nothing_more_is_begun(
-        self, kind: type[BaseException]
-    ) -> None:
+    def test_after_an_error_of_the_reader_no_item_is_begun(self, kind: type[BaseException]) -> None:
         error = kind("reader")
         begun: list[int] = []
 
@@ -404,8 +433,8 @@ class TestEachWith:
         assert len(begun) <= 3
 
 
-class TestTogether:
-    """The three as the pipeline has them: reading, searching and writing overlap."""
+class TestAllTogether:
+    """As in the pipeline: reading, searching and writing overlap."""
 
     @staticmethod
     def run(
@@ -424,7 +453,7 @@ class TestTogether:
 
     @Errors
     @pytest.mark.parametrize("place", PLACES)
-    def test_an_error_anywhere_ends_everything(self, kind: type[BaseException], place: str) -> None:
+    def test_any_error_ends_all_threads(self, kind: type[BaseException], place: str) -> None:
         error = kind(place)
         made: list[int] = []
 
@@ -439,14 +468,14 @@ class TestTogether:
         stages[place] = fail_at_20
         with pytest.raises(kind) as caught:
             self.run(
-                map(stages["source"], noting(range(10**9), made)),
+                map(stages["source"], recording(range(10**9), made)),
                 stages["function"],
                 stages["taker"],
             )
         assert caught.value is error
         assert len(made) < 60
 
-    def test_ctrl_c_in_the_middle_ends_everything(self, ctrl_c: Callable[[], None]) -> None:
+    def test_ctrl_c_in_the_middle_ends_all_threads(self, ctrl_c: Callable[[], None]) -> None:
         def press_at_20(item: int) -> int:
             if item == 20:
                 ctrl_c()
@@ -454,11 +483,11 @@ class TestTogether:
 
         made: list[int] = []
         with pytest.raises(KeyboardInterrupt):
-            self.run(noting(range(10**9), made), press_at_20, lambda _: time.sleep(0.001))
-        assert len(made) < 1000
+            self.run(recording(range(10**9), made), press_at_20, int)
+        assert len(made) < 60
 
 
-class TestQuietLibraries:
+class TestSingleThreadedLibraries:
     @pytest.fixture(autouse=True)
     def two_threads(self) -> Iterator[None]:
         before = cv2.getNumThreads()

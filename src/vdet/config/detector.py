@@ -1,5 +1,6 @@
 """The section `detector`: which detector finds vehicles, and its settings."""
 
+from collections.abc import Hashable
 from typing import Literal
 
 from pydantic import Field, model_validator
@@ -14,6 +15,15 @@ class DetectorSettings(Section):
     """Which detector finds vehicles, and its settings. Each kind has a class of its own."""
 
     kind: str
+
+    @property
+    def search_key(self) -> Hashable:
+        """What the search of a frame depends on.
+
+        Detectors whose settings have the same key, and that read the same model file, find the
+        same candidates in a frame.
+        """
+        return self
 
 
 class StillSettings(Section):
@@ -62,6 +72,11 @@ class SvmSettings(DetectorSettings):
     heat: HeatSettings = HeatSettings()
     score: ScoreSettings = ScoreSettings()
     stills: StillSettings = StillSettings()
+
+    @property
+    def search_key(self) -> Hashable:
+        """What the search of a frame depends on: all but heat, score and still pictures."""
+        return self.kind, self.reference_height, self.features, self.search
 
     @model_validator(mode="after")
     def _heat_sees_every_set(self) -> "SvmSettings":

@@ -21,10 +21,16 @@ from vdet.config.output import OutputSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
-from vdet.config.training import BoxSettings, CalibrationSettings, TrainingSettings, ViewSettings
+from vdet.config.training import (
+    AugmentationSettings,
+    BoxSettings,
+    CalibrationSettings,
+    TrainingSettings,
+)
 from vdet.errors import ConfigError
 
 __all__ = [
+    "AugmentationSettings",
     "BoxSettings",
     "CalibrationSettings",
     "ColorSpace",
@@ -49,7 +55,6 @@ __all__ = [
     "SvmSettings",
     "TrackerSettings",
     "TrainingSettings",
-    "ViewSettings",
     "VoteSettings",
     "WindowSettings",
 ]

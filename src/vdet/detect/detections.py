@@ -94,14 +94,15 @@ class Detections:
 
     def __getitem__(self, rows: slice | Sequence[int] | npt.NDArray[Any]) -> "Detections":
         """Return only these rows, in this order; `trace` stays."""
-        chosen = rows if isinstance(rows, slice) else np.asarray(rows)
+        if not isinstance(rows, slice):
+            rows = np.asarray(rows) if len(rows) else slice(0)  # an empty list would be of floats
         return Detections(
-            self.boxes[chosen],
-            self.scores[chosen],
-            classes=None if self.classes is None else self.classes[chosen],
+            self.boxes[rows],
+            self.scores[rows],
+            classes=None if self.classes is None else self.classes[rows],
             names=self.names,
-            centroids=self.centroids[chosen],
-            strengths=self.strengths[chosen],
+            centroids=self.centroids[rows],
+            strengths=self.strengths[rows],
             trace=self.trace,
         )
 

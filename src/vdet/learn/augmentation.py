@@ -1,7 +1,7 @@
-"""Views: what else a camera could have shown of the thing in a patch.
+"""Augmentation: further samples made of a patch.
 
-Roads are mirrored in the next country, and the frame's sides cut vehicles off; a part of a vehicle
-alone is not to be taken for one.
+Roads may be mirrored, the sides of the frame cut vehicles off, and a part of a vehicle must not be
+taken for a vehicle.
 """
 
 from collections.abc import Callable, Iterator
@@ -9,102 +9,98 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from vdet.config.schema import ViewSettings
+from vdet.config.schema import AugmentationSettings
+from vdet.geometry import Float32Array
 from vdet.media.images import Image
 
-SideValues = npt.NDArray[np.float32]
-"""Left, top, right and bottom as `vdet.learn.dataset.Sides` has them, NaN for unknown ones."""
+UNKNOWN_SIDES: tuple[float, ...] = (np.nan,) * 4
 
-UNKNOWN: tuple[float, ...] = (np.nan,) * 4
-
-_CUT_OFF = (0.15, 0.5)  # of the patch's width
-_PART = (0.4, 0.6)  # of its side
-_CLOSER = (0.6, 1.0)  # of its side
+_CUT_SHARES = (0.15, 0.5)  # of the patch's width
+_PART_SHARES = (0.4, 0.6)  # of its width and height
+_ZOOM_SHARES = (0.6, 1.0)  # of its width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class Sample:
     """A picture to learn from.
 
-    `image` is BGR uint8 `(H, W, 3)`, `sides` float32 `(4,)` says where the vehicle is.
+    `image` is BGR uint8 `(H, W, 3)`. `sides` is float32 `(4,)`: left, top, right and bottom of the
+    vehicle as `vdet.learn.dataset.Sides` has them, NaN for unknown ones.
     """
 
     image: Image
     vehicle: bool
-    sides: SideValues
+    sides: Float32Array
 
 
-Look = Callable[[View, tuple[int, ...]], Iterator[View]]
-"""Gives the views of a patch, from a seed of its own."""
+Augmenter = Callable[[Sample, tuple[int, ...]], Iterator[Sample]]
+"""Makes further samples of a sample and a seed."""
 
 
-def views_of(patch: View, seed: tuple[int, ...], settings: ViewSettings) -> Iterator[View]:
-    """Give the views of a patch, without the patch itself.
+def augment(
+    sample: Sample, seed: tuple[int, ...], settings: AugmentationSettings
+) -> Iterator[Sample]:
+    """Yield the samples made of a patch, without the patch itself.
 
-    Which they are depends on the settings and the seed alone; that one kind is on does not change
-    the others.
+    They depend on the settings and the seed alone. Switching one kind on does not change the
+    others.
     """
     cuts, parts = (np.random.default_rng((*seed, kind)) for kind in range(2))
-    whole = [patch]
+    whole = [sample]
     if settings.mirror:
-        whole.append(mirrored(patch))
+        whole.append(mirrored(sample))
         yield whole[1]
-    for view in whole:
+    for each in whole:
         if cuts.random() < settings.cut:
-            share, left = cuts.uniform(*_CUT_OFF), cuts.random() < 0.5
-            yield cut_off(view, share, left=left)
-        if view.vehicle and parts.random() < settings.parts:
-            yield _part(view, parts)
+            share, left = cuts.uniform(*_CUT_SHARES), cuts.random() < 0.5
+            yield cut_off(each, share, left=left)
+        if each.vehicle and parts.random() < settings.parts:
+            unknown = np.array(UNKNOWN_SIDES, np.float32)
+            yield replace(_crop(each, _PART_SHARES, parts), vehicle=False, sides=unknown)
 
 
-def mirrored(view: View) -> View:
-    """Return what a mirror would show."""
-    left, top, right, bottom = view.sides
+def mirrored(sample: Sample) -> Sample:
+    """Return the mirror image."""
+    left, top, right, bottom = sample.sides
     sides = np.array([-right, top, -left, bottom], np.float32)
-    return View(np.asarray(cv2.flip(view.image, 1), np.uint8), view.vehicle, sides)
+    return Sample(np.asarray(cv2.flip(sample.image, 1), np.uint8), sample.vehicle, sides)
 
 
-def cut_off(view: View, share: float, *, left: bool) -> View:
-    """Return a view cut off by the side of a frame, whose outermost column is repeated beyond.
+def cut_off(sample: Sample, share: float, *, left: bool) -> Sample:
+    """Return a sample cut off by the side of a frame; its outermost column is repeated beyond.
 
     Parameters
     ----------
     share
-        What is cut off, of the width.
+        The share of the width that is cut off.
     left
-        Whether it is the frame's left side, else the right.
+        True for the frame's left side, False for its right side.
     """
-    width = view.image.shape[1]
+    width = sample.image.shape[1]
     lost = round(share * width)
-    kept = view.image[:, lost:] if left else view.image[:, : width - lost]
+    kept = sample.image[:, lost:] if left else sample.image[:, : width - lost]
     before, after = (lost, 0) if left else (0, lost)
     image = cv2.copyMakeBorder(kept, 0, 0, before, after, cv2.BORDER_REPLICATE)
     edge = lost / width - 0.5 if left else 0.5 - lost / width
-    sides = view.sides.copy()
+    sides = sample.sides.copy()
     across = sides[::2]
     across[across < edge if left else across > edge] = np.nan
-    return replace(view, image=np.asarray(image, np.uint8), sides=sides)
+    return replace(sample, image=np.asarray(image, np.uint8), sides=sides)
 
 
-def closer(patch: View, seed: tuple[int, ...]) -> Iterator[View]:
-    """Give one view of most of a patch, larger: a box in it moves and grows with it."""
-    yield _crop(patch, _CLOSER, np.random.default_rng(seed))
+def zoom_in(sample: Sample, seed: tuple[int, ...]) -> Iterator[Sample]:
+    """Yield one crop of most of a sample, in which its box is displaced and larger."""
+    yield _crop(sample, _ZOOM_SHARES, np.random.default_rng(seed))
 
 
-def _part(view: View, rng: np.random.Generator) -> View:
-    """Return a part of a vehicle, which is a non-vehicle."""
-    return replace(_crop(view, _PART, rng), vehicle=False, sides=np.array(UNKNOWN, np.float32))
-
-
-def _crop(view: View, shares: tuple[float, float], rng: np.random.Generator) -> View:
-    """Return some part of a view, as wide and high as a share of it between the two."""
-    whole = np.array(view.image.shape[1::-1])
+def _crop(sample: Sample, shares: tuple[float, float], rng: np.random.Generator) -> Sample:
+    """Return a random crop with a share of width and height between the two `shares`."""
+    whole = np.array(sample.image.shape[1::-1])
     size = np.maximum(1, np.rint(rng.uniform(*shares) * whole)).astype(int)
     corner = rng.integers(0, whole - size + 1)
     (x, y), (right, bottom) = corner, corner + size
     shift = (corner + size / 2) / whole - 0.5
-    sides = (view.sides - np.tile(shift, 2)) * np.tile(whole / size, 2)
-    image = np.ascontiguousarray(view.image[y:bottom, x:right])
-    return View(image, view.vehicle, sides.astype(np.float32))
+    sides = (sample.sides - np.tile(shift, 2)) * np.tile(whole / size, 2)
+    image = np.ascontiguousarray(sample.image[y:bottom, x:right])
+    return Sample(image, sample.vehicle, sides.astype(np.float32))

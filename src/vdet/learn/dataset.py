@@ -1,9 +1,9 @@
-"""Labelled patches from folders or zip files, with the group that each belongs to.
+"""Labelled patches in folders or zip files, each in a group; a zip file can be written too.
 
-The layout is the Udacity set's: `vehicles/<group>/*.png` and `non-vehicles/<group>/*.png`, in
-folders, in zip files, or one class in each. A table beside these folders, `boxes.csv`, may say
-where in a patch the vehicle is; patches that show one, but ill placed, then lie in
-`boxes/<group>/`.
+The layout is that of the Udacity set: `vehicles/<group>/*.png` and `non-vehicles/<group>/*.png`, in
+folders, in zip files, or one class in each. A table beside these folders, `boxes.csv`, may give the
+sides of the vehicle in a patch. Patches that show a vehicle off their centre or of another size
+then lie in `boxes/<group>/`.
 """
 
 import csv
@@ -13,32 +13,37 @@ import re
 import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+import cv2
+
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import DataError
-from vdet.files import escaped, printable, read_whole
+from vdet.files import escaped, printable, read_whole, replacing
 from vdet.media.images import PICTURE_SUFFIXES, Image, decode_image
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
 BOXED = "boxes"
-"""Folder of the patches that tell where a vehicle is, and belong to neither class."""
+"""Folder of the patches with box sides that belong to neither class."""
 TABLE = "boxes.csv"
 COLUMNS = ("name", "left", "top", "right", "bottom")
 MAX_PATCH_BYTES = 16_000_000
 
-Sides = tuple[float | None, float | None, float | None, float | None]
-"""Left, top, right and bottom of a vehicle, from the patch's centre in sides of the patch.
+_ZIP_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest of the format; makes files reproducible
+_ZIP_MODE = 0o644 << 16
 
-Right and down are positive; None for a side that is not known, for instance beyond the frame.
+Sides = tuple[float | None, float | None, float | None, float | None]
+"""Left, top, right and bottom of a vehicle, from the patch's centre, in widths and heights of it.
+
+Right and down are positive; None for a side that is not known, for instance outside the frame.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class PatchFile:
-    """Where a patch lies: in the zip file or folder `source`, under `name`."""
+    """The place of a patch: `name` in the zip file or folder `source`."""
 
     source: Path
     name: str
@@ -46,7 +51,7 @@ class PatchFile:
     """Class and folder, `vehicles/GTI_Far`; patches of one group may be near-duplicates."""
     vehicle: bool
     sides: Sides | None = None
-    """Where in the patch the vehicle is, if that is known."""
+    """Sides of the vehicle in the patch, if known."""
 
     def __str__(self) -> str:
         return f"{self.source}: {printable(self.name)}"
@@ -54,7 +59,7 @@ class PatchFile:
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A patch as read: BGR uint8 image of any size, None where it is broken, and its checksum."""
+    """A patch as read: BGR uint8 image of any size, None if it is broken, and its checksum."""
 
     file: PatchFile
     image: Image | None
@@ -67,9 +72,9 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
     Raises
     ------
     DataError
-        A source cannot be read, holds no patch, or is a zip file with a name in it that is given
-        twice, leads out of the archive or is a symbolic link; one of the two classes has none, or a
-        table of boxes is damaged.
+        A source cannot be read or has no patch, one of the two classes has no patch, a table of
+        boxes is damaged, or a zip file has a member whose name occurs twice or leads out of the
+        archive, or which is a symbolic link.
     """
     files = [file for file in _find(sources) if file.group.split("/")[0] != BOXED]
     for name, vehicle in CLASSES.items():
@@ -83,12 +88,12 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
 
 
 def find_boxed(sources: Sequence[Path]) -> list[PatchFile]:
-    """List the patches of `boxes/`, in the same order; of each, `sides` is known.
+    """List the patches of `boxes/`, in the same order; each has `sides`.
 
     Raises
     ------
     DataError
-        As `find_patches`, but for classes without patches.
+        As for `find_patches`, but a class may be without patches.
     """
     return [file for file in _find(sources) if file.group.split("/")[0] == BOXED]
 
@@ -117,7 +122,7 @@ def _find_in(source: Path) -> list[PatchFile]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Give the files below a folder; no devices and pipes, which may have no end."""
+    """Yield the files below a folder, without devices and pipes, which may be endless."""
     return (path for path in folder.rglob("*") if path.is_file())
 
 
@@ -129,7 +134,7 @@ def _zip_names(source: Path) -> list[str]:
 
 
 def _read_table(source: Path) -> dict[str, Sides]:
-    """Return the sides of each patch that the source's table names."""
+    """Return the sides of each patch in the source's table."""
     with ExitStack() as stack:
         table = _read_bytes(source, TABLE, {}, stack)
     try:
@@ -138,7 +143,7 @@ def _read_table(source: Path) -> dict[str, Sides]:
             raise ValueError(f"its first line is not {','.join(COLUMNS)}")
         return {name: _sides(values) for name, *values in rows[1:]}
     except (ValueError, csv.Error) as error:
-        raise DataError(f"{source}: {TABLE} is damaged ({error}); mine it anew") from error
+        raise DataError(f"{source}: {TABLE} is damaged ({error}); mine it again") from error
 
 
 def _sides(values: Sequence[str]) -> Sides:
@@ -149,7 +154,7 @@ def _sides(values: Sequence[str]) -> Sides:
 
 
 def _patch_file(source: Path, top: str, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
-    """Return the patch that a file name stands for, in a source named `top`; None if it is none."""
+    """Return the patch of a file name in a source named `top`; None if it is no patch."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
     if hidden or path.suffix.lower() not in PICTURE_SUFFIXES:
@@ -165,13 +170,13 @@ def _patch_file(source: Path, top: str, name: str, boxes: Mapping[str, Sides]) -
 
 
 def _numeric(name: str) -> list[tuple[int, str]]:
-    """Sort key in which image10 follows image9; a number may have any number of digits."""
+    """Return a sort key in which image10 follows image9; numbers may have any length."""
     parts = re.split(r"0*([0-9]+)", name)
     return [(len(part) if part.isdecimal() else 0, part) for part in parts]
 
 
 def read_patches(files: Iterable[PatchFile]) -> Iterator[Patch]:
-    """Read patches in the order given; a broken one has no image. Each zip file is opened once."""
+    """Yield patches in the order given; a broken one has no image. Each zip file is opened once."""
     with ExitStack() as stack:
         archives: dict[Path, zipfile.ZipFile] = {}
         for file in files:
@@ -182,7 +187,7 @@ def read_patches(files: Iterable[PatchFile]) -> Iterator[Patch]:
 def _read_bytes(
     source: Path, name: str, archives: dict[Path, zipfile.ZipFile], stack: ExitStack
 ) -> bytes:
-    """Return what a file holds; nothing where it cannot be had."""
+    """Return the content of a file; an empty one if it cannot be read."""
     try:
         if source.is_dir():
             return read_whole(source / name, most=MAX_PATCH_BYTES, what="patch", error=DataError)
@@ -191,3 +196,45 @@ def _read_bytes(
         return read_member(archives[source], name, most=MAX_PATCH_BYTES)
     except (DataError, ArchiveError):
         return b""
+
+
+class PatchArchive:
+    """A zip file of patches, in the order in which they are added."""
+
+    def __init__(self, file: zipfile.ZipFile) -> None:
+        self._file = file
+        self._rows: list[tuple[str, Sides]] = []
+
+    def add(self, name: str, patch: Image, sides: Sides | None = None) -> None:
+        """Add a patch (BGR uint8) as a PNG picture, and the sides of its vehicle."""
+        _, data = cv2.imencode(".png", patch)
+        self._write(name, data.tobytes(), zipfile.ZIP_STORED)
+        if sides is not None:
+            self._rows.append((name, sides))
+
+    def add_table(self) -> None:
+        """Add the table of all sides, with four decimals, after the last patch."""
+        text = io.StringIO(newline="")
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for name, sides in self._rows:
+            table.writerow([name, *("" if side is None else f"{side:.4f}" for side in sides)])
+        self._write(TABLE, text.getvalue().encode("utf-8"), zipfile.ZIP_DEFLATED)
+
+    def _write(self, name: str, data: bytes, method: int) -> None:
+        info = zipfile.ZipInfo(name, _ZIP_TIME)
+        info.create_system = 3  # Unix; the default depends on the system
+        info.external_attr = _ZIP_MODE
+        self._file.writestr(info, data, method)
+
+
+@contextmanager
+def patch_archive(path: Path) -> Iterator[PatchArchive]:
+    """Yield an archive that appears at `path` if the block ends without an error.
+
+    The same patches give the same bytes. Raises `OutputError`.
+    """
+    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as file:
+        archive = PatchArchive(file)
+        yield archive
+        archive.add_table()

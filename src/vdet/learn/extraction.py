@@ -1,19 +1,20 @@
-"""Patch files, and views of them → feature vectors, in parallel."""
+"""Patch files and their augmented samples → feature vectors, in parallel."""
 
 import hashlib
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.features import FeatureExtractor, Vectors, to_patch
+from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
-from vdet.learn.augmentation import UNKNOWN, Look, View
+from vdet.geometry import BoolArray, Float32Array
+from vdet.learn.augmentation import UNKNOWN_SIDES, Augmenter, Sample
 from vdet.learn.dataset import PatchFile, read_patches
 from vdet.media.images import Image
 from vdet.workers import WorkerKilledError, Workers
@@ -21,46 +22,68 @@ from vdet.workers import WorkerKilledError, Workers
 log = logging.getLogger("vdet")
 
 CHUNK = 128
+"""Patches that a process describes at a time."""
 MAX_NAMED = 10
+"""Most broken patches that are named in warnings."""
 
-
-Flags = npt.NDArray[np.bool_]
-Rows = npt.NDArray[np.intp]
-SidesTable = npt.NDArray[np.float32]
-"""Shape `(n, 4)`: left, top, right, bottom of each row's vehicle, NaN for unknown ones."""
+RowNumbers = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Views:
-    """Described views of patches: what only a model's training may see.
+class SampleVectors:
+    """Feature vectors of samples to learn from, row by row.
 
-    `vectors` is float32 of shape `(m, features)`, `vehicle` bool of shape `(m,)`, `sides` `(m, 4)`;
-    `origins` is intp of shape `(m,)`, the row of the patch that each is a view of.
+    `vectors` is float32 `(n, features)`, `vehicle` bool `(n,)`, `sides` float32 `(n, 4)` as in
+    `LabelledVectors`. `origins` is intp `(n,)`: the row of the patch that the sample was made of; a
+    patch has its own row.
     """
 
-    vectors: Vectors
-    vehicle: Flags
-    sides: SidesTable
-    origins: Rows
+    vectors: Float32Array
+    vehicle: BoolArray
+    sides: Float32Array
+    origins: RowNumbers
+
+    @staticmethod
+    def joined(parts: Sequence["SampleVectors"]) -> "SampleVectors":
+        """Return the rows of all parts, in their order."""
+        return SampleVectors(
+            np.concatenate([part.vectors for part in parts]),
+            np.concatenate([part.vehicle for part in parts]),
+            np.concatenate([part.sides for part in parts]),
+            np.concatenate([part.origins for part in parts]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class LabelledVectors:
-    """What a classifier learns from, row by row.
+    """Feature vectors of patches with their labels, row by row.
 
-    `vectors` is float32 of shape `(n, features)`, `vehicle` bool of shape `(n,)`, `groups` str of
-    shape `(n,)`. `digest` is a SHA-256 over the names, checksums and boxes of all patch files,
-    `broken` how many of them could not be read. `sides` is `(n, 4)`, `views` are those of the
-    patches; None for either says that there are none.
+    Attributes
+    ----------
+    vectors
+        float32 `(n, features)`.
+    vehicle
+        bool `(n,)`.
+    groups
+        str `(n,)`.
+    digest
+        SHA-256 over the names, checksums and boxes of all patch files.
+    broken
+        Number of patch files that could not be read.
+    sides
+        float32 `(n, 4)`: left, top, right, bottom of each row's vehicle, NaN for unknown sides.
+        None if no side is known.
+    augmented
+        Samples made of the patches, which only the training may use; None if there are none.
     """
 
-    vectors: Vectors
-    vehicle: Flags
+    vectors: Float32Array
+    vehicle: BoolArray
     groups: npt.NDArray[np.str_]
     digest: str
     broken: int
-    sides: SidesTable | None = None
-    views: Views | None = None
+    sides: Float32Array | None = None
+    augmented: SampleVectors | None = None
 
 
 def extract(
@@ -69,7 +92,7 @@ def extract(
     *,
     max_broken: float,
     workers: Workers,
-    look: Look | None = None,
+    augmenter: Augmenter | None = None,
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> LabelledVectors:
@@ -78,13 +101,14 @@ def extract(
     Parameters
     ----------
     max_broken
-        Share of unreadable patches that is tolerated; they are named in warnings and skipped.
+        Tolerated share of unreadable patches; they are named in warnings and skipped.
     workers
         They describe the patches, `CHUNK` at a time.
-    look
-        Gives the views to describe too; None for none.
+    augmenter
+        Makes further samples of each patch, which are described too; None for none.
     seed
-        Of the views. Those of a patch depend on it and on the patch, not on the other patches.
+        Seed of the augmenter. The samples of a patch depend on it and on the patch, not on the
+        other patches.
     progress
         Called with the number of patches done since the last call.
 
@@ -96,7 +120,7 @@ def extract(
         The cluster of `workers` cannot be used.
     """
     chunks = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)]
-    describe = partial(_describe_chunk, settings=settings, look=look, seed=seed)
+    describe = partial(_describe_chunk, settings=settings, augmenter=augmenter, seed=seed)
     parts = _describe_chunks(describe, chunks, workers, progress)
     good = np.concatenate([part.good for part in parts])
     _check_broken([file for file, ok in zip(files, good, strict=True) if not ok], files, max_broken)
@@ -107,8 +131,8 @@ def extract(
         np.array([file.group for file in kept], str),
         _digest(files, [checksum for part in parts for checksum in part.checksums]),
         len(files) - len(kept),
-        np.array([file.sides or UNKNOWN for file in kept], np.float32),
-        _joined([part.views for part in parts], [len(part.vectors) for part in parts]),
+        np.array([file.sides or UNKNOWN_SIDES for file in kept], np.float32),
+        _all_augmented(parts),
     )
 
 
@@ -132,51 +156,57 @@ def _describe_chunks(
     return [parts[number] for number in range(len(chunks))]
 
 
-def _joined(views: Sequence[Views], lengths: Sequence[int]) -> Views:
-    """Join the views of chunks of these lengths; origins then count from the first chunk on."""
-    starts = np.cumsum([0, *lengths[:-1]])
-    return Views(
-        np.concatenate([each.vectors for each in views]),
-        np.concatenate([each.vehicle for each in views]),
-        np.concatenate([each.sides for each in views]),
-        np.concatenate([each.origins + start for each, start in zip(views, starts, strict=True)]),
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class _Chunk:
-    vectors: Vectors
-    views: Views
-    good: Flags
+    """What is returned for some patch files: `good` bool per file, the rest per readable file."""
+
+    vectors: Float32Array
+    augmented: SampleVectors
+    good: BoolArray
     checksums: list[int]
 
 
 def _describe_chunk(
-    files: Sequence[PatchFile], settings: FeatureSettings, look: Look | None, seed: int
+    files: Sequence[PatchFile], settings: FeatureSettings, augmenter: Augmenter | None, seed: int
 ) -> _Chunk:
     extractor = FeatureExtractor(settings)
     patches = list(read_patches(files))
-    shown = [(_shown(p.file, p.image), p.checksum) for p in patches if p.image is not None]
-    seen = [
-        (row, view)
-        for row, (patch, checksum) in enumerate(shown)
-        for view in (look(patch, (seed, checksum)) if look else ())
+    readable = [
+        (_sample(patch.file, patch.image), patch.checksum)
+        for patch in patches
+        if patch.image is not None
+    ]
+    augmented = [
+        (row, each)
+        for row, (sample, checksum) in enumerate(readable)
+        for each in (augmenter(sample, (seed, checksum)) if augmenter else ())
     ]
     return _Chunk(
-        extractor.describe_all(to_patch(patch.image, settings.patch) for patch, _ in shown),
-        Views(
-            extractor.describe_all(to_patch(view.image, settings.patch) for _, view in seen),
-            np.array([view.vehicle for _, view in seen], bool),
-            np.array([view.sides for _, view in seen], np.float32).reshape(-1, 4),
-            np.array([row for row, _ in seen], np.intp),
+        extractor.describe_all(to_patch(sample.image, settings.patch) for sample, _ in readable),
+        SampleVectors(
+            extractor.describe_all(to_patch(each.image, settings.patch) for _, each in augmented),
+            np.array([each.vehicle for _, each in augmented], bool),
+            np.array([each.sides for _, each in augmented], np.float32).reshape(-1, 4),
+            np.array([row for row, _ in augmented], np.intp),
         ),
         np.array([patch.image is not None for patch in patches]),
         [patch.checksum for patch in patches],
     )
 
 
-def _shown(file: PatchFile, image: Image) -> View:
-    return View(image, file.vehicle, np.array(file.sides or UNKNOWN, np.float32))
+def _sample(file: PatchFile, image: Image) -> Sample:
+    return Sample(image, file.vehicle, np.array(file.sides or UNKNOWN_SIDES, np.float32))
+
+
+def _all_augmented(chunks: Sequence[_Chunk]) -> SampleVectors:
+    """Join the augmented samples; their origins then count over the patches of all chunks."""
+    starts = np.cumsum([0, *(len(chunk.vectors) for chunk in chunks[:-1])])
+    return SampleVectors.joined(
+        [
+            replace(chunk.augmented, origins=chunk.augmented.origins + start)
+            for chunk, start in zip(chunks, starts, strict=True)
+        ]
+    )
 
 
 def _check_broken(
@@ -189,7 +219,7 @@ def _check_broken(
     if len(broken) > max_broken * len(files):
         raise DataError(
             f"{broken[0]}: {len(broken)} of {len(files)} patches are broken, more than the "
-            f"{max_broken:.1%} of training.max_broken; get the data set anew"
+            f"{max_broken:.1%} of training.max_broken; get the data set again"
         )
 
 
@@ -198,5 +228,5 @@ def _digest(files: Sequence[PatchFile], checksums: Sequence[int]) -> str:
     for file, checksum in zip(files, checksums, strict=True):
         sides = f" {file.sides}" if file.sides else ""
         line = f"{file.group}/{file.name.rpartition('/')[2]} {checksum:08x}{sides}\n"
-        digest.update(line.encode("utf-8", "surrogateescape"))  # a name may be no text at all
+        digest.update(line.encode("utf-8", "surrogateescape"))  # a file name may be no valid text
     return digest.hexdigest()

@@ -1,4 +1,4 @@
-"""Scale, fit, calibrate: scikit-learn's estimators → a `LinearModel` that needs none of them."""
+"""Scale, fit and calibrate with scikit-learn; return a `LinearModel` that does not need it."""
 
 import logging
 import warnings
@@ -6,36 +6,35 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings, TrainingSettings
-from vdet.detect.svm.features import Vectors
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.extraction import Flags, Rows
+from vdet.geometry import BoolArray, Float32Array, Float64Array
+from vdet.learn.extraction import RowNumbers
 
 log = logging.getLogger("vdet")
 
 
 def fit(
-    vectors: Vectors,
-    vehicle: Flags,
+    vectors: Float32Array,
+    vehicle: BoolArray,
     features: FeatureSettings,
     settings: TrainingSettings,
-    origins: Rows | None = None,
+    origins: RowNumbers | None = None,
 ) -> LinearModel:
     """Fit StandardScaler → LinearSVC → CalibratedClassifierCV on raw feature vectors.
 
     Parameters
     ----------
     vectors
-        float32 of shape `(n, features)`.
+        float32 `(n, features)`.
     vehicle
-        bool of shape `(n,)`.
+        bool `(n,)`.
     origins
-        intp of shape `(n,)`: the row of the patch that each row is a view of, its own for a patch.
-        The sigmoid is fitted on the patches alone, each scored by an SVM that has seen neither it
-        nor a view of it. None: all rows are patches.
+        intp `(n,)`: the row of the patch that each row was made of; a patch has its own row. The
+        sigmoid is fitted on the patches alone, each scored by an SVM that was fitted without it and
+        without the samples made of it. None: all rows are patches.
 
     Raises
     ------
@@ -73,28 +72,28 @@ def fit(
 
 
 def _unweighted_svm(settings: TrainingSettings) -> Any:
-    """Return an SVM that knows of no weights: these are then those of the calibration alone."""
+    """Return an SVM that takes no sample weights, so that they apply to the calibration alone."""
     from sklearn.svm import LinearSVC
 
     class Svm(LinearSVC):  # type: ignore[misc]  # scikit-learn has no types
-        def fit(self, x: Vectors, y: Flags) -> "Svm":
+        def fit(self, x: Float32Array, y: BoolArray) -> "Svm":
             super().fit(x, y)
             return self
 
     return Svm(C=settings.C, max_iter=settings.max_iterations, random_state=settings.seed)
 
 
-def _weights(patches: Rows, count: int) -> npt.NDArray[np.float64]:
-    """Weigh the rows for the sigmoid: the patches 1, their views 0."""
+def _weights(patches: RowNumbers, count: int) -> Float64Array:
+    """Return the weights for the sigmoid: 1 for patches, 0 for augmented samples."""
     weights = np.zeros(count)
     weights[patches] = 1
     return weights
 
 
 def _folds(
-    vehicle: Flags, patches: Rows, origins: Rows, settings: TrainingSettings
-) -> Iterator[tuple[Rows, Rows]]:
-    """Give the rows to fit and to calibrate on; `vehicle` is of the rows that are `patches`."""
+    vehicle: BoolArray, patches: RowNumbers, origins: RowNumbers, settings: TrainingSettings
+) -> Iterator[tuple[RowNumbers, RowNumbers]]:
+    """Yield the rows to fit on and to calibrate on; `vehicle` holds the labels of `patches`."""
     from sklearn.model_selection import StratifiedKFold
 
     splitter = StratifiedKFold(settings.calibration.folds, shuffle=True, random_state=settings.seed)

@@ -1,13 +1,13 @@
-"""What `vdet train` says of a model: plain numbers, printed and kept as JSON."""
+"""The report of `vdet train` on a model: numbers, printed and written as JSON."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from vdet.files import write_json
+from vdet.geometry import BoolArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,8 +20,8 @@ class Confusion:
     true_negatives: int
 
     @staticmethod
-    def of(truth: npt.NDArray[np.bool_], predicted: npt.NDArray[np.bool_]) -> "Confusion":
-        """Count from bool arrays of shape `(n,)`."""
+    def of(truth: BoolArray, predicted: BoolArray) -> "Confusion":
+        """Count the patches of two bool arrays `(n,)`."""
         return Confusion(
             int(np.count_nonzero(truth & predicted)),
             int(np.count_nonzero(~truth & predicted)),
@@ -32,7 +32,7 @@ class Confusion:
 
 @dataclass(frozen=True, slots=True)
 class GroupAccuracy:
-    """Share of a group's test patches that are classified rightly."""
+    """Share of a group's test patches that are classified correctly."""
 
     group: str
     patches: int
@@ -41,9 +41,9 @@ class GroupAccuracy:
 
 @dataclass(frozen=True, slots=True)
 class BoxError:
-    """How far the regression misses the known sides of held-out patches' boxes.
+    """Error of the regression on the known box sides of held-out patches.
 
-    `mean` is the mean absolute error in sides of the patch, `patches` how many were looked at.
+    `mean` is the mean absolute error as a share of the patch's side, `patches` their number.
     """
 
     patches: int
@@ -54,13 +54,13 @@ class BoxError:
 class SplitReport:
     """A model fitted on one part of the patches and tested on the other.
 
-    `train_views` views of the training patches were learnt from too. `boxes` is None where no
+    `train_augmented` is the number of samples made of the training patches. `boxes` is None if no
     boxes are known.
     """
 
     split: str
     train_patches: int
-    train_views: int
+    train_augmented: int
     test_patches: int
     train_accuracy: float
     test_accuracy: float
@@ -72,10 +72,10 @@ class SplitReport:
 
 @dataclass(frozen=True, slots=True)
 class TrainingReport:
-    """Everything that is said of a training run; the saved model is the first split's.
+    """The report of a training run; the saved model is that of the first split.
 
-    `boxed` counts the patches with a known box, also those that belong to neither class; `groups`
-    all patches of each group.
+    `boxed` is the number of patches with a known box, including those of neither class; `groups`
+    has the number of patches of each group.
     """
 
     vehicles: int
@@ -89,7 +89,7 @@ class TrainingReport:
     splits: tuple[SplitReport, ...]
 
     def lines(self) -> Iterator[str]:
-        """Give the report as lines of text."""
+        """Yield the report as lines of text."""
         broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
         yield (
             f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}; "
@@ -119,9 +119,9 @@ def _split_lines(report: SplitReport) -> Iterator[str]:
     confusion = report.confusion
     yield ""
     yield _SPLITS[report.split]
-    views = f" + {report.train_views} views" if report.train_views else ""
+    more = f" + {report.train_augmented} augmented" if report.train_augmented else ""
     yield (
-        f"  train accuracy {report.train_accuracy:.4f} ({report.train_patches} patches{views}), "
+        f"  train accuracy {report.train_accuracy:.4f} ({report.train_patches} patches{more}), "
         f"test accuracy {report.test_accuracy:.4f} ({report.test_patches} patches), "
         f"fitted in {report.fit_seconds:.1f} s"
     )

@@ -1,4 +1,4 @@
-"""One training run, from labelled vectors to a model with its report."""
+"""A training run: from patch files to a model with its report."""
 
 import time
 from collections import Counter
@@ -14,14 +14,14 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.augmentation import views_of
-from vdet.learn.boxes import BoxPatches, describe_boxes, fit_split_boxes
+from vdet.geometry import BoolArray
+from vdet.learn.augmentation import augment
+from vdet.learn.box_regression import BoxPatches, extract_box_patches, fit_split_boxes
 from vdet.learn.dataset import PatchFile, read_patches
 from vdet.learn.extraction import LabelledVectors, extract
 from vdet.learn.fitting import fit
 from vdet.learn.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
-from vdet.learn.splits import SplitName, hold_out
-from vdet.learn.training_set import lesson_of
+from vdet.learn.training_set import SplitName, hold_out, training_set
 from vdet.workers import make_workers
 
 _TIMED_PATCHES = 200
@@ -41,10 +41,10 @@ def train(
     Parameters
     ----------
     boxed
-        Patches of neither class that tell where a vehicle is. With them, or with `files` that
-        tell it, the model learns to find the sides of vehicles.
+        Patches of neither class with known box sides. If they or `files` have known sides, the
+        model learns to find the sides of vehicles.
     jobs
-        Processes that describe the patches; None for one for each core.
+        Processes, as joblib counts them: -1 for one per core.
     scheduler
         Address of a Dask scheduler whose workers describe the patches instead.
     progress
@@ -52,13 +52,13 @@ def train(
 
     Returns
     -------
-    The model fitted on the training part of `training.split`, with its provenance; the report on
-    both splits, this one first.
+    The model fitted on the training part of `training.split`, with its provenance, and the report
+    on both splits, this one first.
 
     Raises
     ------
     DataError
-        Too many patches are unreadable, or too few are left to learn from; or a process was killed.
+        Too many patches are unreadable, too few are left to learn from, or a process was killed.
     ClusterError
         The cluster of `scheduler` cannot be used.
     """
@@ -69,12 +69,12 @@ def train(
         files,
         settings.svm.features,
         max_broken=training.max_broken,
-        look=partial(views_of, settings=training.views),
-        seed=training.seed,
         workers=workers,
+        augmenter=partial(augment, settings=training.augmentation),
+        seed=training.seed,
         progress=progress,
     )
-    boxes = describe_boxes(files, boxed, settings, workers=workers, progress=progress)
+    boxes = extract_box_patches(files, boxed, settings, workers=workers, progress=progress)
     extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != training.split)
@@ -110,8 +110,8 @@ def _fit_split(
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
-    lesson = lesson_of(data, ~held)
-    model = fit(lesson.vectors, lesson.vehicle, settings.svm.features, training, lesson.origins)
+    samples = training_set(data, ~held)
+    model = fit(samples.vectors, samples.vehicle, settings.svm.features, training, samples.origins)
     regression, error = None, None
     if boxes is not None:
         regression, error = fit_split_boxes(data, held, boxes, name, settings)
@@ -122,7 +122,7 @@ def _fit_split(
     return replace(model, boxes=regression), SplitReport(
         split=name,
         train_patches=train_patches,
-        train_views=len(lesson.vehicle) - train_patches,
+        train_augmented=len(samples.vehicle) - train_patches,
         test_patches=int(np.count_nonzero(held)),
         train_accuracy=float(right[~held].mean()),
         test_accuracy=float(right[held].mean()),
@@ -133,9 +133,7 @@ def _fit_split(
     )
 
 
-def _by_group(
-    groups: npt.NDArray[np.str_], right: npt.NDArray[np.bool_]
-) -> tuple[GroupAccuracy, ...]:
+def _by_group(groups: npt.NDArray[np.str_], right: BoolArray) -> tuple[GroupAccuracy, ...]:
     return tuple(
         GroupAccuracy(str(name), int((groups == name).sum()), float(right[groups == name].mean()))
         for name in np.unique(groups)
@@ -143,7 +141,7 @@ def _by_group(
 
 
 def _milliseconds_per_prediction(model: LinearModel, files: Sequence[PatchFile]) -> float:
-    """Describe and score some patches one by one; return the median time."""
+    """Return the median time to describe and score a patch."""
     extractor = FeatureExtractor(model.features)
     some = files[:: max(1, len(files) // _TIMED_PATCHES)]
     times = []

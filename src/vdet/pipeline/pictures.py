@@ -18,7 +18,7 @@ from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.media.images import PICTURE_SUFFIXES, Image, read_image
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sink, open_sink
+from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.track import Track
 
@@ -79,8 +79,8 @@ def plan_pictures(
         picture = out if is_file or out is None else out / source.name
         folder = stages / source.stem if stages and len(sources) > 1 else stages
         named = {"picture": picture, "stages": folder}
-        outputs = (Output(sink, path) for sink, path in named.items() if path is not None)
-        jobs.append(PictureJob(source, tuple(outputs)))
+        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
+        jobs.append(PictureJob(source, own))
     outputs = [output for job in jobs for output in job.outputs]
     for output, count in Counter(outputs).items():
         if count > 1:
@@ -89,8 +89,7 @@ def plan_pictures(
             )
     if out is not None and not is_file:
         make_folder(out)
-    for output in outputs:
-        check_sink(output, overwrite=overwrite, inputs=sources)
+    check_sinks(outputs, overwrite=overwrite, inputs=sources)
     return jobs
 
 

@@ -5,16 +5,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, red_finder, road
-from vdet.config.schema import StillSettings, SvmSettings
+from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
-from vdet.detect.svm.detector import SvmModel, horizon_of
-from vdet.detect.svm.scores import detection_scores
+from vdet.detect.svm.detector import SvmModel, detection_scores, horizon_of
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
-from vdet.geometry import Box
+from vdet.geometry import Box, Float32Array
 from vdet.media.images import Image
 
 MODEL = red_finder()
@@ -290,3 +291,57 @@ def test_one_loaded_model_serves_frames_of_any_size() -> None:
             height // 4,
             width // 4,
         )
+
+
+# What `detection_scores` makes of the strength of the evidence.
+positive = st.floats(1e-6, 1e6)
+slopes = st.floats(0.01, 100)
+
+
+def scores_of(*strengths: float, middle: float = 0.3, slope: float = 2) -> Float32Array:
+    return detection_scores(np.array(strengths, np.float32), middle, slope)
+
+
+class TestScores:
+    def test_half_of_the_boxes_with_the_middle_strength_are_vehicles(self) -> None:
+        assert scores_of(0.3)[0] == pytest.approx(0.5)
+        assert scores_of(5, middle=5, slope=7)[0] == pytest.approx(0.5)
+
+    def test_the_score_is_a_sigmoid_of_the_logarithm_of_the_strength(self) -> None:
+        strength, middle, slope = 0.7, 0.3, 2.5
+        expected = 1 / (1 + np.exp(-slope * (np.log(strength) - np.log(middle))))
+        assert scores_of(strength, middle=middle, slope=slope)[0] == pytest.approx(
+            expected, rel=1e-6
+        )
+
+    @given(st.lists(st.floats(0, 2**100, width=32), min_size=2, max_size=20), positive, slopes)
+    def test_stronger_evidence_never_has_a_lower_score(
+        self, strengths: list[float], middle: float, slope: float
+    ) -> None:
+        scores = scores_of(*sorted(strengths), middle=middle, slope=slope)
+        assert (np.diff(scores) >= 0).all()
+        assert (scores >= 0).all()
+        assert (scores <= 1).all()
+
+    def test_no_evidence_has_the_score_0_and_endless_evidence_nears_1(self) -> None:
+        for slope in (0.5, 2, 100):
+            scores = scores_of(0, 1e-45, 1e38, slope=slope)
+            assert scores.tolist() == [0, pytest.approx(0), pytest.approx(1)]
+
+    def test_no_strengths_have_no_scores(self) -> None:
+        assert scores_of().shape == (0,)
+        assert scores_of().dtype == np.float32
+
+    @given(st.floats(0, 2**127, width=32), positive, slopes)
+    def test_no_strength_overflows_or_warns(
+        self, strength: float, middle: float, slope: float
+    ) -> None:
+        (score,) = scores_of(strength, middle=middle, slope=slope)  # warnings are errors here
+        assert np.isfinite(score)
+
+    def test_the_settings_allow_nothing_that_has_no_score(self) -> None:
+        for middle, slope in ((1e-300, 100), (1e6, 100), (1e6, 1e-300)):
+            settings = ScoreSettings(middle=middle, slope=slope)
+            assert np.isfinite(
+                scores_of(0, 1e-3, 1, 1e6, middle=settings.middle, slope=slope)
+            ).all()

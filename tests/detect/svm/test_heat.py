@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vdet.config.schema import HeatSettings, WindowSettings
-from vdet.detect.svm.heat import Heat, HeatMap, Values, find_regions
+from vdet.detect.svm.heat import Heat, HeatMap, find_regions
 from vdet.detect.svm.windows import Windows, lay_grid
-from vdet.geometry import Box
+from vdet.geometry import Box, Float32Array
 
 
 def found(*windows: tuple[int, int, int, int, float], share: float = 1) -> Windows:
@@ -33,7 +33,7 @@ def heat_map(
     return HeatMap(100, 60, settings)
 
 
-def values_of(heat: HeatMap, windows: Windows) -> Values:
+def values_of(heat: HeatMap, windows: Windows) -> Float32Array:
     return heat.update(windows).values
 
 
@@ -224,7 +224,7 @@ class TestShrunk:
         left, right = (5 + 0.5) * shrink - 0.5, (8 + 0.5) * shrink - 0.5
         top, bottom = (3 + 0.5) * shrink - 0.5, (4 + 0.5) * shrink - 0.5
         assert region.centroid == pytest.approx(((left + right) / 2, (top + bottom) / 2))
-        assert region.peak == 2
+        assert region.strength == 2
 
     def test_a_single_value_is_a_region_with_its_middle(self, shrink: int) -> None:
         (region,) = find_regions(drawn((5, 3, 1, 1, 2), shrink=shrink), 1)
@@ -244,12 +244,12 @@ def test_a_drawn_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
     (region,) = find_regions(heat, 1.4)
     assert region.box == Box(20, 10, 31, 21)
     assert region.centroid == pytest.approx((35, 20))
-    assert region.peak == 5
+    assert region.strength == 5
 
 
 def test_each_region_has_its_own_peak() -> None:
     regions = find_regions(drawn((50, 5, 10, 10, 2), (5, 30, 10, 10, 3)), 1)
-    assert [(region.box, region.peak) for region in regions] == [
+    assert [(region.box, region.strength) for region in regions] == [
         (Box(50, 5, 10, 10), 2.0),
         (Box(5, 30, 10, 10), 3.0),
     ]
@@ -275,13 +275,13 @@ def test_a_hole_does_not_split_a_region() -> None:
     (region,) = find_regions(drawn((20, 10, 30, 30, 2), (30, 20, 10, 10, 0)), 1)
     assert region.box == Box(20, 10, 30, 30)
     assert region.centroid == pytest.approx((34.5, 24.5))
-    assert region.peak == 2
+    assert region.strength == 2
 
 
 def test_what_lies_in_the_box_but_not_in_the_region_does_not_count_for_its_peak() -> None:
     # an L around a hotter spot that does not touch it
     heat = drawn((10, 10, 5, 40, 2), (10, 45, 40, 5, 2), (30, 15, 5, 5, 9))
-    peaks = {region.box: region.peak for region in find_regions(heat, 1)}
+    peaks = {region.box: region.strength for region in find_regions(heat, 1)}
     assert peaks == {Box(10, 10, 40, 40): 2.0, Box(30, 15, 5, 5): 9.0}
 
 
@@ -289,7 +289,7 @@ def test_a_single_pixel_is_a_region_with_its_middle() -> None:
     (region,) = find_regions(drawn((7, 9, 1, 1, 3)), 1)
     assert region.box == Box(7, 9, 1, 1)
     assert region.centroid == (7.5, 9.5)
-    assert region.peak == 3
+    assert region.strength == 3
 
 
 def test_a_line_is_a_region_with_the_middle_of_its_box() -> None:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vdet.detect.svm.horizon import USUAL, find_horizon
+from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.media.images import Image
 from vdet.synthetic import Renderer, demo_scene, empty_road, frames
 from vdet.synthetic.camera import PinholeCamera
@@ -89,11 +89,11 @@ def test_a_mirrored_road_has_the_same() -> None:
     ids=["black", "white", "noise", "upright lines", "a pixel", "a row"],
 )
 def test_where_no_lines_tell_it_is_where_it_usually_is(image: Image) -> None:
-    assert find_horizon([image]) == USUAL
+    assert find_horizon([image]) == DEFAULT_HORIZON
 
 
 def test_no_frames_tell_nothing() -> None:
-    assert find_horizon([]) == USUAL
+    assert find_horizon([]) == DEFAULT_HORIZON
 
 
 def fan(*slopes: float, meeting: float = 0.45, upward: bool = False) -> Image:
@@ -115,7 +115,7 @@ LEFT = tuple(-slope for slope in RIGHT)
 
 def test_lines_from_both_sides_are_needed() -> None:
     assert find_horizon([fan(*LEFT, *RIGHT)]) == pytest.approx(0.45, abs=STEP)
-    assert find_horizon([fan(*RIGHT)]) == find_horizon([fan(*LEFT)]) == USUAL
+    assert find_horizon([fan(*RIGHT)]) == find_horizon([fan(*LEFT)]) == DEFAULT_HORIZON
 
 
 def test_lines_that_meet_below_themselves_do_not_count() -> None:
@@ -126,7 +126,7 @@ def test_lines_that_meet_below_themselves_do_not_count() -> None:
 
 def test_a_picture_far_taller_than_wide_is_not_enlarged() -> None:
     tracemalloc.start()
-    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == USUAL
+    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == DEFAULT_HORIZON
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 10_000_000

@@ -111,7 +111,7 @@ def test_a_score_is_the_dot_product_plus_the_bias() -> None:
     ones = np.ones(2, np.float32)
     model = LinearModel(SMALL, weights, np.array([10, 20], np.float32), ones, ones)
     vectors = np.array([[1, 1, 1], [2, 0, -1]], np.float32)
-    assert model.scores(vectors).tolist() == [[16, 19.5], [9, 19.5]]
+    assert model.decision_values(vectors).tolist() == [[16, 19.5], [9, 19.5]]
 
 
 def test_the_probability_is_the_mean_of_the_members_sigmoids() -> None:
@@ -316,7 +316,7 @@ def test_another_compression_than_the_one_that_is_declared_is_damage(
         (header_of(version=[1]), r"of version \[1\]"),
         (header_of(version="1"), "of version '1'"),
         (header_of(version=...), "of version None"),
-        (header_of(features=...), "feature settings are not understood; train again"),
+        (header_of(features=...), "feature settings are not understood; train it again"),
         (header_of(features=[]), "feature settings are not understood"),
         (header_of(features={"patch": 63}), "feature settings are not understood"),
         (header_of(features={"patch": math.nan}), "feature settings are not understood"),

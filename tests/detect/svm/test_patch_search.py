@@ -7,9 +7,8 @@ import pytest
 
 from seed import SEED
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
-from vdet.detect.svm import patch_search as patch
-from vdet.detect.svm.dense import located
-from vdet.detect.svm.dense.located import LocatedSearch
+from vdet.detect.svm import dense_search, patch_search
+from vdet.detect.svm.dense_search import LocatedSearch
 from vdet.detect.svm.features import FeatureExtractor, Layout, to_patch
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.patch_search import PatchSearch
@@ -61,7 +60,9 @@ def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing() -> None:
     np.testing.assert_array_equal(engine.search(FramePyramid(frame)).probabilities, first)
 
 
-@pytest.mark.parametrize(("engine", "module"), [(PatchSearch, patch), (LocatedSearch, located)])
+@pytest.mark.parametrize(
+    ("engine", "module"), [(PatchSearch, patch_search), (LocatedSearch, dense_search)]
+)
 def test_windows_scored_some_at_a_time_are_scored_alike(
     engine: type[PatchSearch | LocatedSearch],
     module: ModuleType,

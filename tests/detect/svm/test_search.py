@@ -20,7 +20,7 @@ from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.search import FrameSearch, lay_grids
-from vdet.detect.svm.windows import Boxes, Windows, join_windows
+from vdet.detect.svm.windows import Int32Array, Windows, join_windows
 from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.media.images import Image
 
@@ -42,7 +42,9 @@ def model_of(features: FeatureSettings) -> LinearModel:
     return LinearModel(features, weights.astype(np.float32), 0 * one, -one, 0 * one)
 
 
-def laid(width: int, height: int, settings: SvmSettings = SEED, *, horizon: float = 0.5) -> Boxes:
+def laid(
+    width: int, height: int, settings: SvmSettings = SEED, *, horizon: float = 0.5
+) -> Int32Array:
     grids = lay_grids(settings, settings.features, width, height, horizon=horizon)
     return np.concatenate([grid.boxes for grid in grids])
 
@@ -333,7 +335,10 @@ class TestTheChoiceOfAnEngine:
         ("features", "missing"),
         [
             (COLOUR, "features without HOG"),
-            (SMALL.model_copy(update={"spatial": SpatialSettings(size=4)}), "features.spatial"),
+            (
+                SMALL.model_copy(update={"spatial": SpatialSettings(size=4)}),
+                "detector.features.spatial",
+            ),
         ],
         ids=["colour only", "spatial"],
     )
@@ -342,10 +347,16 @@ class TestTheChoiceOfAnEngine:
     ) -> None:
         with caplog.at_level(logging.INFO, "vdet"):
             auto = search_all(search_of(features))
-        assert f"the patch engine searches: the dense one cannot compute {missing}" in caplog.text
+        assert (
+            f"the patch engine searches, because the dense one cannot compute {missing}"
+            in caplog.text
+        )
         patch = search_all(search_of(features, "patch"))
         np.testing.assert_array_equal(auto.probabilities, patch.probabilities)
-        with pytest.raises(ConfigError, match=rf"dense cannot compute {missing}; take auto or"):
+        with pytest.raises(
+            ConfigError,
+            match=rf"^detector\.search\.engine: dense cannot compute {missing}; take auto or",
+        ):
             search_of(features, "dense")
 
 
@@ -370,4 +381,4 @@ def test_a_frame_with_too_many_windows_is_refused() -> None:
     ) as error:
         FrameSearch(model_of(COLOUR), settings, 1280, 720)
     assert not isinstance(error.value, FrameSizeError)
-    assert "detector.search.windows larger steps, or fewer rows" in str(error.value)
+    assert "give larger steps or fewer rows in detector.search.windows" in str(error.value)

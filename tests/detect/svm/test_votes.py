@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.config.schema import VoteSettings
-from vdet.detect.svm.heat import Region
-from vdet.detect.svm.votes import MOST_VOTES, Votes, split_regions
+from vdet.detect.svm.heat import HotRegion
+from vdet.detect.svm.votes import MAX_VOTES, Votes, split_regions
 from vdet.detect.svm.windows import Windows
 from vdet.geometry import Box
 
@@ -38,13 +38,13 @@ def exactly(box: Box, weight: float) -> Vote:
     return box.x, box.y, box.width, box.height, weight
 
 
-def split(votes: Sequence[Vote], *regions: Box, **settings: float) -> list[Region]:
+def split(votes: Sequence[Vote], *regions: Box, **settings: float) -> list[HotRegion]:
     """Give the vehicles in regions, of one that is everywhere where none is given."""
-    hot = [Region(box, box.center, 1.0) for box in regions or [EVERYWHERE]]
+    hot = [HotRegion(box, box.center, 1.0) for box in regions or [EVERYWHERE]]
     return split_regions(hot, votes_of(*votes), VoteSettings.model_validate(settings))
 
 
-def boxes(regions: list[Region]) -> list[Box]:
+def boxes(regions: list[HotRegion]) -> list[Box]:
     return [region.box for region in regions]
 
 
@@ -55,7 +55,7 @@ class TestVehicles:
 
     def test_votes_that_are_the_same_are_the_vehicle(self) -> None:
         (vehicle,) = split([exactly(LEFT, 0.25)] * 4)
-        assert vehicle == Region(LEFT, LEFT.center, 1.0)
+        assert vehicle == HotRegion(LEFT, LEFT.center, 1.0)
 
     def test_two_that_overlap_are_told_apart(self) -> None:
         found = split(around(LEFT, seed=1) + around(RIGHT, seed=2), LEFT.union(RIGHT))
@@ -68,7 +68,7 @@ class TestVehicles:
         weak, strong = around(LEFT, 0.05), around(RIGHT, 0.1)
         first, second = split(weak + strong)
         assert first.box.iou(RIGHT) > 0.9
-        assert first.peak > second.peak
+        assert first.strength > second.strength
 
     def test_scattered_votes_do_not_pull_the_box_far(self) -> None:
         stray = [exactly(LEFT.moved_to(x, y), 0.1) for x, y in ((60, 100), (140, 130), (100, 60))]
@@ -96,7 +96,7 @@ class TestWeights:
     def test_the_peak_is_the_weight_that_agrees(self) -> None:
         other = LEFT.moved_to(110, 100)
         (vehicle,) = split([exactly(LEFT, 0.5), exactly(other, 0.25)])
-        assert vehicle.peak == pytest.approx(0.5 + 0.25 * LEFT.iou(other))
+        assert vehicle.strength == pytest.approx(0.5 + 0.25 * LEFT.iou(other))
 
     @pytest.mark.parametrize(("least", "count"), [(0, 1), (0.299, 1), (0.301, 0)])
     def test_a_vehicle_needs_some(self, least: float, count: int) -> None:
@@ -109,18 +109,18 @@ class TestWeights:
     def test_whether_and_where_are_weighed_apart(self) -> None:
         off = LEFT.moved_to(120, 100)
         table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
-        votes = Votes(table, whether=np.array([0.2, 0.6]), where=np.array([1e4, 1.0]))
-        (vehicle,) = split_regions([Region(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        votes = Votes(table, presence=np.array([0.2, 0.6]), position=np.array([1e4, 1.0]))
+        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
         assert vehicle.box == LEFT
-        assert vehicle.peak == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
+        assert vehicle.strength == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
 
     def test_a_lone_sure_vote_keeps_no_vehicle_from_being_found(self) -> None:
         lone = exactly(LEFT.moved_to(300, 100), 0)[:4]
         table = np.array([lone, *[exactly(LEFT, 0)[:4]] * 3], np.float64)
         votes = Votes(
-            table, whether=np.array([0.01, 0.1, 0.1, 0.1]), where=np.array([9, 1, 1, 1.0])
+            table, presence=np.array([0.01, 0.1, 0.1, 0.1]), position=np.array([9, 1, 1, 1.0])
         )
-        (vehicle,) = split_regions([Region(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
         assert vehicle.box == LEFT
 
     def test_votes_without_weight_are_none(self) -> None:
@@ -148,7 +148,7 @@ class TestParts:
         assert RIGHT.iou(part) > 0.1
         found = split([exactly(LEFT, 1), exactly(RIGHT, 0.5), exactly(part, 0.25)])
         assert boxes(found) == [LEFT, RIGHT]
-        assert found[1].peak == 0.5
+        assert found[1].strength == 0.5
 
     def test_what_sticks_out_far_enough_is_no_part(self) -> None:
         beside = self.BONNET.moved_to(LEFT.right - 18, 130)  # half of it in LEFT
@@ -192,19 +192,19 @@ class TestCollecting:
 
         votes = collected(windows(2, 0), windows(0, 0), windows(1, 50))
         assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 10, 20], [50, 0, 10, 20]]
-        assert votes.whether.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
-        assert votes.boxes.dtype == votes.whether.dtype == votes.where.dtype == np.float64
+        assert votes.presence.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
+        assert votes.boxes.dtype == votes.presence.dtype == votes.position.dtype == np.float64
 
     def test_where_a_vehicle_is_the_surest_know_best(self) -> None:
         box = np.tile(np.array([10, 10, 20, 20], np.float32), (3, 1))
         sure, ones = np.array([0.5, 0.9, 1], np.float32), np.ones(3, np.float32)
         windows = Windows(np.zeros((3, 4), np.int32), sure, ones, box)
-        where = collected(windows, sharpness=2).where
+        where = collected(windows, sharpness=2).position
         assert where[0] == pytest.approx(np.log(2) ** 2)
         assert where[1] == pytest.approx(np.log(10) ** 2, rel=1e-5)
         assert np.isfinite(where[2])
         assert where[2] > 10 * where[1]
-        assert collected(windows, sharpness=0).where.tolist() == [1, 1, 1]
+        assert collected(windows, sharpness=0).position.tolist() == [1, 1, 1]
 
     def test_a_vehicle_is_voted_for_as_far_as_the_frame_shows_it(self) -> None:
         vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
@@ -212,28 +212,28 @@ class TestCollecting:
         windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
         votes = collected(windows)
         assert votes.boxes.tolist() == [[90, 10, 10, 20], [0, 0, 5, 5], [60, 95, 20, 5]]
-        assert len(votes.whether) == len(votes.where) == 3
+        assert len(votes.presence) == len(votes.position) == 3
 
     def test_votes_for_a_cut_off_vehicle_agree_whatever_they_guess_of_its_rest(self) -> None:
         votes = np.array([[60, 40, width, 30] for width in (45, 60, 90, 120)], np.float32)
         quarters = np.full(4, 0.25, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
-        regions = [Region(Box(60, 40, 40, 30), (80, 55), 1)]
+        regions = [HotRegion(Box(60, 40, 40, 30), (80, 55), 1)]
         (vehicle,) = split_regions(regions, collected(windows), VoteSettings())
         assert vehicle.box == Box(60, 40, 40, 30)
-        assert vehicle.peak == pytest.approx(0.25)
+        assert vehicle.strength == pytest.approx(0.25)
 
     def test_of_too_many_the_surest_are_heard_in_their_order(self) -> None:
         rng = np.random.default_rng(0)
-        weights = rng.permutation(MOST_VOTES + 100) / 1000
+        weights = rng.permutation(MAX_VOTES + 100) / 1000
         votes = votes_of(*((i, 0, 10, 10, weight) for i, weight in enumerate(weights.tolist())))
         heard = votes.within(EVERYWHERE)
-        assert len(heard.where) == MOST_VOTES
-        assert heard.where.min() == 0.1
+        assert len(heard.position) == MAX_VOTES
+        assert heard.position.min() == 0.1
         assert (np.diff(heard.boxes[:, 0]) > 0).all()
 
     def test_too_many_votes_of_a_vehicle_are_one_vehicle(self) -> None:
-        (vehicle,) = split(around(LEFT, 0.01, count=2 * MOST_VOTES))
+        (vehicle,) = split(around(LEFT, 0.01, count=2 * MAX_VOTES))
         assert vehicle.box.iou(LEFT) > 0.9
 
 
@@ -287,7 +287,7 @@ def test_the_order_of_the_votes_does_not_matter(votes: list[Vote], random: Rando
 @given(some_votes)
 def test_vehicles_weigh_no_more_than_the_votes_together(votes: list[Vote]) -> None:
     found = split(votes, least=0)
-    assert max(region.peak for region in found) <= sum(vote[4] for vote in votes) + 1e-9
-    assert [region.peak for region in found] == sorted(
-        (region.peak for region in found), reverse=True
+    assert max(region.strength for region in found) <= sum(vote[4] for vote in votes) + 1e-9
+    assert [region.strength for region in found] == sorted(
+        (region.strength for region in found), reverse=True
     )

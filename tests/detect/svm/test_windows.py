@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from seed import SEED
 from vdet.config.schema import WindowSettings
-from vdet.detect.svm.windows import Boxes, WindowGrid, Windows, every_nth, lay_grid
+from vdet.detect.svm.windows import Int32Array, WindowGrid, Windows, lay_grid
 
 LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that no band here reaches the end of
@@ -21,7 +21,9 @@ def stepped(size: int, step: int, top: int, bottom: int) -> WindowSettings:
     return WindowSettings(size=size, step=step, top=top, bottom=bottom)
 
 
-def boxes_of(settings: WindowSettings, width: int, height: int = ROWS, cells: int = 8) -> Boxes:
+def boxes_of(
+    settings: WindowSettings, width: int, height: int = ROWS, cells: int = 8
+) -> Int32Array:
     return lay_grid(settings, width, height, cells=cells).boxes
 
 
@@ -183,24 +185,24 @@ def test_windows_without_overlap_share_with_none() -> None:
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
 def test_grids_of_every_nth_window_are_together_the_whole_grid(n: int) -> None:
     grid = lay_grid(stepped(100, 1, 40, 300), 555, 720)  # of a fractional step
-    parts = [every_nth(grid, n, across, down) for across in range(n) for down in range(n)]
+    parts = [grid.every_nth(n, column, row) for column in range(n) for row in range(n)]
     together = np.concatenate([part.boxes for part in parts])
     assert len(together) == sum(len(part) for part in parts) == len(grid)
     assert {tuple(box) for box in together.tolist()} == {tuple(b) for b in grid.boxes.tolist()}
 
 
 def test_every_second_window_from_the_second_column_and_row_on() -> None:
-    grid = every_nth(lay_grid(band(10, 0.5, 0, 30), 30, 30), 2, 1, 1)
+    grid = lay_grid(band(10, 0.5, 0, 30), 30, 30).every_nth(2, 1, 1)
     assert grid.boxes[:, :2].tolist() == [[5, 5], [15, 5], [5, 15], [15, 15]]
 
 
-def test_detected_keeps_windows_of_at_least_the_probability_in_order() -> None:
+def test_hits_are_the_windows_of_at_least_the_probability_in_order() -> None:
     boxes = np.arange(16, dtype=np.int32).reshape(4, 4)
     probabilities = np.array([0.5, 0.25, 0.75, 0.499], np.float32)
     shares = np.array([1, 0.5, 0.25, 0.125], np.float32)
     vehicles = boxes.astype(np.float32) + 0.5
     windows = Windows(boxes, probabilities, shares, vehicles)
-    found = windows.detected(0.5)
+    found = windows.hits(0.5)
     assert found.boxes.tolist() == [[0, 1, 2, 3], [8, 9, 10, 11]]
     assert found.probabilities.tolist() == [0.5, 0.75]
     assert found.shares.tolist() == [1, 0.25]

@@ -1,21 +1,25 @@
+"""Labelled videos under several settings: what is shared, and which frames are read."""
+
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from vdet.pipeline.following import follow
 
 from quick import QUICK
 from vdet.config.loading import load_settings
-from vdet.config.schema import Settings
-from vdet.detect.svm.model import LinearModel, load_model
-from vdet.detect.svm.search import FrameSearch
-from vdet.detect.svm.windows import Windows
+from vdet.config.schema import MotionTrackerSettings, Settings
+from vdet.detect.factory import load_detector
+from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
 from vdet.evaluate.clips.clip import detect, open_clip
 from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
 from vdet.evaluate.clips.following import follow_under_all
-from vdet.media import VideoReader
+from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
+from vdet.pipeline.loop import follow_frames, no_progress, peek
+from vdet.pipeline.result import FrameResult
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
@@ -26,11 +30,6 @@ def settings(*assignments: str) -> Settings:
     return load_settings(None, (*QUICK, *assignments))
 
 
-@pytest.fixture(scope="module")
-def model(model_path: Path) -> LinearModel:
-    return load_model(model_path)
-
-
 @pytest.fixture
 def truth_path(scene: Scene, tmp_path: Path) -> Path:
     path = tmp_path / "gt.txt"
@@ -39,7 +38,7 @@ def truth_path(scene: Scene, tmp_path: Path) -> Path:
 
 
 def test_settings_side_by_side_give_what_each_gives_alone(
-    clip_path: Path, model: LinearModel
+    clip_path: Path, model_path: Path
 ) -> None:
     variants = [
         settings("detector.heat.threshold=0.1"),
@@ -49,75 +48,96 @@ def test_settings_side_by_side_give_what_each_gives_alone(
         settings("detector.search.perspective.sizes=[0.25]", "detector.search.alternate=2"),
         settings("detector.search.perspective={sizes: [0.25], horizon: 0.5}"),
         settings("detector.heat.regions=votes", "detector.heat.votes.least=0.02"),
-        settings("tracker={method: motion, motion: {strong: 0.05}}"),
+        settings().model_copy(update={"tracker": MotionTrackerSettings()}),
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
-        frames = list(reader)
-    together = list(follow_under_all(frames, model, variants, 320, 180))
-    assert [frame.index for frame, _ in together] == list(range(FRAMES))
-    alone = [
-        [result.tracks for result in follow(frames, model, each, 320, 180)] for each in variants
-    ]
-    assert [list(tracks) for tracks in zip(*alone, strict=True)] == [t for _, t in together]
-    assert len({str(each) for each in alone}) > 1, "the settings should differ in what they find"
+        frames, info = list(reader), reader.info
+    together = list(follow_under_all(frames, variants, model_path, info))
+    for results, frame in zip(together, frames, strict=True):
+        assert all(result.frame is frame for result in results)
+        assert all(result.source == info.path for result in results)
+    alone = [follow_alone(frames, each, model_path, info) for each in variants]
+    for each, others in zip(zip(*together, strict=True), alone, strict=True):
+        assert [result.tracks for result in each] == [result.tracks for result in others]
+        for one, other in zip(each, others, strict=True):
+            np.testing.assert_array_equal(one.detections.boxes, other.detections.boxes)
+            np.testing.assert_array_equal(one.detections.scores, other.detections.scores)
+    found = {str([result.tracks for result in each]) for each in alone}
+    assert len(found) > 1, "the settings should differ in what they find"
+
+
+def follow_alone(
+    frames: Sequence[Frame], settings: Settings, model_path: Path, info: VideoInfo
+) -> list[FrameResult]:
+    """Follow the vehicles under one of the settings, as a run of the pipeline does."""
+    images, frames_again = peek(frames)
+    model = load_detector(settings.detector, model_path)
+    detector = model.for_video(info.width, info.height, images)
+    return list(follow_frames(frames_again, detector, settings, info))
+
+
+@pytest.fixture
+def searched(monkeypatch: pytest.MonkeyPatch) -> list[int | None]:
+    """The numbers of the frames that are searched, one for each search."""
+    searched: list[int | None] = []
+    search = SvmDetector.search
+
+    def counted(self: SvmDetector, image: Image, index: int | None) -> Candidates:
+        searched.append(index)
+        return search(self, image, index)
+
+    monkeypatch.setattr(SvmDetector, "search", counted)
+    return searched
 
 
 def test_settings_that_search_alike_share_the_search(
-    clip_path: Path, model: LinearModel, monkeypatch: pytest.MonkeyPatch
+    clip_path: Path, model_path: Path, searched: list[int | None]
 ) -> None:
-    searched: list[int | None] = []
-
-    def search(self: FrameSearch, image: Image, turn: int | None = None) -> Windows:
-        searched.append(turn)
-        return whole(self, image, turn)
-
-    whole = FrameSearch.search
-    monkeypatch.setattr(FrameSearch, "search", search)
     variants = [
         settings(),
         settings("detector.heat.threshold=1"),
+        settings("tracker.history=2"),
         settings("detector.search.probability=0.9"),
     ]
     with VideoReader(clip_path, frames=3) as reader:
-        assert len(list(follow_under_all(reader, model, variants, 320, 180))) == 3
-    assert searched == [0, 0, 1, 1, 2, 2]
+        results = list(follow_under_all(reader, variants, model_path, reader.info))
+    assert [len(each) for each in results] == [4, 4, 4]
+    assert searched == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(
-    clip_path: Path, truth_path: Path, model: LinearModel
+    clip_path: Path, truth_path: Path, model_path: Path
 ) -> None:
     steps: list[int] = []
     clip = open_clip(clip_path, truth_path)
-    (found,) = detect(clip, model, [settings()], lambda _: steps.append)
+    (found,) = detect(clip, [settings()], model_path, lambda _: steps.append)
     assert found.frame_count == len(steps) == FRAMES
     assert found.rate == 25
 
 
-def test_until_ends_sooner(clip_path: Path, truth_path: Path, model: LinearModel) -> None:
+def test_until_ends_sooner(clip_path: Path, truth_path: Path, model_path: Path) -> None:
     clip = open_clip(clip_path, truth_path, until=4)
-    (run,) = evaluate_clips([clip], model, [Variant((), settings())])
+    (run,) = evaluate_clips([clip], model_path, [Variant((), settings())])
     assert max(frame.number for frame in run.clips[0].comparison.frames) == 4
 
 
 def test_truth_beyond_the_video_is_refused_with_its_line(
-    clip_path: Path, tmp_path: Path, model: LinearModel
+    clip_path: Path, tmp_path: Path, model_path: Path
 ) -> None:
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
-        detect(open_clip(clip_path, truth), model, [settings()], lambda _: lambda _: None)
+        detect(open_clip(clip_path, truth), [settings()], model_path, no_progress)
 
 
 def test_clips_are_pooled_under_each_setting(
-    clip_path: Path, truth_path: Path, model: LinearModel
+    clip_path: Path, truth_path: Path, model_path: Path
 ) -> None:
     clips = [open_clip(clip_path, truth_path, until=3), open_clip(clip_path, truth_path, until=2)]
-    variants = [Variant((f"heat.threshold={n}",), settings(f"heat.threshold={n}")) for n in (1, 2)]
-    runs = evaluate_clips(clips, model, variants)
-    assert [run.assignments for run in runs] == [
-        ("detector.heat.threshold=1",),
-        ("detector.heat.threshold=2",),
-    ]
+    swept = [f"detector.heat.threshold={threshold}" for threshold in (1, 2)]
+    variants = [Variant((assignment,), settings(assignment)) for assignment in swept]
+    runs = evaluate_clips(clips, model_path, variants)
+    assert [run.assignments for run in runs] == [(assignment,) for assignment in swept]
     for run in runs:
         boxes = [clip.scores.vehicle_boxes for clip in run.clips]
         assert run.total.vehicle_boxes == sum(boxes) > 0

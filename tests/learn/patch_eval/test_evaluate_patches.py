@@ -10,6 +10,7 @@ from vdet.config.schema import (
     HistogramSettings,
     HogSettings,
     Settings,
+    SvmSettings,
     TrainingSettings,
 )
 from vdet.learn.dataset import find_patches
@@ -20,7 +21,7 @@ from vdet.media.images import write_image
 FEATURES = FeatureSettings(
     patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
 )
-SETTINGS = Settings(features=FEATURES, training=TrainingSettings(C=1))
+SETTINGS = Settings(detector=SvmSettings(features=FEATURES), training=TrainingSettings(C=1))
 
 
 @pytest.fixture
@@ -53,7 +54,7 @@ def test_each_split_is_tested_in_the_order_given(bright_and_dark: Path) -> None:
     assert [trial.scores.accuracy for trial in report.trials] == [1, 1]
 
 
-def test_mistakes_are_named_rightly_beside_a_broken_patch(bright_and_dark: Path) -> None:
+def test_mistakes_have_the_right_names_beside_a_broken_patch(bright_and_dark: Path) -> None:
     (bright_and_dark / "non-vehicles" / "a" / "3.png").write_bytes(b"broken")
     light = np.full((16, 16, 3), 180, np.uint8)
     write_image(bright_and_dark / "non-vehicles" / "b" / "7.png", light)
@@ -74,7 +75,7 @@ def test_mistakes_are_named_rightly_beside_a_broken_patch(bright_and_dark: Path)
         ("", "does not say what it was trained on"),
     ],
 )
-def test_says_what_the_model_was_trained_on(
+def test_the_report_tells_what_the_model_was_trained_on(
     bright_and_dark: Path, digest: str | None, words: str
 ) -> None:
     files = find_patches([bright_and_dark])

@@ -2,8 +2,8 @@ import json
 
 import numpy as np
 
-from vdet.learn.patch_eval.results import GroupScores, PatchReport, TrialReport
-from vdet.learn.patch_eval.summary import patch_scores
+from vdet.learn.patch_eval.evaluate import GroupScores, PatchReport, TrialReport
+from vdet.learn.patch_eval.metrics import patch_scores
 from vdet.learn.patch_eval.text import lines, plain
 
 

@@ -8,6 +8,7 @@ from vdet.config.schema import (
     HistogramSettings,
     HogSettings,
     Settings,
+    SvmSettings,
     TrainingSettings,
 )
 from vdet.errors import DataError
@@ -18,7 +19,7 @@ from vdet.learn.patch_eval.trials import holdouts, model_trial, run_trial
 FEATURES = FeatureSettings(
     patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
 )
-SETTINGS = Settings(features=FEATURES, training=TrainingSettings(C=1))
+SETTINGS = Settings(detector=SvmSettings(features=FEATURES), training=TrainingSettings(C=1))
 
 
 def data(groups: dict[str, int]) -> LabelledVectors:
@@ -40,7 +41,7 @@ def test_each_group_is_held_out_in_turn() -> None:
     assert (np.sum(parts, axis=0) == 1).all()
 
 
-def test_the_only_group_of_a_class_stays(caplog: pytest.LogCaptureFixture) -> None:
+def test_the_only_group_of_a_class_is_not_held_out(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.WARNING, logger="vdet"):
         parts = holdouts(
             data({"non-vehicles/a": 9, "vehicles/a": 5, "vehicles/b": 7}), SETTINGS, "groups"
@@ -60,7 +61,7 @@ def test_tail_takes_the_last_of_each_group() -> None:
     assert held == [*range(16, 20), *range(28, 30), *range(42, 45), *range(61, 65)]
 
 
-def test_every_patch_of_the_split_by_group_is_predicted_once_by_a_model_without_it() -> None:
+def test_each_patch_is_predicted_once_by_a_model_fitted_without_its_group() -> None:
     patches = data(FOUR)
     parts = holdouts(patches, SETTINGS, "groups")
     steps: list[int] = []
@@ -69,7 +70,7 @@ def test_every_patch_of_the_split_by_group_is_predicted_once_by_a_model_without_
     assert (trial.fits, steps) == (4, [1, 1, 1, 1])
     held = parts[0]
     model = fit(
-        patches.vectors[~held], patches.vehicle[~held], SETTINGS.features, SETTINGS.training
+        patches.vectors[~held], patches.vehicle[~held], SETTINGS.svm.features, SETTINGS.training
     )
     expected = model.probabilities(patches.vectors[held])
     assert trial.probabilities[:20] == pytest.approx(expected.astype(float))

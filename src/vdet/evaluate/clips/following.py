@@ -1,15 +1,14 @@
 """Vehicles followed through the same frames under several settings at once.
 
-The search takes nearly all the time, so settings with the same detector share it: every frame is
-searched once for them, and only the tracker runs for each.
+The search takes nearly all the time, so settings that search alike share it: every frame is
+searched once for them, and only what follows the search runs for each.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from vdet.config.schema import DetectorSettings, Settings
+from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
-from vdet.detect.protocol import VideoDetector
 from vdet.media import Frame, VideoInfo
 from vdet.pipeline.loop import peek
 from vdet.pipeline.result import FrameResult
@@ -37,22 +36,21 @@ def follow_under_all(
     """
     images, frames = peek(frames)
     size = video.width, video.height
-    detectors: dict[DetectorSettings, VideoDetector] = {}
-    for settings in variants:
-        if settings.detector not in detectors:
-            loaded = load_detector(settings.detector, model)
-            detectors[settings.detector] = loaded.for_video(*size, images)
+    detectors = [
+        load_detector(settings.detector, model).for_video(*size, images) for settings in variants
+    ]
     trackers = [make_tracker(settings, *size) for settings in variants]
+    keys = [settings.detector.search_key for settings in variants]
+    searchers = dict(zip(keys, detectors, strict=True))
     with single_threaded_libraries():
         for frame in frames:
-            found = {
-                key: detector.detect(detector.search(frame.image, frame.index))
-                for key, detector in detectors.items()
+            candidates = {
+                key: searcher.search(frame.image, frame.index)
+                for key, searcher in searchers.items()
             }
             results = []
-            for settings, tracker in zip(variants, trackers, strict=True):
-                detections = found[settings.detector]
+            for key, detector, tracker in zip(keys, detectors, trackers, strict=True):
+                detections = detector.detect(candidates[key])
                 tracks = tuple(tracker.update(detections, float(frame.time), frame.image))
-                detector = detectors[settings.detector]
                 results.append(FrameResult(video.path, frame, detections, tracks, None, detector))
             yield results

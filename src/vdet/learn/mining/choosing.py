@@ -11,21 +11,22 @@ from vdet.config.schema import MiningSettings
 from vdet.detect.detections import Detections
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.geometry import Box, coverage
+from vdet.geometry import BoolArray, Box, coverage
 from vdet.learn.dataset import Sides
-from vdet.learn.mining.placing import Flags, Placing, place
+from vdet.learn.mining.placing import Placing, place
 
 Kind = Literal["vehicle", "box", "false alarm", "part"]
-"""A window that fits a vehicle, one that shows it ill placed, one taken for a vehicle where there
-is none, one taken for a vehicle where there is a part of one."""
+"""`vehicle`: the window fits a vehicle. `box`: it shows one off its centre or of another size.
+`false alarm`: it is taken for a vehicle, but there is none. `part`: it is taken for a vehicle, but
+shows only a part of one."""
 
 _MOST_COVERED = 0.3
-"""Share of a false alarm that a vehicle or an ignore region may cover."""
+"""Largest share of a false alarm that a vehicle or an ignore region may cover."""
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A window that becomes a patch; `sides` tell where in it the vehicle is."""
+    """A window that becomes a patch, and the sides of the vehicle in it."""
 
     kind: Kind
     box: Box
@@ -39,7 +40,7 @@ def choose(
     settings: MiningSettings,
     rng: np.random.Generator,
 ) -> Iterator[Choice]:
-    """Choose from the windows of a frame, as many of each kind as the settings allow.
+    """Choose from the windows of a frame, of each kind as many as the settings allow.
 
     Parameters
     ----------
@@ -92,15 +93,15 @@ def scored_windows(
 
 
 def _owners(placings: list[Placing], count: int) -> npt.NDArray[np.intp]:
-    """Return the number of the vehicle that each window is nearest to, -1 where it is near none."""
+    """Return the number of the vehicle nearest to each window, -1 if none is near."""
     distances = np.full((len(placings) + 1, count), np.inf)
     for number, placing in enumerate(placings, start=1):
         distances[number, placing.near] = placing.distances[placing.near]
     return np.asarray(distances.argmin(axis=0) - 1)
 
 
-def _some(flags: Flags, most: int, rng: np.random.Generator) -> list[int]:
-    """Return at most so many of the flagged rows, in order."""
+def _some(flags: BoolArray, most: int, rng: np.random.Generator) -> list[int]:
+    """Return at most `most` of the flagged rows, at random, in order."""
     (rows,) = np.nonzero(flags)
     return sorted(rng.permutation(rows)[:most].tolist())
 

@@ -1,4 +1,4 @@
-"""Through a labelled video, frame by frame, to a zip file of patches."""
+"""From a labelled video, frame by frame, to a zip file of patches."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, ImageError, TruthError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.truth import read_truth
-from vdet.learn.mining.archive import PatchArchive, patch_archive
+from vdet.learn.dataset import PatchArchive, patch_archive
 from vdet.learn.mining.choosing import Choice, Kind, choose, scored_windows
 from vdet.learn.mining.placing import cut_sides
 from vdet.media import Frame, VideoInfo, VideoReader
@@ -38,10 +38,10 @@ _FOLDERS: dict[Kind, str] = {
 
 @dataclass(frozen=True, slots=True)
 class MiningJob:
-    """What to mine, and the zip file to make of it.
+    """The video to mine, its truth, and the zip file to write.
 
-    Every n-th frame is looked at, and every one that cuts a vehicle off, from the `first` (counted
-    from 1) to the `last`; None: to the last that the truth knows of.
+    The frames `first` to `last` are used, counted from 1: one in `every`, and all that cut a
+    vehicle off. If `last` is None, the last frame is that of the truth.
     """
 
     video: Path
@@ -54,7 +54,7 @@ class MiningJob:
 
 @dataclass(frozen=True, slots=True)
 class Mined:
-    """How many frames were looked at, and how many patches of each kind they gave."""
+    """Number of frames searched, and of patches of each kind."""
 
     frames: int
     vehicles: int
@@ -70,7 +70,7 @@ def mine(
     *,
     progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
 ) -> Mined:
-    """Search the labelled frames, and write what is to be learnt from them.
+    """Search the labelled frames and write patches for the training.
 
     Patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
     `non-vehicles/`, those of parts in `non-vehicles/mined_video_parts/`; frame and window are in
@@ -79,7 +79,7 @@ def mine(
     Parameters
     ----------
     model
-        Model file of the detector whose false alarms are looked for; None for the shipped one.
+        Model file of the detector whose false alarms are searched for; None for the shipped one.
     progress
         Called with the number of frames to read; what it returns is called with the number of
         frames read since the last call.
@@ -87,7 +87,7 @@ def mine(
     Raises
     ------
     TruthError
-        The truth cannot be used, or knows nothing of these frames.
+        The truth cannot be used, or has nothing about these frames.
     VideoError
         The video cannot be read or searched.
     DataError
@@ -100,9 +100,9 @@ def mine(
     last = min(job.last or truth.last_frame, truth.last_frame)
     if last < job.first:
         raise TruthError(
-            f"{job.truth}: knows of the frames up to {truth.last_frame}; mine some of these"
+            f"{job.truth}: covers the frames up to {truth.last_frame}; mine some of these"
         )
-    looked, number = 0, 0
+    searched, number = 0, 0
     counts: Counter[Kind] = Counter()
     with VideoReader(job.video, frames=last) as reader, patch_archive(job.output) as archive:
         advance = progress(last)
@@ -112,19 +112,20 @@ def mine(
             number = frame.index + 1
             labelled = truth.frame(number)
             regular = (number - job.first) % job.every == 0
-            if number >= job.first and (regular or _comes_in(labelled, reader.info.width)):
-                looked += 1
+            wanted = regular or _cuts_off_a_vehicle(labelled, reader.info.width)
+            if wanted and number >= job.first:
+                searched += 1
                 choices = _choices(windows_of(frame.image), labelled, frame, settings)
                 _add(archive, frame, choices, job.video.stem)
                 counts.update(choice.kind for choice in choices)
             advance(1)
         if number < last:
-            read_truth(job.truth, frame_count=number)  # refuses it, and names the line
+            read_truth(job.truth, frame_count=number)  # raises an error with the line
         if not counts:
             raise DataError(
                 f"{job.video}: no window fits a vehicle or is a false alarm; try others"
             )
-    return Mined(looked, counts["vehicle"], counts["box"], counts["false alarm"], counts["part"])
+    return Mined(searched, counts["vehicle"], counts["box"], counts["false alarm"], counts["part"])
 
 
 def _search(
@@ -133,7 +134,7 @@ def _search(
     info: VideoInfo,
     images: Sequence[Image],
 ) -> Callable[[Image], Windows]:
-    """Return what gives the windows of a frame, with the probability of each.
+    """Return a function that returns the windows of a frame with their probabilities.
 
     Those of the linear model are its own. For another detector they are laid as the linear model's
     settings say, and a window has the score of the detection that it fits.
@@ -157,15 +158,15 @@ def _search(
     return search
 
 
-def _comes_in(truth: LabelledVideo, width: int) -> bool:
-    """Tell whether the frame's side cuts a vehicle off: that is seldom, and hard to learn."""
+def _cuts_off_a_vehicle(truth: LabelledVideo, width: int) -> bool:
+    """Return whether a side of the frame cuts a vehicle off, which is rare and hard to learn."""
     return any(cut_sides(box, width).any() for box in truth.boxes[~truth.ignored])
 
 
 def _choices(
     windows: Windows, truth: LabelledVideo, frame: Frame, settings: Settings
 ) -> list[Choice]:
-    """Choose by chance that depends on the frame alone, whichever others are looked at."""
+    """Choose at random, with a seed that depends on the frame alone."""
     rng = np.random.default_rng((settings.training.seed, frame.index))
     return list(choose(windows, truth, frame.image.shape[1], settings.mining, rng))
 

@@ -1,7 +1,6 @@
-"""How well the classifier tells patches of vehicles from others."""
+"""How well the classifier separates patches of vehicles from others."""
 
-from vdet.learn.patch_eval.evaluate import evaluate_model, evaluate_splits
-from vdet.learn.patch_eval.results import PatchReport
-from vdet.learn.patch_eval.trials import SPLITS, SplitName
+from vdet.learn.patch_eval.evaluate import PatchReport, evaluate_model, evaluate_splits
+from vdet.learn.patch_eval.trials import SPLITS
 
-__all__ = ["SPLITS", "PatchReport", "SplitName", "evaluate_model", "evaluate_splits"]
+__all__ = ["SPLITS", "PatchReport", "evaluate_model", "evaluate_splits"]

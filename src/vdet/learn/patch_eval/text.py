@@ -1,12 +1,12 @@
-"""A report on patches as lines of text, and as plain JSON values."""
+"""A report on patches as lines of text, and as values for JSON."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
 from vdet.evaluate.output import ABSENT, share, table
-from vdet.learn.patch_eval.measures import MEASURES
-from vdet.learn.patch_eval.results import PatchReport, PatchScores
+from vdet.learn.patch_eval.evaluate import PatchReport
+from vdet.learn.patch_eval.metrics import METRICS, PatchScores
 
 NAMES = {
     "accuracy": "accuracy",
@@ -18,16 +18,16 @@ NAMES = {
     "log_loss": "log loss",
     "calibration_error": "calibration error",
 }
-"""The measures as people call them."""
+"""The metrics by their usual names."""
 
 
 def lines(report: PatchReport) -> Iterator[str]:
-    """Give the report as lines: all tests side by side, then each one's groups."""
+    """Yield the report as lines: all tests side by side, their groups, the confusion of each."""
     broken = f" ({report.broken} broken ones skipped)" if report.broken else ""
     yield f"patches: {report.vehicles} vehicles, {report.non_vehicles} non-vehicles{broken}"
     yield ""
     headings = ["95 % intervals in brackets", *(trial.name for trial in report.trials)]
-    yield from table(headings, measure_rows(report))
+    yield from table(headings, metric_rows(report))
     yield ""
     headings = ["accuracy by group", *(trial.name for trial in report.trials)]
     yield from table(headings, group_rows(report))
@@ -37,12 +37,12 @@ def lines(report: PatchReport) -> Iterator[str]:
         yield from confusion_table(trial.scores)
 
 
-def measure_rows(report: PatchReport) -> list[list[str]]:
-    """Return a row of text for each measure: its name, then its value in each test."""
+def metric_rows(report: PatchReport) -> list[list[str]]:
+    """Return a row of text for each metric: its name, then its value in each test."""
     counts = ["patches tested", *(str(trial.scores.patches) for trial in report.trials)]
     rows = [
         [NAMES[name], *(_with_interval(trial.scores, name) for trial in report.trials)]
-        for name in MEASURES
+        for name in METRICS
     ]
     return [counts, *rows]
 
@@ -68,7 +68,7 @@ def group_rows(report: PatchReport) -> list[list[str]]:
 
 
 def plain(report: PatchReport) -> dict[str, Any]:
-    """Return the report as values that JSON knows, without the curves' points."""
+    """Return the report as values for JSON, without the points of the curves."""
     values = asdict(report)
     for trial, source in zip(values["trials"], report.trials, strict=True):
         del trial["curves"]

@@ -1,4 +1,4 @@
-"""Which patches are held out from which fit, and what was said of them."""
+"""Trials: models fitted without some patches, or a ready model, and what they predict."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -8,27 +8,25 @@ from typing import Literal, get_args
 import numpy as np
 
 from vdet.config.schema import Settings
-from vdet.detect.svm.features import Vectors
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.geometry import Float64Array, Int64Array
+from vdet.geometry import BoolArray, Float64Array, Int64Array
 from vdet.learn.extraction import LabelledVectors
 from vdet.learn.fitting import fit
-from vdet.learn.splits import Held, hold_out
-from vdet.learn.training_set import lesson_of
+from vdet.learn.training_set import hold_out, training_set
 
 log = logging.getLogger("vdet")
 
-SplitName = Literal["random", "tail", "groups"]
-SPLITS: tuple[SplitName, ...] = get_args(SplitName)
+TrialSplit = Literal["random", "tail", "groups"]
+SPLITS: tuple[TrialSplit, ...] = get_args(TrialSplit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """The patches of a test, and the probabilities that they were given.
+    """The patches of a test and their probabilities.
 
     `rows` is int64 `(n,)`: rows of the data; `probabilities` is float64 `(n,)`. `fits` is the
-    number of models that gave them, 0 where a ready one did.
+    number of models that were fitted for it, 0 for a ready model.
     """
 
     name: str
@@ -37,11 +35,11 @@ class Trial:
     fits: int
 
 
-def holdouts(data: LabelledVectors, settings: Settings, split: SplitName) -> list[Held]:
-    """Return the test parts of a split, one a fit.
+def holdouts(data: LabelledVectors, settings: Settings, split: TrialSplit) -> list[BoolArray]:
+    """Return the test parts of a split, bool `(n,)`, one for each model to fit.
 
-    `random` and `tail` have one part, `groups` has one for each group; a group without which its
-    class would be empty is never held out (a warning tells so).
+    `random` and `tail` have one part, `groups` has one for each group. A group without which its
+    class would be empty is never held out, with a warning.
 
     Raises
     ------
@@ -49,7 +47,7 @@ def holdouts(data: LabelledVectors, settings: Settings, split: SplitName) -> lis
         Nothing can be held out.
     """
     if split == "groups":
-        parts = [data.groups == group for group in _spare_groups(data)]
+        parts = _group_holdouts(data)
     else:
         training = settings.training
         parts = [hold_out(data.groups, split, training.test_fraction, training.seed)]
@@ -58,42 +56,45 @@ def holdouts(data: LabelledVectors, settings: Settings, split: SplitName) -> lis
     return parts
 
 
-def _spare_groups(data: LabelledVectors) -> list[str]:
-    spare = []
-    for group in np.unique(data.groups).tolist():
-        of_class = data.vehicle == data.vehicle[data.groups == group][0]
-        if (data.groups[of_class] == group).all():
-            log.warning("%s: is the only group of its class; it is not held out", group)
-        else:
-            spare.append(group)
-    return spare
+def _group_holdouts(data: LabelledVectors) -> list[BoolArray]:
+    from sklearn.model_selection import LeaveOneGroupOut
+
+    parts = []
+    if len(np.unique(data.groups)) > 1:
+        for kept, tested in LeaveOneGroupOut().split(data.groups, groups=data.groups):
+            if len(np.unique(data.vehicle[kept])) == 2:
+                parts.append(np.isin(np.arange(len(data.groups)), tested))
+            else:
+                group = data.groups[tested[0]]
+                log.warning("%s: is the only group of its class; it is not held out", group)
+    return parts
 
 
 def run_trial(
-    name: SplitName,
+    name: TrialSplit,
     data: LabelledVectors,
     settings: Settings,
-    parts: Sequence[Held],
+    parts: Sequence[BoolArray],
     progress: Callable[[int], object],
 ) -> Trial:
-    """Fit once for each part, on everything else, and predict that part. Raises `DataError`."""
+    """Fit for each part on all other patches, and predict the part. Raises `DataError`."""
     rows, probabilities = [], []
     for held in parts:
-        lesson = lesson_of(data, ~held)
+        samples = training_set(data, ~held)
         model = fit(
-            lesson.vectors, lesson.vehicle, settings.svm.features, settings.training, lesson.origins
+            samples.vectors,
+            samples.vehicle,
+            settings.svm.features,
+            settings.training,
+            samples.origins,
         )
         rows.append(np.flatnonzero(held))
-        probabilities.append(_probabilities(model, data.vectors[held]))
+        probabilities.append(model.probabilities(data.vectors[held]).astype(np.float64))
         progress(1)
     return Trial(name, np.concatenate(rows), np.concatenate(probabilities), len(parts))
 
 
 def model_trial(data: LabelledVectors, model: LinearModel) -> Trial:
-    """Predict every patch by a ready model."""
-    rows = np.arange(len(data.vehicle))
-    return Trial("model", rows, _probabilities(model, data.vectors), 0)
-
-
-def _probabilities(model: LinearModel, vectors: Vectors) -> Float64Array:
-    return model.probabilities(vectors).astype(np.float64)
+    """Predict every patch with a ready model."""
+    probabilities = model.probabilities(data.vectors).astype(np.float64)
+    return Trial("model", np.arange(len(data.vehicle)), probabilities, 0)

@@ -12,7 +12,7 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import Float64Array
 from vdet.track.motion.state import MotionState, measure
 
-LONGEST_LOOK = 0.08
+LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
 
 SCORE_TIME = 0.5

@@ -1,0 +1,130 @@
+"""The dense engine compared with the patch engine, with models fitted to generated patches."""
+
+import functools
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from vdet.config.schema import FeatureSettings, HogSettings, WindowSettings
+from vdet.detect.svm.dense_search import dense_search
+from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.model import BoxRegression, LinearModel
+from vdet.detect.svm.patch_search import PatchSearch
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.windows import WindowGrid, lay_grid
+from vdet.geometry import Float32Array
+from vdet.media.images import Image
+from vdet.synthetic import background_patches, demo_scene, render, vehicle_patches
+
+Exact = npt.NDArray[np.float64]
+
+SEED_FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
+_EACH = 120  # patches of a class
+
+
+@dataclass(frozen=True, slots=True)
+class EngineResults:
+    """The log-odds of the same windows from the dense engine and from the patch engine."""
+
+    dense: Float32Array
+    patch: Float32Array
+
+    @property
+    def correlation(self) -> float:
+        return float(np.corrcoef(self.dense, self.patch)[0, 1])
+
+    @property
+    def same(self) -> float:
+        """The share of windows that both engines put on the same side of probability 0.5."""
+        return float(np.mean((self.dense >= 0) == (self.patch >= 0)))
+
+
+def compare(model: LinearModel, grids: list[WindowGrid], image: Image) -> EngineResults:
+    """Search a frame with both engines."""
+    frame = pyramid(image, grids)
+    dense = [dense_search(model, grid).search(frame).probabilities for grid in grids]
+    patch = [PatchSearch(model, grid).search(frame).probabilities for grid in grids]
+    return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
+
+
+def pyramid(image: Image, grids: list[WindowGrid]) -> FramePyramid:
+    """Return a frame with a margin for windows beyond its sides, whole pixels at all levels."""
+    return FramePyramid(image, margin=-16 * min(0, *(int(grid.left // 16) for grid in grids)))
+
+
+def log_odds(probabilities: Float32Array) -> Float32Array:
+    # Nearer to 0 or 1 than a millionth, probabilities differ by rounding only.
+    bounded = np.clip(probabilities.astype(np.float64), 1e-6, 1 - 1e-6)
+    return np.asarray(np.log(bounded / (1 - bounded)), np.float32)
+
+
+def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
+    """Fit a model by ridge regression, each member on other patches."""
+    patches, labels = _patches()
+    extractor = FeatureExtractor(features)
+    vectors = extractor.describe_all(to_patch(patch, features.patch) for patch in patches)
+    parts = [np.arange(len(labels)) % (members + 1) != i for i in range(members)]
+    fits = [_ridge(vectors[part].astype(np.float64), labels[part]) for part in parts]
+    weights, biases = (np.array(each, np.float32) for each in zip(*fits, strict=True))
+    slopes = np.full(members, -4, np.float32)
+    return LinearModel(features, weights, biases, slopes, np.zeros(members, np.float32))
+
+
+def with_boxes(model: LinearModel) -> LinearModel:
+    """Add a box regression to a model, fitted to crops of vehicle patches."""
+    rng = np.random.default_rng(2)
+    patches = _patches()[0][:_EACH] * 2
+    zooms = rng.uniform(0.6, 1, len(patches))
+    crops = [_crop(*each, rng) for each in zip(patches, zooms, strict=True)]
+    extractor = FeatureExtractor(model.features)
+    vectors = extractor.describe_all(to_patch(crop, model.features.patch) for crop, _ in crops)
+    hogs = vectors[:, : extractor.layout.hog_length].astype(np.float64)
+    targets = np.array([sides for _, sides in crops])
+    weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
+    biases = biases + targets.mean(axis=0)
+    boxes = BoxRegression(weights.T.astype(np.float32), biases.astype(np.float32))
+    return replace(model, boxes=boxes)
+
+
+def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, list[float]]:
+    """Crop a vehicle patch at random; return the crop and the patch's sides from its middle."""
+    whole = len(patch)
+    side = round(zoom * whole)
+    x, y = rng.integers(0, whole - side + 1, 2).tolist()
+    sides = [(0 - x) / side, (0 - y) / side, (whole - x) / side, (whole - y) / side]
+    return patch[y : y + side, x : x + side], [each - 0.5 for each in sides]
+
+
+def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:
+    """Return weights `(n,)` or `(n, m)` and biases for targets `(k,)` or `(k, m)` of mean 0."""
+    mean, deviation = vectors.mean(axis=0), vectors.std(axis=0) + 1e-3
+    scaled = (vectors - mean) / deviation
+    kernel = scaled @ scaled.T / scaled.shape[1] + np.eye(len(targets))
+    weights = scaled.T @ np.linalg.solve(kernel, targets) / scaled.shape[1]
+    weights = (weights.T / deviation).T
+    return weights, -mean @ weights
+
+
+@functools.cache
+def _patches() -> tuple[list[Image], Float32Array]:
+    rng = np.random.default_rng(1)
+    patches = [*vehicle_patches(_EACH, rng), *background_patches(_EACH, rng)]
+    return patches, np.repeat(np.array([1, -1], np.float32), _EACH)
+
+
+@functools.cache
+def road(width: int = 1280, height: int = 720) -> Image:
+    """Return a frame of the demo's clip: cars of a 17th, an 11th and an 8th of its width."""
+    return render(demo_scene(1, width=width, height=height), 200)
+
+
+def cars() -> Image:
+    """Return the part of `road` where its cars are, 440 × 200 pixels."""
+    return road()[360:560, 560:1000]
+
+
+def grid_of(size: int, *, overlap: float | None = None, step: int | None = None) -> WindowGrid:
+    """Lay windows of 48 to 128 pixels over `cars`; a patch has eight cells."""
+    settings = WindowSettings(size=size, overlap=overlap, step=step, top=8, bottom=size + 52)
+    return lay_grid(settings, 440, 200)

@@ -1,0 +1,272 @@
+"""The dense and the patch engine give nearly the same results for the same windows."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+
+from detect.svm.engine_comparison import (
+    SEED_FEATURES,
+    EngineResults,
+    cars,
+    compare,
+    fitted,
+    grid_of,
+    log_odds,
+    road,
+    with_boxes,
+)
+from seed import SEED
+from vdet.config.schema import (
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    SearchSettings,
+    SvmSettings,
+)
+from vdet.detect.svm.dense_search import (
+    AlignedSearch,
+    LocatedSearch,
+    PhasedSearch,
+    dense_search,
+)
+from vdet.detect.svm.features import FeatureExtractor, Layout, to_patch
+from vdet.detect.svm.horizon import find_horizon
+from vdet.detect.svm.kind import shipped_model
+from vdet.detect.svm.model import BoxRegression, LinearModel, load_model
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.detect.svm.strips import Strip, describe_blocks
+from vdet.detect.svm.windows import WindowGrid, Windows, join_windows
+from vdet.geometry import iou_matrix
+from vdet.media.images import Image
+
+SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
+GRIDS = {
+    "a cell": (AlignedSearch, grid_of(64, step=1)),
+    "two cells": (AlignedSearch, grid_of(96, step=2)),
+    "three cells": (AlignedSearch, grid_of(64, step=3)),
+    "one and a half": (PhasedSearch, grid_of(64, overlap=0.8)),
+    "half pixels": (LocatedSearch, grid_of(128, overlap=0.8)),
+    "third pixels": (LocatedSearch, grid_of(96, overlap=0.8)),
+    "enlarged": (PhasedSearch, grid_of(48, overlap=0.8)),
+    "enlarged, third pixels": (LocatedSearch, grid_of(48, overlap=0.85)),
+}
+FEATURES = {
+    "no histogram": FeatureSettings(histogram=HistogramSettings(bins=0)),
+    "fine histogram": FeatureSettings(histogram=HistogramSettings(bins=256)),
+    "luma only": FeatureSettings(hog=HogSettings(channels=(0,))),
+    "other order": FeatureSettings(hog=HogSettings(channels=(2, 0))),
+    "12 orientations": FeatureSettings(hog=HogSettings(orientations=12)),
+    "large blocks": FeatureSettings(hog=HogSettings(block=3)),
+    "single cells": FeatureSettings(hog=HogSettings(block=1)),
+    "patch of 48": FeatureSettings(patch=48, hog=HogSettings(cell=6)),
+    "HSV": FeatureSettings(color_space="HSV"),
+    "LUV": FeatureSettings(color_space="LUV"),
+    "HLS": FeatureSettings(color_space="HLS"),
+    "YUV": FeatureSettings(color_space="YUV"),
+    "RGB": FeatureSettings(color_space="RGB"),
+}
+
+
+STEPS = {AlignedSearch: 12, PhasedSearch: 18, LocatedSearch: 19}
+"""Of windows of 96 pixels."""
+HORIZON = 0.57
+"""Of the drawn road."""
+
+PROBABILITY = 0.5
+"""Of a detection; only these are asked where their vehicle is."""
+
+FEW = 0.92
+"""Decisions of so small a grid that one or two near 0.5 are a few percent."""
+
+
+def assert_agree(results: EngineResults, correlation: float = 0.99, same: float = 0.99) -> None:
+    assert (results.patch > 0).any(), "nothing is found: decisions cannot differ"
+    assert results.correlation >= correlation
+    assert results.same >= same
+
+
+@pytest.mark.parametrize(("name", "members"), [("seed", 3), ("default", 1), ("default", 3)])
+def test_the_engines_agree_on_a_drawn_road(name: str, members: int) -> None:
+    model = fitted(SHIPPED[name].features, members)
+    grids = lay_grids(SHIPPED[name], model.features, 1280, 720, horizon=HORIZON)
+    assert_agree(compare(model, grids, road()))
+
+
+@pytest.mark.parametrize("kind", GRIDS)
+def test_they_agree_whatever_the_step(kind: str) -> None:
+    search, grid = GRIDS[kind]
+    model = fitted(SEED_FEATURES, members=2)
+    assert type(dense_search(model, grid)) is search
+    assert_agree(compare(model, [grid], cars()), same=FEW)
+
+
+@pytest.mark.parametrize("name", FEATURES)
+def test_they_agree_whatever_the_features(name: str) -> None:
+    grids = [grid_of(96, step=1), grid_of(96, overlap=0.7)]
+    model = fitted(FEATURES[name])
+    assert {type(dense_search(model, grid)) for grid in grids} == {AlignedSearch, LocatedSearch}
+    assert_agree(compare(model, grids, cars()), same=FEW)
+
+
+def _a_car_cut_off(side: str) -> Image:
+    """Give the nearest of the drawn cars cut off by a side of the frame."""
+    return cars()[:, 280:440] if side == "left" else cars()[:, 160:320]
+
+
+def _right_of_the_middle(grids: list[WindowGrid]) -> list[WindowGrid]:
+    return [grid.every_nth(1, grid.columns * 2 // 5, 0) for grid in grids]  # the cars are there
+
+
+@pytest.mark.parametrize(("width", "height"), [(640, 360), (960, 540), (1920, 1080), (1277, 719)])
+def test_they_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
+    model = fitted(SEED_FEATURES)
+    grids = _right_of_the_middle(lay_grids(SEED.svm, model.features, width, height))
+    assert_agree(compare(model, grids, road(width, height)))
+
+
+@pytest.mark.parametrize(("width", "height"), [(853, 480), (960, 540), (1242, 375), (1920, 1080)])
+def test_the_default_sets_agree_in_frames_of_any_size(width: int, height: int) -> None:
+    # Their strips are halved as the windows would be, whatever the size of the frame.
+    model = fitted(FeatureSettings())
+    grids = lay_grids(SvmSettings(), model.features, width, height, horizon=HORIZON)
+    assert_agree(compare(model, grids, road(width, height)), correlation=0.999)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_they_agree_beyond_the_sides(side: str) -> None:
+    grids = [
+        WindowGrid(96, Fraction(step), Fraction(-48), Fraction(8), columns=160 // step + 1, rows=5)
+        for step in STEPS.values()
+    ]
+    model = fitted(FeatureSettings())
+    assert {type(dense_search(model, grid)) for grid in grids} == set(STEPS)
+    assert_agree(compare(model, grids, _a_car_cut_off(side)), same=FEW)
+
+
+@pytest.fixture(scope="module")
+def real_frames(real_data: Path) -> list[Image]:
+    """Give frames 250, 500 and 750 of the project video, those that can be sought."""
+    images = []
+    with av.open(real_data / "project_video.mp4") as container:
+        for second in (10, 20, 30):
+            container.seek(second * av.time_base)
+            frame = next(container.decode(video=0))
+            assert frame.time == second
+            images.append(np.asarray(frame.to_ndarray(format="bgr24"), np.uint8))
+    return images
+
+
+@pytest.mark.realdata
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image]) -> None:
+    settings = SHIPPED[name]
+    model = load_model(shipped_model(settings))
+    grids = lay_grids(settings, model.features, 1280, 720, horizon=find_horizon(real_frames))
+    results = [compare(model, grids, image) for image in real_frames]
+    dense = np.concatenate([result.dense for result in results])
+    patch = np.concatenate([result.patch for result in results])
+    assert_agree(EngineResults(dense, patch))
+
+
+def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -> Windows:
+    """Search a frame by one set of windows, that of the grid."""
+    search = SearchSettings.model_validate({"engine": engine, "probability": PROBABILITY})
+    settings = SvmSettings(search=search)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("vdet.detect.svm.search.lay_grids", lambda *_, **__: [grid])
+        height, width = image.shape[:2]
+        (windows,) = FrameSearch(model, settings, width, height).search(image)
+        return windows
+
+
+def _without_edges(model: LinearModel) -> LinearModel:
+    """Leave out of the regression the blocks at the edge of a patch, in which engines differ."""
+    assert model.boxes is not None
+    inner = np.zeros_like(model.boxes.weights)
+    for part in Layout.of(model.features).hog:
+        blocks = model.boxes.weights[:, part].reshape(4, 7, 7, -1).copy()
+        blocks[:, [0, -1]] = blocks[:, :, [0, -1]] = 0
+        inner[:, part] = blocks.reshape(4, -1)
+    return replace(model, boxes=BoxRegression(inner, model.boxes.biases))
+
+
+def _vehicles_by_both(model: LinearModel, kind: type) -> tuple[Windows, Windows]:
+    """Return those of the dense and of the patch engine, by a grid that reaches beyond."""
+    step = STEPS[kind]
+    left, columns = Fraction(-2 * step), (440 + 4 * step - 96) // step + 1
+    grid = WindowGrid(96, Fraction(step), left, Fraction(8), columns, rows=5)
+    assert type(dense_search(model, grid)) is kind
+    dense, patch = (_vehicles(model, grid, cars(), engine) for engine in ("dense", "patch"))
+    hits = [found.probabilities >= PROBABILITY for found in (dense, patch)]
+    assert (hits[0] & hits[1]).sum() > 5
+    same = hits[0] == hits[1]
+    assert same.mean() > FEW
+    return _only(dense, same), _only(patch, same)
+
+
+def _only(windows: Windows, keep: np.ndarray) -> Windows:
+    return Windows(
+        windows.boxes[keep],
+        windows.probabilities[keep],
+        windows.shares[keep],
+        windows.vehicles[keep],
+    )
+
+
+@pytest.mark.parametrize("kind", STEPS)
+def test_they_agree_on_the_vehicles_that_windows_show(kind: type) -> None:
+    dense, patch = _vehicles_by_both(with_boxes(fitted(FeatureSettings())), kind)
+    hits = patch.probabilities >= PROBABILITY
+    assert (patch.vehicles[hits] != patch.boxes[hits]).any(axis=1).all()
+    pair = (found.vehicles.astype(np.float64) for found in (dense, patch))
+    assert np.diag(iou_matrix(*pair)).min() > 0.9
+    for found in (dense, patch):
+        np.testing.assert_array_equal(found.vehicles[~hits], found.boxes[~hits])
+
+
+@pytest.mark.parametrize("kind", [AlignedSearch, PhasedSearch])
+def test_they_differ_about_vehicles_by_the_edges_of_patches_alone(kind: type) -> None:
+    dense, patch = _vehicles_by_both(_without_edges(with_boxes(fitted(FeatureSettings()))), kind)
+    np.testing.assert_allclose(dense.vehicles, patch.vehicles, atol=0.05)
+
+
+def _windows_of_blocks(model: LinearModel, grid: WindowGrid) -> tuple[np.ndarray, np.ndarray]:
+    """Return the blocks of each window, from its strip and from its patch, `(n, 7, 7, d)`."""
+    features, image = model.features, cars()
+    every = describe_blocks(Strip(grid, features).cut(FramePyramid(image)), features)
+    extractor, layout = FeatureExtractor(features), Layout.of(features)
+    by_strip, by_patch = [], []
+    for i, (x, y, w, h) in enumerate(grid.boxes.tolist()):
+        row, column = divmod(i, grid.columns)
+        by_strip.append(every[column : column + 7, row : row + 7])
+        vector = extractor.describe(to_patch(image[y : y + h, x : x + w], features.patch))
+        parts = [vector[part].reshape(7, 7, -1) for part in layout.hog]
+        by_patch.append(np.concatenate(parts, axis=-1))
+    return np.array(by_strip), np.array(by_patch)
+
+
+@pytest.mark.parametrize("size", [64, 128])
+@pytest.mark.parametrize("features", [SEED_FEATURES, FeatureSettings()], ids=["seed", "default"])
+def test_blocks_away_from_the_edge_of_a_patch_are_the_same(
+    features: FeatureSettings, size: int
+) -> None:
+    by_strip, by_patch = _windows_of_blocks(fitted(features), grid_of(size, step=1))
+    inner = np.s_[:, 1:-1, 1:-1]
+    np.testing.assert_allclose(by_strip[inner], by_patch[inner], atol=1e-4, rtol=0)
+    assert np.abs(by_patch).max() > 0.1
+
+
+def test_a_frame_is_searched_at_all_windows_of_all_sets_in_order() -> None:
+    model, image = fitted(FeatureSettings()), road()
+    search = FrameSearch(model, SvmSettings(), 1280, 720, horizon=HORIZON)
+    found = join_windows(search.search(image))
+    grids = lay_grids(SvmSettings(), model.features, 1280, 720, horizon=HORIZON)
+    assert list(search.grids) == grids
+    np.testing.assert_array_equal(found.boxes, np.concatenate([grid.boxes for grid in grids]))
+    one_by_one = compare(model, grids, image)
+    np.testing.assert_allclose(log_odds(found.probabilities), one_by_one.dense, atol=1e-3)

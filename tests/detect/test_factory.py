@@ -1,0 +1,149 @@
+"""Detectors by the name of their kind: those of vdet, and those that other packages register."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import dedent
+
+import numpy as np
+import pytest
+
+from vdet.config.detector import DetectorSettings
+from vdet.config.loading import load_settings
+from vdet.config.schema import FeatureSettings, Settings, SvmSettings
+from vdet.detect.factory import load_detector, model_file
+from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.kind import shipped_model
+from vdet.detect.svm.model import load_model
+from vdet.errors import ConfigError, ModelError
+
+OTHER = FeatureSettings(color_space="HSV")
+
+
+class TestLinearModel:
+    def test_the_default_detector_is_the_shipped_linear_model(self) -> None:
+        model = load_detector(Settings().detector)
+        assert isinstance(model, SvmModel)
+        shipped = model_file(Settings().detector)
+        assert shipped is not None
+        assert shipped.stem == "default"
+        assert load_model(shipped).features == FeatureSettings()
+
+    @pytest.mark.parametrize("name", ["default", "seed"])
+    def test_the_shipped_model_is_the_one_with_the_features_of_the_settings(
+        self, name: str
+    ) -> None:
+        models = Path(shipped_model(SvmSettings())).parent
+        features = load_model(models / f"{name}.npz").features
+        settings = SvmSettings(features=features)
+        assert model_file(settings) == models / f"{name}.npz"
+        assert isinstance(load_detector(settings), SvmModel)
+
+    def test_features_that_no_shipped_model_has_are_refused_with_advice(self) -> None:
+        settings = SvmSettings(features=OTHER)
+        for load in (load_detector, model_file):
+            with pytest.raises(ModelError, match=r"no shipped model .* give --model, or train one"):
+                load(settings)
+
+    def test_a_model_file_is_taken_instead_of_the_shipped_one(self) -> None:
+        seed = shipped_model(SvmSettings()).with_name("seed.npz")
+        assert model_file(SvmSettings(), seed) == seed
+        assert isinstance(load_detector(SvmSettings(), seed), SvmModel)
+
+    def test_a_model_brings_its_features_where_the_settings_leave_the_default(self) -> None:
+        seed = shipped_model(SvmSettings()).with_name("seed.npz")
+        image = np.zeros((720, 1280, 3), np.uint8)
+        detector = load_detector(SvmSettings(), seed).for_video(1280, 720, [image])
+        sheet = detector.stage_pictures(image, detector.detect(detector.search(image, None)))
+        assert sheet["patches"].size > 0
+
+    def test_features_asked_for_must_be_those_of_the_model(self) -> None:
+        default = shipped_model(SvmSettings())
+        with pytest.raises(ModelError, match="was trained with other features"):
+            load_detector(SvmSettings(features=OTHER), default)
+
+    def test_a_missing_model_file_is_named(self, tmp_path: Path) -> None:
+        with pytest.raises(ModelError, match=r"none\.npz: cannot be read"):
+            load_detector(SvmSettings(), tmp_path / "none.npz")
+
+
+def test_an_unknown_kind_is_refused_and_the_known_ones_are_named() -> None:
+    for load in (load_detector, model_file):
+        with pytest.raises(ConfigError, match=r"^sonar: is not known; known are svm"):
+            load(DetectorSettings(kind="sonar"))
+
+
+class TestAnotherPackage:
+    """A detector that another installed package registers as an entry point."""
+
+    MODULE = '''
+        from typing import Literal
+
+        from vdet.config.detector import DetectorSettings
+        from vdet.detect.detections import Detections
+        from vdet.detect.factory import DetectorKind
+
+
+        class CornerSettings(DetectorSettings):
+            """A box in the corner of every frame."""
+
+            kind: Literal["corner"] = "corner"
+            side: int = 10
+
+
+        class CornerDetector:
+            def __init__(self, settings, model):
+                self.settings, self.model = settings, model
+
+            def for_video(self, width, height, images):
+                return self
+
+            def search(self, image, index):
+                return None
+
+            def detect(self, candidates):
+                return Detections([[0, 0, self.settings.side, self.settings.side]], [1])
+
+            def stage_pictures(self, image, detections):
+                return {}
+
+
+        KIND = DetectorKind(CornerSettings, CornerDetector)
+    '''
+
+    @pytest.fixture(autouse=True)
+    def installed(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+        (tmp_path / "corner_detector.py").write_text(dedent(self.MODULE), "utf-8")
+        info = tmp_path / "corner_detector-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: corner-detector\nVersion: 1.0\n"
+        )
+        points = "[vdet.detectors]\ncorner = corner_detector:KIND\nbroken = corner_detector:NONE\n"
+        (info / "entry_points.txt").write_text(points)
+        monkeypatch.syspath_prepend(tmp_path)
+        yield
+        sys.modules.pop("corner_detector", None)
+
+    def test_is_found_by_the_name_of_its_kind(self) -> None:
+        settings = load_settings(None, ["detector={kind: corner, side: 20}"])
+        detector = load_detector(settings.detector).for_video(100, 80, [])
+        assert detector.detect(None).boxes.tolist() == [[0, 0, 20, 20]]
+        assert model_file(settings.detector) is None
+
+    def test_gets_the_model_file(self) -> None:
+        settings = load_settings(None, ["detector.kind=corner"])
+        path = Path("corner.bin")
+        loaded = load_detector(settings.detector, path)
+        assert vars(loaded)["model"] == path
+        assert model_file(settings.detector, path) == path
+
+    def test_is_named_among_the_known_ones(self) -> None:
+        with pytest.raises(ConfigError, match=r"known are svm, broken, corner$"):
+            load_detector(DetectorSettings(kind="sonar"))
+
+    def test_that_cannot_be_loaded_is_named(self) -> None:
+        with pytest.raises(
+            ConfigError, match=r"^broken: cannot be loaded from corner_detector:NONE"
+        ):
+            load_detector(DetectorSettings(kind="broken"))

@@ -1,0 +1,64 @@
+"""The list of boxes of still pictures."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.red_runs import result_of, write
+from red_cars import road
+from vdet.errors import OutputError
+from vdet.geometry import Box
+from vdet.pipeline.sinks.protocol import Output
+from vdet.track.track import Track
+
+ITEMS = (
+    {
+        "image": "a.png",
+        "width": 320,
+        "height": 240,
+        "boxes": [{"x": 1, "y": 2, "width": 3, "height": 4, "score": 0.5679}],
+    },
+    {"image": str(Path("in") / "b.png"), "width": 64, "height": 48, "boxes": []},
+)
+
+
+RESULTS = (
+    result_of(
+        Track(1, Box(1, 2, 3, 4), 0.567891, predicted=False),
+        source=Path("a.png"),
+        image=road(),
+    ),
+    result_of(source=Path("in") / "b.png", image=road()[:48, :64]),
+)
+
+
+def read(text: str) -> list[dict[str, Any]]:
+    items: list[dict[str, Any]] = json.loads(text)
+    return items
+
+
+def test_there_is_an_item_a_picture_with_a_list_of_boxes(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.json"
+    write(Output("json", path), RESULTS)
+    assert read(path.read_text(encoding="utf-8")) == list(ITEMS)
+
+
+def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    write(Output("json", Path("-")), RESULTS)
+    assert read(capsys.readouterr().out) == list(ITEMS)
+
+
+@pytest.mark.parametrize("name", ["boxes.json", "-"])
+def test_of_no_pictures_nothing_is_written(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(Output("json", Path("-") if name == "-" else tmp_path / name), [])
+    assert list(tmp_path.iterdir()) == []
+    assert capsys.readouterr().out == ""
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"boxes\.json: cannot be written"):
+        write(Output("json", tmp_path / "none" / "boxes.json"), RESULTS)

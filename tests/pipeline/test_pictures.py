@@ -1,0 +1,188 @@
+"""Still pictures: which are taken, where their results go, and what is found in them."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.red_runs import model_for
+from red_cars import CAR, PERSPECTIVE, SETTINGS, road
+from vdet.config.schema import Settings
+from vdet.errors import ImageError, OutputError
+from vdet.media.images import read_image, write_image
+from vdet.pipeline.pictures import (
+    PictureJob,
+    find_images,
+    plan_pictures,
+    run_picture,
+)
+from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import Output
+
+
+def touch(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+class TestFindingImages:
+    def test_files_stay_in_the_order_given(self, tmp_path: Path) -> None:
+        paths = [tmp_path / name for name in ("b.png", "a.jpg", "c.txt")]
+        touch(*paths)
+        assert find_images(paths) == paths
+
+    def test_a_folder_gives_its_pictures_by_name(self, tmp_path: Path) -> None:
+        touch(*(tmp_path / name for name in ("b.png", "a.JPG", "c.webp", "notes.txt")))
+        assert [path.name for path in find_images([tmp_path])] == ["a.JPG", "b.png", "c.webp"]
+
+    def test_folders_inside_a_folder_are_not_searched(self, tmp_path: Path) -> None:
+        touch(tmp_path / "a.png", tmp_path / "more" / "b.png")
+        assert find_images([tmp_path]) == [tmp_path / "a.png"]
+
+    def test_a_picture_that_is_named_twice_is_taken_once(self, tmp_path: Path) -> None:
+        touch(tmp_path / "a.png", tmp_path / "b.png")
+        found = find_images([tmp_path / "b.png", tmp_path, tmp_path / "a.png"])
+        assert [path.name for path in found] == ["b.png", "a.png"]
+
+    def test_a_folder_without_pictures_is_named(self, tmp_path: Path) -> None:
+        touch(tmp_path / "in" / "notes.txt")
+        with pytest.raises(ImageError, match=r"in: holds no pictures \(.*\.png"):
+            find_images([tmp_path / "in"])
+
+    def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
+        with pytest.raises(ImageError, match=r"none\.png: no such file or folder"):
+            find_images([tmp_path / "none.png"])
+
+
+class TestPlan:
+    def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
+        source, out = tmp_path / "a.png", tmp_path / "found.jpg"
+        expected = PictureJob(source, (Output("picture", out),))
+        assert plan_pictures([source], out, None, overwrite=False) == [expected]
+
+    def test_one_picture_goes_into_a_folder_that_is_named(self, tmp_path: Path) -> None:
+        out = tmp_path / "new" / "out"
+        (job,) = plan_pictures([tmp_path / "a.png"], out, None, overwrite=False)
+        assert job.outputs == (Output("picture", out / "a.png"),)
+        assert out.is_dir()
+
+    def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.jpg"]
+        jobs = plan_pictures(sources, tmp_path / "out", None, overwrite=False)
+        assert [job.outputs for job in jobs] == [
+            (Output("picture", tmp_path / "out" / source.name),) for source in sources
+        ]
+
+    def test_without_an_output_no_picture_is_written(self, tmp_path: Path) -> None:
+        (job,) = plan_pictures([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
+        assert [output.sink for output in job.outputs] == ["stages"]
+        assert [path.name for path in tmp_path.iterdir()] == ["stages"]
+
+    def test_stages_of_two_inputs_of_one_stem_are_refused(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "a.jpg"]
+        with pytest.raises(OutputError, match="wanted by two inputs"):
+            plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
+
+    def test_earlier_stages_are_kept(self, tmp_path: Path) -> None:
+        (tmp_path / "5-boxes.png").write_text("precious")
+        with pytest.raises(OutputError, match="--overwrite"):
+            plan_pictures([tmp_path / "a.png"], None, tmp_path, overwrite=False)
+
+    def test_stages_of_one_picture_go_into_the_folder_itself(self, tmp_path: Path) -> None:
+        (job,) = plan_pictures([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
+        assert job.outputs == (Output("stages", tmp_path / "stages"),)
+
+    def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        jobs = plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
+        assert [job.outputs for job in jobs] == [
+            (Output("stages", tmp_path / "stages" / name),) for name in "ab"
+        ]
+
+    def test_one_output_that_is_there_already_refuses_all(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        touch(tmp_path / "out" / "b.png")
+        with pytest.raises(OutputError, match=r"b\.png: is there already"):
+            plan_pictures(sources, tmp_path / "out", None, overwrite=False)
+        assert len(plan_pictures(sources, tmp_path / "out", None, overwrite=True)) == 2
+
+    def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
+        touch(tmp_path / "out")
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        with pytest.raises(OutputError, match="out: cannot be made a folder"):
+            plan_pictures(sources, tmp_path / "out", None, overwrite=True)
+
+    def test_the_folder_of_the_inputs_cannot_be_the_output(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        touch(*sources)
+        with pytest.raises(OutputError, match="is the input itself"):
+            plan_pictures(sources, tmp_path, None, overwrite=True)
+
+
+def run_red(source: Path, settings: Settings = SETTINGS, **paths: Path) -> FrameResult:
+    """Search a picture for red cars, and write outputs by the names of their sinks."""
+    wanted = tuple(Output(sink, path) for sink, path in paths.items())
+    return run_picture(PictureJob(source, wanted), model_for(settings), settings)
+
+
+class TestRun:
+    @pytest.fixture
+    def source(self, tmp_path: Path) -> Path:
+        path = tmp_path / "road.png"
+        write_image(path, road(CAR))
+        return path
+
+    @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
+    def test_gives_the_boxes_of_the_detection(self, source: Path, settings: Settings) -> None:
+        result = run_red(source, settings)
+        image = road(CAR)
+        detector = model_for(settings).for_video(image.shape[1], image.shape[0], [image])
+        detections = detector.detect(detector.search(image, None))
+        assert result.source == source
+        assert (result.frame.index, result.frame.time) == (0, Fraction(0))
+        np.testing.assert_array_equal(result.frame.image, image)
+        (track,) = result.tracks
+        assert [track.box] == detections.rounded
+        assert track.score == pytest.approx(detections.scores.tolist()[0])
+        assert (track.id, track.predicted) == (1, False)
+        assert track.box.iou(CAR) > 0.35
+        assert result.detections.strengths[0] > settings.svm.heat.threshold
+
+    def test_writes_nothing_that_is_not_asked_for(self, source: Path) -> None:
+        run_red(source)
+        assert [path.name for path in source.parent.iterdir()] == ["road.png"]
+
+    def test_draws_the_boxes_into_the_picture_only(self, source: Path) -> None:
+        out = source.with_name("out.png")
+        (track,) = run_red(source, picture=out).tracks
+        box = track.box
+        changed = (read_image(out) != road(CAR)).any(axis=2)
+        assert changed[box.y : box.bottom, box.x].all()
+        assert not changed[box.bottom :].any()
+        np.testing.assert_array_equal(read_image(source), road(CAR))
+
+    def test_an_empty_road_is_written_as_it_is(self, tmp_path: Path) -> None:
+        source, out = tmp_path / "empty.png", tmp_path / "out.png"
+        write_image(source, road())
+        assert run_red(source, picture=out).tracks == ()
+        np.testing.assert_array_equal(read_image(out), road())
+
+    def test_stages_show_the_frame_without_the_boxes_of_the_output(self, source: Path) -> None:
+        both, alone = source.with_name("both"), source.with_name("alone")
+        for folder in (both, alone):
+            folder.mkdir()
+        run_red(source, picture=source.with_name("out.png"), stages=both)
+        run_red(source, stages=alone)
+        names = sorted(path.name for path in both.iterdir())
+        assert len(names) == 5
+        for name in names:
+            assert (both / name).read_bytes() == (alone / name).read_bytes()
+
+    def test_a_picture_that_is_too_small_is_named(self, tmp_path: Path) -> None:
+        source = tmp_path / "tiny.png"
+        write_image(source, road(CAR)[:, :20])
+        with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
+            run_red(source, picture=tmp_path / "out.png")
+        assert not (tmp_path / "out.png").exists()

@@ -1,0 +1,159 @@
+"""The same scene at any frame rate gives about the same tracks."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from track.motion.scenes import WIDTH, detections, follow, id_at, ids, inside
+from track.motion.traffic import (
+    PERFECT,
+    Noise,
+    RoadVehicle,
+    TrueVehicle,
+    random_traffic,
+    track_scores,
+    truth_at,
+)
+from vdet.config.schema import MotionTrackerSettings
+from vdet.evaluate.scores import Scores
+from vdet.geometry import Box
+from vdet.synthetic import demo_scene
+from vdet.synthetic.truth import true_boxes
+from vdet.track.motion.tracker import MotionTracker
+
+RATES = (5, 10, 25, 50)
+CAR = Box(400, 400, 100, 70)
+DEFAULTS = MotionTrackerSettings()
+
+every_rate = pytest.mark.parametrize("rate", RATES)
+
+# Times
+
+
+@every_rate
+def test_a_clearly_seen_vehicle_is_shown_from_its_second_to_its_eighth_frame_on(rate: int) -> None:
+    shown = follow([[], *[[(CAR, 0.9)]] * 20], rate)
+    first = [bool(tracks) for tracks in shown[1:]].index(True)
+    assert first >= 1
+    assert first / rate <= max(0.15, 1 / rate)
+
+
+@every_rate
+def test_a_lost_vehicle_is_shown_for_the_same_time(rate: int) -> None:
+    shown = follow([*[[CAR]] * rate, *[[]] * rate], rate)
+    predicted = sum(track.predicted for tracks in shown for track in tracks)
+    assert DEFAULTS.carried - 1 / rate < predicted / rate <= DEFAULTS.carried
+
+
+@every_rate
+def test_a_lost_vehicle_keeps_its_id_for_the_same_time(rate: int) -> None:
+    for missed, id_ in ((0.8, 1), (1.3, 2)):
+        gap: list[list[Box]] = [[]] * round(missed * rate)
+        shown = follow([*[[CAR]] * rate, *gap, *[[CAR]] * rate], rate)
+        assert ids(shown[-1:]) == {id_}
+
+
+# Steps
+
+
+@pytest.mark.parametrize("dx", [-80, 80])
+def test_a_new_vehicle_that_moves_most_of_its_width_between_frames_is_one(dx: int) -> None:
+    places = [CAR.moved_to(640 + n * dx, 400) for n in range(-7, 7)]
+    shown = follow(([place] for place in places), rate=5)
+    assert ids(shown) == {1}
+    assert [id_at(tracks, place) for tracks, place in zip(shown[3:], places[3:], strict=True)] == [
+        1
+    ] * 11
+
+
+def test_frames_may_come_at_any_times() -> None:
+    rng = np.random.default_rng(3)
+    times = np.cumsum(rng.uniform(0.01, 0.2, 100))
+    tracker = MotionTracker(DEFAULTS, WIDTH, 720)
+    for number, time in enumerate(times):
+        place = inside(CAR.moved_to(round(100 + 70 * time), 400))
+        tracks = tracker.update(detections([place]), float(time))
+        if number > 20:
+            (track,) = tracks
+            assert (track.id, track.box.iou(place) > 0.9) == (1, True)
+
+
+@pytest.mark.parametrize(("gap", "id_"), [(0.8, 1), (10.0, 2), (1e6, 2)])
+def test_a_vehicle_keeps_its_id_through_a_short_gap_in_the_video(gap: float, id_: int) -> None:
+    tracker = MotionTracker(DEFAULTS, WIDTH, 720)
+    for n in range(20):
+        tracker.update(detections([CAR]), n / 25)
+    for n in range(20):
+        tracks = tracker.update(detections([CAR]), 0.8 + gap + n / 25)
+    assert [track.id for track in tracks] == [id_]
+
+
+def test_a_clock_that_stands_still_or_goes_back_changes_nothing_for_good() -> None:
+    tracker = MotionTracker(DEFAULTS, WIDTH, 720)
+    times = [*np.arange(20) / 25, 0.76, 0.76, *np.arange(20) / 25]
+    shown = [tracker.update(detections([CAR]), float(time)) for time in times]
+    assert [[track.id for track in tracks] for tracks in shown[5:]] == [[1]] * 37
+
+
+# Traffic
+
+SECONDS = 10.0
+OVERTAKING = (
+    RoadVehicle(0, 25.0, 0.2),
+    RoadVehicle(1, 32.0, -2.0),
+    RoadVehicle(-1, 8.0, 3.0, height=1.9),
+    RoadVehicle(2, 12.0, 2.0),
+)
+
+
+@every_rate
+def test_perfect_detections_give_each_vehicle_one_id(rate: int) -> None:
+    clip = [truth_at(OVERTAKING, n / rate) for n in range(int(SECONDS * rate))]
+    scores = track_scores(clip, rate, PERFECT)
+    assert (scores.tracks, scores.id_switches, scores.never_found) == (4, 0, 0)
+    assert scores.precision == 1
+    assert scores.recall > 1 - 2.5 / (SECONDS * min(rate, 10))
+    assert scores.mean_iou > 0.9
+
+
+@cache
+def noisy_traffic(seed: int, rate: int) -> Scores:
+    vehicles = random_traffic(seed, SECONDS, fastest=12)
+    clip = [truth_at(vehicles, n / rate) for n in range(int(SECONDS * rate))]
+    return track_scores(clip, rate, Noise(), seed)
+
+
+@pytest.mark.parametrize("rate", [5, 10, 50])
+@pytest.mark.parametrize("seed", [1, 2])
+def test_traffic_with_real_differences_of_speed_is_followed_alike(seed: int, rate: int) -> None:
+    usual, other = noisy_traffic(seed, 25), noisy_traffic(seed, rate)
+    assert usual.f1 > 0.95
+    assert other.f1 > usual.f1 - 0.1
+    assert other.mota > usual.mota - 0.1
+    assert other.false_tracks == 0
+
+
+@cache
+def drawn_clip() -> list[list[TrueVehicle]]:
+    scene = demo_scene(1, width=1280, height=720)
+    return [
+        [
+            TrueVehicle(
+                each.id,
+                np.array([each.box.x, each.box.y, each.box.width, each.box.height], np.float64),
+                each.hidden,
+            )
+            for each in true_boxes(scene, index)
+        ]
+        for index in range(scene.frames)
+    ]
+
+
+def test_the_clip_of_the_demo_is_followed_at_five_frames_a_second() -> None:
+    usual = track_scores(drawn_clip(), 25, Noise())
+    thinned = track_scores(drawn_clip()[::5], 5, Noise())
+    assert usual.f1 > 0.95
+    assert thinned.f1 > usual.f1 - 0.1
+    assert thinned.mota > usual.mota - 0.1
+    assert usual.id_switches == 0

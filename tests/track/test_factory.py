@@ -1,0 +1,35 @@
+import subprocess
+import sys
+
+import pytest
+
+from seed import SEED
+from vdet.config.schema import RulesTrackerSettings, Settings
+from vdet.detect.detections import NO_DETECTIONS
+from vdet.track.factory import make_tracker
+from vdet.track.motion.tracker import MotionTracker
+from vdet.track.rules.tracker import RulesTracker
+
+
+def test_the_method_decides_which_tracker_it_is() -> None:
+    assert isinstance(make_tracker(Settings(), 1280, 720), MotionTracker)
+    assert isinstance(make_tracker(SEED, 1280, 720), RulesTracker)
+
+
+def test_the_lengths_of_the_rules_are_scaled_to_the_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[RulesTrackerSettings] = []
+    monkeypatch.setattr(RulesTracker, "__init__", lambda _, settings: made.append(settings))
+    make_tracker(SEED, 640, 360)
+    assert (made[0].min_region, made[0].near) == (25, 25)
+
+
+def test_every_tracker_is_new() -> None:
+    first, second = (make_tracker(Settings(), 1280, 720) for _ in range(2))
+    assert first is not second
+    assert first.update(NO_DETECTIONS, 0.0) == []
+
+
+def test_the_rules_do_without_scipy() -> None:
+    code = "import sys, vdet.track.factory, vdet.track.rules.tracker; print('scipy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
