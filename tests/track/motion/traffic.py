@@ -98,9 +98,9 @@ def truth_at(vehicles: Sequence[RoadVehicle], time: float) -> list[TrueVehicle]:
 class Noise:
     """What a detector does wrong.
 
-    `sides` is the standard deviation of a box's sides, share of its size; `missed` the share of
-    vehicles that it does not see; `false` the mean number of false detections in a frame, with scores up to
-    `surest`.
+    `sides` is the standard deviation of the sides of a box, share of its size. `missed` is the
+    share of vehicles that it does not see. `false` is the mean number of false detections in a
+    frame; their scores go up to `surest`.
     """
 
     sides: float = 0.05
