@@ -155,7 +155,7 @@ def test_settings_that_ask_for_other_features(
 ) -> None:
     options = ("--model", model_path, "--set", "detector.features.color_space=HSV")
     line = _failure(run, clip_path, out, *options)
-    assert "was trained with other features (features.color_space: YCrCb, asked for HSV)" in line
+    assert "was trained with other features (detector.features.color_space: YCrCb, asked for HSV)" in line
 
 
 def test_an_unknown_setting(run: Run, clip_path: Path, out: Path) -> None:

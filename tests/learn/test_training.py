@@ -358,7 +358,7 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
     other, report = train(files, settings, boxed=boxed, jobs=1)
     np.testing.assert_array_equal(one.weights, other.weights)
     np.testing.assert_array_equal(one.slopes, other.slopes)
-    assert one.boxes is not None
+    assert one.box_regression is not None
     assert other.boxes is not None
     np.testing.assert_array_equal(one.boxes.weights, other.boxes.weights)
     assert report.splits[0].train_augmented > report.splits[0].train_patches
@@ -485,7 +485,7 @@ def test_without_hog_no_sides_are_found(mined: Path) -> None:
     colour = FeatureSettings(patch=SIZE, hog=HogSettings(channels=()))
     settings = SETTINGS.model_copy(update={"detector": SvmSettings(features=colour)})
     files, boxed = find_patches([mined]), find_boxed([mined])
-    assert train(files, settings, boxed=boxed, jobs=1)[0].boxes is None
+    assert train(files, settings, boxed=boxed, jobs=1)[0].box_regression is None
 
 
 def test_different_boxes_have_different_digests(mined: Path) -> None:
