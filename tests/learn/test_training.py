@@ -359,7 +359,7 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
     np.testing.assert_array_equal(one.weights, other.weights)
     np.testing.assert_array_equal(one.slopes, other.slopes)
     assert one.box_regression is not None
-    assert other.boxes is not None
+    assert other.box_regression is not None
     np.testing.assert_array_equal(one.boxes.weights, other.boxes.weights)
     assert report.splits[0].train_augmented > report.splits[0].train_patches
 
