@@ -1,14 +1,15 @@
 """What the rest of the program knows of an output, and how outputs are opened by name."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 from vdet.config.schema import Settings
-from vdet.errors import OutputError
+from vdet.errors import OutputError, VdetError
 from vdet.files import OutputFiles, check_output, make_folder
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
@@ -140,8 +141,50 @@ def check_sinks(
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:
-    """Open the sink of an output. Raises `ConfigError`, `OutputError`, `VideoError`."""
-    return _kind_for(output).open(output.path, context)
+    """Open the sink of an output; an `OSError` that it raises becomes one that names the output.
+
+    Raises
+    ------
+    OutputError
+        The suffix is not one of the sink's, or the output cannot be written.
+    ConfigError
+        There is no sink of that name.
+    """
+    kind = _kind_for(output)
+    with _naming(output.path):
+        return _NamedSink(kind.open(output.path, context), output.path)
+
+
+class _NamedSink:
+    """A `Sink` whose `OSError` becomes an `OutputError` with the path of its output."""
+
+    def __init__(self, sink: Sink, path: Path) -> None:
+        self._sink = sink
+        self._path = path
+
+    def __enter__(self) -> Self:
+        with _naming(self._path):
+            self._sink.__enter__()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        with _naming(self._path):
+            self._sink.__exit__(*raised)
+
+    def write(self, result: FrameResult) -> None:
+        with _naming(self._path):
+            self._sink.write(result)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except VdetError:
+        raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"{path}: cannot be written: {reason}") from error
 
 
 def _kind_for(output: Output) -> SinkKind:
