@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -141,13 +142,25 @@ def tag_width(image: Any) -> int:
     return int(near.any(axis=0).sum())
 
 
+FULL = OSError(28, "No space left on device")
+
+
+def failing_exit(sink: type[TrackSink | VideoSink], error: Exception) -> Callable[..., None]:
+    """Return an end of a sink that does its work and then fails."""
+    leave = sink.__exit__
+
+    def fail(opened: Any, *raised: Any) -> None:
+        leave(opened, *raised)
+        raise error
+
+    return fail
+
+
 class TestTogether:
     """All files of a run appear at its end, or none does."""
 
     @pytest.mark.parametrize("failing", [TrackSink, VideoSink])
-    @pytest.mark.parametrize(
-        "error", [OSError(28, "No space left on device"), RuntimeError("a bug")]
-    )
+    @pytest.mark.parametrize("error", [FULL, RuntimeError("a bug")])
     def test_a_sink_that_fails_at_its_end_leaves_nothing_and_can_be_repeated(
         self,
         run: Run,
@@ -155,20 +168,14 @@ class TestTogether:
         out: Path,
         red: tuple[str, ...],
         monkeypatch: pytest.MonkeyPatch,
-        failing: type[TrackSink],
+        failing: type[TrackSink | VideoSink],
         error: Exception,
     ) -> None:
         command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv",
                    "--sink", f"tracks={out}/b.txt", "--stages", out / "stages", "--at", "0.2",
                    *red)  # fmt: skip
-        leave = failing.__exit__
-
-        def fail(sink: TrackSink, *raised: Any) -> None:
-            leave(sink, *raised)
-            raise error
-
         with monkeypatch.context() as patch:
-            patch.setattr(failing, "__exit__", fail)
+            patch.setattr(failing, "__exit__", failing_exit(failing, error))
             result = run(*command)
         assert result.code == 1
         assert result.err.count("\n") == 1, result.err
@@ -186,10 +193,7 @@ class TestTogether:
         for name in ("a.mp4", "a.csv"):
             (out / name).write_text("precious")
 
-        def fail(*_: Any) -> None:
-            raise OSError(28, "No space left on device")
-
-        monkeypatch.setattr(TrackSink, "__exit__", fail)
+        monkeypatch.setattr(TrackSink, "__exit__", failing_exit(TrackSink, FULL))
         assert run(*command, "--overwrite").code == 1
         assert [(out / name).read_text() for name in names(out)] == ["precious"] * 2
 
