@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, red_finder, road
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
-from vdet.detect.svm.detector import SvmModel, detection_scores, horizon_of
+from vdet.detect.svm.detector import SvmModel, horizon_of
+from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
