@@ -7,7 +7,7 @@ from pathlib import Path
 from vdet.batch.inputs import Source, find_sources
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
-from vdet.media.writer import SUFFIXES
+from vdet.media.writer import VIDEO_SUFFIXES
 from vdet.pipeline.run import VideoJob
 
 MANIFEST = "manifest.jsonl"
@@ -72,7 +72,7 @@ def make_plan(clips: Sequence[Path], folder: Path, common: VideoJob, wishes: Wis
 
 def _job(source: Source, folder: Path, common: VideoJob, wishes: Wishes) -> VideoJob:
     place = folder / source.place
-    video = place if place.suffix.lower() in SUFFIXES else place.with_suffix(".mp4")
+    video = place if place.suffix.lower() in VIDEO_SUFFIXES else place.with_suffix(".mp4")
     return replace(
         common,
         source=source.path,

@@ -21,7 +21,7 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import SOME_FAILED, VdetError
 from vdet.pipeline.run import VideoJob
-from vdet.pipeline.sinks.tracks import SUFFIXES
+from vdet.pipeline.sinks.tracks import TRACK_SUFFIXES
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -83,8 +83,8 @@ def wishes_of(
 ) -> Wishes:
     """Read what the files of a batch are to become; raise `click.UsageError` on nonsense."""
     suffix = None if tracks is None else str(tracks).lower()
-    if suffix not in (None, *SUFFIXES):
-        raise click.UsageError(f"with -d give --tracks a suffix: {', '.join(SUFFIXES)}")
+    if suffix not in (None, *TRACK_SUFFIXES):
+        raise click.UsageError(f"with -d give --tracks a suffix: {', '.join(TRACK_SUFFIXES)}")
     if no_video and suffix is None:
         raise click.UsageError("nothing would be written; leave out --no-video, or give --tracks")
     if overwrite and options.skip_existing:

@@ -20,7 +20,7 @@ from pathlib import Path, PurePosixPath
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import DataError
 from vdet.files import escaped, printable, read_whole
-from vdet.media.images import SUFFIXES, Image, decode_image
+from vdet.media.images import PICTURE_SUFFIXES, Image, decode_image
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
 BOXED = "boxes"
@@ -152,7 +152,7 @@ def _patch_file(source: Path, top: str, name: str, boxes: Mapping[str, Sides]) -
     """Return the patch that a file name stands for, in a source named `top`; None if it is none."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
-    if hidden or path.suffix.lower() not in SUFFIXES:
+    if hidden or path.suffix.lower() not in PICTURE_SUFFIXES:
         return None
     sides = boxes.get(name)
     known = CLASSES | ({BOXED: True} if sides else {})

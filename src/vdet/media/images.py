@@ -20,7 +20,7 @@ log = logging.getLogger("vdet")
 MAX_BYTES = 256_000_000
 """Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits, not compressed at all."""
 
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
+PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 
 
 def read_image(path: Path) -> Image:
@@ -109,6 +109,6 @@ def write_image(path: Path, image: Image) -> None:
     except cv2.error:
         written = False
     if not written:
-        raise ImageError(f"{path}: pictures are written as {', '.join(sorted(SUFFIXES))}")
+        raise ImageError(f"{path}: pictures are written as {', '.join(sorted(PICTURE_SUFFIXES))}")
     with replacing(path) as temporary:
         temporary.write_bytes(data.tobytes())

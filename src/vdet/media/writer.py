@@ -13,7 +13,7 @@ from vdet.files import replacing
 from vdet.media.encoder import Encoder
 from vdet.media.frame import Frame, VideoInfo
 
-SUFFIXES = (".mp4", ".mov", ".mkv")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 
 class FrameWriter(Protocol):
@@ -80,8 +80,10 @@ class VideoWriter:
         whole_sound: bool = True,
         threads: int | None = None,
     ) -> None:
-        if path.suffix.lower() not in SUFFIXES:
-            raise OutputError(f"{path}: videos are written as {', '.join(SUFFIXES)}; name it so")
+        if path.suffix.lower() not in VIDEO_SUFFIXES:
+            raise OutputError(
+                f"{path}: videos are written as {', '.join(VIDEO_SUFFIXES)}; name it so"
+            )
         self._path = path
         self._info = info
         self._settings = settings

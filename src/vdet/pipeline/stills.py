@@ -17,7 +17,7 @@ from vdet.lanes.drawing import draw_lane
 from vdet.lanes.lane import Lane
 from vdet.lanes.record import lane_record
 from vdet.lanes.road import LaneRequest, Road, RoadWatch
-from vdet.media.images import SUFFIXES, Image, read_image, write_image
+from vdet.media.images import PICTURE_SUFFIXES, Image, read_image, write_image
 from vdet.pipeline.annotation import write_lane_stages
 from vdet.pipeline.threads import quiet_libraries
 
@@ -60,7 +60,9 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if _is_picture(p))
             if not inside:
-                raise ImageError(f"{path}: holds no pictures ({', '.join(sorted(SUFFIXES))})")
+                raise ImageError(
+                    f"{path}: holds no pictures ({', '.join(sorted(PICTURE_SUFFIXES))})"
+                )
             found += inside
         elif path.exists():
             found.append(path)
@@ -70,7 +72,9 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
 
 
 def _is_picture(path: Path) -> bool:
-    return path.suffix.lower() in SUFFIXES and not path.name.startswith(".") and path.is_file()
+    return (
+        path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".") and path.is_file()
+    )
 
 
 def plan(
@@ -86,7 +90,7 @@ def plan(
     OutputError
         An output is there already (and not `overwrite`), equals a source, or is wanted twice.
     """
-    single_file = out is not None and len(sources) == 1 and out.suffix.lower() in SUFFIXES
+    single_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
     jobs = []
     for source in sources:
         picture = out if single_file or out is None else out / source.name

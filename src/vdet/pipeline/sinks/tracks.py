@@ -104,13 +104,13 @@ _FORMATS: dict[str, Callable[[TextIO], TrackWriter]] = {
     ".csv": _Csv,
     ".jsonl": _JsonLines,
 }
-SUFFIXES = tuple(_FORMATS)
+TRACK_SUFFIXES = tuple(_FORMATS)
 
 
 def check_suffix(path: Path) -> None:
     """Raise `OutputError` where the suffix names no format of tracks."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise OutputError(f"{path}: tracks are written as {', '.join(SUFFIXES)}")
+    if path.suffix.lower() not in TRACK_SUFFIXES:
+        raise OutputError(f"{path}: tracks are written as {', '.join(TRACK_SUFFIXES)}")
 
 
 @contextmanager
