@@ -16,13 +16,16 @@ class WindowSettings(Section):
         description="side of a window, pixels"
     )
     overlap: float | None = Field(
-        None, ge=0, lt=1, description="share of a window that its neighbour covers too; or"
+        None,
+        ge=0,
+        lt=1,
+        description="share of a window that its neighbour covers too; an item has this or step",
     )
     step: int | None = Field(
         None,
         ge=1,
-        description="distance to the next window in cells of the patch, which is what the dense "
-        "engine is fastest with; one of overlap and step is given",
+        description="distance to the next window, cells of the patch; the dense engine is fastest "
+        "with it",
     )
     top: Pixels = Field(description="first row of the band")
     bottom: Pixels = Field(description="first row below the band")
