@@ -40,7 +40,7 @@ class MotionTrackerSettings(TrackerSettings):
         "vehicle's own size",
     )
     acceleration: Positive = Field(
-        1.25,
+        1.0,
         description="standard deviation by which a vehicle's velocity changes in a second, sizes "
         "of the vehicle a second",
     )

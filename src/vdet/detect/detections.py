@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import Box, Float32Array
+from vdet.geometry import Box, Float32Array, Int32Array
 
 if TYPE_CHECKING:
     import supervision
-
-ClassIds = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -47,7 +45,7 @@ class Detections:
 
     boxes: Float32Array
     scores: Float32Array
-    classes: ClassIds | None
+    classes: Int32Array | None
     names: tuple[str, ...]
     centroids: Float32Array
     strengths: Float32Array

@@ -181,7 +181,7 @@ class VideoReader:
                 f"{self.info.path}: {self._faults[0]}, more than input.max_damaged "
                 f"({self._tolerated:g}) allows; raise it to take what is left"
             )
-        jumped = self._decoder.losses.jumped
+        jumped = self._decoder.losses.skipped
         if not damaged and jumped > _SHORTFALL * total:
             share = f"{jumped} of {total + jumped}"
             self._faults.append(f"times jump as if {share} frames were missing")

@@ -14,13 +14,13 @@ from typing import Any
 from vdet.config.schema import Settings
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector
-from vdet.errors import ConfigError, FrameSizeError, ImageError, OutputError, VideoError
+from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
 from vdet.files import OutputFiles
 from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sink, open_sink
+from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import (
     StalledError,
     map_ordered,
@@ -82,11 +82,7 @@ class Summary:
 
 def check_job(job: VideoJob, *, overwrite: bool) -> None:
     """Refuse, before any work, a job whose outputs could not be written. Raises `OutputError`."""
-    paths = [output.path.resolve() for output in job.outputs]
-    for output in job.outputs:
-        if paths.count(output.path.resolve()) > 1:
-            raise OutputError(f"{output.path}: two outputs would be written to it; give two paths")
-        check_sink(output, overwrite=overwrite, inputs=[job.source])
+    check_sinks(job.outputs, overwrite=overwrite, inputs=[job.source])
 
 
 def run_video(

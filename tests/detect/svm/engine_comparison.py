@@ -84,7 +84,7 @@ def with_boxes(model: LinearModel) -> LinearModel:
     weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
     biases = biases + targets.mean(axis=0)
     boxes = BoxRegression(weights.T.astype(np.float32), biases.astype(np.float32))
-    return replace(model, boxes=boxes)
+    return replace(model, box_regression=boxes)
 
 
 def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, list[float]]:

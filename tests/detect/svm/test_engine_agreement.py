@@ -186,13 +186,13 @@ def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -
 
 def _without_edges(model: LinearModel) -> LinearModel:
     """Leave out of the regression the blocks at the edge of a patch, in which engines differ."""
-    assert model.boxes is not None
-    inner = np.zeros_like(model.boxes.weights)
+    assert model.box_regression is not None
+    inner = np.zeros_like(model.box_regression.weights)
     for part in Layout.of(model.features).hog:
-        blocks = model.boxes.weights[:, part].reshape(4, 7, 7, -1).copy()
+        blocks = model.box_regression.weights[:, part].reshape(4, 7, 7, -1).copy()
         blocks[:, [0, -1]] = blocks[:, :, [0, -1]] = 0
         inner[:, part] = blocks.reshape(4, -1)
-    return replace(model, boxes=BoxRegression(inner, model.boxes.biases))
+    return replace(model, box_regression=BoxRegression(inner, model.box_regression.biases))
 
 
 def _vehicles_by_both(model: LinearModel, kind: type) -> tuple[Windows, Windows]:

@@ -39,12 +39,12 @@ def model_with_boxes() -> LinearModel:
     rng = np.random.default_rng(9)
     weights, biases = rng.normal(size=(4, 32)), rng.normal(size=4)
     boxes = BoxRegression(weights.astype(np.float32), biases.astype(np.float32))
-    return replace(model_of(2, WITH_HOG, 56), boxes=boxes)
+    return replace(model_of(2, WITH_HOG, 56), box_regression=boxes)
 
 
 def boxes_of(model: LinearModel) -> BoxRegression:
-    assert model.boxes is not None
-    return model.boxes
+    assert model.box_regression is not None
+    return model.box_regression
 
 
 def header_of(asked: FeatureSettings = SMALL, **changes: Any) -> dict[str, Any]:
@@ -180,8 +180,8 @@ def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
 
 
 def test_a_model_without_boxes_is_loaded_without(path: Path) -> None:
-    save_model(replace(model_with_boxes(), boxes=None), path)
-    assert load_model(path).boxes is None
+    save_model(replace(model_with_boxes(), box_regression=None), path)
+    assert load_model(path).box_regression is None
 
 
 @pytest.mark.parametrize(

@@ -20,8 +20,9 @@ from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.search import FrameSearch, lay_grids
-from vdet.detect.svm.windows import Int32Array, Windows, join_windows
+from vdet.detect.svm.windows import Windows, join_windows
 from vdet.errors import ConfigError, FrameSizeError, ImageError
+from vdet.geometry import Int32Array
 from vdet.media.images import Image
 
 Sides = tuple[float, float, float, float]
@@ -93,7 +94,7 @@ def with_sides(
         update={"probability": MEDIAN if probability is None else probability}
     )
     settings = SvmSettings(reference_height=120, features=SMALL, search=search)
-    return FrameSearch(replace(model_of(SMALL), boxes=boxes), settings, 160, 120)
+    return FrameSearch(replace(model_of(SMALL), box_regression=boxes), settings, 160, 120)
 
 
 def search_all(search: FrameSearch, image: Image = FRAME) -> Windows:

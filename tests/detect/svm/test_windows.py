@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from seed import SEED
 from vdet.config.schema import WindowSettings
-from vdet.detect.svm.windows import Int32Array, WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
+from vdet.geometry import Int32Array
 
 LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that no band here reaches the end of

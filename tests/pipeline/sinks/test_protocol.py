@@ -19,7 +19,7 @@ from vdet.media import Frame, VideoInfo, VideoWriter
 from vdet.media.images import Image
 from vdet.pipeline.loop import VideoJob, check_job
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind, check_sink
+from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
 
 Register = Callable[[str, SinkKind], None]
 MOMENTS = ("open", "enter", "first", "middle", "end")
@@ -235,8 +235,8 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
 class TestCheck:
     def test_an_unknown_sink_is_refused_with_those_that_are_known(self, tmp_path: Path) -> None:
         known = "video, tracks, stages, picture, json"
-        with pytest.raises(ConfigError, match=f"nosuch: is not known; known are {known}"):
-            check_sink(Output("nosuch", tmp_path / "a"), overwrite=False)
+        with pytest.raises(ConfigError, match=f"nosuch: is no sink; known are {known}"):
+            check_sinks([Output("nosuch", tmp_path / "a")], overwrite=False)
 
     @pytest.mark.parametrize(
         ("sink", "name", "what"),
@@ -246,27 +246,27 @@ class TestCheck:
         self, tmp_path: Path, sink: str, name: str, what: str
     ) -> None:
         with pytest.raises(OutputError, match=rf"{name}: {what} are written as \.\w+, "):
-            check_sink(Output(sink, tmp_path / name), overwrite=False)
+            check_sinks([Output(sink, tmp_path / name)], overwrite=False)
 
     @pytest.mark.parametrize(("sink", "name"), [("video", "A.MP4"), ("tracks", "a.Csv")])
     def test_the_case_of_a_suffix_does_not_matter(
         self, tmp_path: Path, sink: str, name: str
     ) -> None:
-        check_sink(Output(sink, tmp_path / name), overwrite=False)
+        check_sinks([Output(sink, tmp_path / name)], overwrite=False)
 
     def test_the_folder_of_an_output_is_made_where_the_output_is_a_folder(
         self, tmp_path: Path
     ) -> None:
-        check_sink(Output("stages", tmp_path / "new" / "stages"), overwrite=False)
+        check_sinks([Output("stages", tmp_path / "new" / "stages")], overwrite=False)
         assert (tmp_path / "new" / "stages").is_dir()
 
     def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "3-boxes.png").touch()
         with pytest.raises(OutputError, match=r"3-boxes\.png: is there already"):
-            check_sink(Output("stages", tmp_path), overwrite=False)
-        check_sink(Output("stages", tmp_path), overwrite=True)
+            check_sinks([Output("stages", tmp_path)], overwrite=False)
+        check_sinks([Output("stages", tmp_path)], overwrite=True)
 
     def test_one_path_for_two_outputs_is_refused(self, tmp_path: Path) -> None:
         twice = outputs(tracks=tmp_path / "a.txt", json=tmp_path / "." / "a.txt")
-        with pytest.raises(OutputError, match=r"a\.txt: two outputs would be written to it"):
+        with pytest.raises(OutputError, match=r"a\.txt: is given for two outputs"):
             check_job(VideoJob(tmp_path / "in.mp4", twice), overwrite=True)

@@ -39,11 +39,11 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     ModelError
         The file cannot be used, or was trained with other features than the settings ask for.
     """
-    model = load_model(path or shipped_model(settings), asked_features(settings))
+    model = load_model(path or shipped_model(settings), requested_features(settings))
     return SvmModel(model, settings)
 
 
-def asked_features(settings: SvmSettings) -> FeatureSettings | None:
+def requested_features(settings: SvmSettings) -> FeatureSettings | None:
     """Return the features that a model must have; None where the default ones were left."""
     return None if settings.features == FeatureSettings() else settings.features
 

@@ -1,6 +1,6 @@
 """What the rest of the program knows of an output, and how outputs are opened by name."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,6 +14,8 @@ from vdet.files import OutputFiles, check_output, make_folder
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
 from vdet.plugins import SINKS, load_plugin
+
+STANDARD_OUTPUT = Path("-")
 
 
 class Sink(Protocol):
@@ -82,12 +84,15 @@ class SinkKind:
     marker
         For an output that is a folder, which is made: a pattern of the files in it that tell that
         it was written before.
+    writes_standard_output
+        Whether the path `-` means standard output.
     """
 
     open: Callable[[Path, SinkContext], Sink]
     suffixes: Sequence[str] = ()
     what: str = "outputs"
     marker: str = ""
+    writes_standard_output: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,23 +109,35 @@ def sink_kind(name: str) -> SinkKind:
     return kind
 
 
-def check_sink(
-    output: Output, *, overwrite: bool, inputs: Iterable[Path] = (), makes_folder: bool = False
+def check_sinks(
+    outputs: Sequence[Output],
+    *,
+    overwrite: bool,
+    inputs: Sequence[Path] = (),
+    makes_folder: bool = False,
 ) -> None:
-    """Refuse, before any work, an output that could not be written; arguments as `check_output`.
+    """Refuse, before any work, outputs that could not be written; arguments as `check_output`.
 
     Raises
     ------
     OutputError
-        The suffix is not one of the sink's, or the output cannot be written or is there already.
+        Two outputs have one path, a suffix is not one of the sink's, or an output cannot be written
+        or is there already.
     ConfigError
-        There is no sink of that name.
+        There is no sink of a name.
     """
-    kind, path = _kind_for(output), output.path
-    if kind.marker:
-        make_folder(path)
-        path = next(path.glob(kind.marker), path / kind.marker)
-    check_output(path, overwrite=overwrite, inputs=inputs, makes_folder=makes_folder)
+    seen: set[Path] = set()
+    for output in outputs:
+        kind, path = _kind_for(output), output.path
+        if kind.writes_standard_output and path == STANDARD_OUTPUT:
+            continue
+        if path.resolve() in seen:
+            raise OutputError(f"{path}: is given for two outputs; name another file for one")
+        seen.add(path.resolve())
+        if kind.marker:
+            make_folder(path)
+            path = next(path.glob(kind.marker), path / kind.marker)
+        check_output(path, overwrite=overwrite, inputs=inputs, makes_folder=makes_folder)
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:
