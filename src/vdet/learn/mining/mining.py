@@ -15,10 +15,11 @@ from vdet.detect.svm.detector import SvmDetector, horizon_of
 from vdet.detect.svm.features import to_patch
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import lay_grids
-from vdet.detect.svm.windows import Int32Array, Windows
+from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, FrameSizeError, ImageError, TruthError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.truth import read_truth
+from vdet.geometry import Int32Array
 from vdet.learn.dataset import PatchArchive, patch_archive
 from vdet.learn.mining.choosing import (
     ChosenWindow,
