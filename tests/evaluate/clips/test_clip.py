@@ -13,13 +13,14 @@ from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
-from vdet.evaluate.clips.clip import detect, open_clip
+from vdet.evaluate.clips.clip import find_tracks, follow_variants, open_clip
 from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
-from vdet.evaluate.clips.following import follow_under_all
+from vdet.evaluate.predictions import read_predictions
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.loop import follow_frames, no_progress, peek
 from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
@@ -52,7 +53,7 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
         frames, info = list(reader), reader.info
-    together = list(follow_under_all(frames, variants, model_path, info))
+    together = list(follow_variants(frames, variants, model_path, info))
     for results, frame in zip(together, frames, strict=True):
         assert all(result.frame is frame for result in results)
         assert all(result.source == info.path for result in results)
@@ -100,7 +101,7 @@ def test_settings_that_search_alike_share_the_search(
         settings("detector.search.probability=0.9"),
     ]
     with VideoReader(clip_path, frames=3) as reader:
-        results = list(follow_under_all(reader, variants, model_path, reader.info))
+        results = list(follow_variants(reader, variants, model_path, reader.info))
     assert [len(each) for each in results] == [4, 4, 4]
     assert searched == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
 
@@ -110,7 +111,7 @@ def test_only_the_frames_that_the_truth_covers_are_read(
 ) -> None:
     steps: list[int] = []
     clip = open_clip(clip_path, truth_path)
-    (found,) = detect(clip, [settings()], model_path, lambda _: steps.append)
+    (found,) = find_tracks(clip, [settings()], model_path, lambda _: steps.append)
     assert found.frame_count == len(steps) == FRAMES
     assert found.rate == 25
 
@@ -127,7 +128,7 @@ def test_truth_beyond_the_video_is_refused_with_its_line(
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
-        detect(open_clip(clip_path, truth), [settings()], model_path, no_progress)
+        find_tracks(open_clip(clip_path, truth), [settings()], model_path, no_progress)
 
 
 def test_clips_are_pooled_under_each_setting(
@@ -141,3 +142,33 @@ def test_clips_are_pooled_under_each_setting(
     for run in runs:
         boxes = [clip.scores.vehicle_boxes for clip in run.clips]
         assert run.total.vehicle_boxes == sum(boxes) > 0
+
+
+def test_no_output_appears_where_the_truth_covers_frames_beyond_the_video(
+    clip_path: Path, tmp_path: Path, model_path: Path
+) -> None:
+    truth, tracks = tmp_path / "gt.txt", tmp_path / "found.csv"
+    truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
+    clip = open_clip(clip_path, truth)
+    with pytest.raises(TruthError):
+        find_tracks(clip, [settings()], model_path, no_progress, [Output("tracks", tracks)])
+    assert [path.name for path in tmp_path.iterdir()] == ["gt.txt"]
+
+
+def test_outputs_get_the_results_under_the_first_of_the_settings(
+    clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    tracks = tmp_path / "found.csv"
+    variants = [settings(), settings("detector.heat.threshold=5000")]
+    first, second = find_tracks(
+        open_clip(clip_path, truth_path),
+        variants,
+        model_path,
+        no_progress,
+        [Output("tracks", tracks)],
+    )
+    written = read_predictions(tracks)
+    assert len(first) > len(second) == 0
+    np.testing.assert_array_equal(written.frames, first.frames)
+    np.testing.assert_array_equal(written.ids, first.ids)
+    np.testing.assert_array_equal(written.boxes, first.boxes)
