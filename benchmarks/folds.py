@@ -119,7 +119,7 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
             samples.vectors, samples.vehicle, settings.svm.features, training, samples.origins
         )
         told = [samples, training_set(boxed_data, kept_boxed)]
-        return replace(model, boxes=fit_boxes(told, assumed, settings))
+        return replace(model, box_regression=fit_boxes(told, assumed, settings))
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))
@@ -141,7 +141,7 @@ def _search(
         for frame in frames:
             block = int(_block_of(np.array([frame.index + 1]), last)[0])
             candidates = detectors[block].search(frame.image, frame.index)
-            found.append(candidates.windows.detected(LEAST))
+            found.append(candidates.windows.hits(LEAST))
     return SearchedVideo(info.width, info.height, float(info.rate), found)
 
 

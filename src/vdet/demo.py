@@ -1,7 +1,7 @@
 """The whole system on a made-up road: patches, training, detection, comparison with the truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vdet.config.schema import Settings
@@ -14,7 +14,7 @@ from vdet.files import check_output, make_folder
 from vdet.learn.dataset import find_patches
 from vdet.learn.report import TrainingReport
 from vdet.learn.training import train
-from vdet.pipeline.loop import Progress, VideoJob, no_progress, run_video
+from vdet.pipeline.loop import Progress, VideoJob, check_job, no_progress, run_video
 from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic.clip import write_clip, write_truth
 from vdet.synthetic.patches import write_patches
@@ -70,6 +70,12 @@ class DemoFiles:
         """Folder of pictures of every stage at one moment."""
         return self.folder / "stages"
 
+    @property
+    def job(self) -> VideoJob:
+        """What is made of the road."""
+        outputs = {"video": self.result, "tracks": self.tracks, "stages": self.stages}
+        return VideoJob(self.clip, tuple(Output(sink, path) for sink, path in outputs.items()))
+
 
 @dataclass(frozen=True, slots=True)
 class DemoResult:
@@ -84,9 +90,9 @@ class DemoResult:
 def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
     """Make the folder, and refuse to write over an earlier demo. Raises `OutputError`."""
     make_folder(files.folder)
-    outputs = (files.clip, files.truth, files.model, files.report, files.result, files.tracks)
-    for path in outputs:
+    for path in (files.clip, files.truth, files.model, files.report):
         check_output(path, overwrite=overwrite)
+    check_job(files.job, overwrite=overwrite)
 
 
 def run_demo(
@@ -119,12 +125,7 @@ def run_demo(
     save_model(model, files.model)
     report.write(files.report)
     say("3/4 finding the vehicles …")
-    outputs = (
-        Output("video", files.result),
-        Output("tracks", files.tracks),
-        Output("stages", files.stages),
-    )
-    job = VideoJob(files.clip, outputs, at=scene.frames / scene.rate / 2)
+    job = replace(files.job, at=scene.frames / scene.rate / 2)
     detector = load_detector(settings.detector, files.model)
     summary = run_video(job, detector, settings, progress=progress)
     say("4/4 comparing with the truth …")

@@ -1,13 +1,14 @@
 """What a batch will do, and what it refuses before any work."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from vdet.batch.plan import OutputOptions, Plan, make_plan
-from vdet.errors import BatchError, OutputError
+from vdet.errors import BatchError, ConfigError, OutputError
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import Output
 
@@ -32,7 +33,7 @@ def plan(*inputs: str, folder: str = "out", tracks: str | None = None, **options
 
 
 def plan_outputs(
-    *inputs: str, suffixes: dict[str, str | None], folder: str = "out", **options: bool
+    *inputs: str, suffixes: Mapping[str, str | None], folder: str = "out", **options: bool
 ) -> Plan:
     return make_plan(
         [Path(p) for p in inputs], Path(folder), COMMON, OutputOptions(suffixes, **options)
@@ -68,6 +69,10 @@ class TestJobs:
         assert outputs(plan("clips/a.mp4", tracks=".csv").jobs) == [["out/a.mp4", "out/a.csv"]]
         alone = plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"})
         assert outputs(alone.jobs) == [["out/a.csv"]]
+
+    def test_a_suffix_for_the_video_chooses_its_container(self) -> None:
+        made = plan_outputs("clips/a.mp4", "clips/c.avi", suffixes={"video": ".mkv"})
+        assert outputs(made.jobs) == [["out/a.mkv"], ["out/c.mkv"]]
 
     def test_what_is_done_is_skipped_and_what_is_half_done_is_not(self) -> None:
         Path("out").mkdir()
@@ -109,6 +114,19 @@ class TestRefused:
         assert len(plan("clips").jobs) == 5
         with pytest.raises(BatchError, match=r"both would become out/a\.txt"):
             plan("clips", tracks=".txt")
+
+    def test_two_outputs_of_one_input_with_one_name(self) -> None:
+        two: dict[str, str | None] = {"tracks": ".txt", "json": ".txt"}
+        with pytest.raises(BatchError, match=r"^out/a\.txt: two outputs of clips/a\.mp4 would"):
+            plan_outputs("clips/a.mp4", suffixes=two)
+
+    def test_a_suffix_that_the_sink_cannot_write(self) -> None:
+        with pytest.raises(OutputError, match=r"out/a\.xml: tracks are written as \.txt, \.csv"):
+            plan("clips/a.mp4", tracks=".xml")
+
+    def test_a_sink_that_is_not_known(self) -> None:
+        with pytest.raises(ConfigError, match=r"^nothing: is no sink; known are video, tracks"):
+            plan_outputs("clips/a.mp4", suffixes={"nothing": ".txt"})
 
     def test_tracks_that_would_be_the_manifest(self) -> None:
         Path("clips/a.mp4").rename("clips/manifest.mp4")

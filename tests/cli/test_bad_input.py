@@ -155,9 +155,12 @@ def test_settings_that_ask_for_other_features(
 ) -> None:
     options = ("--model", model_path, "--set", "detector.features.color_space=HSV")
     line = _failure(run, clip_path, out, *options)
-    assert "was trained with other features (features.color_space: YCrCb, asked for HSV)" in line
+    assert (
+        "was trained with other features (detector.features.color_space: YCrCb, asked for HSV)"
+        in line
+    )
 
 
 def test_an_unknown_setting(run: Run, clip_path: Path, out: Path) -> None:
-    line = _failure(run, clip_path, out, "--set", "tracker.histroy=3")
-    assert "tracker.histroy: is no setting; did you mean history?" in line
+    line = _failure(run, clip_path, out, "--set", "tracker.neded=3")
+    assert "tracker.neded: is no setting; did you mean needed?" in line

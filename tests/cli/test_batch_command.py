@@ -44,7 +44,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]
     assert names(out) == made
     assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
-    model = shipped_model(Settings().features)
+    model = shipped_model(Settings().svm)
     for record in records_of(out):
         assert record["program"] == f"vdet {vdet.__version__}"
         assert record["model"] == model.name

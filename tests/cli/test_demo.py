@@ -88,7 +88,7 @@ def test_the_model_has_learnt_the_patches(done: Demo) -> None:
     assert {split.split for split in done.result.training.splits} == {"random", "tail"}
     for split in done.result.training.splits:
         assert 0.85 < split.test_accuracy <= 1
-    assert load_model(done.files.model).features == Settings().features
+    assert load_model(done.files.model).features == Settings().svm.features
 
 
 def test_tracks_and_truth_can_be_scored_again(done: Demo) -> None:
@@ -108,6 +108,14 @@ def test_each_step_is_told(done: Demo) -> None:
 def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     with pytest.raises(OutputError, match=f"{name}: is there already; give --overwrite"):
+        check_demo(DemoFiles(tmp_path), overwrite=False)
+    check_demo(DemoFiles(tmp_path), overwrite=True)
+
+
+def test_earlier_stage_pictures_are_not_written_over_either(tmp_path: Path) -> None:
+    (tmp_path / "stages").mkdir()
+    (tmp_path / "stages" / "5-boxes.png").touch()
+    with pytest.raises(OutputError, match=r"5-boxes\.png: is there already; give --overwrite"):
         check_demo(DemoFiles(tmp_path), overwrite=False)
     check_demo(DemoFiles(tmp_path), overwrite=True)
 

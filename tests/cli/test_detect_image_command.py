@@ -40,7 +40,8 @@ def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Sc
     assert (item["image"], item["width"], item["height"]) == (str(picture), 320, 180)
     assert item["boxes"]
     for box in item["boxes"]:
-        assert set(box) == {"x", "y", "width", "height", "peak"}
+        assert set(box) == {"x", "y", "width", "height", "score"}
+        assert 0 < box["score"] <= 1
         assert 0 <= box["x"] < box["x"] + box["width"] <= 320
     near = [true.box for true in true_boxes(scene, 10) if true.box.width > 20]
     assert any(
@@ -174,7 +175,7 @@ def test_boxes_lie_in_the_picture_whatever_its_size(
     loose = (
         "detector.heat.threshold=0.01",
         "detector.search.probability=0.05",
-        "tracker.motion.strong=0.01",
+        "detector.stills={strength: 0.01, width: 0}",
     )
     options = [word for assignment in loose for word in ("--set", assignment)]
     result = run("detect-image", path, "--json", "-", "--model", model_path, *options)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 from fractions import Fraction
 from pathlib import Path
 
@@ -119,13 +120,16 @@ def test_keeps_what_is_there(run: Run, clip_path: Path, tmp_path: Path) -> None:
     assert out.read_bytes() == b"precious"
 
 
-@pytest.mark.parametrize("option", ["out", "tracks"])
-def test_never_writes_over_its_input(run: Run, clip_path: Path, option: str) -> None:
-    target = (clip_path,) if option == "out" else ("--no-video", "--tracks", clip_path)
-    result = run("detect-video", clip_path, *target, "--overwrite")
+@pytest.mark.parametrize(("option", "suffix"), [("out", ".mp4"), ("tracks", ".csv")])
+def test_never_writes_over_its_input(
+    run: Run, clip_path: Path, tmp_path: Path, option: str, suffix: str
+) -> None:
+    clip = Path(shutil.copy(clip_path, tmp_path / f"clip{suffix}"))
+    target = (clip,) if option == "out" else ("--no-video", "--tracks", clip)
+    result = run("detect-video", clip, *target, "--overwrite")
     assert result.code == 1
     assert "is the input itself" in result.err
-    assert len(_times(clip_path)) == 30
+    assert len(_times(clip)) == 30
 
 
 @pytest.mark.parametrize(

@@ -1,25 +1,15 @@
 """`vdet eval video`."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS
-from vdet.synthetic.clip import write_truth
-from vdet.synthetic.scene import Scene
 
 TWO_SHIPPED = "detector.features={patch: 32, hog: {cell: 4}},{patch: 64, hog: {cell: 8}}"
-"""Features of two shipped models; all settings of a sweep are compared under one."""
-
-
-@pytest.fixture
-def truth_path(scene: Scene, tmp_path: Path) -> Path:
-    path = tmp_path / "gt.txt"
-    write_truth(path, replace(scene, frames=8))
-    return path
+"""Features of two shipped models."""
 
 
 def test_scores_agree_with_those_of_the_tracks_written(
@@ -86,8 +76,7 @@ def test_several_videos_and_a_sweep(
             1,
             "no shipped model",
         ),
-        (("--truth", "gt.txt", "--sweep", "detector.features.hog.cell=4,8"), 1, "other features"),
-        (("--truth", "gt.txt", "--sweep", TWO_SHIPPED), 1, "other features"),
+        (("--truth", "gt.txt", "--sweep", "detector.features.hog.cell=4,8"), 1, "no shipped model"),
     ],
 )
 def test_what_cannot_be_is_said_before_any_work(
@@ -97,6 +86,26 @@ def test_what_cannot_be_is_said_before_any_work(
     result = run("eval", "video", clip_path, *named)
     assert (result.code, result.out) == (code, "")
     assert words in result.err
+
+
+@pytest.mark.parametrize("sweep", [TWO_SHIPPED, "detector.features.color_space=YCrCb,HSV"])
+def test_a_model_that_is_given_must_fit_all_settings(
+    run: Run, clip_path: Path, truth_path: Path, model_path: Path, sweep: str
+) -> None:
+    options = ("--truth", truth_path, "--model", model_path, "--sweep", sweep)
+    result = run("eval", "video", clip_path, *options)
+    assert (result.code, result.out) == (1, "")
+    assert "was trained with other features" in result.err
+
+
+def test_without_a_model_each_setting_has_the_shipped_one_that_fits_it(
+    run: Run, clip_path: Path, truth_path: Path
+) -> None:
+    options = ("--truth", truth_path, "--until", "2", "--sweep", TWO_SHIPPED, "--json", "-")
+    result = run("eval", "video", clip_path, *options)
+    assert result.code == 0, result.err
+    features = [each["settings"]["detector.features"] for each in json.loads(result.out)["sweep"]]
+    assert features == ["{patch: 32, hog: {cell: 4}}", "{patch: 64, hog: {cell: 8}}"]
 
 
 def test_truth_of_a_longer_video(

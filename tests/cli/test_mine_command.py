@@ -72,7 +72,7 @@ def test_mines_patches_that_train_learns_from(
     for group, count in counts.items():
         assert re.search(rf"{group} +{count} patches", learnt.out)
     model = load_model(model_path)
-    assert model.boxes is not None
+    assert model.box_regression is not None
     assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
 
 

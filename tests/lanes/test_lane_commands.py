@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from conftest import Outcome, Run
-from red_cars import COLOUR, SETTINGS, red_finder
+from red_cars import SETTINGS, red_finder
 from vdet.config.lanes import LaneSettings
 from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.detect.svm.model import save_model
@@ -121,14 +121,11 @@ def write_video(path: Path, images: list[Image]) -> None:
 
 def red_settings(lanes: LaneSettings) -> Settings:
     windows = WindowSettings(size=32, overlap=0.75, top=280, bottom=400)
-    changes = {
-        "reference_height": HEIGHT,
-        "features": COLOUR,
-        "search": SETTINGS.search.model_copy(update={"windows": (windows,)}),
-        "lanes": lanes,
-        "output": OutputSettings(crf=4),
-    }
-    return SETTINGS.model_copy(update=changes)
+    search = SETTINGS.svm.search.model_copy(update={"windows": (windows,)})
+    detector = SETTINGS.svm.model_copy(update={"reference_height": HEIGHT, "search": search})
+    tracker = SETTINGS.tracker.model_copy(update={"reference_height": HEIGHT})
+    output = OutputSettings(crf=4)
+    return Settings(detector=detector, tracker=tracker, lanes=lanes, output=output)
 
 
 def video_images(path: Path) -> list[Image]:

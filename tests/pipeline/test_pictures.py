@@ -1,5 +1,6 @@
 """Still pictures: which are taken, where their results go, and what is found in them."""
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -140,7 +141,7 @@ class TestRun:
         detector = model_for(settings).for_video(image.shape[1], image.shape[0], [image])
         detections = detector.detect(detector.search(image, None))
         assert result.source == source
-        assert (result.frame.index, result.frame.time) == (0, 0)
+        assert (result.frame.index, result.frame.time) == (0, Fraction(0))
         np.testing.assert_array_equal(result.frame.image, image)
         (track,) = result.tracks
         assert [track.box] == detections.rounded

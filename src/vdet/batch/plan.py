@@ -8,7 +8,7 @@ from vdet.batch.inputs import Source, find_sources
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
 from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output, check_sink, sink_kind
+from vdet.pipeline.sinks.protocol import Output, check_sinks, sink_kind
 
 MANIFEST = "manifest.jsonl"
 
@@ -70,8 +70,8 @@ def make_plan(
     plan = Plan(folder, tuple(_where(jobs, done, False)), tuple(_where(jobs, done, True)))
     check_output(plan.manifest, overwrite=True, makes_folder=True)
     replaces = options.overwrite or options.skip_existing
-    for output in (output for job in plan.jobs for output in job.outputs):
-        check_sink(output, overwrite=replaces, makes_folder=True)
+    for job in plan.jobs:
+        check_sinks(job.outputs, overwrite=replaces, makes_folder=True)
     return plan
 
 
@@ -119,7 +119,7 @@ def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
 
 
 def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
-    """Refuse an output that is another job's too, or the manifest, or an input."""
+    """Refuse an output that is another output too, or the manifest, or an input."""
     inputs = {job.source.resolve() for job in jobs}
     owners: dict[Path, Path] = {}
     for job in jobs:
@@ -130,8 +130,11 @@ def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
                 raise BatchError(
                     f"{job.source}: one of its outputs would be {path}, which is the manifest"
                 )
-            other = owners.setdefault(path, job.source)
-            if other != job.source:
+            if path not in owners:
+                owners[path] = job.source
+            elif (other := owners[path]) == job.source:
+                raise BatchError(f"{path}: two outputs of {job.source} would have this name")
+            else:
                 raise BatchError(
                     f"{other} and {job.source}: both would become {path}; rename one, or take "
                     "them from a folder above both"

@@ -22,7 +22,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
 from vdet.errors import SOME_FAILED, VdetError
 from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output
+from vdet.pipeline.sinks.protocol import Output, sink_kind
 from vdet.workers import DaskCluster, LocalProcesses, Workers
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -80,13 +80,10 @@ def output_options(
 ) -> OutputOptions:
     """Read which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
     suffixes: dict[str, str | None] = {} if no_video else {"video": None}
-    asked = [Output("tracks", tracks)] if tracks else []
-    for output in (*asked, *sinks):
-        suffix = str(output.path).lower()
-        if not re.fullmatch(r"\.[a-z0-9]+", suffix):
-            option = "--tracks" if output in asked else f"--sink {output.sink}"
-            raise click.UsageError(f"with -d give {option} a suffix, as in .csv")
-        suffixes[output.sink] = suffix
+    for output in (*([Output("tracks", tracks)] if tracks else []), *sinks):
+        if suffixes.get(output.sink) is not None:
+            raise click.UsageError(f"{output.sink} is given two suffixes; keep one")
+        suffixes[output.sink] = _suffix(output)
     if not suffixes:
         raise click.UsageError("nothing would be written; leave out --no-video, or give --tracks")
     if overwrite and options.skip_existing:
@@ -94,6 +91,18 @@ def output_options(
     if options.jobs and options.scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
     return OutputOptions(suffixes, overwrite=overwrite, skip_existing=options.skip_existing)
+
+
+def _suffix(output: Output) -> str:
+    """Return the suffix that an output has in a batch; its name is that of the video."""
+    kind, suffix = sink_kind(output.sink), str(output.path).lower()
+    if kind.marker:
+        raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
+    if not re.fullmatch(r"\.[a-z0-9]+", suffix) or suffix not in (kind.suffixes or [suffix]):
+        known = ", ".join(kind.suffixes) or "as in .txt"
+        option = "--tracks" if output.sink == "tracks" else f"--sink {output.sink}"
+        raise click.UsageError(f"with -d give {option} a suffix: {known}")
+    return suffix
 
 
 def do_batch(

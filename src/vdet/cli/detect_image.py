@@ -18,8 +18,7 @@ from vdet.cli.options import (
 )
 from vdet.detect.factory import load_detector
 from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
-from vdet.pipeline.sinks.json_list import STANDARD_OUTPUT
-from vdet.pipeline.sinks.protocol import Output, check_sink
+from vdet.pipeline.sinks.protocol import Output, check_sinks
 
 log = logging.getLogger("vdet")
 
@@ -57,14 +56,12 @@ def detect_image(
     if json_target is not None:
         shared = (Output("json", json_target), *shared)
     if not (output or stages or shared):
-        raise click.UsageError("nothing would be written; give -o, --json or --stages")
+        raise click.UsageError("nothing would be written; give -o, --json, --stages or --sink")
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments)
     model = load_detector(settings.detector, model_path)
     sources = find_images(images)
-    for each in shared:
-        if each.path != STANDARD_OUTPUT:
-            check_sink(each, overwrite=overwrite, inputs=sources)
+    check_sinks(shared, overwrite=overwrite, inputs=sources)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     failures = run_pictures(jobs, shared, model, settings, request)
     if failures:

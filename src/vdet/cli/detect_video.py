@@ -149,7 +149,7 @@ def _check_usage(
     if no_video == (video is not None):
         raise click.UsageError("give OUT, or --no-video without OUT; or -d DIR for several videos")
     if not outputs:
-        raise click.UsageError("nothing would be written; give OUT, --tracks or --stages")
+        raise click.UsageError("nothing would be written; give OUT, --tracks, --stages or --sink")
     if with_stages == (at is None):
         raise click.UsageError("--stages and --at go together")
 

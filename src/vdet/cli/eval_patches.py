@@ -7,7 +7,7 @@ import click
 from vdet.cli.eval_options import give_results, results_options
 from vdet.cli.options import PathOf, read_settings, settings_options
 from vdet.cli.progress import progress_bar
-from vdet.detect.svm.kind import asked_features
+from vdet.detect.svm.kind import requested_features
 from vdet.detect.svm.model import load_model
 from vdet.evaluate.output import check_outputs
 from vdet.learn.dataset import find_patches
@@ -54,7 +54,7 @@ def patches(
     if model_path is not None and splits:
         raise click.UsageError("--split trains afresh; leave it out, or --model")
     settings = read_settings(config_name, assignments)
-    model = load_model(model_path, asked_features(settings.svm)) if model_path else None
+    model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     inputs = [*data, *([model_path] if model_path else [])]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
     files = find_patches(data)

@@ -16,7 +16,7 @@ from vdet.cli.options import (
 from vdet.cli.progress import progress_bar
 from vdet.detect.factory import load_detector, model_file
 from vdet.evaluate.output import check_outputs
-from vdet.pipeline.sinks.protocol import check_sink
+from vdet.pipeline.sinks.protocol import check_sinks
 
 
 @click.command()
@@ -82,8 +82,7 @@ def video(
     files = [path for each in settings if (path := model_file(each.detector, model_path))]
     inputs = [*videos, *truths, *files]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
-    for output in outputs:
-        check_sink(output, overwrite=overwrite, inputs=inputs)
+    check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
     variants = [Variant(extra, each) for extra, each in zip(swept, settings, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:

@@ -119,7 +119,7 @@ def _fit_split(
     predicted = model.probabilities(data.vectors) >= 0.5
     right = predicted == data.vehicle
     train_patches = int(np.count_nonzero(~held))
-    return replace(model, boxes=regression), SplitReport(
+    return replace(model, box_regression=regression), SplitReport(
         split=name,
         train_patches=train_patches,
         train_augmented=len(samples.vehicle) - train_patches,

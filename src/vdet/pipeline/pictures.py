@@ -1,5 +1,6 @@
 """Vehicles, and the lane, in still pictures: read, detected, handed to sinks."""
 
+from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.media.images import PICTURE_SUFFIXES, Image, read_image
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sink, open_sink
+from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.track import Track
 
@@ -73,26 +74,23 @@ def plan_pictures(
         An output is there already (and not `overwrite`), equals a source, or is wanted twice.
     """
     is_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
-    if out is not None and not is_file:
-        make_folder(out)
     jobs = []
     for source in sources:
         picture = out if is_file or out is None else out / source.name
         folder = stages / source.stem if stages and len(sources) > 1 else stages
         named = {"picture": picture, "stages": folder}
-        outputs = (Output(sink, path) for sink, path in named.items() if path is not None)
-        jobs.append(PictureJob(source, tuple(outputs)))
-    _check_outputs([output for job in jobs for output in job.outputs], sources, overwrite=overwrite)
-    return jobs
-
-
-def _check_outputs(outputs: Sequence[Output], sources: Sequence[Path], *, overwrite: bool) -> None:
-    for output in outputs:
-        if outputs.count(output) > 1:
+        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
+        jobs.append(PictureJob(source, own))
+    outputs = [output for job in jobs for output in job.outputs]
+    for output, count in Counter(outputs).items():
+        if count > 1:
             raise OutputError(
                 f"{output.path}: wanted by two inputs of one name; run them separately"
             )
-        check_sink(output, overwrite=overwrite, inputs=sources)
+    if out is not None and not is_file:
+        make_folder(out)
+    check_sinks(outputs, overwrite=overwrite, inputs=sources)
+    return jobs
 
 
 def run_pictures(

@@ -18,8 +18,8 @@ from track.motion.traffic import (
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
 from vdet.geometry import Box
-from vdet.synthetic import default_clip
-from vdet.synthetic.truth import truth
+from vdet.synthetic import demo_scene
+from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker
 
 RATES = (5, 10, 25, 50)
@@ -134,9 +134,20 @@ def test_traffic_with_real_differences_of_speed_is_followed_alike(seed: int, rat
     assert other.false_tracks == 0
 
 
+@every_rate
+def test_many_weak_false_detections_do_not_become_tracks(rate: int) -> None:
+    clip = [truth_at(OVERTAKING, n / rate) for n in range(int(SECONDS * rate))]
+    scores = track_scores(clip, rate, Noise(sides=0.03, missed=0.03, false=2.0, surest=0.4))
+    assert scores.false_tracks == 0
+    assert scores.id_switches == 0
+    assert scores.f1 > 0.93
+    shown_after = [(first.delay or 0) / rate for first in scores.first_detections]
+    assert max(shown_after) <= max(0.4, 3 / rate)
+
+
 @cache
 def drawn_clip() -> list[list[TrueVehicle]]:
-    scene = default_clip(1, width=1280, height=720)
+    scene = demo_scene(1, width=1280, height=720)
     return [
         [
             TrueVehicle(
@@ -144,7 +155,7 @@ def drawn_clip() -> list[list[TrueVehicle]]:
                 np.array([each.box.x, each.box.y, each.box.width, each.box.height], np.float64),
                 each.hidden,
             )
-            for each in truth(scene, index)
+            for each in true_boxes(scene, index)
         ]
         for index in range(scene.frames)
     ]

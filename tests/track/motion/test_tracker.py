@@ -280,8 +280,8 @@ def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:
 
 def test_ids_count_up_in_the_order_of_showing() -> None:
     first, second, third = CAR, CAR.moved_to(100, 400), CAR.moved_to(800, 400)
-    later = [(first), (third, WEAK), (second)]
-    shown = follow([*[[(first)]] * 5, *[later] * 20])
+    later: list[tuple[Box, float] | Box] = [first, (third, WEAK), second]
+    shown = follow([[first]] * 5 + [later] * 20)
     assert [id_at(shown[-1], box) for box in (first, second, third)] == [1, 2, 3]
     assert [track.id for track in shown[-1]] == [1, 2, 3]
 

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from vdet.evaluate.rows import NO_ID, Row, in_memory
 
 from track.motion.scenes import HEIGHT, WIDTH
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
+from vdet.evaluate.labelled_video import NO_ID, LabelledVideo, Row
 from vdet.evaluate.scores import Scores, score
 from vdet.geometry import Float64Array, coverage
 from vdet.track.motion.tracker import MotionTracker
@@ -98,13 +98,15 @@ def truth_at(vehicles: Sequence[RoadVehicle], time: float) -> list[TrueVehicle]:
 class Noise:
     """What a detector does wrong.
 
-    `sides` is the standard deviation of a box's sides, share of its size; `missed` the share of
-    vehicles that it does not see; `false` the mean number of false detections in a frame.
+    `sides` is the standard deviation of the sides of a box, share of its size. `missed` is the
+    share of vehicles that it does not see. `false` is the mean number of false detections in a
+    frame; their scores go up to `surest`.
     """
 
     sides: float = 0.05
     missed: float = 0.1
     false: float = 0.1
+    surest: float = 0.6
 
 
 PERFECT = Noise(0, 0, 0)
@@ -125,7 +127,7 @@ def detect(truth: Iterable[TrueVehicle], noise: Noise, rng: np.random.Generator)
         width = np.exp(rng.uniform(np.log(30), np.log(200)))
         left, top = rng.uniform(0, WIDTH - width), rng.uniform(350, 600)
         boxes.append([left, top, left + width, top + 0.8 * width])
-        scores.append(rng.uniform(0.1, 0.6))
+        scores.append(rng.uniform(0.1, noise.surest))
     return Detections(np.reshape(boxes, (-1, 4)), scores)
 
 
@@ -144,10 +146,14 @@ def track_scores(
     for number, vehicles in enumerate(clip, start=1):
         for vehicle in vehicles:
             id_ = vehicle.id if vehicle.counts else NO_ID
-            true.append(Row(0, number, id_, *vehicle.box.tolist(), ignored=not vehicle.counts))
+            x, y, width, height = vehicle.box.tolist()
+            counts = vehicle.counts
+            true.append(Row(0, number, id_, x, y, width, height, ignored=not counts))
         for track in tracker.update(detect(vehicles, noise, rng), number / rate):
             box = track.box
             row = Row(0, number, track.id, box.x, box.y, box.width, box.height, track.score)
             shown.append(row)
-    videos = [in_memory(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)]
+    videos = [
+        LabelledVideo.from_rows(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)
+    ]
     return score(*videos)

@@ -1,4 +1,4 @@
-"""The linear model as a detector: windows → heat → regions → detections."""
+"""The linear model as a detector: windows → heat → hot regions → detections."""
 
 import logging
 from collections import deque
@@ -10,8 +10,8 @@ import numpy as np
 from vdet.config.schema import StillSettings, SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.detections import Detections
-from vdet.detect.svm.heat import Heat, HeatMap, Region, find_regions
-from vdet.detect.svm.horizon import USUAL, find_horizon
+from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
+from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
@@ -27,12 +27,13 @@ log = logging.getLogger("vdet")
 class Candidates:
     """What the search of one frame gives.
 
-    `windows` are all that were searched. `turns` are those to be added to the heat one after the
-    other: of a video's frame all at once; of a still picture as if it were several frames.
+    `windows` are all that were searched. `by_frame` are the windows that each of one or more
+    consecutive frames adds to the heat: for a frame of a video there is one; a still picture counts
+    as several, each of which adds the sets that it would search in a video.
     """
 
     windows: Windows
-    turns: tuple[Windows, ...]
+    by_frame: tuple[Windows, ...]
     is_still: bool
 
 
@@ -44,7 +45,7 @@ class SvmModel:
         self._settings = settings
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
-        """Return a detector for frames of one size; the horizon is looked for in `images`."""
+        """Return a detector for frames of one size; `images` show where the horizon is."""
         horizon = horizon_of(self._settings, images)
         log.info("the horizon lies at %.2f of the height", horizon)
         return SvmDetector(self._model, self._settings, width, height, horizon=horizon)
@@ -66,6 +67,8 @@ class SvmDetector:
         No search window fits into such a frame.
     ImageError
         Too many windows fit into such a frame.
+    ConfigError
+        The dense engine is asked for, and cannot compute the model's features.
     """
 
     def __init__(
@@ -75,7 +78,7 @@ class SvmDetector:
         width: int,
         height: int,
         *,
-        horizon: float = USUAL,
+        horizon: float = DEFAULT_HORIZON,
     ) -> None:
         self._search = FrameSearch(model, settings, width, height, horizon=horizon)
         self._features = model.features
@@ -86,35 +89,39 @@ class SvmDetector:
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
 
     def search(self, image: Image, index: int | None) -> Candidates:
-        """Score the windows of a frame; may be called by several threads."""
+        """Search the windows of a frame; several threads may call this at once."""
         if index is not None:
             windows = join_windows(self._search.search(image, self._search.sets_of(index)))
             return Candidates(windows, (windows,), is_still=False)
-        found = self._search.search(image)
-        turns = (self._search.sets_of(turn) for turn in range(self._heat.frames))
-        parts = tuple(join_windows([found[number] for number in turn]) for turn in turns)
-        return Candidates(join_windows(found), parts, is_still=True)
+        by_set = self._search.search(image)
+        by_frame = tuple(
+            join_windows([by_set[number] for number in self._search.sets_of(frame)])
+            for frame in range(self._heat.frames)
+        )
+        return Candidates(join_windows(by_set), by_frame, is_still=True)
 
     def detect(self, candidates: Candidates) -> Detections:
-        """Add the windows of the next frame to the heat, and return what is hot.
+        """Add the hits of the next frame to the heat, and return what is hot.
 
-        A still picture counts as if it stood still for `heat.frames` frames, so that the threshold
-        means the same as in video.
+        A still picture counts as `heat.frames` frames that all show it, so that thresholds mean the
+        same as in video.
         """
-        for turn in candidates.turns:
-            hits = turn.detected(self._settings.search.probability)
+        for windows in candidates.by_frame:
+            hits = windows.hits(self._settings.search.probability)
             heat = self._map.update(hits)
             self._recent.append(hits)
         regions = self._regions(heat)
         if candidates.is_still:
             regions = [each for each in regions if self._is_shown(each, self._settings.stills)]
-        return self._detections(candidates.windows, heat, regions)
+            hits = candidates.windows.hits(self._settings.search.probability)
+        trace = Trace(candidates.windows, hits, heat, self._search.grids)
+        return self._detections(regions, trace)
 
     def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
-        """Return pictures of a patch's features, the windows, the hits and the heat."""
+        """Return pictures of patches and their features, the windows, the hits and the heat."""
         return stage_pictures(image, detections.trace, self._features)
 
-    def _regions(self, heat: Heat) -> list[Region]:
+    def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
         if self._heat.regions == "votes":
             votes = Votes.of(self._recent, self._size, self._heat.votes)
@@ -122,31 +129,30 @@ class SvmDetector:
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
 
-    def _is_shown(self, region: Region, stills: StillSettings) -> bool:
+    def _is_shown(self, region: HotRegion, stills: StillSettings) -> bool:
         width, height = self._size
         return (
-            region.peak >= stills.strength
+            region.strength >= stills.strength
             and region.box.width >= stills.width * width
             and region.box.height >= stills.height * height
         )
 
-    def _detections(self, windows: Windows, heat: Heat, regions: Sequence[Region]) -> Detections:
-        strengths = np.array([region.peak for region in regions], np.float32)
-        score = self._settings.score
+    def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Detections:
+        strengths = np.array([region.strength for region in regions], np.float32)
         boxes = [(b.x, b.y, b.right, b.bottom) for b in (region.box for region in regions)]
-        hits = windows.detected(self._settings.search.probability)
+        score = self._settings.score
         return Detections(
-            np.reshape(np.array(boxes, np.float32), (-1, 4)),
+            np.reshape(boxes, (-1, 4)),
             detection_scores(strengths, score.middle, score.slope),
             centroids=np.reshape([region.centroid for region in regions], (-1, 2)),
             strengths=strengths,
-            trace=Trace(windows, hits, heat, self._search.grids),
+            trace=trace,
         )
 
 
 def horizon_of(settings: SvmSettings, images: Sequence[Image]) -> float:
-    """Return the horizon's row, share of the height: the set one, or that which `images` show."""
+    """Return the row of the horizon, share of the height: from the settings, or from `images`."""
     perspective = settings.search.perspective
     if not perspective.sizes:
-        return USUAL  # nothing depends on it
+        return DEFAULT_HORIZON  # no window set depends on it
     return perspective.horizon or find_horizon(images)

@@ -13,9 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings
+from vdet.geometry import Float32Array
 from vdet.media.images import Image
-
-Vectors = npt.NDArray[np.float32]
 
 _CONVERSIONS = {
     "YCrCb": cv2.COLOR_BGR2YCrCb,
@@ -29,7 +28,7 @@ _CONVERSIONS = {
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Where the parts of a feature vector lie; HOG has one part a described channel."""
+    """Where the parts of a feature vector lie; `hog` has one part for each described channel."""
 
     hog: tuple[slice, ...]
     histogram: slice
@@ -50,21 +49,21 @@ class Layout:
 
     @property
     def hog_length(self) -> int:
-        """HOG features of a patch, which come first; 4,704 for the seed's settings."""
+        """Number of HOG features, which come first; 4,704 for the seed's settings."""
         return int(self.histogram.start)
 
     @property
     def length(self) -> int:
-        """Features of a patch; 4,800 for the seed's settings."""
+        """Number of all features; 4,800 for the seed's settings."""
         return int(self.spatial.stop)
 
 
 class FeatureExtractor:
-    """Describes patches by the settings; holds OpenCV's descriptor, nothing that changes.
+    """Computes the feature vectors of patches; it has no state, so threads may share it.
 
-    A vector's parts, in order: HOG channel by channel (each as `cv2.HOGDescriptor.compute` gives
-    it: block column by column, then down, then cell, then orientation), colour histogram channel
-    by channel, spatial bins.
+    The parts of a vector, in order: HOG channel by channel (each as `cv2.HOGDescriptor.compute`
+    gives it: blocks column by column from the top, then cells, then orientations), colour histogram
+    channel by channel, shrunk patch channel by channel.
     """
 
     def __init__(self, settings: FeatureSettings) -> None:
@@ -72,17 +71,17 @@ class FeatureExtractor:
         self.layout = Layout.of(settings)
         self._hog = hog_descriptor(settings, (settings.patch, settings.patch))
 
-    def describe(self, patch: Image) -> Vectors:
-        """Describe one patch.
+    def describe(self, patch: Image) -> Float32Array:
+        """Compute the features of one patch.
 
         Parameters
         ----------
         patch
-            BGR uint8 of shape `(patch, patch, 3)`.
+            BGR uint8 `(patch, patch, 3)`.
 
         Returns
         -------
-        float32 of shape `(layout.length,)`: HOG 0 to 1, histogram in pixels, spatial bins 0 to 255.
+        float32 `(layout.length,)`: HOG 0 to 1, histogram in pixels, shrunk patch 0 to 255.
         """
         channels = np.ascontiguousarray(convert(patch, self.settings).transpose(2, 0, 1))
         parts: list[npt.ArrayLike] = []
@@ -93,8 +92,8 @@ class FeatureExtractor:
             parts += [cv2.resize(c, (side, side), interpolation=cv2.INTER_AREA) for c in channels]
         return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
 
-    def describe_all(self, patches: Iterable[Image]) -> Vectors:
-        """Describe patches one by one; float32 of shape `(n, layout.length)`."""
+    def describe_all(self, patches: Iterable[Image]) -> Float32Array:
+        """Compute the features of patches one by one; float32 `(n, layout.length)`."""
         vectors = [self.describe(patch) for patch in patches]
         return np.stack(vectors) if vectors else np.empty((0, self.layout.length), np.float32)
 
@@ -123,10 +122,10 @@ def to_patch(image: Image, side: int) -> Image:
 
 
 def resize(image: Image, width: int, height: int) -> Image:
-    """Resize an image without skipping pixels.
+    """Resize an image so that every pixel of it counts.
 
-    It is halved (each pixel the mean of four) as long as it is twice too large and both sides are
-    even, then brought to size bilinearly, or by area where it is still twice too large.
+    It is halved (each pixel the mean of four) while it is at least twice as large and both sides
+    are even. The rest is done bilinearly, or by area where it is still at least twice as large.
     """
     while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width and _is_even(image):
         image = halve(image)

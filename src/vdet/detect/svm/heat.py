@@ -1,6 +1,7 @@
-"""Detections of the last frames summed into a heatmap, and the regions where it is hot.
+"""Hits of the last frames summed into a heatmap, and the regions where it is hot.
 
-A window heats the vehicle that it shows: with box regression that is tighter than the window.
+A hit adds to the pixels of its vehicle (`Windows.vehicles`): with box regression, that is tighter
+than the window.
 
 Source: seed section 3, "Combine frames to create a heatmap and find contours".
 """
@@ -14,16 +15,14 @@ import numpy.typing as npt
 
 from vdet.config.schema import HeatSettings
 from vdet.detect.svm.windows import Windows
-from vdet.geometry import Box
-
-Values = npt.NDArray[np.float32]
+from vdet.geometry import Box, Float32Array
 
 
 @dataclass(frozen=True, slots=True)
 class Heat:
     """A heatmap: float32 `values`, each of them for `shrink` × `shrink` pixels of the frame."""
 
-    values: Values
+    values: Float32Array
     shrink: int = 1
 
     @property
@@ -33,20 +32,26 @@ class Heat:
 
 
 @dataclass(frozen=True, slots=True)
-class Region:
-    """A connected part of the heatmap above the threshold.
+class HotRegion:
+    """A part of a frame with evidence for a vehicle.
 
-    `box` is its bounding rectangle, `centroid` its centre of mass as `(x, y)` (both in full-frame
-    pixels), `peak` the highest heat in it, or the weight of the votes for it (`votes`).
+    Attributes
+    ----------
+    box
+        Its bounding rectangle, pixels of the frame.
+    centroid
+        Its centre of mass `(x, y)`, pixels of the frame.
+    strength
+        The highest heat in it; of a region found by votes, their weight.
     """
 
     box: Box
     centroid: tuple[float, float]
-    peak: float
+    strength: float
 
 
 class HeatMap:
-    """Sums the probabilities of detected windows over the last frames.
+    """Sums the probabilities of hits over the last frames.
 
     Parameters
     ----------
@@ -59,15 +64,15 @@ class HeatMap:
     def __init__(self, width: int, height: int, settings: HeatSettings) -> None:
         self._shape = (-(-height // settings.shrink), -(-width // settings.shrink))
         self._settings = settings
-        self._recent: deque[Values] = deque(maxlen=settings.frames)
+        self._recent: deque[Float32Array] = deque(maxlen=settings.frames)
 
-    def update(self, detections: Windows) -> Heat:
-        """Add a frame's detected windows, forget the oldest frame, return the blurred sum.
+    def update(self, hits: Windows) -> Heat:
+        """Add the hits of the next frame, drop the oldest frame, return the blurred sum.
 
-        The sum runs over the last `frames` frames, this one included, and the windows that cover a
-        pixel; each adds its probability, or with `weight: coverage` its share of that.
+        A value is the sum over the hits of the last `frames` frames, this one included, that cover
+        it. Each adds its probability or, with `weight: coverage`, its probability times its share.
         """
-        self._recent.append(self._values_of(detections))
+        self._recent.append(self._values_of(hits))
         total = np.zeros(self._shape, np.float32)
         for values in self._recent:
             total += values
@@ -76,12 +81,12 @@ class HeatMap:
             cv2.GaussianBlur(total, (side, side), 0, dst=total)
         return Heat(total, self._settings.shrink)
 
-    def _values_of(self, detections: Windows) -> Values:
+    def _values_of(self, hits: Windows) -> Float32Array:
         values = np.zeros(self._shape, np.float32)
-        heats = detections.probabilities
+        heats = hits.probabilities
         if self._settings.weight == "coverage":
-            heats = heats * detections.shares
-        sides = detections.vehicles.astype(np.float64)
+            heats = heats * hits.shares
+        sides = hits.vehicles.astype(np.float64)
         sides[:, 2:] += sides[:, :2]
         sides = np.maximum(0, np.floor(sides / self._settings.shrink + 0.5)).astype(np.int64)
         for (left, top, right, bottom), heat in zip(sides.tolist(), heats.tolist(), strict=True):
@@ -89,11 +94,11 @@ class HeatMap:
         return values
 
 
-def find_regions(heat: Heat, threshold: float) -> list[Region]:
-    """Return the connected regions where `heat` is above `threshold`, topmost-leftmost first.
+def find_regions(heat: Heat, threshold: float) -> list[HotRegion]:
+    """Return the connected regions where `heat` is above `threshold`, from the top left on.
 
-    Outer contours only: a hole does not split a region. The centroid is that of the filled
-    outline (`cv2.moments`), or the middle of the box where the outline is a line or a point.
+    A region with a hole is one region: only outer contours count. The centroid is that of the
+    filled contour (`cv2.moments`), or the middle of the box where the contour is a line or a point.
     """
     hot = (heat.values > threshold).astype(np.uint8)
     contours, _ = cv2.findContours(hot, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
@@ -101,7 +106,7 @@ def find_regions(heat: Heat, threshold: float) -> list[Region]:
     return sorted(regions, key=lambda region: (region.box.y, region.box.x))
 
 
-def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike) -> Region:
+def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike) -> HotRegion:
     x, y, width, height = cv2.boundingRect(contour)
     inside = np.zeros((height, width), np.uint8)
     cv2.drawContours(inside, [contour], -1, 1, cv2.FILLED, offset=(-x, -y))
@@ -112,7 +117,7 @@ def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike)
     moments = cv2.moments(contour)
     area = moments["m00"]
     if not area:
-        return Region(box, box.center, peak)
-    offset = (n - 1) / 2  # the middle of a value's pixels
+        return HotRegion(box, box.center, peak)
+    offset = (n - 1) / 2  # from the first pixel of a value to their middle
     centroid = (n * moments["m10"] / area + offset, n * moments["m01"] / area + offset)
-    return Region(box, centroid, peak)
+    return HotRegion(box, centroid, peak)

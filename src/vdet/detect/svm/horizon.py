@@ -1,7 +1,7 @@
 """The horizon of a camera over a road: the row where the lines of the road meet.
 
-Lane lines, barriers, kerbs and roofs run along the road, so their pictures meet in its vanishing
-point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
+Lane lines, barriers, kerbs and roofs run along the road, so in the picture they meet in its
+vanishing point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
 """
 
 from collections.abc import Iterable
@@ -9,36 +9,34 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
+from vdet.geometry import Float64Array
 from vdet.media.images import Image
 
-USUAL = 0.58
-"""Where a dashboard camera has it, share of the height: taken where no lines tell."""
+DEFAULT_HORIZON = 0.58
+"""Share of the height at which dashboard cameras usually have it; for frames without lines."""
 
-_TALLEST = 4  # picture that can show a road, height in widths
-_WIDTH = 640  # of the picture in which segments are looked for, pixels
-_SHORTEST = 0.02  # segment, share of the width
-_SLOPES = (12.0, 75.0)  # degrees from the horizontal: flatter is traffic, steeper stands upright
-_MISSES = 0.05  # sine of the angle by which a segment may miss the point it votes for
-_FEWEST = 8  # segments on each side
+_MAX_ASPECT = 4  # height over width of a picture that can show a road
+_WIDTH = 640  # pixels, of the picture in which segments are detected
+_MIN_LENGTH = 0.02  # of a segment, share of the width
+_SLOPES = (12.0, 75.0)  # degrees from the horizontal; vehicles are flatter, poles are steeper
+_MAX_SINE = 0.05  # of the angle between a segment and the direction to the point it votes for
+_MIN_SEGMENTS = 8  # on each side
 _ROWS = np.arange(0.30, 0.75, 0.01)
 _COLUMNS = np.arange(0.25, 0.76, 0.02)
-
-Values = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class _Segments:
     """Line segments: middle `(n, 2)`, normal `(n, 2)` and length `(n,)`, in widths of the frame."""
 
-    middles: Values
-    normals: Values
-    lengths: Values
+    middles: Float64Array
+    normals: Float64Array
+    lengths: Float64Array
 
 
 def find_horizon(images: Iterable[Image]) -> float:
-    """Return the horizon's row, share of the frame's height.
+    """Return the row of the horizon, share of the frame's height.
 
     Parameters
     ----------
@@ -47,31 +45,31 @@ def find_horizon(images: Iterable[Image]) -> float:
 
     Returns
     -------
-    0.30 to 0.74 in steps of 0.01, `USUAL` where too few lines run along the road.
+    0.30 to 0.74 in steps of 0.01; `DEFAULT_HORIZON` where too few lines run along the road.
     """
     images = list(images)
     if not images:
-        return USUAL
+        return DEFAULT_HORIZON
     height, width = images[0].shape[:2]
-    if height > _TALLEST * width:
-        return USUAL
-    segments = np.concatenate([_segments(image) for image in images])
-    directions = segments[:, 2:] - segments[:, :2]
+    if height > _MAX_ASPECT * width:
+        return DEFAULT_HORIZON
+    ends = np.concatenate([_segment_ends(image) for image in images])
+    directions = ends[:, 2:] - ends[:, :2]
     falling = directions[:, 0] * directions[:, 1] > 0
-    sides = [_oriented(segments[side]) for side in (falling, ~falling)]
-    if min(len(side.lengths) for side in sides) < _FEWEST:
-        return USUAL
-    left, right = (_votes(side, height / width) for side in sides)
-    both = np.minimum(left, right)  # a point needs lines from both sides
+    sides = [_segments(ends[side]) for side in (falling, ~falling)]
+    if min(len(side.lengths) for side in sides) < _MIN_SEGMENTS:
+        return DEFAULT_HORIZON
+    left, right = (_sum_votes(side, height / width) for side in sides)
+    both = np.minimum(left, right)  # a vanishing point has lines on both sides
     if not both.any():
-        return USUAL
+        return DEFAULT_HORIZON
     votes = both + 0.2 * (left + right)
     row, _ = np.unravel_index(int(votes.argmax()), votes.shape)
     return round(float(_ROWS[row]), 2)
 
 
-def _segments(image: Image) -> Values:
-    """Return the ends of the usable segments, `(n, 4)`, in widths of the frame."""
+def _segment_ends(image: Image) -> Float64Array:
+    """Return x, y of both ends of the usable segments, `(n, 4)`, in widths of the frame."""
     height, width = image.shape[:2]
     small = (_WIDTH, max(1, round(height * _WIDTH / width)))
     grey = cv2.cvtColor(cv2.resize(image, small, interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2GRAY)
@@ -80,23 +78,23 @@ def _segments(image: Image) -> Values:
     ends = ends / _WIDTH
     across, down = abs(ends[:, 2] - ends[:, 0]), abs(ends[:, 3] - ends[:, 1])
     slopes = np.degrees(np.arctan2(down, across))
-    usable = (np.hypot(across, down) > _SHORTEST) & (slopes > _SLOPES[0]) & (slopes < _SLOPES[1])
+    usable = (np.hypot(across, down) > _MIN_LENGTH) & (slopes > _SLOPES[0]) & (slopes < _SLOPES[1])
     return np.asarray(ends[usable])
 
 
-def _oriented(ends: Values) -> _Segments:
+def _segments(ends: Float64Array) -> _Segments:
     directions = ends[:, 2:] - ends[:, :2]
     lengths = np.hypot(directions[:, 0], directions[:, 1])
     normals = np.stack([-directions[:, 1], directions[:, 0]], axis=1) / lengths[:, np.newaxis]
     return _Segments((ends[:, :2] + ends[:, 2:]) / 2, normals, lengths)
 
 
-def _votes(segments: _Segments, aspect: float) -> Values:
+def _sum_votes(segments: _Segments, aspect: float) -> Float64Array:
     """Sum the votes for each point, `(rows, columns)`; a segment votes for points above it."""
     x, y = np.meshgrid(_COLUMNS, _ROWS * aspect)
     dx = x[..., np.newaxis] - segments.middles[:, 0]
     dy = y[..., np.newaxis] - segments.middles[:, 1]
-    away = abs(dx * segments.normals[:, 0] + dy * segments.normals[:, 1])
-    sines = away / (np.hypot(dx, dy) + 1e-9)
-    votes = segments.lengths * np.maximum(0, 1 - (sines / _MISSES) ** 2) * (dy < 0)
+    offsets = abs(dx * segments.normals[:, 0] + dy * segments.normals[:, 1])
+    sines = offsets / (np.hypot(dx, dy) + 1e-9)
+    votes = segments.lengths * np.maximum(0, 1 - (sines / _MAX_SINE) ** 2) * (dy < 0)
     return np.asarray(votes.sum(axis=-1))

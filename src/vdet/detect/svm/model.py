@@ -1,8 +1,8 @@
-"""The linear model: weights, probability, and the file they are kept in.
+"""The linear model: weights, probabilities, and the file that holds them.
 
-A model is one or several linear SVMs, each with a sigmoid that turns its score into a probability
-(Platt 1999); the model's probability is their mean. The scaling of features is folded into the
-weights, so that a score is one dot product with the raw features.
+A model is one or several linear SVMs, its members. Each has a sigmoid that turns its decision value
+into a probability (Platt 1999); the model's probability is the mean over the members. Features are
+not scaled before: their scaling is part of the weights.
 """
 
 import io
@@ -28,7 +28,7 @@ from vdet.geometry import Float32Array
 FORMAT_VERSION = 2
 MAX_MEMBERS = 20
 MAX_VALUE = 1e9
-"""Of a weight and its like, either way: beyond it a score or its sigmoid could overflow."""
+"""Largest absolute value of any number in a model; with larger ones, sigmoids could overflow."""
 _MAX_BYTES = 64_000_000
 _ARRAYS = ("weights", "biases", "slopes", "offsets")
 _BOX_ARRAYS = ("box_weights", "box_biases")
@@ -36,12 +36,12 @@ _BOX_ARRAYS = ("box_weights", "box_biases")
 
 @dataclass(frozen=True, slots=True)
 class BoxRegression:
-    """The sides of the vehicle that a window shows, linear in the window's HOG.
+    """Finds the sides of the vehicle in a window, as linear functions of the window's HOG.
 
-    `weights` is float32 of shape `(4, h)`, `h` the HOG features of a patch; `biases` is float32 of
-    shape `(4,)`. The rows give left, top, right and bottom, measured from the window's centre in
-    sides of the window. Source: the bounding-box regression of Felzenszwalb et al., "Object
-    Detection with Discriminatively Trained Part-Based Models", 2010, section 7.
+    `weights` is float32 `(4, h)`, `h` the number of HOG features of a patch; `biases` is float32
+    `(4,)`. The rows give left, top, right and bottom, measured from the centre of the window in its
+    sides. Source: the bounding-box regression of Felzenszwalb et al., "Object Detection with
+    Discriminatively Trained Part-Based Models", 2010, section 7.
     """
 
     weights: Float32Array
@@ -54,13 +54,23 @@ class BoxRegression:
 
 @dataclass(frozen=True, slots=True)
 class LinearModel:
-    """`k` calibrated linear SVMs over `n` raw features.
+    """`k` calibrated linear SVMs over `n` features.
 
-    `weights` is float32 of shape `(k, n)`; `biases`, `slopes` and `offsets` are float32 of shape
-    `(k,)`. The score of member i is `weights[i] · x + biases[i]`; its probability is
-    `1 / (1 + exp(slopes[i] · score + offsets[i]))`. `provenance` says
-    where the model is from, as plain JSON values (data set, metrics, versions). `boxes` is None
-    where the patches it learnt from came without boxes.
+    The decision value of member i for the features x is `weights[i] · x + biases[i]`; its
+    probability is `1 / (1 + exp(slopes[i] · value + offsets[i]))`.
+
+    Attributes
+    ----------
+    features
+        What the features are.
+    weights
+        float32 `(k, n)`.
+    biases, slopes, offsets
+        float32 `(k,)`.
+    provenance
+        Where the model comes from: data set, metrics, versions; JSON values.
+    box_regression
+        None where no training patch came with the box of its vehicle.
     """
 
     features: FeatureSettings
@@ -69,20 +79,20 @@ class LinearModel:
     slopes: Float32Array
     offsets: Float32Array
     provenance: dict[str, Any] = field(default_factory=dict)
-    boxes: BoxRegression | None = None
-
-    def scores(self, vectors: Float32Array) -> Float32Array:
-        """Return the SVMs' scores of `vectors`, `(m, n)` → `(m, k)`."""
-        return vectors @ self.weights.T + self.biases
-
-    def probabilities_of_scores(self, scores: Float32Array) -> Float32Array:
-        """Return the mean probability over the members, `(m, k)` → `(m,)`."""
-        exponent = np.clip(scores * self.slopes + self.offsets, -80, 80)
-        return np.asarray((1 / (1 + np.exp(exponent))).mean(axis=1), np.float32)
+    box_regression: BoxRegression | None = None
 
     def probabilities(self, vectors: Float32Array) -> Float32Array:
-        """Return the probability that each vector is a vehicle, `(m, n)` → `(m,)`."""
-        return self.probabilities_of_scores(self.scores(vectors))
+        """Return the probability that each vector is of a vehicle, `(m, n)` → `(m,)`."""
+        return self.to_probabilities(self.decision_values(vectors))
+
+    def decision_values(self, vectors: Float32Array) -> Float32Array:
+        """Return the decision value of each member for each vector, `(m, n)` → `(m, k)`."""
+        return vectors @ self.weights.T + self.biases
+
+    def to_probabilities(self, values: Float32Array) -> Float32Array:
+        """Return the mean probability over the members for decision values, `(m, k)` → `(m,)`."""
+        exponent = np.clip(values * self.slopes + self.offsets, -80, 80)
+        return np.asarray((1 / (1 + np.exp(exponent))).mean(axis=1), np.float32)
 
 
 def save_model(model: LinearModel, path: Path) -> None:
@@ -94,8 +104,8 @@ def save_model(model: LinearModel, path: Path) -> None:
         "provenance": model.provenance,
     }
     arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
-    if model.boxes is not None:
-        parts = (model.boxes.weights, model.boxes.biases)
+    if model.box_regression is not None:
+        parts = (model.box_regression.weights, model.box_regression.biases)
         arrays |= {
             name: part.astype(np.float32) for name, part in zip(_BOX_ARRAYS, parts, strict=True)
         }
@@ -107,12 +117,14 @@ def save_model(model: LinearModel, path: Path) -> None:
 def load_model(path: Path, features: FeatureSettings | None = None) -> LinearModel:
     """Read a model; with `features`, check that it was trained with these.
 
+    The file is data: nothing in it is executed.
+
     Raises
     ------
     ModelError
-        The file cannot be read, is damaged, of another version, of other features than it says or
-        than asked for, or holds a value that is not finite or beyond `MAX_VALUE`. Nothing in it
-        is ever run.
+        The file cannot be read or is damaged; it is of another version or was trained with other
+        features; its arrays do not fit its features; a value is not finite, or larger than
+        `MAX_VALUE`.
     """
     header, arrays = _read(path)
     boxes = [arrays.pop(name) for name in _BOX_ARRAYS if name in arrays]
@@ -120,13 +132,13 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         _features(header, path),
         **arrays,
         provenance=header.get("provenance", {}),
-        boxes=BoxRegression(*boxes) if boxes else None,
+        box_regression=BoxRegression(*boxes) if boxes else None,
     )
     _check_arrays(model, path)
     if features is not None and features != model.features:
         raise ModelError(
             f"{path}: was trained with other features ({_difference(model.features, features)}); "
-            "take these settings out, or train with them"
+            "remove these settings, or train a model with them"
         )
     return model
 
@@ -162,7 +174,7 @@ def _read_array(archive: zipfile.ZipFile, name: str, path: Path) -> npt.NDArray[
 
 
 def _check_declared_size(data: bytes, name: str, path: Path) -> None:
-    """Refuse a shape that the file does not hold, before memory is set aside for it."""
+    """Refuse a shape that the file does not hold, before memory is allocated for it."""
     file = io.BytesIO(data)
     version = np.lib.format.read_magic(file)
     if version != (1, 0):
@@ -195,7 +207,9 @@ def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
     try:
         return FeatureSettings.model_validate(header.get("features"))
     except ValidationError as error:
-        raise ModelError(f"{path}: its feature settings are not understood; train again") from error
+        raise ModelError(
+            f"{path}: its feature settings are not understood; train it again"
+        ) from error
 
 
 def _check_arrays(model: LinearModel, path: Path) -> None:
@@ -210,9 +224,9 @@ def _check_arrays(model: LinearModel, path: Path) -> None:
     for name in _ARRAYS[1:]:
         _check_array(getattr(model, name), (members,), name, path)
     _check_array(model.weights, expected, "weights", path)
-    if model.boxes is not None:
-        _check_array(model.boxes.weights, (4, layout.hog_length), _BOX_ARRAYS[0], path)
-        _check_array(model.boxes.biases, (4,), _BOX_ARRAYS[1], path)
+    if model.box_regression is not None:
+        _check_array(model.box_regression.weights, (4, layout.hog_length), _BOX_ARRAYS[0], path)
+        _check_array(model.box_regression.biases, (4,), _BOX_ARRAYS[1], path)
 
 
 def _check_array(array: Float32Array, shape: tuple[int, ...], name: str, path: Path) -> None:
@@ -224,9 +238,9 @@ def _check_array(array: Float32Array, shape: tuple[int, ...], name: str, path: P
         raise ModelError(f"{path}: {name} hold a value beyond {MAX_VALUE:g}; train it again")
 
 
-def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:
+def _difference(trained: FeatureSettings, requested: FeatureSettings) -> str:
     return ", ".join(
-        f"detector.features.{name}: {getattr(ours, name)}, asked for {getattr(asked, name)}"
-        for name in type(ours).model_fields
-        if getattr(ours, name) != getattr(asked, name)
+        f"detector.features.{name}: {getattr(trained, name)}, asked for {getattr(requested, name)}"
+        for name in type(trained).model_fields
+        if getattr(trained, name) != getattr(requested, name)
     )

@@ -1,4 +1,4 @@
-"""A patch with everything it is described by: channels, HOG of each, histogram of each."""
+"""A picture of patches and their features: channels, HOG of each, histogram of each."""
 
 import math
 
@@ -9,6 +9,7 @@ import numpy.typing as npt
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import convert, histogram, hog_descriptor, to_patch
 from vdet.draw.boxes import WHITE
+from vdet.geometry import Float64Array
 from vdet.media.images import Image
 
 TILE = 192
@@ -16,7 +17,7 @@ _BACKGROUND = 32
 
 
 def patch_sheet(patches: dict[str, Image], settings: FeatureSettings) -> Image:
-    """Return a row of tiles a patch: itself, its channels, their HOG, their histograms.
+    """Return a row of tiles for each patch: itself, its channels, their HOG, their histograms.
 
     Parameters
     ----------
@@ -54,15 +55,14 @@ def _captioned(tile: Image, text: str) -> Image:
 
 
 def _hog_tile(channel: Image, settings: FeatureSettings) -> Image:
-    """Draw each cell's gradient directions as lines along the edge, brighter for stronger."""
+    """Draw each cell's edges as lines; a stronger gradient makes a brighter line."""
     tile = np.zeros((TILE, TILE, 3), np.uint8)
     strengths = _cell_strengths(channel, settings)
     _, columns, orientations = strengths.shape
     size = TILE / columns
     for row, column, k in np.argwhere(strengths > 0.05 * strengths.max()).tolist():
-        angle = (
-            math.pi * (k + 0.5) / orientations + math.pi / 2
-        )  # the edge lies across the gradient
+        # The edge lies across the gradient.
+        angle = math.pi * (k + 0.5) / orientations + math.pi / 2
         dx, dy = math.cos(angle) * size * 0.45, math.sin(angle) * size * 0.45
         x, y = (column + 0.5) * size, (row + 0.5) * size
         shade = round(255 * float(strengths[row, column, k] / strengths.max()))
@@ -71,12 +71,12 @@ def _hog_tile(channel: Image, settings: FeatureSettings) -> Image:
     return tile
 
 
-def _cell_strengths(channel: Image, settings: FeatureSettings) -> npt.NDArray[np.float64]:
-    """Average each cell over the blocks that hold it; shape `(rows, columns, orientations)`."""
+def _cell_strengths(channel: Image, settings: FeatureSettings) -> Float64Array:
+    """Average each cell over its blocks; float64 `(rows, columns, orientations)`."""
     hog = settings.hog
     cells, blocks = settings.patch // hog.cell, settings.patch // hog.cell - hog.block + 1
     vector = hog_descriptor(settings, (settings.patch, settings.patch)).compute(channel)
-    # block column, block row, cell column, cell row, orientation
+    # axes: block column, block row, cell column, cell row, orientation
     values = np.reshape(vector, (blocks, blocks, hog.block, hog.block, hog.orientations))
     total = np.zeros((cells, cells, hog.orientations))
     count = np.zeros((cells, cells, 1))
@@ -89,7 +89,7 @@ def _cell_strengths(channel: Image, settings: FeatureSettings) -> npt.NDArray[np
 
 
 def _histogram_tile(counts: npt.NDArray[np.intp]) -> Image:
-    """Draw bars of `(3, bins)` counts, one band a channel, each to its own height."""
+    """Draw `(3, bins)` counts as bars, one band for each channel, scaled to its highest bar."""
     bands = []
     for row in counts:
         band = np.full((TILE // 3, TILE, 3), 16, np.uint8)

@@ -1,8 +1,8 @@
-"""Window sets that follow the perspective: how large a vehicle looks tells where it stands.
+"""Window sets that follow the perspective: the size of a vehicle gives its row.
 
-On a flat road, what stands on the ground ends as far below the horizon as the camera stands above
-the ground, both in widths of the thing, whatever its distance. So one number, the horizon, places
-all sets.
+On a flat road, a vehicle of width w stands on the row horizon + w · (height of the camera) /
+(real width of the vehicle): the farther, the smaller and the nearer to the horizon. So the horizon
+alone places the sets of all sizes.
 """
 
 import math
@@ -11,8 +11,8 @@ from fractions import Fraction
 from vdet.config.schema import FeatureSettings, PerspectiveSettings
 from vdet.detect.svm.windows import WindowGrid
 
-_WIDEST = 16 / 9
-"""Of a wider frame, this share of its height counts as its width: it shows more to the sides."""
+_MAX_ASPECT = 16 / 9
+"""A frame that is wider shows more to the sides; its height times this counts as its width."""
 
 
 def lay_perspective(
@@ -25,23 +25,24 @@ def lay_perspective(
 ) -> list[WindowGrid]:
     """Lay the sets over a frame of `width` × `height` pixels.
 
-    Windows lie inside the frame's rows, and may reach beyond its sides. Sizes and first rows are
-    rounded so that a set's strip can be halved exactly until it is near a patch in scale.
+    Windows lie inside the frame's rows, and may reach beyond its left and right. Sizes and first
+    rows are rounded so that a set's strip can be halved exactly until a window is about as large as
+    a patch.
 
     Parameters
     ----------
     horizon
-        Its row, share of the frame's height.
+        Row of the horizon, share of the frame's height.
 
     Returns
     -------
-    A grid a size, in the order given; sizes of which no window fits are left out, and those that
-    are rounded to one before them.
+    One grid for each size, in the order given. Sizes of which no window fits are left out; of
+    several sizes that are rounded to the same one, the first is laid.
     """
     cells = features.patch // features.hog.cell
     grids: list[WindowGrid] = []
     for share in settings.sizes:
-        side = share * settings.zoom * min(width, _WIDEST * height)
+        side = share * settings.zoom * min(width, _MAX_ASPECT * height)
         halvings = max(0, math.floor(math.log2(max(side, 1) / features.patch)))
         unit = cells << halvings
         size = unit * max(1, round(side / unit))

@@ -1,4 +1,4 @@
-"""A frame at full, half, quarter … size, so that each strip starts from what is near its scale."""
+"""A frame at full, half, quarter … size, from which strips and windows are cut."""
 
 import cv2
 import numpy as np
@@ -8,17 +8,17 @@ from vdet.media.images import Image
 
 
 class FramePyramid:
-    """The searched rows of one frame, halved as often as strips ask for.
+    """The searched rows of one frame at full size and, made when needed, halved again and again.
 
     Parameters
     ----------
     image
         BGR uint8 `(H, W, 3)`.
     top, bottom
-        The rows that will be asked for.
+        First row that is searched, and first row below; None for the frame's end.
     margin
-        Columns that will be asked for beyond the left and right of the frame; they repeat its
-        outermost ones.
+        Columns beyond the left and right of the frame that are searched too; they repeat its
+        outermost columns.
     """
 
     def __init__(
@@ -33,14 +33,15 @@ class FramePyramid:
         self._levels = [rows]
 
     def crop(self, x: int, y: int, width: int, height: int) -> Image:
-        """Return a window of the frame at full size; full-frame pixels, x may be negative."""
+        """Return a window at full size; all in pixels of the frame, `x` may be negative."""
         left, top = x + self._origin[0], y + self._origin[1]
         return self._levels[0][top : top + height, left : left + width]
 
     def cut(self, rows: slice, columns: slice, width: int, height: int) -> Image:
-        """Return a part of the frame (full-frame pixels), resized to `width` × `height`.
+        """Return a part of the frame, resized to `width` × `height`.
 
-        The pixels are those of `resize(image[rows, columns], width, height)`.
+        `rows` and `columns` are pixels of the frame, columns may be negative. The result equals
+        `resize(image[rows, columns], width, height)`; halvings are shared by all cuts.
         """
         across, down = self._origin
         sides = rows.start + down, rows.stop + down, columns.start + across, columns.stop + across

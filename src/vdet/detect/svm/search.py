@@ -1,4 +1,4 @@
-"""The search of one frame size: window sets laid over the frame, each scored by an engine."""
+"""The search of one frame size: window sets laid over the frame, each searched by an engine."""
 
 import logging
 from collections.abc import Sequence
@@ -8,14 +8,13 @@ import numpy as np
 
 from vdet.config.schema import FeatureSettings, SearchSettings, SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.dense import dense_search, why_not_dense
-from vdet.detect.svm.horizon import USUAL
+from vdet.detect.svm.dense_search import dense_search, why_not_dense
+from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.scored import Scored
-from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, lay_grid
 from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.geometry import Float32Array
 from vdet.media.images import Image
@@ -23,20 +22,21 @@ from vdet.media.images import Image
 MAX_WINDOWS = 100_000
 """In a frame; more take minutes. The shipped settings lay about 2,700 over a frame of 16:9."""
 
-_MULTIPLE = 16  # of rows and columns, so that the pyramid's levels begin at whole pixels
+_ALIGNMENT = 16  # of the pyramid's first row and column, so that its levels begin at whole pixels
+_MIN_SIDE = 0.2  # of the smallest vehicle that a window can show, sides of the window
 
 log = logging.getLogger("vdet")
 
 
 class GridSearch(Protocol):
-    """Scores the windows of one grid."""
+    """An engine for the windows of one grid."""
 
-    def search(self, frame: FramePyramid) -> Scored:
-        """Score each window."""
+    def search(self, frame: FramePyramid) -> GridResult:
+        """Return the probability of each window."""
 
 
 class FrameSearch:
-    """Scores the windows of frames of one size; nothing in it changes, so threads may share it.
+    """Searches the windows of frames of one size; it has no state, so threads may share it.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class FrameSearch:
     Raises
     ------
     FrameSizeError
-        No search window fits into such a frame.
+        No window fits into such a frame.
     ImageError
         More than `MAX_WINDOWS` windows fit.
     ConfigError
-        The dense engine is asked for, and the model's features cannot be computed densely.
+        The dense engine is asked for, and cannot compute the model's features.
     """
 
     def __init__(
@@ -67,51 +67,58 @@ class FrameSearch:
         width: int,
         height: int,
         *,
-        horizon: float = USUAL,
+        horizon: float = DEFAULT_HORIZON,
     ) -> None:
         grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
         if not grids:
             raise FrameSizeError(
-                f"no search window fits into a frame of {width}×{height} pixels; "
-                "give a larger one, or other detector.search.windows"
+                f"no search window fits into a frame of {width}×{height} pixels; give a larger "
+                "frame, or smaller windows in detector.search.windows or "
+                "detector.search.perspective.sizes"
             )
         if (count := sum(map(len, grids))) > MAX_WINDOWS:
             raise ImageError(
                 f"{count:,} search windows would be laid over a frame of {width}×{height} pixels, "
-                f"more than {MAX_WINDOWS:,}; give detector.search.windows larger steps, or fewer "
-                "rows"
+                f"more than {MAX_WINDOWS:,}; give larger steps or fewer rows in "
+                "detector.search.windows and detector.search.perspective"
             )
-        search_grid = dense_search if _is_dense(settings.search, model.features) else PatchSearch
+        engine = dense_search if _use_dense(settings.search, model.features) else PatchSearch
         self.grids = grids
-        self._sets = [_WindowSet(grid, search_grid(model, grid)) for grid in grids]
-        self._turns = min(settings.search.alternate, len(grids))
-        self._least = settings.search.probability
-        self._regression = model.boxes
+        self._sets = [_WindowSet(grid, engine(model, grid)) for grid in grids]
+        self._alternate = min(settings.search.alternate, len(grids))
+        self._probability = settings.search.probability
+        self._regression = model.box_regression
 
     def sets_of(self, index: int) -> range:
-        """Return the numbers of the sets that are searched in a video's frame `index`."""
-        return range(index % self._turns, len(self._sets), self._turns)
+        """Return the indices of the sets that are searched in frame `index` of a video."""
+        return range(index % self._alternate, len(self._sets), self._alternate)
 
     def search(self, image: Image, sets: Sequence[int] | None = None) -> list[Windows]:
-        """Score the windows of some sets in a frame, BGR uint8 `(H, W, 3)`; None for all sets."""
-        chosen = self._sets if sets is None else [self._sets[number] for number in sets]
-        top = min(each.top for each in chosen) // _MULTIPLE * _MULTIPLE
-        margin = -(min(each.left for each in chosen) // _MULTIPLE * _MULTIPLE)
+        """Search a frame, BGR uint8 `(H, W, 3)`; return the windows of each of the sets.
+
+        Parameters
+        ----------
+        sets
+            Indices of sets in `grids`; None for all of them.
+        """
+        chosen = self._sets if sets is None else [self._sets[index] for index in sets]
+        top = min(each.top for each in chosen) // _ALIGNMENT * _ALIGNMENT
+        margin = -(min(each.left for each in chosen) // _ALIGNMENT * _ALIGNMENT)
         frame = FramePyramid(image, top, max(each.bottom for each in chosen), margin=margin)
         return [self._windows(each, each.search.search(frame)) for each in chosen]
 
-    def _windows(self, window_set: "_WindowSet", scored: Scored) -> Windows:
+    def _windows(self, window_set: "_WindowSet", result: GridResult) -> Windows:
         boxes = window_set.boxes
         vehicles = boxes.astype(np.float32)
-        (hits,) = np.nonzero(scored.probabilities >= self._least)
+        (hits,) = np.nonzero(result.probabilities >= self._probability)
         if self._regression is not None and len(hits):
-            sides = self._regression.sides(scored.hogs(hits))
-            vehicles[hits] = _placed(vehicles[hits], sides)
-        return Windows(boxes, scored.probabilities, window_set.shares, vehicles)
+            sides = self._regression.sides(result.hogs(hits))
+            vehicles[hits] = _vehicle_boxes(vehicles[hits], sides)
+        return Windows(boxes, result.probabilities, window_set.shares, vehicles)
 
 
 class _WindowSet:
-    """A grid, its search, and what of its windows is the same in every frame."""
+    """A grid, its search, and what is the same in every frame."""
 
     def __init__(self, grid: WindowGrid, search: GridSearch) -> None:
         self.search = search
@@ -121,21 +128,21 @@ class _WindowSet:
         self.bottom = int((self.boxes[:, 1] + self.boxes[:, 3]).max())
 
 
-def _placed(windows: Float32Array, sides: Float32Array) -> Float32Array:
-    """Turn sides, relative to their windows, into boxes; a box has at least `_LEAST` of a window.
+def _vehicle_boxes(windows: Float32Array, sides: Float32Array) -> Float32Array:
+    """Return the boxes of vehicles in windows, `(m, 4)` of x, y, width, height.
 
-    `windows` `(m, 4)` are x, y, width, height; `sides` `(m, 4)` left, top, right, bottom from the
-    window's centre in its sides.
+    Parameters
+    ----------
+    windows
+        `(m, 4)` of x, y, width, height.
+    sides
+        `(m, 4)` of left, top, right, bottom, measured from the centre of the window in its sides.
     """
     size = windows[:, 2:]
     middle = windows[:, :2] + size / 2
-    extent = np.maximum(sides[:, 2:] - sides[:, :2], _LEAST)
+    extent = np.maximum(sides[:, 2:] - sides[:, :2], _MIN_SIDE)
     centre = middle + (sides[:, :2] + sides[:, 2:]) / 2 * size
     return np.concatenate([centre - extent * size / 2, extent * size], axis=1, dtype=np.float32)
-
-
-_LEAST = 0.2
-"""Width and height of the smallest vehicle that a window can show, sides of the window."""
 
 
 def lay_grids(
@@ -144,9 +151,9 @@ def lay_grids(
     width: int,
     height: int,
     *,
-    horizon: float = USUAL,
+    horizon: float = DEFAULT_HORIZON,
 ) -> list[WindowGrid]:
-    """Lay the window sets over a frame; those of which no window fits are left out."""
+    """Lay the window sets over a frame; sets of which no window fits are left out."""
     search = scale_lengths(settings.search, height / settings.reference_height)
     cells = features.patch // features.hog.cell
     grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
@@ -154,12 +161,14 @@ def lay_grids(
     return [grid for grid in grids if len(grid)]
 
 
-def _is_dense(search: SearchSettings, features: FeatureSettings) -> bool:
+def _use_dense(search: SearchSettings, features: FeatureSettings) -> bool:
     if search.engine == "patch":
         return False
     reason = why_not_dense(features)
     if reason and search.engine == "dense":
-        raise ConfigError(f"search.engine: dense cannot compute {reason}; take auto or patch")
+        raise ConfigError(
+            f"detector.search.engine: dense cannot compute {reason}; take auto or patch"
+        )
     if reason:
-        log.info("the patch engine searches: the dense one cannot compute %s", reason)
+        log.info("the patch engine searches, because the dense one cannot compute %s", reason)
     return not reason

@@ -1,4 +1,4 @@
-"""A picture of every stage of the detection, as the original's report shows them."""
+"""A picture of each stage of the detection, as in the report of the original."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ from vdet.media.images import Image
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What the pictures show of the detection in one frame.
+    """What the stage pictures of a frame need.
 
-    `windows` are the searched ones, `hits` those of at least `search.probability`, `grids` the
-    window sets.
+    `windows` are all that were searched, `hits` those of at least `detector.search.probability`,
+    `heat` is the heatmap of the last frames, `grids` are the window sets.
     """
 
     windows: Windows
@@ -31,14 +31,14 @@ class Trace:
 
 
 def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dict[str, Image]:
-    """Return pictures of a patch's features, the windows, the hits and the heat, by name.
+    """Return four pictures by name: patches and their features, windows, hits, heat.
 
     Parameters
     ----------
     image
-        The frame searched, BGR uint8 `(H, W, 3)`.
+        The searched frame, BGR uint8 `(H, W, 3)`.
     features
-        Those of the model.
+        The features of the model.
     """
     return {
         "patches": patch_sheet(_examples(image, trace.windows), features),
@@ -49,7 +49,7 @@ def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dic
 
 
 def _examples(image: Image, windows: Windows) -> dict[str, Image]:
-    """Return the likeliest and the unlikeliest window of the frame, with captions."""
+    """Return the most and the least probable window of the frame, by caption."""
     best, worst = int(windows.probabilities.argmax()), int(windows.probabilities.argmin())
     frame = FramePyramid(image, margin=int(windows.boxes[:, 2].max()))
     examples = {}
@@ -60,7 +60,7 @@ def _examples(image: Image, windows: Windows) -> dict[str, Image]:
 
 
 def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
-    """Draw each set's windows as a fine grid with one whole window, and its count."""
+    """Draw a row of lines for each row of windows, and one whole window with size and count."""
     picture = (image * 0.6).astype(np.uint8)
     for number, grid in enumerate(grids):
         for x, y, width, height in grid.boxes.tolist():
@@ -90,7 +90,7 @@ def _draw_heat(image: Image, heat: Heat) -> Image:
 
 
 def blend_heat(image: Image, heat: Heat) -> Image:
-    """Return the image with the heat over it, from black over red to white at its peak."""
+    """Return the darkened image with the heat over it: black, red, white at the peak."""
     scale = 255 / heat.peak if heat.peak > 0 else 0
     shade = (heat.values * scale).astype(np.uint8)
     large = np.kron(shade, np.ones((heat.shrink, heat.shrink), np.uint8))

@@ -1,11 +1,12 @@
-"""Hot regions split into vehicles by the votes of the windows in them.
+"""Hot regions split into vehicles by the votes of the hits in them.
 
-A detection votes for the box of the vehicle that it shows, and its vote weighs twice. Whether there
-is a vehicle: by its probability, which soon comes near to 1. Where it is: by how far the window is
-from being none, which is most where it fits the vehicle best. The box that most votes agree with
-is a vehicle; these are averaged and used up, and the rest vote again: greedy non-maximum
-suppression that averages instead of picking one, as Viola & Jones, "Robust Real-Time Face
-Detection", 2004, section 5.6, merge detections.
+Each hit votes for a box, that of the vehicle in its window. A vote has two weights. `presence`,
+for there being a vehicle, is the hit's probability, which soon nears 1. `position`, for where the
+box is, grows without bound, and is highest for the window that fits the vehicle best.
+
+The box that most votes agree with is a vehicle. These votes are averaged and removed, and the rest
+vote again. This is greedy non-maximum suppression that averages boxes instead of picking one, as
+Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section 5.6).
 """
 
 from collections.abc import Sequence
@@ -14,95 +15,106 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.config.schema import VoteSettings
-from vdet.detect.svm.heat import Region
+from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 from vdet.geometry import Box, Float64Array, coverage, iou_matrix, visible
 
-MOST_VOTES = 400
-"""In a region; of more, the surest are heard. Keeps the square of their number small."""
+MAX_VOTES = 400
+"""In a region: the time grows with the square of their number, so of more the best are kept."""
 
-
-_SUREST = 1 - 2**-24
-"""Probabilities above it are taken for it; in float32 they may be 1."""
+_MAX_PROBABILITY = 1 - 2**-24
+"""Higher ones are lowered to it, because the position weight of 1 is infinite."""
 
 
 @dataclass(frozen=True, slots=True)
 class Votes:
-    """Boxes voted for, float64 `(n, 4)` of x, y, width, height, and the weights of the votes.
+    """The votes of some hits.
 
-    `whether`, float64 `(n,)`, is the weight for there being a vehicle; `where`, `(n,)`, above 0,
-    for the place of its box.
+    Attributes
+    ----------
+    boxes
+        float64 `(n, 4)`: x, y, width, height, pixels of the frame.
+    presence
+        float64 `(n,)`: weight for there being a vehicle.
+    position
+        float64 `(n,)`, above 0: weight for the place of the box.
     """
 
     boxes: Float64Array
-    whether: Float64Array
-    where: Float64Array
+    presence: Float64Array
+    position: Float64Array
 
     @staticmethod
-    def of(detections: Sequence[Windows], size: tuple[int, int], settings: VoteSettings) -> "Votes":
-        """Collect the votes of some frames' detections.
+    def of(hits: Sequence[Windows], size: tuple[int, int], settings: VoteSettings) -> "Votes":
+        """Collect the votes of the hits of some frames.
 
-        What lies outside the frame of `size`, width and height in pixels, is cut off: how far a
-        vehicle reaches there, windows can only guess, and need not agree on.
+        Boxes are cut off at the sides of the frame of `size` (width and height, pixels): windows
+        can only guess how far a vehicle reaches beyond, so their guesses need not agree.
         """
-        boxes = np.concatenate([each.vehicles for each in detections], dtype=np.float64)
-        shares = np.concatenate([each.shares for each in detections], dtype=np.float64)
-        sure = np.concatenate([each.probabilities for each in detections], dtype=np.float64)
-        where = (-np.log1p(-np.clip(sure, 1 - _SUREST, _SUREST))) ** settings.sharpness
+        boxes = np.concatenate([each.vehicles for each in hits], dtype=np.float64)
+        shares = np.concatenate([each.shares for each in hits], dtype=np.float64)
+        probabilities = np.concatenate([each.probabilities for each in hits], dtype=np.float64)
+        bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
+        position = (-np.log1p(-bounded)) ** settings.sharpness
         inside = visible(boxes, size)
         seen = (inside[:, 2:] >= 1).all(axis=1)
-        return Votes(inside[seen], (sure * shares)[seen], where[seen])
+        return Votes(inside[seen], (probabilities * shares)[seen], position[seen])
 
     def within(self, box: Box) -> "Votes":
-        """Return those whose centre lies in `box`; the surest where they are too many."""
+        """Return the votes whose centre lies in `box`; of too many, those of highest `position`."""
         x, y = (self.boxes[:, :2] + self.boxes[:, 2:] / 2).T
         inside = (box.x <= x) & (x < box.right) & (box.y <= y) & (y < box.bottom)
-        (numbers,) = np.nonzero(inside)
-        surest = np.argsort(-self.where[numbers], kind="stable")[:MOST_VOTES]
-        numbers = np.sort(numbers[surest])
-        return Votes(self.boxes[numbers], self.whether[numbers], self.where[numbers])
+        (indices,) = np.nonzero(inside)
+        best = np.argsort(-self.position[indices], kind="stable")[:MAX_VOTES]
+        indices = np.sort(indices[best])
+        return Votes(self.boxes[indices], self.presence[indices], self.position[indices])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Vehicle:
-    """A box, `(4,)`, the agreement on it, and the evidence for it."""
+class _VotedBox:
+    """A box `(4,)` that votes agree on, and the sums of their weights.
+
+    A vote counts by its overlap with the box.
+    """
 
     box: Float64Array
-    agreed: float
-    evidence: float
+    position: float
+    presence: float
 
 
-def split_regions(regions: Sequence[Region], votes: Votes, settings: VoteSettings) -> list[Region]:
+def split_regions(
+    regions: Sequence[HotRegion], votes: Votes, settings: VoteSettings
+) -> list[HotRegion]:
     """Replace each region by the vehicles that the votes in it agree on, strongest first."""
     return [
         vehicle for region in regions for vehicle in _vehicles(votes.within(region.box), settings)
     ]
 
 
-def _vehicles(votes: Votes, settings: VoteSettings) -> list[Region]:
+def _vehicles(votes: Votes, settings: VoteSettings) -> list[HotRegion]:
     overlaps = iou_matrix(votes.boxes, votes.boxes)
-    whether, where = votes.whether.copy(), votes.where.copy()
-    found: list[_Vehicle] = []
-    while where.any():
-        agreed = np.where(where > 0, overlaps @ where, 0)
+    presence, position = votes.presence.copy(), votes.position.copy()
+    found: list[_VotedBox] = []
+    while position.any():
+        agreed = np.where(position > 0, overlaps @ position, 0)
         mode = int(agreed.argmax())
-        box = _average(votes.boxes, where, overlaps[mode], settings.agreement)
+        box = _average(votes.boxes, position, overlaps[mode], settings.agreement)
         around = iou_matrix(box[np.newaxis], votes.boxes)[0]
-        box = _average(votes.boxes, where, around, settings.agreement)
-        vehicle = _Vehicle(box, float(agreed[mode]), float(overlaps[mode] @ whether))
+        box = _average(votes.boxes, position, around, settings.agreement)
+        vehicle = _VotedBox(box, float(agreed[mode]), float(overlaps[mode] @ presence))
         used = np.maximum(around, overlaps[mode]) > settings.agreement
-        used[mode] = True  # no vote is heard twice, even where agreement is 1
-        if vehicle.evidence >= settings.least:
+        used[mode] = True  # with an agreement of 1, no overlap is above it
+        if vehicle.presence >= settings.least:
             found.append(vehicle)
             used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > settings.inside
-        whether[used] = where[used] = 0
+        presence[used] = position[used] = 0
     return [_region(each) for each in found if not _is_part(each, found, settings.inside)]
 
 
 def _average(
     boxes: Float64Array, weights: Float64Array, overlaps: Float64Array, agreement: float
 ) -> Float64Array:
-    """Average the boxes that agree; better overlap counts more."""
+    """Average the boxes that agree; a better overlap counts more."""
     shares = np.where(overlaps > agreement, weights * overlaps**2, 0)
     total = shares.sum()
     if not total:
@@ -110,20 +122,20 @@ def _average(
     return np.asarray(shares @ boxes / total)
 
 
-def _is_part(vehicle: _Vehicle, others: Sequence[_Vehicle], inside: float) -> bool:
-    """Tell whether a larger vehicle, agreed on about as well, holds this one."""
+def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox], inside: float) -> bool:
+    """Return whether it lies in a larger box that has more than half its `position` weight."""
     box = vehicle.box
     return any(
         other.box[2] * other.box[3] > box[2] * box[3]
         and coverage(box[np.newaxis], other.box[np.newaxis])[0, 0] > inside
-        and other.agreed > vehicle.agreed / 2
+        and other.position > vehicle.position / 2
         for other in others
     )
 
 
-def _region(vehicle: _Vehicle) -> Region:
+def _region(vehicle: _VotedBox) -> HotRegion:
     box = vehicle.box
     x1, y1 = np.floor(box[:2] + 0.5).astype(int).tolist()
     x2, y2 = np.floor(box[:2] + box[2:] + 0.5).astype(int).tolist()
     x, y = (box[:2] + box[2:] / 2).tolist()
-    return Region(Box(x1, y1, x2 - x1, y2 - y1), (x, y), vehicle.evidence)
+    return HotRegion(Box(x1, y1, x2 - x1, y2 - y1), (x, y), vehicle.presence)

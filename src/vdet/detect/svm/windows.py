@@ -1,10 +1,10 @@
-"""Window sets → window positions, and what was found in them.
+"""Windows: where they lie in a frame, and what the model says of them.
 
 Source of the overlap rule: seed section 2, "Sliding Windows"; the counts 423 + 408 = 831 for a
 1280×720 frame are the original's.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -12,25 +12,31 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import WindowSettings
-from vdet.geometry import Float32Array
+from vdet.geometry import Float32Array, Int32Array
 
-Boxes = npt.NDArray[np.int32]
-"""Shape `(n, 4)`: x, y, width, height in full-frame pixels."""
+IndexArray = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Searched windows with the probability that each shows a vehicle.
+    """Searched windows, each with the probability that it shows a vehicle.
 
-    `boxes` is int32 of shape `(n, 4)`: x, y, width, height in full-frame pixels;
-    `probabilities` is float32 of shape `(n,)`, 0 to 1; `shares` is float32 of shape `(n,)`: one
-    over the number of windows of the same set that cover a pixel. `vehicles` is float32 of shape
-    `(n, 4)`: x, y, width, height of the vehicle that a window shows, which for windows that are no
-    detections, and without box regression, is the window itself. Windows and vehicles may reach
-    beyond the frame.
+    Attributes
+    ----------
+    boxes
+        int32 `(n, 4)`: x, y, width, height of the windows, pixels of the frame.
+    probabilities
+        float32 `(n,)`, 0 to 1.
+    shares
+        float32 `(n,)`: one over the number of windows of the same set that cover a pixel.
+    vehicles
+        float32 `(n, 4)`: x, y, width, height of the vehicle in a window, pixels of the frame. Only
+        hits have one that differs from the window, and only where the model has a box regression.
+
+    Windows and vehicles may reach beyond the frame.
     """
 
-    boxes: Boxes
+    boxes: Int32Array
     probabilities: Float32Array
     shares: Float32Array
     vehicles: Float32Array
@@ -38,12 +44,20 @@ class Windows:
     def __len__(self) -> int:
         return len(self.boxes)
 
-    def detected(self, probability: float) -> "Windows":
-        """Return those of at least this probability, in the same order."""
+    def hits(self, probability: float) -> "Windows":
+        """Return the windows of at least this probability, in the same order."""
         keep = self.probabilities >= probability
         return Windows(
             self.boxes[keep], self.probabilities[keep], self.shares[keep], self.vehicles[keep]
         )
+
+
+NO_WINDOWS = Windows(
+    np.empty((0, 4), np.int32),
+    np.empty(0, np.float32),
+    np.empty(0, np.float32),
+    np.empty((0, 4), np.float32),
+)
 
 
 def join_windows(parts: Sequence[Windows]) -> Windows:
@@ -58,20 +72,25 @@ def join_windows(parts: Sequence[Windows]) -> Windows:
     )
 
 
-NO_WINDOWS = Windows(
-    np.empty((0, 4), np.int32),
-    np.empty(0, np.float32),
-    np.empty(0, np.float32),
-    np.empty((0, 4), np.float32),
-)
+@dataclass(frozen=True, slots=True)
+class GridResult:
+    """What the search of a grid gives, window by window in the order of `WindowGrid.boxes`.
+
+    `probabilities` is float32 `(n,)`. `hogs` takes indices of windows, `(m,)`, and returns their
+    HOG features as `FeatureExtractor` gives them, float32 `(m, h)`; few windows need them, so they
+    are computed when asked for.
+    """
+
+    probabilities: Float32Array
+    hogs: Callable[[IndexArray], Float32Array]
 
 
 @dataclass(frozen=True, slots=True)
 class WindowGrid:
-    """A set's square windows, in columns and rows.
+    """The square windows of a set, in columns and rows.
 
-    `size` is a window's side and `step` the distance to the next, frame pixels. The window in
-    column i and row j lies at `left + i·step`, `top + j·step`, rounded to whole pixels.
+    `size` is the side of a window and `step` the distance to the next one, pixels of the frame. The
+    window in column i and row j lies at `left + i·step`, `top + j·step`, rounded to whole pixels.
     """
 
     size: int
@@ -85,7 +104,7 @@ class WindowGrid:
         return self.columns * self.rows
 
     @property
-    def boxes(self) -> Boxes:
+    def boxes(self) -> Int32Array:
         """The windows row by row from the top left, int32 `(rows · columns, 4)`."""
         x = np.array([round(self.left + i * self.step) for i in range(self.columns)], np.int32)
         y = np.array([round(self.top + j * self.step) for j in range(self.rows)], np.int32)
@@ -96,20 +115,30 @@ class WindowGrid:
 
     @property
     def share(self) -> float:
-        """One over the number of windows that cover a pixel in the middle of the set."""
+        """One over the number of windows that cover a pixel in the middle of the grid."""
         along = max(1.0, float(self.size / self.step))
         return 1 / (min(self.columns, along) * min(self.rows, along))
+
+    def every_nth(self, n: int, column: int, row: int) -> "WindowGrid":
+        """Return the grid of every n-th window, from this column and row on."""
+        return WindowGrid(
+            self.size,
+            self.step * n,
+            self.left + column * self.step,
+            self.top + row * self.step,
+            len(range(column, self.columns, n)),
+            len(range(row, self.rows, n)),
+        )
 
 
 def lay_grid(
     settings: WindowSettings, frame_width: int, frame_height: int, *, cells: int = 8
 ) -> WindowGrid:
-    """Lay a set's windows over its band of rows and the width of the frame.
+    """Lay the windows of a set over its band of rows and the width of the frame.
 
-    With `overlap`, each product is truncated to an integer: step = int(size·(1 - overlap)),
-    buffer = int(size·overlap), count = int((span - buffer) / step), across and down, or as many as
-    fit. With `step`,
-    a whole number of cells, as many windows as the span holds.
+    With `overlap`, each product is truncated to a whole number: step = int(size·(1 - overlap)),
+    buffer = int(size·overlap), count = int((span - buffer) / step) across and down, or fewer where
+    fewer fit. With `step`, a number of cells, there are as many windows as fit.
 
     Parameters
     ----------
@@ -118,14 +147,14 @@ def lay_grid(
     frame_width, frame_height
         Pixels; the band ends where the frame does.
     cells
-        Cells across a patch, in which `step` is counted.
+        Number of cells across a patch, in which `step` is counted.
 
     Returns
     -------
     The grid; without windows where the band or the frame is smaller than a window.
     """
     size = settings.size
-    bottom = max(settings.bottom, settings.top + size)  # rounding may have cut a row off the band
+    bottom = max(settings.bottom, settings.top + size)  # scaling may have rounded a row away
     spans = frame_width, min(bottom, frame_height) - settings.top
     if size <= 0 or min(spans) < size:
         return WindowGrid(max(1, size), Fraction(1), Fraction(0), Fraction(settings.top), 0, 0)
@@ -140,18 +169,6 @@ def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, Fr
     if settings.step is not None:
         step = Fraction(settings.step * settings.size, cells)
         return step, settings.size - step
-    assert settings.overlap is not None  # one of the two is always given
+    assert settings.overlap is not None  # the settings have one of the two
     step = Fraction(max(1, int(settings.size * (1 - settings.overlap))))
     return step, Fraction(int(settings.size * settings.overlap))
-
-
-def every_nth(grid: WindowGrid, n: int, across: int, down: int) -> WindowGrid:
-    """Return the grid of every n-th window, from column `across` and row `down` on."""
-    return WindowGrid(
-        grid.size,
-        grid.step * n,
-        grid.left + across * grid.step,
-        grid.top + down * grid.step,
-        len(range(across, grid.columns, n)),
-        len(range(down, grid.rows, n)),
-    )

@@ -112,14 +112,17 @@ def metrics_of(vehicle: BoolArray, probabilities: Float64Array) -> dict[str, flo
 
     positive = probabilities >= THRESHOLD
     found: dict[str, float] = {"accuracy": metrics.accuracy_score(vehicle, positive)}
-    if vehicle.any():
-        found["recall"] = metrics.recall_score(vehicle, positive)
-    if vehicle.all() or not vehicle.any():
+    if not vehicle.any():
+        return found
+    precision, found["recall"], f1, _ = metrics.precision_recall_fscore_support(
+        vehicle, positive, average="binary", zero_division=np.nan
+    )
+    if vehicle.all():
         return found
     if positive.any():
-        found["precision"] = metrics.precision_score(vehicle, positive)
+        found["precision"] = precision
     return found | {
-        "f1": metrics.f1_score(vehicle, positive),
+        "f1": f1,
         "roc_auc": metrics.roc_auc_score(vehicle, probabilities),
         "average_precision": metrics.average_precision_score(vehicle, probabilities),
         "log_loss": metrics.log_loss(vehicle, probabilities),

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Self
 
+from vdet.errors import OutputError
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
@@ -10,11 +11,14 @@ from vdet.pipeline.sinks.video import annotated
 
 
 class PictureSink:
-    """Writes each picture that comes to the same path: made for one."""
+    """Writes one picture."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
+        if context.video is not None:
+            raise OutputError(f"{path}: the sink picture is for still pictures; use the sink video")
         self._path = path
         self._context = context
+        self._is_done = False
 
     def __enter__(self) -> Self:
         return self
@@ -23,9 +27,17 @@ class PictureSink:
         pass
 
     def write(self, result: FrameResult) -> None:
-        """Draw the vehicles with their scores, and write the picture."""
+        """Draw the vehicles with their scores, and write the picture.
+
+        Raises `OutputError` for a second picture.
+        """
+        if self._is_done:
+            raise OutputError(
+                f"{self._path}: takes one picture; for several give the name of a folder"
+            )
+        self._is_done = True
         data = encode_image(annotated(result, scores=True), self._path)
         self._context.files.stage(self._path).write_bytes(data)
 
 
-PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures")
+PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures", takes="pictures")

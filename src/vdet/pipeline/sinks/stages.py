@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
+from vdet.files import make_folder
 from vdet.media.images import Image, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
@@ -37,6 +38,7 @@ class StagesSink:
         if self._is_done or result.frame.time < self._time:
             return
         self._is_done = True
+        make_folder(self._folder)
         pictures = {**result.stage_pictures(), _BOXES: _with_boxes(result)}
         if result.road:
             pictures |= result.road.pictures()

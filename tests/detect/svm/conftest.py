@@ -1,4 +1,4 @@
-"""The searches run as in the pipeline: a thread each, the libraries kept from starting more."""
+"""The tests search as the pipeline does: libraries use a single thread."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""What the dense engine is held to: the patch engine, with models fitted to generated patches."""
+"""The dense engine compared with the patch engine, with models fitted to generated patches."""
 
 import functools
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings, HogSettings, WindowSettings
-from vdet.detect.svm.dense import dense_search
+from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.patch_search import PatchSearch
@@ -20,12 +20,12 @@ from vdet.synthetic import background_patches, demo_scene, render, vehicle_patch
 Exact = npt.NDArray[np.float64]
 
 SEED_FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
-_EACH = 120  # patches of a class
+_EACH = 120  # patches of each class
 
 
 @dataclass(frozen=True, slots=True)
-class Scores:
-    """The log-odds of the same windows by the dense engine and by the patch engine."""
+class EngineResults:
+    """The log-odds of the same windows from the dense engine and from the patch engine."""
 
     dense: Float32Array
     patch: Float32Array
@@ -36,31 +36,31 @@ class Scores:
 
     @property
     def same(self) -> float:
-        """The share of windows about which the engines decide alike."""
+        """The share of windows that both engines put on the same side of probability 0.5."""
         return float(np.mean((self.dense >= 0) == (self.patch >= 0)))
 
 
-def compare(model: LinearModel, grids: list[WindowGrid], image: Image) -> Scores:
+def compare(model: LinearModel, grids: list[WindowGrid], image: Image) -> EngineResults:
     """Search a frame with both engines."""
     frame = pyramid(image, grids)
     dense = [dense_search(model, grid).search(frame).probabilities for grid in grids]
     patch = [PatchSearch(model, grid).search(frame).probabilities for grid in grids]
-    return Scores(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
+    return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
 
 
 def pyramid(image: Image, grids: list[WindowGrid]) -> FramePyramid:
-    """Give a frame with room for windows beyond its sides, whole pixels at all levels."""
+    """Return a frame with a margin for windows beyond its sides, whole pixels at all levels."""
     return FramePyramid(image, margin=-16 * min(0, *(int(grid.left // 16) for grid in grids)))
 
 
 def log_odds(probabilities: Float32Array) -> Float32Array:
-    # Beyond a millionth, what is left of a probability's distance from 0 or 1 is rounding.
-    sure = np.clip(probabilities.astype(np.float64), 1e-6, 1 - 1e-6)
-    return np.asarray(np.log(sure / (1 - sure)), np.float32)
+    # Nearer to 0 or 1 than a millionth, probabilities differ by rounding only.
+    bounded = np.clip(probabilities.astype(np.float64), 1e-6, 1 - 1e-6)
+    return np.asarray(np.log(bounded / (1 - bounded)), np.float32)
 
 
 def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
-    """Fit a model by ridge regression; each member has seen other patches."""
+    """Fit a model by ridge regression, each member on other patches."""
     patches, labels = _patches()
     extractor = FeatureExtractor(features)
     vectors = extractor.describe_all(to_patch(patch, features.patch) for patch in patches)
@@ -72,7 +72,7 @@ def fitted(features: FeatureSettings, members: int = 1) -> LinearModel:
 
 
 def with_boxes(model: LinearModel) -> LinearModel:
-    """Let a model know the vehicles' boxes too, learnt from crops of vehicle patches."""
+    """Add a box regression to a model, fitted to crops of vehicle patches."""
     rng = np.random.default_rng(2)
     patches = _patches()[0][:_EACH] * 2
     zooms = rng.uniform(0.6, 1, len(patches))
@@ -84,11 +84,11 @@ def with_boxes(model: LinearModel) -> LinearModel:
     weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
     biases = biases + targets.mean(axis=0)
     boxes = BoxRegression(weights.T.astype(np.float32), biases.astype(np.float32))
-    return replace(model, boxes=boxes)
+    return replace(model, box_regression=boxes)
 
 
 def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, list[float]]:
-    """Cut a square out of a vehicle patch; and tell the patch's sides from the crop's middle."""
+    """Crop a vehicle patch at random; return the crop and the patch's sides from its middle."""
     whole = len(patch)
     side = round(zoom * whole)
     x, y = rng.integers(0, whole - side + 1, 2).tolist()
@@ -115,12 +115,12 @@ def _patches() -> tuple[list[Image], Float32Array]:
 
 @functools.cache
 def road(width: int = 1280, height: int = 720) -> Image:
-    """Give a frame of the demo's clip: cars of a 17th, an 11th and an 8th of its width."""
+    """Return a frame of the demo's clip: cars of a 17th, an 11th and an 8th of its width."""
     return render(demo_scene(1, width=width, height=height), 200)
 
 
 def cars() -> Image:
-    """Give the part of `road` where its cars are, 440 × 200 pixels."""
+    """Return the part of `road` where its cars are, 440 × 200 pixels."""
     return road()[360:560, 560:1000]
 
 

@@ -1,0 +1,201 @@
+"""Strips, the parts of a frame that the dense engine describes once for all windows in them.
+
+A strip is what a grid covers, at the scale where a window is a patch. This module cuts strips,
+computes their HOG blocks, and sums the model's weights over the windows in them: of HOG by a matrix
+product, of colour histograms by look-up tables and integral images.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+import cv2
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+from vdet.config.schema import FeatureSettings
+from vdet.detect.svm.features import Layout, convert, hog_descriptor
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.windows import IndexArray, WindowGrid
+from vdet.geometry import Float32Array
+from vdet.media.images import Image
+
+
+class Strip:
+    """Cuts a grid's strip out of frames.
+
+    The strip begins at the grid's first window and ends with its last. The position of a window in
+    it is its position in the grid times patch / size; the grids that are searched by strips have
+    whole numbers there.
+    """
+
+    def __init__(self, grid: WindowGrid, features: FeatureSettings) -> None:
+        self._features = features
+        self._columns, self._width = _extent(grid, features, grid.left, grid.columns)
+        self._rows, self._height = _extent(grid, features, grid.top, grid.rows)
+
+    def cut(self, frame: FramePyramid) -> Image:
+        """Return the strip of a frame in the features' colour space, uint8 `(h, w, 3)`."""
+        strip = frame.cut(self._rows, self._columns, self._width, self._height)
+        return convert(strip, self._features)
+
+
+def _extent(
+    grid: WindowGrid, features: FeatureSettings, first: Fraction, count: int
+) -> tuple[slice, int]:
+    """Return what `count` windows from `first` on cover in the frame, and their side of a strip."""
+    span = (count - 1) * grid.step + grid.size
+    start = round(first)
+    return slice(start, start + round(span)), round(span * features.patch / grid.size)
+
+
+@dataclass(frozen=True, slots=True)
+class StripWeights:
+    """The weights of a model with `m` members, in the order in which strips need them.
+
+    `hog` is float32 `(m, blocks, blocks, d)`: blocks of a window by column and row, `d` features of
+    a block, channel by channel. `tables` is float32 `(m, 256, 3)`: what a pixel adds to the colour
+    histogram's part of the decision value, by the pixel's value and channel.
+    """
+
+    hog: Float32Array
+    tables: Float32Array
+
+    @staticmethod
+    def of(model: LinearModel) -> "StripWeights":
+        """Sort the weights of a model."""
+        layout, features = Layout.of(model.features), model.features
+        hog = [_by_block(model.weights[:, part], features) for part in layout.hog]
+        tables = _tables(model.weights[:, layout.histogram], features.histogram.bins)
+        return StripWeights(np.concatenate(hog, axis=-1), tables)
+
+
+def _by_block(weights: Float32Array, features: FeatureSettings) -> Float32Array:
+    blocks = features.patch // features.hog.cell - features.hog.block + 1
+    return weights.reshape(len(weights), blocks, blocks, -1)
+
+
+def _tables(weights: Float32Array, bins: int) -> Float32Array:
+    if not bins:
+        return np.zeros((len(weights), 256, 3), np.float32)
+    by_channel = weights.reshape(len(weights), 3, bins)
+    return np.ascontiguousarray(np.repeat(by_channel, 256 // bins, axis=2).transpose(0, 2, 1))
+
+
+def describe_blocks(strip: Image, features: FeatureSettings) -> Float32Array:
+    """Compute the HOG features of every block of a strip.
+
+    Parameters
+    ----------
+    strip
+        uint8 `(h, w, 3)` in the features' colour space; both sides whole numbers of cells.
+
+    Returns
+    -------
+    float32 `(columns, rows, d)`, `d` features of a block, channel by channel.
+    """
+    height, width = strip.shape[:2]
+    hog = features.hog
+    columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
+    # A descriptor whose window is the strip gives each block once, column by column.
+    descriptor = hog_descriptor(features, (width, height))
+    blocks = [
+        np.reshape(descriptor.compute(channel_of(strip, number)), (columns, rows, -1))
+        for number in hog.channels
+    ]
+    return np.concatenate(blocks, axis=-1, dtype=np.float32)
+
+
+def channel_of(strip: Image, number: int) -> Image:
+    """Return one channel of a strip, contiguous `(h, w)`, as the descriptor needs it."""
+    return np.ascontiguousarray(strip[:, :, number])
+
+
+def window_blocks(
+    blocks: Float32Array, columns: IndexArray, rows: IndexArray, features: FeatureSettings
+) -> Float32Array:
+    """Return the HOG features of some windows, as `FeatureExtractor` gives them.
+
+    Parameters
+    ----------
+    blocks
+        `(columns, rows, d)`, as from `describe_blocks`.
+    columns, rows
+        Positions of the windows in `blocks`, `(m,)`.
+
+    Returns
+    -------
+    float32 `(m, h)`, channel by channel.
+    """
+    channels = len(features.hog.channels)
+    side = features.patch // features.hog.cell - features.hog.block + 1
+    steps = np.arange(side)
+    across = columns[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
+    down = rows[:, np.newaxis, np.newaxis] + steps
+    chosen = blocks[across, down].reshape(len(columns), side * side, channels, -1)
+    return np.reshape(chosen.transpose(0, 2, 1, 3), (len(columns), -1))
+
+
+def block_sums(blocks: Float32Array, weights: Float32Array) -> Float32Array:
+    """Sum the weighted blocks of the window at each block position.
+
+    One matrix product gives every block's product with every slice of the weights: b² planes a
+    member. The sum of a window runs over the planes, each shifted by its own block position; in
+    memory, these shifts are constant strides.
+
+    Parameters
+    ----------
+    blocks
+        `(columns, rows, d)`.
+    weights
+        `(m, b, b, d)`, for windows of b × b blocks.
+
+    Returns
+    -------
+    float32 `(m, columns - b + 1, rows - b + 1)`.
+    """
+    columns, rows, length = blocks.shape
+    members, side = weights.shape[:2]
+    planes = weights.reshape(-1, length) @ blocks.reshape(-1, length).T
+    plane, item = columns * rows, planes.itemsize
+    wide, high = columns - side + 1, rows - side + 1
+    flat = (wide - 1) * rows + high
+    strides = (side * side * plane, side * plane + rows, plane + 1, 1)
+    shifted = as_strided(
+        planes, (members, side, side, flat), [item * stride for stride in strides], writeable=False
+    )
+    sums = np.zeros((members, wide * rows), np.float32)
+    np.sum(shifted, axis=(1, 2), out=sums[:, :flat])
+    return sums.reshape(members, wide, rows)[:, :, :high]
+
+
+def table_sums(
+    strip: Image, tables: Float32Array, side: int, x: IndexArray, y: IndexArray
+) -> Float32Array:
+    """Sum look-up tables over the pixels of square windows.
+
+    Parameters
+    ----------
+    strip
+        uint8 `(h, w, 3)`.
+    tables
+        float32 `(m, 256, 3)`.
+    side
+        Of a window, pixels of the strip.
+    x, y
+        Top-left pixels of the windows, of shapes that broadcast.
+
+    Returns
+    -------
+    float32 `(m, …)`, `…` being the broadcast shape of `x` and `y`.
+    """
+    sums = []
+    for table in tables:
+        values = cv2.LUT(strip, np.ascontiguousarray(table[:, np.newaxis]))
+        integral = np.asarray(cv2.integral(cv2.transform(values, _ADD_CHANNELS)))
+        inner = integral[y + side, x + side] - integral[y, x + side]
+        sums.append(inner - integral[y + side, x] + integral[y, x])
+    return np.asarray(sums, np.float32)
+
+
+_ADD_CHANNELS = np.ones((1, 3), np.float32)

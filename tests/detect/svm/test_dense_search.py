@@ -1,0 +1,223 @@
+"""The dense engine: which grids and features it searches, and that results are in their place.
+
+A texture that is drawn into one window must be found in that window.
+"""
+
+import logging
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+
+from vdet.config.schema import (
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    SearchSettings,
+    SpatialSettings,
+    SvmSettings,
+    WindowSettings,
+)
+from vdet.detect.svm.dense_search import (
+    AlignedSearch,
+    LocatedSearch,
+    PhasedSearch,
+    dense_search,
+    why_not_dense,
+)
+from vdet.detect.svm.features import FeatureExtractor
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.patch_search import PatchSearch
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.detect.svm.windows import WindowGrid
+from vdet.errors import ConfigError
+from vdet.media.images import Image
+
+FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=0))
+GRIDS = [
+    (AlignedSearch, 64, 8),
+    (AlignedSearch, 64, 16),
+    (AlignedSearch, 64, 24),
+    (AlignedSearch, 128, 16),
+    (PhasedSearch, 64, 12),
+    (PhasedSearch, 128, 24),
+    (PhasedSearch, 48, 9),
+    (LocatedSearch, 64, 7),
+    (LocatedSearch, 128, 25),
+    (LocatedSearch, 96, 19),
+    (LocatedSearch, 48, 7),
+    (LocatedSearch, 80, 13),
+]
+
+
+def texture(side: int) -> Image:
+    coarse = np.random.default_rng(3).integers(0, 256, (8, 8, 3), dtype=np.uint8)
+    return np.asarray(cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC), np.uint8)
+
+
+def texture_finder(members: int) -> LinearModel:
+    """Return a model for which the texture is the most probable vehicle."""
+    vector = FeatureExtractor(FEATURES).describe(texture(64))
+    weights = np.tile(vector / np.linalg.norm(vector) ** 2, (members, 1))
+    return LinearModel(
+        FEATURES,
+        weights,
+        biases=np.full(members, -0.7, np.float32),
+        slopes=np.full(members, -8, np.float32),
+        offsets=np.linspace(-1, 1, members, dtype=np.float32)
+        if members > 1
+        else np.zeros(1, np.float32),
+    )
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+@pytest.mark.parametrize("members", [1, 2])
+def test_a_texture_is_most_probable_in_the_window_that_it_fills(
+    kind: type, size: int, step: int, members: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder(members)
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    for index in (0, 6, 9, 17, 28, 34):
+        x, y, w, h = grid.boxes[index].tolist()
+        frame = np.full((2 * size + 6 * step, 2 * size + 8 * step, 3), 100, np.uint8)
+        frame[y : y + h, x : x + w] = texture(size)
+        found = search.search(FramePyramid(frame)).probabilities
+        assert found.shape == (35,)
+        assert found.dtype == np.float32
+        assert int(found.argmax()) == index
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+@pytest.mark.parametrize(("columns", "rows"), [(1, 1), (1, 4), (5, 1), (2, 2)])
+def test_a_grid_may_be_a_window_a_row_or_a_column(
+    kind: type, size: int, step: int, columns: int, rows: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(3), columns, rows)
+    model = texture_finder(1)
+    frame = FramePyramid(np.asarray(texture(256), np.uint8))
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    expected = PatchSearch(model, grid).search(frame).probabilities
+    np.testing.assert_allclose(search.search(frame).probabilities, expected, atol=0.1)
+
+
+@pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
+def test_the_hog_features_of_a_window_give_its_probability(
+    kind: type, size: int, step: int
+) -> None:
+    grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
+    model = texture_finder(2)
+    search = dense_search(model, grid)
+    assert type(search) is kind
+    found = search.search(FramePyramid(np.asarray(texture(400), np.uint8)))
+    numbers = np.random.default_rng(1).permutation(len(grid))
+    hogs = found.hogs(numbers)
+    assert hogs.shape == (len(grid), FeatureExtractor(FEATURES).layout.hog_length)
+    assert hogs.dtype == np.float32
+    expected = model.probabilities(hogs)  # there are no other features
+    np.testing.assert_allclose(found.probabilities[numbers], expected, atol=1e-5)
+    assert len(np.unique(expected.round(4))) > len(grid) / 2
+
+
+def test_a_search_does_not_change_later_searches() -> None:
+    for _, size, step in GRIDS:
+        grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
+        search = dense_search(texture_finder(1), grid)
+        first = search.search(FramePyramid(texture(256)))
+        kept = first.probabilities.copy()
+        hogs = first.hogs(np.arange(len(grid)))
+        search.search(FramePyramid(255 - texture(256)))
+        again = search.search(FramePyramid(texture(256)))
+        for found in (first, again):
+            np.testing.assert_array_equal(found.probabilities, kept)
+            np.testing.assert_array_equal(found.hogs(np.arange(len(grid))), hogs)
+
+
+SPATIAL = FeatureSettings(spatial=SpatialSettings(size=4))
+NO_HOG = FeatureSettings(hog=HogSettings(channels=()))
+NOISE = np.random.default_rng(0).integers(0, 256, (90, 160, 3), dtype=np.uint8)
+REASONS = {"detector.features.spatial": SPATIAL, "features without HOG": NO_HOG}
+
+
+def model_of(features: FeatureSettings) -> LinearModel:
+    length = FeatureExtractor(features).layout.length
+    weights = np.random.default_rng(1).normal(scale=0.01, size=(1, length)).astype(np.float32)
+    zero, one = np.zeros(1, np.float32), np.ones(1, np.float32)
+    return LinearModel(features, weights, zero, -one, zero)
+
+
+def settings(engine: str) -> SvmSettings:
+    search = SearchSettings.model_validate(
+        {
+            "engine": engine,
+            "windows": [WindowSettings(size=32, step=1, top=20, bottom=80)],
+            "perspective": {"sizes": []},
+        }
+    )
+    return SvmSettings(reference_height=90, search=search)
+
+
+def searched(features: FeatureSettings, engine: str) -> np.ndarray:
+    (windows,) = FrameSearch(model_of(features), settings(engine), 160, 90).search(NOISE)
+    return windows.probabilities
+
+
+def by_patch(features: FeatureSettings) -> np.ndarray:
+    model = model_of(features)
+    (grid,) = lay_grids(settings("patch"), features, 160, 90)
+    return PatchSearch(model, grid).search(FramePyramid(NOISE)).probabilities
+
+
+@pytest.fixture(autouse=True)
+def log(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(logging.getLogger("vdet"), "propagate", True)  # the program turns this off
+    caplog.set_level(logging.INFO, logger="vdet")
+
+
+@pytest.mark.parametrize("reason", REASONS)
+def test_features_that_cannot_be_dense_are_searched_by_patch_and_logged(
+    reason: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    features = REASONS[reason]
+    np.testing.assert_array_equal(searched(features, "auto"), by_patch(features))
+    (record,) = caplog.records
+    assert record.levelno == logging.INFO
+    assert record.getMessage() == (
+        f"the patch engine searches, because the dense one cannot compute {reason}"
+    )
+
+
+@pytest.mark.parametrize("reason", REASONS)
+def test_the_dense_engine_refuses_features_that_cannot_be_dense(reason: str) -> None:
+    message = rf"^detector\.search\.engine: dense cannot compute {reason}; take auto or patch$"
+    with pytest.raises(ConfigError, match=message):
+        searched(REASONS[reason], "dense")
+
+
+@pytest.mark.parametrize("features", [FeatureSettings(), SPATIAL, NO_HOG])
+def test_the_patch_engine_takes_any_features_and_logs_nothing(
+    features: FeatureSettings, caplog: pytest.LogCaptureFixture
+) -> None:
+    np.testing.assert_array_equal(searched(features, "patch"), by_patch(features))
+    assert caplog.records == []
+
+
+@pytest.mark.parametrize("engine", ["auto", "dense"])
+def test_other_features_are_searched_densely_and_nothing_is_logged(
+    engine: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    dense = searched(FeatureSettings(), engine)
+    assert np.corrcoef(dense, by_patch(FeatureSettings()))[0, 1] > 0.5
+    assert (dense != by_patch(FeatureSettings())).any()  # at the edges of patches
+    assert caplog.records == []
+
+
+def test_the_reason_against_the_dense_engine_is_named() -> None:
+    assert why_not_dense(FeatureSettings()) is None
+    assert why_not_dense(FeatureSettings(histogram=HistogramSettings(bins=0))) is None
+    assert why_not_dense(SPATIAL) == "detector.features.spatial"
+    assert why_not_dense(NO_HOG) == "features without HOG"

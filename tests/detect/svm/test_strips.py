@@ -1,0 +1,195 @@
+"""Strips: where they are cut, their HOG blocks, and the sums over the windows in them."""
+
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from detect.svm.engine_comparison import SEED_FEATURES
+from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.detect.svm.features import FeatureExtractor, Layout, convert, to_patch
+from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.strips import (
+    Strip,
+    StripWeights,
+    block_sums,
+    channel_of,
+    describe_blocks,
+    table_sums,
+    window_blocks,
+)
+from vdet.detect.svm.windows import WindowGrid
+from vdet.media.images import Image
+
+FRAME = np.random.default_rng(0).integers(0, 256, (300, 400, 3), dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("grid", "width", "height"),
+    [
+        (WindowGrid(64, Fraction(8), Fraction(0), Fraction(0), 10, 3), 64 + 9 * 8, 64 + 2 * 8),
+        (WindowGrid(64, Fraction(8), Fraction(5), Fraction(7), 1, 1), 64, 64),
+        (WindowGrid(128, Fraction(50), Fraction(25), Fraction(50), 4, 2), 64 + 3 * 25, 64 + 25),
+        (WindowGrid(96, Fraction(57), Fraction(19), Fraction(0), 3, 4), 64 + 2 * 38, 64 + 3 * 38),
+        (WindowGrid(43, Fraction(43, 8), Fraction(0), Fraction(9), 9, 5), 64 + 8 * 8, 64 + 4 * 8),
+    ],
+    ids=["a cell", "one window", "half pixels", "third pixels", "an odd size"],
+)
+def test_a_strip_reaches_from_the_first_window_to_the_last(
+    grid: WindowGrid, width: int, height: int
+) -> None:
+    strip = Strip(grid, SEED_FEATURES).cut(FramePyramid(FRAME))
+    assert strip.shape == (height, width, 3)
+    assert strip.dtype == np.uint8
+
+
+@pytest.mark.parametrize(("size", "step"), [(64, 8), (64, 12), (128, 16), (128, 50), (32, 12)])
+@pytest.mark.parametrize("color_space", ["YCrCb", "HLS"])
+def test_the_position_of_a_window_is_scaled_by_patch_over_size(
+    size: int, step: int, color_space: str
+) -> None:
+    features = FeatureSettings.model_validate(
+        {"patch": 64, "color_space": color_space, "hog": HogSettings(cell=8)}
+    )
+    grid = WindowGrid(size, Fraction(step), Fraction(6), Fraction(11), 4, 3)
+    strip = Strip(grid, features).cut(FramePyramid(FRAME))
+    for i, (x, y, w, h) in enumerate(grid.boxes.tolist()):
+        row, column = divmod(i, grid.columns)
+        left, top = column * step * 64 // size, row * step * 64 // size
+        patch = convert(to_patch(FRAME[y : y + h, x : x + w], 64), features)
+        inner = np.s_[1:-1, 1:-1]  # enlarging uses pixels beyond the edge
+        ours = strip[top : top + 64, left : left + 64]
+        assert levels_apart(ours[inner], patch[inner], color_space).max() <= 1
+
+
+def levels_apart(ours: Image, other: Image, color_space: str) -> npt.NDArray[np.int64]:
+    """Return the differences of values; hue, the first channel of HLS, is circular (period 180).
+
+    OpenCV's conversion of a crop and of its frame may differ by one level: vectorised code rounds
+    otherwise than the code for the last few pixels of a row.
+    """
+    apart = abs(ours.astype(np.int64) - other)
+    if color_space == "HLS":
+        apart[..., 0] = np.minimum(apart[..., 0], 180 - apart[..., 0])
+    return apart
+
+
+RNG = np.random.default_rng(0)
+STRIP = RNG.integers(0, 256, (96, 160, 3), dtype=np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("members", "side", "columns", "rows"),
+    [(1, 7, 20, 9), (3, 7, 20, 9), (2, 3, 3, 8), (2, 3, 8, 3), (1, 5, 5, 5), (4, 1, 6, 4)],
+)
+def test_the_sum_of_a_window_is_that_of_its_weighted_blocks(
+    members: int, side: int, columns: int, rows: int
+) -> None:
+    rng = np.random.default_rng(columns * rows)
+    blocks = rng.normal(size=(columns, rows, 6)).astype(np.float32)
+    weights = rng.normal(size=(members, side, side, 6)).astype(np.float32)
+    sums = block_sums(blocks, weights)
+    assert sums.shape == (members, columns - side + 1, rows - side + 1)
+    for m, x, y in np.ndindex(*sums.shape):
+        expected = (blocks[x : x + side, y : y + side] * weights[m]).sum()
+        assert sums[m, x, y] == pytest.approx(expected, abs=1e-4)
+
+
+def test_every_block_of_a_strip_is_described_once() -> None:
+    assert describe_blocks(STRIP, SEED_FEATURES).shape == (19, 11, 3 * 4 * 8)
+    large = FeatureSettings(hog=HogSettings(cell=8, block=3, orientations=9, channels=(1,)))
+    assert describe_blocks(STRIP, large).shape == (18, 10, 9 * 9)
+
+
+def test_a_block_equals_that_of_a_descriptor_around_it() -> None:
+    blocks = describe_blocks(STRIP, SEED_FEATURES)
+    block = cv2.HOGDescriptor((32, 32), (16, 16), (8, 8), (8, 8), 8)
+    for column, row in ((1, 1), (5, 2), (17, 9)):
+        x, y = 8 * column - 8, 8 * row - 8
+        for number in range(3):
+            around = np.ascontiguousarray(STRIP[y : y + 32, x : x + 32, number])
+            middle = np.reshape(block.compute(around), (3, 3, 32))[1, 1]
+            ours = blocks[column, row, 32 * number : 32 * (number + 1)]
+            np.testing.assert_allclose(ours, middle, atol=1e-5)
+
+
+def test_channels_are_described_in_the_order_of_the_settings() -> None:
+    every = describe_blocks(STRIP, SEED_FEATURES)
+    settings = FeatureSettings(hog=HogSettings(cell=8, channels=(2, 0)))
+    some = describe_blocks(STRIP, settings)
+    np.testing.assert_array_equal(some, np.concatenate([every[..., 64:], every[..., :32]], axis=-1))
+
+
+@pytest.mark.parametrize(
+    "features",
+    [SEED_FEATURES, FeatureSettings(patch=64, hog=HogSettings(block=3, channels=(2, 0)))],
+    ids=["seed", "large blocks"],
+)
+def test_the_blocks_of_a_window_have_the_order_of_the_features(features: FeatureSettings) -> None:
+    patch = STRIP[:64, :64]
+    extractor = FeatureExtractor(features)
+    blocks = describe_blocks(convert(patch, features), features)
+    origin = np.zeros(1, np.intp)
+    (hog,) = window_blocks(blocks, origin, origin, features)
+    expected = extractor.describe(patch)[: extractor.layout.hog_length]
+    np.testing.assert_allclose(hog, expected, atol=1e-6)
+
+
+def test_the_blocks_of_a_window_are_those_at_its_position() -> None:
+    blocks = describe_blocks(STRIP, SEED_FEATURES)
+    columns, rows = np.array([0, 12, 5]), np.array([4, 0, 2])
+    windows = window_blocks(blocks, columns, rows, SEED_FEATURES)
+    for column, row, window in zip(columns, rows, windows, strict=True):
+        cut = blocks[column : column + 7, row : row + 7]
+        zero = np.zeros(1, np.intp)
+        np.testing.assert_array_equal(window, window_blocks(cut, zero, zero, SEED_FEATURES)[0])
+
+
+def test_a_channel_is_contiguous() -> None:
+    channel = channel_of(STRIP, 1)
+    assert channel.flags.c_contiguous
+    np.testing.assert_array_equal(channel, STRIP[:, :, 1])
+
+
+SMALL_STRIP = RNG.integers(0, 256, (40, 70, 3), dtype=np.uint8)
+X, Y = np.array([0, 3, 38])[:, np.newaxis], np.array([0, 1, 7, 8])[np.newaxis]
+
+
+def weights_of(bins: int, members: int) -> tuple[StripWeights, np.ndarray]:
+    """Return a model's sorted weights, and those of its histogram, `(members, 3, bins)`."""
+    features = FeatureSettings(
+        hog=HogSettings(channels=(0,)), histogram=HistogramSettings.model_validate({"bins": bins})
+    )
+    layout = Layout.of(features)
+    weights = np.random.default_rng(bins).normal(size=(members, layout.length)).astype(np.float32)
+    model = LinearModel(features, weights, *np.zeros((3, members), np.float32))
+    return StripWeights.of(model), weights[:, layout.histogram].reshape(members, 3, bins)
+
+
+@pytest.mark.parametrize("bins", [8, 32, 256])
+@pytest.mark.parametrize("members", [1, 3])
+def test_a_window_sums_the_weights_of_its_histogram(bins: int, members: int) -> None:
+    sorted_weights, weights = weights_of(bins, members)
+    sums = table_sums(SMALL_STRIP, sorted_weights.tables, 32, X, Y)
+    assert sums.shape == (members, 3, 4)
+    assert sums.dtype == np.float32
+    for m, i, j in np.ndindex(*sums.shape):
+        x, y = X[i, 0], Y[0, j]
+        window = SMALL_STRIP[y : y + 32, x : x + 32]
+        counts = [np.histogram(window[:, :, c], bins, (0, 256))[0] for c in range(3)]
+        assert sums[m, i, j] == pytest.approx(np.sum(counts * weights[m]), abs=2e-3)
+
+
+def test_tables_are_summed_for_a_list_of_windows_too() -> None:
+    tables = weights_of(16, 2)[0].tables
+    grid = table_sums(SMALL_STRIP, tables, 32, X, Y)
+    listed = table_sums(SMALL_STRIP, tables, 32, np.array([38, 0]), np.array([7, 8]))
+    np.testing.assert_array_equal(listed, [[m[2, 2], m[0, 3]] for m in grid])
+
+
+def test_without_a_histogram_nothing_is_added() -> None:
+    tables = weights_of(0, 2)[0].tables
+    assert not table_sums(SMALL_STRIP, tables, 32, X, Y).any()
