@@ -235,7 +235,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
 class TestCheck:
     def test_an_unknown_sink_is_refused_with_those_that_are_known(self, tmp_path: Path) -> None:
         known = "video, tracks, stages, picture, json"
-        with pytest.raises(ConfigError, match=f"nosuch: is not known; known are {known}"):
+        with pytest.raises(ConfigError, match=f"nosuch: is no sink; known are {known}"):
             check_sinks([Output("nosuch", tmp_path / "a")], overwrite=False)
 
     @pytest.mark.parametrize(
@@ -268,5 +268,5 @@ class TestCheck:
 
     def test_one_path_for_two_outputs_is_refused(self, tmp_path: Path) -> None:
         twice = outputs(tracks=tmp_path / "a.txt", json=tmp_path / "." / "a.txt")
-        with pytest.raises(OutputError, match=r"a\.txt: two outputs would be written to it"):
+        with pytest.raises(OutputError, match=r"a\.txt: is given for two outputs"):
             check_job(VideoJob(tmp_path / "in.mp4", twice), overwrite=True)

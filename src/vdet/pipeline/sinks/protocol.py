@@ -131,9 +131,9 @@ def check_sinks(
         kind, path = _kind_for(output), output.path
         if kind.writes_standard_output and path == STANDARD_OUTPUT:
             continue
-        if path in seen:
+        if path.resolve() in seen:
             raise OutputError(f"{path}: is given for two outputs; name another file for one")
-        seen.add(path)
+        seen.add(path.resolve())
         if kind.marker:
             make_folder(path)
             path = next(path.glob(kind.marker), path / kind.marker)

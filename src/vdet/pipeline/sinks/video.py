@@ -11,7 +11,7 @@ from vdet.errors import OutputError
 from vdet.lanes.drawing import draw_lane
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
-from vdet.media.writer import SUFFIXES
+from vdet.media.writer import VIDEO_SUFFIXES
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.threads import write_async
@@ -56,7 +56,7 @@ class VideoSink:
         self._encode(Frame(result.frame.index, result.frame.time, image))
 
 
-VIDEO = SinkKind(VideoSink, SUFFIXES, "videos")
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos")
 
 
 def annotated(result: FrameResult, *, scores: bool) -> Image:
