@@ -195,14 +195,16 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
         with pytest.raises(ClusterError, match="the scheduler has no worker"):
             next(DaskCluster(cluster.address, worker_timeout=0.1).map(abs, [1]))
         worker = dask("worker", "--no-nanny", folder=tmp_path)
-        until(lambda: registered(tmp_path) == 1)
-        running = start(("detect-video", clip, "-d", out, "--scheduler", cluster.address))
         try:
-            until(lambda: bool(cluster.gate.held()))
-            process.kill()
-            result = running.finish()
+            until(lambda: registered(tmp_path) == 1)
+            running = start(("detect-video", clip, "-d", out, "--scheduler", cluster.address))
+            try:
+                until(lambda: bool(cluster.gate.held()))
+                process.kill()
+                result = running.finish()
+            finally:
+                running.stop()
         finally:
-            running.stop()
             worker.kill()
             worker.wait()
     assert result.code == 1
