@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "vdet"
 MODULES = sorted(PACKAGE.rglob("*.py"))
-LONGEST = 250
+LONGEST = 400
 
 ROOMS = (
     "__main__", "cli", "demo", "batch", "learn", "evaluate", "pipeline", "lanes", "resources",
