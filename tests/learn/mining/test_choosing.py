@@ -61,7 +61,7 @@ def test_windows_become_patches_of_their_kind() -> None:
     }
 
 
-def test_what_the_model_does_not_take_for_a_vehicle_is_no_false_alarm() -> None:
+def test_a_false_alarm_needs_the_probability_of_the_settings() -> None:
     fits, shows, part, false, sure = about(450), about(470), about(450, 36), about(100), about(200)
     found = windows(fits, shows, part, false, sure)
     found.probabilities[:] = [0, 0, 0.19, 0.19, 0.21]
@@ -82,14 +82,13 @@ def test_a_window_far_too_large_for_its_vehicle_is_a_false_alarm() -> None:
     assert kinds(chosen(windows(too_large), truth(CAR))) == {too_large: "false alarm"}
 
 
-def test_a_window_on_a_part_of_a_vehicle_is_none_where_another_is_whole() -> None:
-    """On two vehicles side by side the window belongs to the nearer one."""
+def test_a_window_on_two_vehicles_belongs_to_the_nearer_one() -> None:
     beside = Box(480, 300, 100, 70)
     between = about(530)
     assert kinds(chosen(windows(between), truth(CAR, beside))) == {between: "vehicle"}
 
 
-def test_a_part_in_an_ignore_region_is_not_taken() -> None:
+def test_no_part_is_taken_from_an_ignore_region() -> None:
     part = about(465, 36)
     assert kinds(chosen(windows(part), truth(CAR))) == {part: "part"}
     assert chosen(windows(part), truth(CAR, ignored=(Box(455, 280, 90, 90),))) == []
@@ -99,7 +98,7 @@ def many() -> Windows:
     return windows(*(about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120)))
 
 
-def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:
+def test_the_settings_limit_the_patches_of_each_vehicle_and_frame() -> None:
     settings = MiningSettings(probability=0, per_vehicle=4, false_alarms=7, parts=3)
     choices = chosen(many(), truth(CAR, OTHER), settings)
     counted = [choice.kind for choice in choices]
@@ -109,7 +108,7 @@ def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> No
     assert sum(box.x < 600 for box in fitting) == 4
 
 
-def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
+def test_the_same_seed_takes_the_same_windows_and_another_seed_takes_others() -> None:
     settings = MiningSettings(per_vehicle=4, false_alarms=7)
     one, same, other = (chosen(many(), truth(CAR), settings, seed) for seed in (0, 0, 1))
     assert one == same
@@ -120,6 +119,6 @@ def test_a_window_that_two_sets_share_is_one_patch() -> None:
     assert len(chosen(windows(about(450), about(450)), truth(CAR))) == 1
 
 
-def test_a_frame_without_vehicles_has_false_alarms_only() -> None:
+def test_a_frame_without_vehicles_gives_false_alarms_only() -> None:
     assert {choice.kind for choice in chosen(many(), truth())} == {"false alarm"}
     assert len(chosen(many(), truth())) == len(many())
