@@ -41,12 +41,12 @@ def tracks(
     PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
     labels or CVAT for video 1.1.
     """
-    from vdet.evaluate.clips.evaluate import judge_files
+    from vdet.evaluate.clips.evaluate import score_files
     from vdet.evaluate.clips.text import plain_clip, run_lines
     from vdet.evaluate.report.video_page import video_page
 
     check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
-    run = judge_files(prediction, truth, until=until, rate=rate)
+    run = score_files(prediction, truth, until=until, rate=rate)
     print_results(
         run_lines([run]),
         plain_clip(run.clips[0]),

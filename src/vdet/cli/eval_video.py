@@ -72,8 +72,8 @@ def video(
 
     Vehicles are found and followed in each video IN, and compared with its truth.
     """
-    from vdet.evaluate.clips.clip import open_clip
-    from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
+    from vdet.evaluate.clips.clip import Variant, open_clip
+    from vdet.evaluate.clips.evaluate import evaluate_clips
     from vdet.evaluate.clips.sweep import grid
     from vdet.evaluate.clips.text import plain, run_lines
     from vdet.evaluate.report.video_page import video_page
@@ -84,17 +84,18 @@ def video(
     outputs = read_sinks(sinks)
     if outputs and (len(swept) > 1 or len(videos) > 1):
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
-    settings = [read_settings(config_name, (*assignments, *extra)) for extra in swept]
-    for each in settings:
-        load_detector(each.detector, model_path)  # all fit the model, or it says so
-    files = [path for each in settings if (path := model_file(each.detector, model_path))]
+    variants = []
+    for extra in swept:
+        settings = read_settings(config_name, (*assignments, *extra))
+        variants.append(Variant(settings, load_detector(settings.detector, model_path), extra))
+    detectors = [variant.settings.detector for variant in variants]
+    files = [path for each in detectors if (path := model_file(each, model_path))]
     inputs = [*videos, *truths, *files]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
     check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
-    variants = [Variant(extra, each) for extra, each in zip(swept, settings, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:
-        runs = evaluate_clips(clips, model_path, variants, progress, outputs=outputs)
+        runs = evaluate_clips(clips, variants, progress, outputs=outputs)
     print_results(
         run_lines(runs),
         plain(runs),

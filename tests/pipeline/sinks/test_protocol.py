@@ -10,16 +10,23 @@ from typing import Self
 import numpy as np
 import pytest
 
-from pipeline.red_runs import COUNT, outputs, read, run_red
-from red_cars import HEIGHT
+from pipeline.red_runs import COUNT, outputs, read, run_red, video_info
+from red_cars import HEIGHT, SETTINGS
 from vdet import plugins
 from vdet.config.schema import OutputSettings
 from vdet.errors import ConfigError, OutputError
+from vdet.files import OutputFiles
 from vdet.media import Frame, VideoInfo, VideoWriter
 from vdet.media.images import Image
 from vdet.pipeline.loop import VideoJob, check_job
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
+from vdet.pipeline.sinks.protocol import (
+    Output,
+    SinkContext,
+    SinkKind,
+    check_sinks,
+    open_sink,
+)
 
 Register = Callable[[str, SinkKind], None]
 MOMENTS = ("open", "enter", "first", "middle", "end")
@@ -230,6 +237,25 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
     assert len(read(tmp_path / "out.mp4")) == 5
     assert (tmp_path / "out.csv").read_text() == "frame,time,id,x,y,width,height,score,predicted\n"
     assert [path.name for path in (tmp_path / "stages").iterdir()] == ["1-boxes.png"]
+
+
+@pytest.mark.parametrize(
+    ("sink", "name", "is_video", "words"),
+    [
+        ("video", "a.mp4", False, "is for videos; give another for pictures"),
+        ("picture", "a.png", True, "is for pictures; give another for videos"),
+        ("json", "a.json", True, "is for pictures; give another for videos"),
+    ],
+)
+def test_a_sink_is_refused_what_it_cannot_take(
+    tmp_path: Path, sink: str, name: str, is_video: bool, words: str
+) -> None:
+    output = Output(sink, tmp_path / name)
+    with OutputFiles() as files:
+        context = SinkContext(files, SETTINGS, video_info() if is_video else None)
+        with pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"):
+            open_sink(output, context)
+    assert list(tmp_path.iterdir()) == []
 
 
 class TestCheck:

@@ -58,4 +58,4 @@ class JsonSink:
         self._items.append(item)
 
 
-JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True)
+JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")

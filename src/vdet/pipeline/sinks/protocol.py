@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError, VdetError
@@ -86,6 +86,8 @@ class SinkKind:
         it was written before.
     writes_standard_output
         Whether the path `-` means standard output.
+    takes
+        "videos" or "pictures" if the sink can take results of these only.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -93,6 +95,7 @@ class SinkKind:
     what: str = "outputs"
     marker: str = ""
     writes_standard_output: bool = False
+    takes: Literal["videos", "pictures", "both"] = "both"
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +149,17 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
     Raises
     ------
     OutputError
-        The suffix is not one of the sink's, or the output cannot be written.
+        The sink does not take such results, the suffix is not one of the sink's, or the output
+        cannot be written.
     ConfigError
         There is no sink of that name.
     """
     kind = _kind_for(output)
+    source = "pictures" if context.video is None else "videos"
+    if kind.takes not in ("both", source):
+        raise OutputError(
+            f"{output.path}: the sink {output.sink} is for {kind.takes}; give another for {source}"
+        )
     with _naming(output.path):
         return _NamedSink(kind.open(output.path, context), output.path)
 

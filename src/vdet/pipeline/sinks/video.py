@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, Self
 
 from vdet.draw.boxes import color_of, draw_box
-from vdet.errors import OutputError
 from vdet.lanes.drawing import draw_lane
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
@@ -22,8 +21,7 @@ class VideoSink:
     """Draws into the frames, and encodes them in a thread."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        if context.video is None:
-            raise OutputError(f"{path}: the sink video is for videos; use the sink picture")
+        assert context.video is not None  # `takes` says so
         self._path = path
         self._context = context
         self._video = context.video
@@ -56,7 +54,7 @@ class VideoSink:
         self._encode(Frame(result.frame.index, result.frame.time, image))
 
 
-VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos")
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos")
 
 
 def annotated(result: FrameResult, *, scores: bool) -> Image:
