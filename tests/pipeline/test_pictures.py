@@ -82,7 +82,7 @@ class TestPlan:
 
     def test_stages_of_two_inputs_of_one_stem_are_refused(self, tmp_path: Path) -> None:
         sources = [tmp_path / "a.png", tmp_path / "a.jpg"]
-        with pytest.raises(OutputError, match="wanted by two inputs"):
+        with pytest.raises(OutputError, match="is wanted by two inputs"):
             plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
 
     def test_earlier_stages_are_kept(self, tmp_path: Path) -> None:
