@@ -1,4 +1,4 @@
-"""Zip files from outside: listed and read, but never more of them than there should be."""
+"""Zip files from outside, listed and read with limits, so that a small file cannot do harm."""
 
 import stat
 import zipfile
@@ -8,12 +8,12 @@ from typing import IO
 from vdet.files import printable
 
 _COMPRESSIONS = frozenset({zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED})
-"""Those that can be unpacked up to a limit; zipfile unpacks the others in one go."""
+"""Methods that can be unpacked up to a limit; zipfile unpacks the others as a whole."""
 _ENCRYPTED = 1  # bit of a member's flags
 
 
 class ArchiveError(ValueError):
-    """A zip file, or a member of it, that is not read; the message says why."""
+    """A zip file, or a member of it, is refused; the message says why."""
 
 
 def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
@@ -30,25 +30,25 @@ def list_members(path: Path) -> list[str]:
     Raises
     ------
     ArchiveError
-        It is not a zip file or is damaged, or a name is there twice, leads out of a folder that
-        the archive would be unpacked in, or is that of a symbolic link.
+        It is not a zip file or is damaged, a name occurs twice or leads out of the folder that the
+        archive would be unpacked in, or a member is a symbolic link.
     """
     with open_archive(path) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
     names: set[str] = set()
     for member in members:
-        if complaint := _complaint(member, names):
-            raise ArchiveError(f"its member {printable(member.filename)} {complaint}")
+        if mistake := _mistake(member, names):
+            raise ArchiveError(f"its member {printable(member.filename)} {mistake}")
         names.add(member.filename)
     return [member.filename for member in members]
 
 
-def _complaint(member: zipfile.ZipInfo, earlier: set[str]) -> str | None:
+def _mistake(member: zipfile.ZipInfo, earlier: set[str]) -> str | None:
     posix, windows = PurePosixPath(member.filename), PureWindowsPath(member.filename)
     if posix.is_absolute() or windows.drive or windows.root:
-        return "has an absolute name; make the archive anew, with names from its top folder on"
+        return "has an absolute name; make the archive again, with names relative to its top folder"
     if ".." in windows.parts:
-        return "has '..' in its name; make the archive anew, with names from its top folder on"
+        return "has '..' in its name; make the archive again, with names relative to its top folder"
     if stat.S_ISLNK(member.external_attr >> 16):
         return "is a symbolic link; put the file itself in its place"
     if member.filename in earlier:
@@ -57,7 +57,7 @@ def _complaint(member: zipfile.ZipInfo, earlier: set[str]) -> str | None:
 
 
 def read_member(archive: zipfile.ZipFile, name: str, *, most: int) -> bytes:
-    """Return a member's content, its checksum compared; no more is unpacked than it claims to be.
+    """Return a member's content, checksum verified; never unpack more than its stated size.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read_member(archive: zipfile.ZipFile, name: str, *, most: int) -> bytes:
         if member.compress_type not in _COMPRESSIONS:
             raise ArchiveError(f"its member {name} is compressed in an unusual way")
         with archive.open(member) as file:
-            return file.read(member.file_size)  # not read(): that unpacks before it counts
+            return file.read(member.file_size)  # not read(), which unpacks everything first
     except ArchiveError:
         raise
     except Exception as error:  # zipfile and zlib raise a dozen kinds on damaged data

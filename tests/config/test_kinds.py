@@ -227,8 +227,10 @@ class TestOtherPackages:
             load_settings(None, ["detector.level=9"])
 
     def test_its_settings_are_printed_with_their_comments_and_read_back(self, path: Path) -> None:
-        settings = load_settings(None, ["detector.kind=fake", "detector.parts=[{size: 4}]"])
+        parts = ["detector.parts=[{size: 4}]", "detector.by_name={a: {size: 5}}"]
+        settings = load_settings(None, ["detector.kind=fake", *parts])
         text = render(settings)
+        assert "  # its parts\n  # Each item is a part of it.\n  #   size: how large" in text
         assert "# A detector of another package.\ndetector:\n  # fake: finds nothing\n" in text
         assert "  # how red a vehicle is\n  level: 7\n" in text
         assert load(path, text) == settings

@@ -47,13 +47,13 @@ class ScoreSettings(Section):
     """
 
     middle: float = Field(
-        0.3,
+        0.272,
         gt=0,
         le=1e6,
         description="evidence (heat, or weight of hits) at which the score is 0.5",
     )
     slope: float = Field(
-        2.0, gt=0, le=100, description="how steeply the score rises with the evidence"
+        3.5, gt=0, le=100, description="how steeply the score rises with the evidence"
     )
 
 

@@ -32,7 +32,8 @@ class MotionTrackerSettings(TrackerSettings):
     )
     leak: Fraction = Field(
         0.2,
-        description="detections with lower scores do not add evidence; so much is lost a second",
+        description="evidence that a vehicle loses in a second; detections with lower scores never "
+        "add up",
     )
     noise: Positive = Field(
         0.1,

@@ -20,7 +20,7 @@ from vdet.synthetic import background_patches, demo_scene, render, vehicle_patch
 Exact = npt.NDArray[np.float64]
 
 SEED_FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
-_EACH = 120  # patches of a class
+_EACH = 120  # patches of each class
 
 
 @dataclass(frozen=True, slots=True)

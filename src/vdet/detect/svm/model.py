@@ -238,9 +238,9 @@ def _check_array(array: Float32Array, shape: tuple[int, ...], name: str, path: P
         raise ModelError(f"{path}: {name} hold a value beyond {MAX_VALUE:g}; train it again")
 
 
-def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:
+def _difference(trained: FeatureSettings, requested: FeatureSettings) -> str:
     return ", ".join(
-        f"detector.features.{name}: {getattr(ours, name)}, asked for {getattr(asked, name)}"
-        for name in type(ours).model_fields
-        if getattr(ours, name) != getattr(asked, name)
+        f"detector.features.{name}: {getattr(trained, name)}, asked for {getattr(requested, name)}"
+        for name in type(trained).model_fields
+        if getattr(trained, name) != getattr(requested, name)
     )
