@@ -97,7 +97,7 @@ class TestDetectVideo:
             ("tracks=a.xml", "a.xml: tracks are written as .txt, .csv, .jsonl; name it so"),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
             ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
-            ("picture=a.png", "a.png: the sink picture is for still pictures"),
+            ("picture=a.png", "a.png: the sink picture is for pictures; give another for videos"),
             ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one"),
         ],
     )
