@@ -153,18 +153,7 @@ def output_errors(path: Path) -> Iterator[None]:
     except VdetError:
         raise
     except OSError as error:
-        raise _unwritable(path, error) from error
-
-
-def _unwritable(path: Path, error: OSError) -> OutputError:
-    return OutputError(f"{path}: cannot be written: {error.strerror or error}")
-
-
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary file beside `path`, renamed to `path` at the end: `OutputFiles` for one."""
-    with OutputFiles() as files:
-        yield files.stage(path)
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def write_json(values: Any, target: str) -> None:

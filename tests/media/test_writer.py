@@ -9,22 +9,13 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.files import OutputFiles
-from vdet.media import (
-    ColorTags,
-    Frame,
-    FrameWriter,
-    NullWriter,
-    VideoInfo,
-    VideoReader,
-    VideoWriter,
-)
+from vdet.files import replacing
+from vdet.media import ColorTags, Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.media.images import Image
 
-Image = NDArray[np.uint8]
 Draw = Callable[[int, int, int], Image]
 Writer = Callable[..., Path]
 FAST = OutputSettings(preset="ultrafast")
@@ -45,7 +36,7 @@ def failing(frames: list[Frame], error: type[BaseException]) -> Iterator[Frame]:
 
 
 def write(path: Path, frames: Iterable[Frame], info: VideoInfo = INFO) -> Path:
-    with OutputFiles() as files, VideoWriter(files.stage(path), info, FAST, name=path) as writer:
+    with replacing(path) as temporary, VideoWriter(temporary, info, FAST, name=path) as writer:
         for frame in frames:
             writer.write(frame)
     return path
@@ -137,6 +128,14 @@ class TestFile:
             corner = next(iter(reader)).image[60:90, 10:70]
         assert np.abs(corner.mean(axis=(0, 1)) - (40, 30, 210)).max() < 5
 
+    def test_it_may_be_written_directly(self, frames: list[Frame], tmp_path: Path) -> None:
+        path = tmp_path / "out.mp4"
+        with VideoWriter(path, INFO, FAST) as writer:
+            for frame in frames:
+                writer.write(frame)
+            assert path.exists()
+        assert len(read(path)) == 12
+
     @pytest.mark.parametrize("name", ["ж视频 é.mp4", "a:b.mp4", "100% %03d.mp4", "-o.mp4"])
     def test_any_name_will_do(self, name: str, frames: list[Frame], tmp_path: Path) -> None:
         assert len(read(write(tmp_path / name, frames))) == 12
@@ -146,7 +145,7 @@ class TestFile:
 class TestAllOrNothing:
     def test_nothing_has_the_name_before_the_end(self, frames: list[Frame], tmp_path: Path) -> None:
         path = tmp_path / "out.mp4"
-        with OutputFiles() as files, VideoWriter(files.stage(path), INFO, FAST) as writer:
+        with replacing(path) as temporary, VideoWriter(temporary, INFO, FAST) as writer:
             writer.write(frames[0])
             assert not path.exists()
         assert listing(tmp_path) == ["out.mp4"]
@@ -189,22 +188,15 @@ class TestAllOrNothing:
 
 
 class TestRefusals:
-    def test_a_folder_that_is_missing(self, tmp_path: Path) -> None:
-        with pytest.raises(OutputError, match=r"out\.mp4: cannot be written"):
-            write(tmp_path / "none" / "out.mp4", [])
+    def test_a_folder_that_is_missing(self, frames: list[Frame], tmp_path: Path) -> None:
+        writer = VideoWriter(tmp_path / "none" / "out.mp4", INFO, FAST, name=Path("name.mp4"))
+        with (
+            pytest.raises(OutputError, match=r"^name\.mp4: cannot be written: No such file"),
+            writer,
+        ):
+            writer.write(frames[0])
 
     @pytest.mark.parametrize("name", ["out.avi", "out", "out.mp4.txt"])
     def test_a_kind_of_file_that_is_not_written(self, name: str, tmp_path: Path) -> None:
         with pytest.raises(OutputError, match=r"\.mp4, \.mov, \.mkv"):
             VideoWriter(tmp_path / name, INFO, FAST)
-
-
-def test_the_null_writer_takes_frames_and_leaves_nothing(
-    frames: list[Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    writer: FrameWriter
-    with NullWriter() as writer:
-        for frame in frames:
-            writer.write(frame)
-    assert listing(tmp_path) == []
