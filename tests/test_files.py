@@ -25,7 +25,7 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_the_file_appears_only_when_the_block_ends_well(tmp_path: Path) -> None:
+def test_the_file_appears_only_when_the_block_ends_without_an_error(tmp_path: Path) -> None:
     with replacing(tmp_path / "out.txt") as temporary:
         temporary.write_text("whole")
         assert not (tmp_path / "out.txt").exists()
@@ -84,7 +84,7 @@ def test_a_full_disk_names_the_output(tmp_path: Path) -> None:
     assert names(tmp_path) == []
 
 
-def test_an_error_that_says_what_to_do_passes_unchanged(tmp_path: Path) -> None:
+def test_an_error_of_vdet_passes_unchanged(tmp_path: Path) -> None:
     def write() -> None:
         with replacing(tmp_path / "out.mp4"):
             raise VideoError("in.mp4: is cut off")
@@ -230,13 +230,13 @@ class TestOutputFiles:
         assert names(tmp_path) == []
 
 
-def test_what_an_ended_process_left_is_removed(tmp_path: Path) -> None:
+def test_the_file_of_an_ended_process_is_removed(tmp_path: Path) -> None:
     left = leave_one(tmp_path / "out.mp4")
     remove_stale(tmp_path)
     assert not left.exists()
 
 
-def test_what_is_in_use_is_kept(tmp_path: Path) -> None:
+def test_a_file_in_use_is_kept(tmp_path: Path) -> None:
     with replacing(tmp_path / "out.mp4") as temporary:
         remove_stale(tmp_path)
         assert temporary.exists()
@@ -244,7 +244,7 @@ def test_what_is_in_use_is_kept(tmp_path: Path) -> None:
             assert temporary.exists()
 
 
-def test_writing_anything_in_a_folder_cleans_it(tmp_path: Path) -> None:
+def test_writing_a_file_removes_stale_files_in_its_folder(tmp_path: Path) -> None:
     leave_one(tmp_path / "a.csv")
     with replacing(tmp_path / "b.mp4"):
         pass
@@ -267,12 +267,12 @@ def test_a_link_of_such_a_name_is_not_followed(tmp_path: Path) -> None:
     assert (tmp_path / "precious").exists()
 
 
-def test_a_folder_that_is_not_there_needs_no_cleaning(tmp_path: Path) -> None:
+def test_a_missing_folder_has_no_stale_files(tmp_path: Path) -> None:
     remove_stale(tmp_path / "none")
 
 
 @pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
-def test_a_name_of_any_length_has_room_for_the_mark(tmp_path: Path, stem: str) -> None:
+def test_names_may_have_any_length(tmp_path: Path, stem: str) -> None:
     path = tmp_path / f"{stem}.mp4"
     with replacing(path) as temporary:
         temporary.write_text("whole")
@@ -308,7 +308,7 @@ def test_a_file_removed_before_it_is_locked_is_made_again(
         assert [temporary] != made
 
 
-def test_an_output_that_is_there_is_refused_without_overwrite(tmp_path: Path) -> None:
+def test_an_existing_output_is_refused_without_overwrite(tmp_path: Path) -> None:
     path = tmp_path / "out.txt"
     path.touch()
     with pytest.raises(OutputError, match="give --overwrite"):
@@ -316,7 +316,7 @@ def test_an_output_that_is_there_is_refused_without_overwrite(tmp_path: Path) ->
     check_output(path, overwrite=True)
 
 
-def test_a_new_output_is_fine_and_is_not_made_yet(tmp_path: Path) -> None:
+def test_a_new_output_passes_and_is_not_made(tmp_path: Path) -> None:
     check_output(tmp_path / "out.txt", overwrite=False)
     assert names(tmp_path) == []
 
@@ -332,7 +332,7 @@ def test_an_output_in_a_missing_folder_is_refused(tmp_path: Path) -> None:
         check_output(tmp_path / "no" / "out.txt", overwrite=True)
 
 
-def test_a_missing_folder_that_the_work_makes_must_have_one_above_it(tmp_path: Path) -> None:
+def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     check_output(tmp_path / "a" / "b" / "out.txt", overwrite=False, makes_folder=True)
     with pytest.raises(OutputError, match="file is no folder"):
@@ -357,14 +357,14 @@ def test_a_file_within_its_limit_is_read_whole(tmp_path: Path, size: int) -> Non
     assert read(path, 10) == b"x" * size
 
 
-def test_a_larger_file_is_refused_in_the_callers_own_kind_of_error(tmp_path: Path) -> None:
+def test_a_larger_file_is_refused_with_the_error_of_the_caller(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"x" * 1001)
     with pytest.raises(ConfigError, match=r"file: is larger than 1,000 bytes; that is no letter"):
         read(path, 1000)
 
 
-def test_a_file_without_an_end_takes_no_more_memory_than_its_limit() -> None:
+def test_an_endless_file_takes_no_more_memory_than_the_limit() -> None:
     tracemalloc.start()
     with pytest.raises(ConfigError, match="/dev/zero: is larger than 3,000,000 bytes"):
         read(Path("/dev/zero"), 3_000_000)
@@ -373,7 +373,7 @@ def test_a_file_without_an_end_takes_no_more_memory_than_its_limit() -> None:
     assert peak < 7_500_000
 
 
-def test_no_memory_is_set_aside_for_a_limit_that_is_not_reached(tmp_path: Path) -> None:
+def test_a_small_file_takes_little_memory_whatever_the_limit(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"x")
     tracemalloc.start()
@@ -389,7 +389,7 @@ def test_a_missing_file_is_named() -> None:
 
 
 @given(st.text(max_size=200))
-def test_a_name_is_shown_on_one_line_that_a_terminal_only_shows(name: str) -> None:
+def test_a_name_is_shown_on_one_line_without_control_characters(name: str) -> None:
     shown = printable(name)
     assert shown.isprintable()
     assert len(shown) <= 81

@@ -232,7 +232,7 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
     Parameters
     ----------
     most
-        Bytes. A larger file is refused once so many have been read, whatever size it claims.
+        Bytes. A larger file is refused after `most` + 1 bytes, whatever size it claims.
     what
         What the file should be, for the message.
     error

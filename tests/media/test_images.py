@@ -1,4 +1,4 @@
-"""Pictures: read from any common format, written whole; the libraries' comments on them."""
+"""Pictures: read from any common format, written whole; comments of the decoders captured."""
 
 import os
 import struct
@@ -21,7 +21,7 @@ PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
 
 
 def smooth() -> Image:
-    """Give a picture that JPEG keeps well: blue grows to the right, red downwards."""
+    """Return a picture that JPEG keeps well: blue increases to the right, red downwards."""
     y, x = np.mgrid[0:48, 0:64]
     return np.stack([x * 4, np.full_like(x, 99), y * 5], axis=2).astype(np.uint8)
 
@@ -31,7 +31,7 @@ def encoded(suffix: str, image: np.ndarray) -> bytes:
 
 
 def turned_jpeg(image: Image, orientation: int) -> bytes:
-    """Encode as JPEG with an EXIF segment that holds nothing but the orientation."""
+    """Encode as JPEG, with only the orientation in its EXIF segment."""
     entry = struct.pack(">HHIHH", 0x0112, 3, 1, orientation, 0)
     exif = b"Exif\0\0MM\0*\0\0\0\x08" + struct.pack(">H", 1) + entry + bytes(4)
     jpeg = encoded(".jpg", image)
@@ -60,7 +60,7 @@ def test_a_path_need_not_be_ascii(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_image(path), PICTURE)
 
 
-def test_the_format_is_told_from_the_content_not_from_the_suffix(tmp_path: Path) -> None:
+def test_the_content_decides_on_the_format_not_the_suffix(tmp_path: Path) -> None:
     path = tmp_path / "picture.jpg"
     path.write_bytes(encoded(".png", PICTURE))
     np.testing.assert_array_equal(read_image(path), PICTURE)
@@ -139,7 +139,7 @@ def test_a_folder_is_no_picture(tmp_path: Path) -> None:
     ],
     ids=["empty", "text", "cut png", "cut jpeg", "png signature alone"],
 )
-def test_what_is_no_picture_is_named(tmp_path: Path, data: bytes) -> None:
+def test_the_error_names_a_file_that_is_no_picture(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "broken.png"
     path.write_bytes(data)
     with pytest.raises(ImageError, match=r"broken\.png: is not a picture, or is damaged"):
@@ -156,7 +156,7 @@ def test_any_bytes_are_a_picture_or_none(suffix: str, kept: int, junk: bytes) ->
     assert image is None or (image.dtype == np.uint8 and image.ndim == 3)
 
 
-def test_a_picture_of_a_trillion_pixels_is_refused_unread() -> None:
+def test_a_picture_that_claims_a_trillion_pixels_is_refused() -> None:
     header = struct.pack(">IIBBBBB", 1_000_000, 1_000_000, 8, 2, 0, 0, 0)
     png = encoded(".png", PICTURE)
     chunk = b"IHDR" + header
@@ -165,7 +165,7 @@ def test_a_picture_of_a_trillion_pixels_is_refused_unread() -> None:
 
 
 @pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])
-def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str) -> None:
+def test_the_error_for_an_unknown_suffix_lists_the_known_ones(tmp_path: Path, name: str) -> None:
     with pytest.raises(ImageError, match=r"written as .*\.jpg, .*\.png"):
         write_image(tmp_path / name, PICTURE)
     assert list(tmp_path.iterdir()) == []

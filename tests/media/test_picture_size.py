@@ -1,4 +1,4 @@
-"""The size that a header claims is the size that the decoder would make."""
+"""The size read from a header is the size to which OpenCV decodes the picture."""
 
 import struct
 
@@ -34,7 +34,7 @@ def encoded(name: str) -> bytes:
 
 
 def tiff(order: str, *, big: bool) -> bytes:
-    """Encode nothing but a header and the two sizes, 70000 × 500, as LONG and SHORT."""
+    """Return a TIFF header with the two sizes only, 70000 × 500, as LONG and SHORT."""
     mark = b"II" if order == "<" else b"MM"
     if big:
         entries = struct.pack(order + "HHQI4xHHQH6x", 256, 4, 1, 70_000, 257, 3, 1, 500)
@@ -54,7 +54,7 @@ def test_tiff_has_two_byte_orders_and_two_forms(order: str, big: bool) -> None:
     assert picture_size(tiff(order, big=big)) == (70_000, 500)
 
 
-def test_segments_and_fill_bytes_before_the_frame_of_a_jpeg_are_passed() -> None:
+def test_segments_and_fill_bytes_before_the_frame_of_a_jpeg_are_skipped() -> None:
     jpeg = encoded("jpeg")
     thumbnail = jpeg[:2] + b"\xff\xe1" + struct.pack(">H", 2 + len(jpeg)) + jpeg  # as EXIF has it
     fake = jpeg.replace(struct.pack(">HH", 24, 40), struct.pack(">HH", 9, 9))
