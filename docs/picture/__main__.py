@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
-
 from docs.picture.scene import Motorway, Vehicle
 from docs.picture.shapes import HATCHBACK, LORRY, OFF_ROADER, SALOON, VAN
+
 from vdet.media import VideoReader
 from vdet.media.images import Image, write_image
 

@@ -7,15 +7,14 @@ road bends, so `lateral` is metres to the right of its middle, and `z` is metres
 from dataclasses import dataclass
 
 import numpy as np
-
 from docs.picture.light import (
     GRAIN,
-    Noise,
     ROUGH,
     SKYLIGHT,
     SMOOTH,
     SUN,
     SUNLIGHT,
+    Noise,
     haze,
     mix,
     ramp,
@@ -23,6 +22,7 @@ from docs.picture.light import (
     sky,
     unit,
 )
+
 from vdet.geometry import Float32Array
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH

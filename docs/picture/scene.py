@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-
 from docs.picture.landscape import CAMERA, LIGHT_ON_ROAD, bend, landscape
 from docs.picture.light import (
     SKYLIGHT,
@@ -21,6 +20,7 @@ from docs.picture.light import (
 )
 from docs.picture.paint import Surface, paint_car, paint_lorry
 from docs.picture.shapes import Car, Shape
+
 from vdet.geometry import Float32Array
 from vdet.media.images import Image
 
