@@ -88,7 +88,7 @@ def test_vehicles_are_found(done: Demo) -> None:
     assert scores.precision > 0.35
 
 
-def test_the_model_has_learnt_the_patches(done: Demo) -> None:
+def test_the_model_classifies_the_patches(done: Demo) -> None:
     assert {split.split for split in done.result.training.splits} == {"random", "tail"}
     for split in done.result.training.splits:
         assert 0.85 < split.test_accuracy <= 1
@@ -124,7 +124,7 @@ def test_earlier_stage_pictures_are_not_written_over_either(tmp_path: Path) -> N
     check_demo(DemoFiles(tmp_path), overwrite=True)
 
 
-def test_a_new_or_an_empty_folder_will_do(tmp_path: Path) -> None:
+def test_the_folder_may_be_new_or_empty(tmp_path: Path) -> None:
     check_demo(DemoFiles(tmp_path), overwrite=False)
     check_demo(DemoFiles(tmp_path / "new" / "demo"), overwrite=False)
     assert (tmp_path / "new" / "demo").is_dir()

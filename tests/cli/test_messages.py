@@ -10,7 +10,7 @@ from vdet.cli.messages import files_bar
 
 
 class Terminal(io.StringIO):
-    """What a bar takes for a terminal."""
+    """A stream that says it is a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -39,7 +39,7 @@ def test_a_batch_has_a_bar_over_files_with_the_rate_of_all_frames_and_the_time_l
     assert "<" in last  # tqdm's mark before the time that is left
 
 
-def test_nothing_is_shown_if_it_shall_be_quiet(terminal: Terminal) -> None:
+def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
     with files_bar(4, quiet=True) as advance:
         advance(200)
     assert terminal.getvalue() == ""

@@ -1,7 +1,6 @@
 """The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -9,8 +8,8 @@ from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
-from vdet.errors import OutputError, VdetError
-from vdet.files import OutputFiles, check_output, make_folder
+from vdet.errors import OutputError
+from vdet.files import OutputFiles, check_output, make_folder, output_errors
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
 from vdet.plugins import SINKS, load_plugin
@@ -160,7 +159,7 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
         raise OutputError(
             f"{output.path}: the sink {output.sink} is for {kind.takes}; give another for {source}"
         )
-    with _naming(output.path):
+    with output_errors(output.path):
         return _NamedSink(kind.open(output.path, context), output.path)
 
 
@@ -172,28 +171,17 @@ class _NamedSink:
         self._path = path
 
     def __enter__(self) -> Self:
-        with _naming(self._path):
+        with output_errors(self._path):
             self._sink.__enter__()
         return self
 
     def __exit__(self, *raised: Any) -> None:
-        with _naming(self._path):
+        with output_errors(self._path):
             self._sink.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
-        with _naming(self._path):
+        with output_errors(self._path):
             self._sink.write(result)
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except VdetError:
-        raise
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"{path}: cannot be written: {reason}") from error
 
 
 def _kind_for(output: Output) -> SinkKind:
