@@ -67,8 +67,8 @@ def landscape(x: Float32Array, y: Float32Array) -> tuple[Float32Array, Float32Ar
     color[above] = _with_hills(_sky(x[above], y[above]), x[above], y[above])
     z = CAMERA.above_ground / -y[~above]
     color[~above], depth[~above] = haze(_ground(x[~above], z), z), z
-    for number, trees in enumerate(_ROWS, start=1):
-        _paint_trees(color, depth, x, y, trees, number)
+    for number in range(1, len(_ROWS) + 1):
+        _paint_trees(color, depth, x, y, number)
     for lateral in _RAILS:
         _paint_rail(color, depth, x, y, lateral)
     return color, depth
@@ -159,10 +159,10 @@ def _paint_trees(
     depth: Float32Array,
     x: Float32Array,
     y: Float32Array,
-    trees: _Trees,
     number: int,
 ) -> None:
-    """Paint a row of trees as a wall with a ragged top and leaves made of noise."""
+    """Paint a row of trees, counted from 1, as a wall with a ragged top and leaves made of noise."""
+    trees = _ROWS[number - 1]
     wall = _wall(x, trees.lateral)
     height = CAMERA.above_ground + y * np.minimum(wall, 1e4)
     size, variation = trees.height, trees.variation
