@@ -161,7 +161,7 @@ def _paint_trees(
     y: Float32Array,
     number: int,
 ) -> None:
-    """Paint a row of trees, counted from 1, as a wall with a ragged top and leaves made of noise."""
+    """Paint row `number` of the trees, from 1, as a wall with a ragged top and leaves of noise."""
     trees = _ROWS[number - 1]
     wall = _wall(x, trees.lateral)
     height = CAMERA.above_ground + y * np.minimum(wall, 1e4)
