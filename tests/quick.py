@@ -1,8 +1,8 @@
-"""Settings with which tests find vehicles quickly in the small clip, by the small model.
+"""Settings with which tests find vehicles quickly in the small clip, with the small model.
 
-One set of windows, about as large as the nearest vehicle, and the original's outlines and rules;
-and since the model has seen few patches, only what it is surer of counts, but less heat makes a
-region, and less of it a confident one.
+There is one set of windows, about as large as the nearest vehicle, and boxes are made and followed
+as in the original system. The model has seen few patches. So a window needs a higher probability,
+and a region less heat than usual.
 """
 
 QUICK = (
@@ -10,9 +10,7 @@ QUICK = (
     "detector.search.windows=[{size: 80, step: 1, top: 380, bottom: 520}]",
     "detector.search.perspective.sizes=[]",
     "detector.search.alternate=1",
-    "detector.heat={frames: 4, weight: coverage, shrink: 4, blur: 15}",
-    "detector.heat.threshold=0.1",
-    "detector.heat.regions=outline",
+    "detector.heat={frames: 4, threshold: 0.1, regions: outline}",
     "detector.score.middle=0.1",
     "detector.stills={strength: 0, width: 0.04, height: 0.07}",
     "tracker.method=rules",
@@ -23,7 +21,7 @@ QUICK_OPTIONS = tuple(word for assignment in QUICK for word in ("--set", assignm
 
 
 def only_windows(settings: str) -> tuple[str, ...]:
-    """Give the options for one set of windows, and no others."""
+    """Return the options for one set of windows and no others."""
     none = "detector.search.perspective.sizes=[]"
     return ("--set", f"detector.search.windows=[{{{settings}}}]", "--set", none)
 
@@ -35,4 +33,4 @@ FEW_OPTIONS = (
     "--set",
     "output.preset=ultrafast",
 )
-"""Options with which a run costs next to nothing, for tests of anything but what is found."""
+"""Options with which a run takes little time, for tests in which nothing need be found."""

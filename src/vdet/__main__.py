@@ -9,7 +9,7 @@ from typing import NoReturn
 from vdet.errors import INTERRUPTED
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-CLEANUP_TIMEOUT = 5.0  # seconds between a signal and a forced exit
+CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 
 
 def main() -> NoReturn:

@@ -23,7 +23,7 @@ from vdet.media.images import Image
 from vdet.pipeline.loop import Summary, VideoJob, check_job, follow_frames, peek, run_video
 from vdet.pipeline.pictures import PictureJob, detect_picture, run_picture
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind, check_sink
+from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
 from vdet.pipeline.threads import prefetch, single_threaded_libraries
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.protocol import VideoTracker
@@ -247,8 +247,7 @@ def detect_image(
     settings = settings or Settings()
     named = {"picture": picture, **(outputs or {})}
     wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
-    for output in wanted:
-        check_sink(output, overwrite=overwrite, inputs=[Path(source)])
+    check_sinks(wanted, overwrite=overwrite, inputs=[Path(source)])
     job = PictureJob(Path(source), wanted)
     return run_picture(job, load_detector(settings.detector, _path(model)), settings).detections
 

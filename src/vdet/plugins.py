@@ -1,7 +1,7 @@
 """Detectors, trackers and sinks by name: those of vdet, and those of other installed packages.
 
-Another package registers its own as entry points of these groups. Nothing of it is imported before
-it is asked for by name.
+Another package registers its own as entry points of these groups. It is imported when one of its
+names is used, not before.
 """
 
 from importlib.metadata import entry_points
@@ -15,6 +15,7 @@ DETECTORS = "vdet.detectors"
 TRACKERS = "vdet.trackers"
 SINKS = "vdet.sinks"
 
+_NOUNS = {DETECTORS: "detector", TRACKERS: "tracker", SINKS: "sink"}
 _BUILT_IN = {
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
@@ -35,12 +36,12 @@ def plugin_names(group: str) -> list[str]:
 
 
 def load_plugin(group: str, name: str) -> Any:
-    """Import what a name of a group stands for.
+    """Import what is registered under a name of a group.
 
     Raises
     ------
     ConfigError
-        There is no such name, or what it stands for cannot be imported.
+        Nothing is registered under this name, or it cannot be imported.
     """
     if name in _BUILT_IN[group]:
         return resolve_name(_BUILT_IN[group][name])
@@ -50,7 +51,7 @@ def load_plugin(group: str, name: str) -> Any:
         except Exception as error:  # another package's code may raise anything
             raise ConfigError(
                 f"{name}: cannot be loaded from {point.value} ({type(error).__name__}: {error}); "
-                "mend or reinstall that package"
+                "repair or reinstall that package"
             ) from error
     known = ", ".join(plugin_names(group))
-    raise ConfigError(f"{printable(name)}: is not known; known are {known}")
+    raise ConfigError(f"{printable(name)}: is no {_NOUNS[group]}; known are {known}")

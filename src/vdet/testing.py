@@ -136,23 +136,27 @@ def _scene(index: int) -> Image:
     return image
 
 
-def check_sink(kind: SinkKind, path: Path, settings: Settings | None = None) -> None:
+def check_sink(
+    kind: SinkKind, path: Path, settings: Settings | None = None, *, still: bool = False
+) -> None:
     """Check a sink that writes to `path`, which must not be there yet.
+
+    With `still` it gets one still picture, else three frames of a video.
 
     * Nothing is there before the run ends, nor after a run that ends with an error.
     * After a run that ends well the output is there, and no temporary file is left.
     * The frame's image is left as it is.
     * The same output can be written again after a failed run.
     """
-    run = _SinkRun(kind, path, settings or Settings())
+    run = _SinkRun(kind, path, settings or Settings(), still)
     try:
-        run.write(frames=3, error=ZeroDivisionError())
+        run.write(error=ZeroDivisionError())
     except ZeroDivisionError:
         pass
     else:
         raise AssertionError("the sink hid the error that ended the run")
     assert not _content(path), "a failed run left its output"
-    run.write(frames=3)
+    run.write()
     assert _content(path), "a run that ended well left no output"
 
 
@@ -161,14 +165,15 @@ class _SinkRun:
     kind: SinkKind
     path: Path
     settings: Settings
+    still: bool
 
-    def write(self, frames: int, error: Exception | None = None) -> None:
-        """Write some frames through the sink; raise `error` after them."""
+    def write(self, error: Exception | None = None) -> None:
+        """Write a picture or some frames through the sink; raise `error` after them."""
         folder = self.path if self.kind.marker else self.path.parent
         folder.mkdir(parents=True, exist_ok=True)
         try:
             with OutputFiles() as files, self.kind.open(self.path, self._context(files)) as sink:
-                for index in range(frames):
+                for index in range(1 if self.still else 3):
                     result = _result(index)
                     before = result.frame.image.copy()
                     sink.write(result)
@@ -183,7 +188,7 @@ class _SinkRun:
     def _context(self, files: OutputFiles) -> SinkContext:
         rate = Fraction(RATE)
         video = VideoInfo(Path("check.mp4"), 640, 360, rate, 1 / rate, frames=3)
-        return SinkContext(files, self.settings, video)
+        return SinkContext(files, self.settings, None if self.still else video)
 
 
 def _content(path: Path) -> list[Path]:

@@ -33,7 +33,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
-CLEANUP_TIMEOUT = 5.0  # seconds between SIGTERM and a forced exit
+CLEANUP_TIMEOUT = 10.0  # seconds between SIGTERM and a forced exit
 SAFE_PATH = "PYTHONSAFEPATH"  # if set, Python imports no module from the current folder
 ENVIRONMENT = {
     SAFE_PATH: "1",

@@ -62,6 +62,11 @@ def scheduler(folder: Path) -> "Iterator[tuple[Cluster, subprocess.Popen[bytes]]
         process.wait()
 
 
+def registered(folder: Path) -> int:
+    """Return how many workers the scheduler of a folder has had."""
+    return (folder / "worker.log").read_text().count("Registered to")
+
+
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
     """A scheduler with two workers."""
@@ -70,8 +75,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
         options = ("--nworkers", "2", "--nthreads", "1")
         workers = dask("worker", *options, folder=folder)
         try:
-            log = folder / "worker.log"
-            until(lambda: log.read_text().count("Registered to") == 2)
+            until(lambda: registered(folder) == 2)
             yield cluster
         finally:
             workers.terminate()
@@ -191,13 +195,16 @@ def test_a_scheduler_that_has_no_worker_and_one_that_ends(tmp_path: Path) -> Non
         with pytest.raises(ClusterError, match="the scheduler has no worker"):
             next(DaskCluster(cluster.address, worker_timeout=0.1).map(abs, [1]))
         worker = dask("worker", "--no-nanny", folder=tmp_path)
-        running = start(("detect-video", clip, "-d", out, "--scheduler", cluster.address))
         try:
-            until(lambda: bool(cluster.gate.held()))
-            process.kill()
-            result = running.finish()
+            until(lambda: registered(tmp_path) == 1)
+            running = start(("detect-video", clip, "-d", out, "--scheduler", cluster.address))
+            try:
+                until(lambda: bool(cluster.gate.held()))
+                process.kill()
+                result = running.finish()
+            finally:
+                running.stop()
         finally:
-            running.stop()
             worker.kill()
             worker.wait()
     assert result.code == 1

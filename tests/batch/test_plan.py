@@ -1,6 +1,7 @@
 """What a batch will do, and what it refuses before any work."""
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +33,7 @@ def plan(*inputs: str, folder: str = "out", tracks: str | None = None, **options
 
 
 def plan_outputs(
-    *inputs: str, suffixes: dict[str, str | None], folder: str = "out", **options: bool
+    *inputs: str, suffixes: Mapping[str, str | None], folder: str = "out", **options: bool
 ) -> Plan:
     return make_plan(
         [Path(p) for p in inputs], Path(folder), COMMON, OutputOptions(suffixes, **options)
@@ -124,7 +125,7 @@ class TestRefused:
             plan("clips/a.mp4", tracks=".xml")
 
     def test_a_sink_that_is_not_known(self) -> None:
-        with pytest.raises(ConfigError, match=r"^nothing: is not known; known are video, tracks"):
+        with pytest.raises(ConfigError, match=r"^nothing: is no sink; known are video, tracks"):
             plan_outputs("clips/a.mp4", suffixes={"nothing": ".txt"})
 
     def test_tracks_that_would_be_the_manifest(self) -> None:

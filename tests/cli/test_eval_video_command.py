@@ -1,25 +1,15 @@
 """`vdet eval video`."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS
-from vdet.synthetic.clip import write_truth
-from vdet.synthetic.scene import Scene
 
 TWO_SHIPPED = "detector.features={patch: 32, hog: {cell: 4}},{patch: 64, hog: {cell: 8}}"
 """Features of two shipped models."""
-
-
-@pytest.fixture
-def truth_path(scene: Scene, tmp_path: Path) -> Path:
-    path = tmp_path / "gt.txt"
-    write_truth(path, replace(scene, frames=8))
-    return path
 
 
 def test_scores_agree_with_those_of_the_tracks_written(

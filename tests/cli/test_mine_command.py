@@ -72,7 +72,7 @@ def test_mines_patches_that_train_learns_from(
     for group, count in counts.items():
         assert re.search(rf"{group} +{count} patches", learnt.out)
     model = load_model(model_path)
-    assert model.boxes is not None
+    assert model.box_regression is not None
     assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
 
 
@@ -145,7 +145,7 @@ def _patches(path: Path) -> dict[str, bytes]:
     [
         (("--until", "3", "--from", "4"), 2, "--until must not be before --from"),
         (("--every", "0"), 2, "--every"),
-        (("--from", "10"), 1, "gt.txt: knows of the frames up to 9; mine some of these"),
+        (("--from", "10"), 1, "gt.txt: covers the frames up to 9; mine some of these"),
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--set", "mining.parts=-1"), 1, "mining.parts"),

@@ -6,7 +6,13 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vdet.config.document import MAX_BYTES, parse_assignment, parse_document, read_document
+from vdet.config.document import (
+    MAX_BYTES,
+    Document,
+    parse_assignment,
+    parse_document,
+    read_document,
+)
 from vdet.errors import ConfigError
 
 
@@ -58,6 +64,16 @@ def test_every_key_has_the_place_where_it_stands() -> None:
         ("a", "c", 1): "my.yaml:3:10",
         ("a", "c", 1, "d"): "my.yaml:3:11",
     }
+
+
+def test_a_place_is_that_of_the_key_or_of_the_nearest_thing_in_or_around_it() -> None:
+    document = parse_document("a:\n  b:\n    c: 1\nd: 2\n", "my.yaml")
+    assert document.place_of(("a", "b")) == "my.yaml:2:3"
+    assert document.place_of(("a", "x")) == "my.yaml:1:1"
+    assert document.place_of(("x",)) == "my.yaml:1:1"
+    within = Document("--set", {}, {("a", "b", "c"): "--set"})
+    assert within.place_of(("a",)) == "--set"
+    assert Document("empty.yaml", {}).place_of(("a",)) == "empty.yaml"
 
 
 @pytest.mark.parametrize("text", ["", "\n", "# nothing\n", "---\n", "null", "{}"])

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from vdet.config.loading import find_config, format_key, load_settings
+from vdet.config.document import format_key
+from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import (
     HeatSettings,
     SearchSettings,

@@ -161,7 +161,14 @@ def test_the_words_of_every_key_are_printed_as_a_comment(name: str, key: str) ->
     text = render(KINDS[name])
     comments = [line.strip()[2:] for line in text.splitlines() if "# " in line]
     words = dict(fields_of(KINDS[name]))[key].description or ""
-    assert words in " ".join(comments)
+    assert words in " ".join(" ".join(comments).split())
+
+
+@pytest.mark.parametrize("settings", KINDS.values(), ids=KINDS)
+def test_one_empty_line_stands_before_each_section(settings: Settings) -> None:
+    blocks = render(settings).split("\n\n")
+    assert len(blocks) == 1 + len(Settings.model_fields)
+    assert all(block.startswith("# ") for block in blocks)
 
 
 @pytest.mark.parametrize("settings", KINDS.values(), ids=KINDS)

@@ -1,4 +1,4 @@
-"""The columns of `Detections`: what they hold, what they refuse, and that nobody changes them."""
+"""The columns of `Detections`: what they hold and refuse, and that they cannot be changed."""
 
 import sys
 import warnings
@@ -51,7 +51,7 @@ def test_given_centroids_strengths_and_trace_are_kept() -> None:
 
 
 @pytest.mark.parametrize("boxes", [[], np.empty((0, 4)), np.empty(0, np.float64)])
-def test_there_may_be_none(boxes: Any) -> None:
+def test_a_table_may_have_no_rows(boxes: Any) -> None:
     detections = Detections(boxes, [], classes=[], names=("car",))
     assert len(detections) == 0
     assert detections.boxes.shape == (0, 4)
@@ -133,7 +133,7 @@ class TestImmutability:
         with pytest.raises(FrozenInstanceError):
             setattr(TYPED, name, None)
 
-    def test_what_is_passed_in_may_change_afterwards(self) -> None:
+    def test_a_later_change_of_an_argument_does_not_matter(self) -> None:
         boxes, scores = np.array(BOXES, np.float32), np.array(SCORES, np.float32)
         detections = Detections(boxes, scores, centroids=boxes[:, :2], strengths=scores)
         boxes[:], scores[:] = 0, 0
@@ -176,13 +176,13 @@ class TestRows:
         assert chosen.names == ("car", "lorry")
         assert chosen.trace == "trace"
 
-    def test_no_rows_may_be_an_empty_list(self) -> None:
+    def test_an_empty_list_chooses_no_rows(self) -> None:
         assert len(self.DETECTIONS[[]]) == 0
 
-    def test_without_classes_there_are_none_afterwards(self) -> None:
+    def test_rows_of_detections_without_classes_have_none(self) -> None:
         assert Detections(BOXES, SCORES)[1:].classes is None
 
-    def test_a_row_that_is_not_there_is_refused(self) -> None:
+    def test_a_row_beyond_the_last_is_refused(self) -> None:
         with pytest.raises(IndexError):
             self.DETECTIONS[[3]]
 
@@ -204,7 +204,7 @@ class TestSupervision:
         monkeypatch.setitem(sys.modules, "supervision", module)
 
     @pytest.mark.usefixtures("stub")
-    def test_gets_boxes_scores_and_classes(self) -> None:
+    def test_supervision_gets_boxes_scores_and_classes(self) -> None:
         made: Any = TYPED.to_supervision()
         np.testing.assert_array_equal(made.xyxy, TYPED.boxes)
         np.testing.assert_array_equal(made.confidence, TYPED.scores)
@@ -213,13 +213,13 @@ class TestSupervision:
         assert made.data["class_name"].tolist() == ["lorry", "car", "lorry"]
 
     @pytest.mark.usefixtures("stub")
-    def test_gets_no_classes_where_there_are_none(self) -> None:
+    def test_supervision_gets_no_classes_where_there_are_none(self) -> None:
         made: Any = Detections(BOXES, SCORES).to_supervision()
         assert made.class_id is None
         assert made.data == {}
 
     @pytest.mark.usefixtures("stub")
-    def test_may_change_what_it_gets(self) -> None:
+    def test_supervision_gets_copies(self) -> None:
         made: Any = TYPED.to_supervision()
         made.xyxy[:], made.confidence[:] = 0, 0
         np.testing.assert_array_equal(TYPED.boxes, np.array(BOXES, np.float32))

@@ -69,7 +69,7 @@ class TestLinearModel:
 
 def test_an_unknown_kind_is_refused_and_the_known_ones_are_named() -> None:
     for load in (load_detector, model_file):
-        with pytest.raises(ConfigError, match=r"^sonar: is not known; known are svm"):
+        with pytest.raises(ConfigError, match=r"^sonar: is no detector; known are svm"):
             load(DetectorSettings(kind="sonar"))
 
 
@@ -125,24 +125,24 @@ class TestAnotherPackage:
         yield
         sys.modules.pop("corner_detector", None)
 
-    def test_is_found_by_the_name_of_its_kind(self) -> None:
+    def test_another_detector_is_found_by_the_name_of_its_kind(self) -> None:
         settings = load_settings(None, ["detector={kind: corner, side: 20}"])
         detector = load_detector(settings.detector).for_video(100, 80, [])
         assert detector.detect(None).boxes.tolist() == [[0, 0, 20, 20]]
         assert model_file(settings.detector) is None
 
-    def test_gets_the_model_file(self) -> None:
+    def test_another_detector_gets_the_model_file(self) -> None:
         settings = load_settings(None, ["detector.kind=corner"])
         path = Path("corner.bin")
         loaded = load_detector(settings.detector, path)
         assert vars(loaded)["model"] == path
         assert model_file(settings.detector, path) == path
 
-    def test_is_named_among_the_known_ones(self) -> None:
+    def test_another_detector_is_named_among_the_known_ones(self) -> None:
         with pytest.raises(ConfigError, match=r"known are svm, broken, corner$"):
             load_detector(DetectorSettings(kind="sonar"))
 
-    def test_that_cannot_be_loaded_is_named(self) -> None:
+    def test_a_detector_that_cannot_be_loaded_is_named(self) -> None:
         with pytest.raises(
             ConfigError, match=r"^broken: cannot be loaded from corner_detector:NONE"
         ):

@@ -240,6 +240,6 @@ def test_the_largest_values_that_are_read_give_probabilities_and_sides(tmp_path:
     vectors = np.full((3, LENGTH), 65_536, np.float32)
     with warnings.catch_warnings(action="error"):
         model = load_model(path)
-        assert model.boxes is not None
+        assert model.box_regression is not None
         assert np.isfinite(model.probabilities(vectors)).all()
-        assert np.isfinite(model.boxes.sides(vectors[:, :HOG_LENGTH])).all()
+        assert np.isfinite(model.box_regression.sides(vectors[:, :HOG_LENGTH])).all()

@@ -358,9 +358,9 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
     other, report = train(files, settings, boxed=boxed, jobs=1)
     np.testing.assert_array_equal(one.weights, other.weights)
     np.testing.assert_array_equal(one.slopes, other.slopes)
-    assert one.boxes is not None
-    assert other.boxes is not None
-    np.testing.assert_array_equal(one.boxes.weights, other.boxes.weights)
+    assert one.box_regression is not None
+    assert other.box_regression is not None
+    np.testing.assert_array_equal(one.box_regression.weights, other.box_regression.weights)
     assert report.splits[0].train_augmented > report.splits[0].train_patches
 
 
@@ -420,7 +420,7 @@ def test_groups_of_one_patch_each_have_no_tail_to_test(
 
 def test_without_boxes_a_model_finds_no_sides(files: list[PatchFile]) -> None:
     model, report = train(files, SETTINGS, jobs=1)
-    assert model.boxes is None
+    assert model.box_regression is None
     assert report.boxed == 0
     assert {split.boxes for split in report.splits} == {None}
 
@@ -429,12 +429,12 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
     settings = but(split="tail", boxes=BoxSettings(penalty=1e-3))
     files, boxed = find_patches([mined]), find_boxed([mined])
     model, report = train(files, settings, boxed=boxed, jobs=1)
-    assert model.boxes is not None
+    assert model.box_regression is not None
     last = boxed[-1]
     assert last.sides is not None
     described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
     hogs = described[: Layout.of(SETTINGS.svm.features).hog_length]
-    found = model.boxes.sides(hogs[np.newaxis])[0]
+    found = model.box_regression.sides(hogs[np.newaxis])[0]
     np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
     np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)
     error = report.splits[0].boxes
@@ -466,13 +466,13 @@ def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     settings = but(boxes=BoxSettings(penalty=100, assumed=assumed))
     files = find_patches([small, data])
     model, _ = train(files, settings, jobs=1)
-    assert model.boxes is not None
+    assert model.box_regression is not None
     vehicles = [file for file in files if file.vehicle]
     described = extract(
         vehicles, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()
     ).vectors
     hogs = described[:, : Layout.of(SETTINGS.svm.features).hog_length]
-    left, top, right, bottom = model.boxes.sides(hogs).mean(axis=0).tolist()
+    left, top, right, bottom = model.box_regression.sides(hogs).mean(axis=0).tolist()
     if assumed:
         assert max(left, -right) < -0.25
         assert max(top, -bottom) < -0.15
@@ -485,7 +485,7 @@ def test_without_hog_no_sides_are_found(mined: Path) -> None:
     colour = FeatureSettings(patch=SIZE, hog=HogSettings(channels=()))
     settings = SETTINGS.model_copy(update={"detector": SvmSettings(features=colour)})
     files, boxed = find_patches([mined]), find_boxed([mined])
-    assert train(files, settings, boxed=boxed, jobs=1)[0].boxes is None
+    assert train(files, settings, boxed=boxed, jobs=1)[0].box_regression is None
 
 
 def test_different_boxes_have_different_digests(mined: Path) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,14 @@ import cv2
 import numpy as np
 import pytest
 from av.stream import Disposition
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame, VideoReader
+from vdet.media.reader import Clock
 
 Image = NDArray[np.uint8]
 Number = Callable[[Image], int]
@@ -28,6 +32,8 @@ DAMAGED: dict[str, dict[str, Any]] = {
     "avi": {"codec": "mpeg4", "options": {"g": "10", "bf": "2", "q": "2"}},
     "ts": {"codec": "libx264"},
 }
+TICK = Fraction(1, 1000)
+PERIOD = Fraction(1, 25)
 TOLERANT = InputSettings(max_damaged=1)
 
 
@@ -307,3 +313,36 @@ class TestRefusals:
         data = path.read_bytes()
         path.write_bytes(data[: data.index(b"mdat") + 4])
         assert "not one frame" in self.refusal(path)
+
+
+def clock_times(*stamps: int | None) -> list[Fraction]:
+    clock = Clock(TICK, PERIOD)
+    return [clock.time(stamp) for stamp in stamps]
+
+
+def test_stamps_that_increase_are_taken_exactly() -> None:
+    assert clock_times(-7, 0, 3, 1000) == [-7 * TICK, 0, 3 * TICK, 1]
+
+
+def test_a_missing_stamp_is_one_period_after_the_frame_before() -> None:
+    assert clock_times(None, None, 200, None) == [0, PERIOD, Fraction(1, 5), Fraction(6, 25)]
+
+
+def test_a_stamp_that_repeats_or_goes_back_counts_as_missing() -> None:
+    assert clock_times(100, 100, 20, 500) == [
+        Fraction(1, 10),
+        Fraction(7, 50),
+        Fraction(9, 50),
+        Fraction(1, 2),
+    ]
+
+
+@given(st.lists(st.none() | st.integers(-(2**40), 2**40)))
+def test_times_always_increase(stamps: list[int | None]) -> None:
+    assert all(earlier < later for earlier, later in pairwise(clock_times(*stamps)))
+
+
+@given(st.sets(st.integers(-(2**40), 2**40)))
+def test_increasing_stamps_are_never_touched(stamps: set[int]) -> None:
+    increasing = sorted(stamps)
+    assert clock_times(*increasing) == [stamp * TICK for stamp in increasing]

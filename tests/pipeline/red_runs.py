@@ -29,6 +29,9 @@ def video_info(width: int = WIDTH, height: int = HEIGHT) -> VideoInfo:
     return VideoInfo(Path("red.mp4"), width, height, rate, 1 / rate, frames=COUNT)
 
 
+VIDEO = video_info()
+
+
 def model_for(settings: Settings) -> SvmModel:
     """Return the detector of red cars under these settings."""
     return SvmModel(red_finder(), settings.svm)
@@ -90,12 +93,15 @@ def write(
     results: Iterable[FrameResult],
     *,
     settings: Settings = SETTINGS,
-    video: VideoInfo | None = None,
+    video: VideoInfo | None = VIDEO,
     at: Fraction = Fraction(0),
 ) -> None:
-    """Give results to a sink of its own run; `at` is the moment that is asked for."""
+    """Give results to a sink of its own run.
+
+    Without a `video` they are those of pictures. `at` is the moment that is asked for.
+    """
     with OutputFiles() as files:
-        context = SinkContext(files, settings, video or video_info(), at=at)
+        context = SinkContext(files, settings, video, at=at)
         with open_sink(output, context) as sink:
             for result in results:
                 sink.write(result)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vdet.errors import BatchError
 
-SUFFIXES = frozenset((
+VIDEO_INPUT_SUFFIXES = frozenset((
     ".264", ".265", ".3g2", ".3gp", ".asf", ".avi", ".dav", ".dv", ".f4v", ".flv", ".h264", ".h265",
     ".hevc", ".insv", ".m2t", ".m2ts", ".m2v", ".m4v", ".mjpeg", ".mjpg", ".mkv", ".mov", ".mp4",
     ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m",
@@ -69,7 +69,7 @@ def _below(folder: Path, base: Path) -> Iterator[Source]:
         folders[:] = [name for name in folders if not name.startswith(".")]
         for name in names:
             path = Path(root, name)
-            if path.suffix.lower() in SUFFIXES and not name.startswith("."):
+            if path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not name.startswith("."):
                 yield Source(path, path.relative_to(base))
 
 

@@ -8,7 +8,7 @@ from vdet.batch.inputs import Source, find_sources
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
 from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output, check_sink, sink_kind
+from vdet.pipeline.sinks.protocol import Output, check_sinks, sink_kind
 
 MANIFEST = "manifest.jsonl"
 
@@ -70,8 +70,8 @@ def make_plan(
     plan = Plan(folder, tuple(_where(jobs, done, False)), tuple(_where(jobs, done, True)))
     check_output(plan.manifest, overwrite=True, makes_folder=True)
     replaces = options.overwrite or options.skip_existing
-    for output in (output for job in plan.jobs for output in job.outputs):
-        check_sink(output, overwrite=replaces, makes_folder=True)
+    for job in plan.jobs:
+        check_sinks(job.outputs, overwrite=replaces, makes_folder=True)
     return plan
 
 

@@ -1,4 +1,4 @@
-"""`vdet detect-image`: vehicles in pictures."""
+"""`vdet detect-image`: find vehicles in pictures."""
 
 import logging
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.options import (
-    PathOf,
+    PATH,
     lane_options,
     model_option,
     overwrite_option,
@@ -18,25 +18,32 @@ from vdet.cli.options import (
 )
 from vdet.detect.factory import load_detector
 from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
-from vdet.pipeline.sinks.json_list import STANDARD_OUTPUT
-from vdet.pipeline.sinks.protocol import Output, check_sink
+from vdet.pipeline.sinks.protocol import Output, check_sinks
 
 log = logging.getLogger("vdet")
 
 
 @click.command()
-@click.argument("images", nargs=-1, required=True, type=PathOf(), metavar="IMAGE...")
+@click.argument("images", nargs=-1, required=True, type=PATH, metavar="IMAGE...")
 @click.option(
-    "-o", "--output", type=PathOf(), help="Annotated picture, or a folder for several of them."
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="PATH",
+    help="Write the picture with its boxes. For several pictures, give a folder.",
 )
 @click.option(
-    "--json", "json_target", type=PathOf(), metavar="FILE", help="The boxes; - for standard output."
+    "--json",
+    "json_target",
+    type=PATH,
+    metavar="FILE",
+    help="Write the boxes to FILE, or with - to standard output.",
 )
-@click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage.")
+@click.option("--stages", type=PATH, metavar="DIR", help="Write a picture of every stage into DIR.")
 @sink_option
 @lane_options
 @model_option
-@settings_options
+@settings_options("detector.stills.strength=0.2")
 @overwrite_option
 def detect_image(
     *,
@@ -52,19 +59,20 @@ def detect_image(
     assignments: tuple[str, ...],
     overwrite: bool,
 ) -> None:
-    """Find vehicles in each IMAGE: files, or folders of them."""
+    """Find vehicles in pictures.
+
+    Each IMAGE is a file, or a folder of files.
+    """
     shared = read_sinks(sinks)
     if json_target is not None:
         shared = (Output("json", json_target), *shared)
     if not (output or stages or shared):
-        raise click.UsageError("nothing would be written; give -o, --json or --stages")
+        raise click.UsageError("nothing would be written; give -o, --json, --stages or --sink")
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments)
     model = load_detector(settings.detector, model_path)
     sources = find_images(images)
-    for each in shared:
-        if each.path != STANDARD_OUTPUT:
-            check_sink(each, overwrite=overwrite, inputs=sources)
+    check_sinks(shared, overwrite=overwrite, inputs=sources)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     failures = run_pictures(jobs, shared, model, settings, request)
     if failures:

@@ -12,7 +12,7 @@ from vdet.config.section import Fraction, Section
 
 
 class DetectorSettings(Section):
-    """Which detector finds vehicles, and its settings. Each kind has a class of its own."""
+    """Which detector finds vehicles, and its settings; each kind has its own class."""
 
     kind: str
 
@@ -27,45 +27,48 @@ class DetectorSettings(Section):
 
 
 class StillSettings(Section):
-    """What a single picture shows; in video the tracker decides."""
+    """Which detections are shown in a still picture; in video, the tracker decides."""
 
     strength: float = Field(
         0.42,
         ge=0,
-        description="vehicles with weaker evidence (heat, or weight of votes) are left out",
+        description="least evidence: heat, or with votes the weight of the hits that agree",
     )
-    width: Fraction = Field(
-        0.028, description="narrower vehicles are left out, share of the picture's width"
-    )
+    width: Fraction = Field(0.028, description="least width of a box, share of the picture's width")
     height: Fraction = Field(
-        0.0, description="lower vehicles are left out, share of the picture's height"
+        0.0, description="least height of a box, share of the picture's height"
     )
 
 
 class ScoreSettings(Section):
-    """How the evidence for a vehicle becomes its score, the share of such boxes that are vehicles.
+    """Score of a box: 1 / (1 + (middle / evidence) ** slope).
 
-    score = 1 / (1 + (middle / evidence) ** slope), fitted on frames that the model has not seen.
+    It is the share of such boxes that show a vehicle. Fitted on frames that the model has not seen.
     """
 
     middle: float = Field(
-        0.3, gt=0, le=1e6, description="evidence at which half of the boxes are vehicles"
+        0.272,
+        gt=0,
+        le=1e6,
+        description="evidence (heat, or weight of hits) at which the score is 0.5",
     )
-    slope: float = Field(2.0, gt=0, le=100, description="how steeply the score rises there")
+    slope: float = Field(
+        3.5, gt=0, le=100, description="how steeply the score rises with the evidence"
+    )
 
 
 class SvmSettings(DetectorSettings):
-    """The linear SVM on HOG and colour features, with sliding windows and a heatmap."""
+    """The detector: a linear SVM on HOG and colour features, sliding windows and a heatmap."""
 
     kind: Literal["svm"] = Field(
-        "svm", description="svm: the linear SVM on HOG and colour features"
+        "svm", description="kind of detector; svm: a linear SVM on HOG and colour features"
     )
     reference_height: int = Field(
         720,
         ge=16,
         le=100_000,
-        description="lengths in frame pixels below (search, heat) are for a frame with this many "
-        "rows; for another frame they are multiplied by rows / reference_height and rounded",
+        description="height of the frames that lengths in pixels (detector.search.windows, "
+        "detector.heat.blur) are given for; for frames of another height they are scaled",
     )
     features: FeatureSettings = FeatureSettings()
     search: SearchSettings = SearchSettings()

@@ -14,10 +14,10 @@ from vdet.errors import ConfigError
 from vdet.files import printable, read_whole
 
 MAX_BYTES = 100_000
-"""Ten times what all settings with all their comments take."""
+"""Ten times the size of all settings with all their comments."""
 MAX_INTEGER_BITS = 64
 MAX_MISTAKES = 20
-"""Shown of one file; the others are only counted."""
+"""Most mistakes of one file that are shown; the others are counted."""
 
 _INTEGER = "tag:yaml.org,2002:int"
 
@@ -27,10 +27,36 @@ Key = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """Values read from one source, and the place of each key as text, `file:line:column`."""
+    """Values read from the source `name`, and the place of each key: `file:line:column`."""
 
+    name: str
     values: dict[str, Any]
     places: dict[Key, str] = field(default_factory=dict)
+
+    def place_of(self, key: Key) -> str:
+        """Return the place of a key, or of the nearest thing in or around it that has one."""
+        for length in range(len(key), -1, -1):
+            for at, place in self.places.items():
+                if at[:length] == key[:length]:
+                    return place
+        return self.name
+
+
+def format_key(key: Key) -> str:
+    """Write a path as a user would: `detector.search.windows[0].size`."""
+    text = ""
+    for part in key:
+        name = printable(str(part))
+        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
+    return text
+
+
+def config_error(lines: Iterable[str], count: int) -> ConfigError:
+    """Return the error for `count` mistakes; only the first of their `lines` are shown."""
+    shown = list(islice(lines, MAX_MISTAKES))
+    if count > len(shown):
+        shown.append(f"… and {count - len(shown)} more mistakes")
+    return ConfigError("\n".join(shown))
 
 
 class _Loader(yaml.SafeLoader):
@@ -50,14 +76,6 @@ class _Loader(yaml.SafeLoader):
             return super().compose_node(parent, index)
         problem = f"{refused} are not accepted"
         raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
-
-
-def mistakes(lines: Iterable[str], count: int) -> ConfigError:
-    """Return the error for `count` mistakes, of which the first `lines` are looked at."""
-    shown = list(islice(lines, MAX_MISTAKES))
-    if count > len(shown):
-        shown.append(f"… and {count - len(shown)} more mistakes")
-    return ConfigError("\n".join(shown))
 
 
 _Loader.add_implicit_resolver(
@@ -93,8 +111,8 @@ def parse_document(text: str, name: str) -> Document:
         got = reprlib.repr(values)
         walk.errors.append(f"{name}:1:1: expected settings (key: value), got {got}")
     if walk.errors:
-        raise mistakes(walk.errors, len(walk.errors))
-    return Document(values, walk.places)
+        raise config_error(walk.errors, len(walk.errors))
+    return Document(name, values, walk.places)
 
 
 def parse_assignment(text: str) -> Document:
@@ -114,11 +132,11 @@ def parse_assignment(text: str) -> Document:
     path: Key = tuple(int(part) if _is_number(part) else part for part in parts)
     nested = walk.value(_compose(value, name), path)
     if walk.errors:
-        raise mistakes(walk.errors, len(walk.errors))
+        raise config_error(walk.errors, len(walk.errors))
     for part in reversed(path):
         nested = {part: nested}
     places = dict.fromkeys(walk.places, name) | {path: name}
-    return Document(nested, places)
+    return Document(name, nested, places)
 
 
 def _is_number(part: str) -> bool:

@@ -1,4 +1,4 @@
-"""The section `detector.features`: what a patch is described by."""
+"""The section `detector.features`: which features of a patch the model gets."""
 
 from typing import Literal
 
@@ -10,13 +10,17 @@ ColorSpace = Literal["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
 
 
 class HogSettings(Section):
-    """Histogram of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor computes it."""
+    """Histograms of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor gives them."""
 
-    orientations: int = Field(8, ge=2, le=32, description="bins of gradient direction in 180°")
-    cell: int = Field(4, ge=2, le=64, description="side of a cell, patch pixels")
-    block: int = Field(2, ge=1, le=8, description="side of a block, cells; blocks step by one cell")
+    orientations: int = Field(
+        8, ge=2, le=32, description="number of bins for gradient directions of 0 to 180°"
+    )
+    cell: int = Field(4, ge=2, le=64, description="side of a cell, pixels of the patch")
+    block: int = Field(
+        2, ge=1, le=8, description="side of a block, cells; neighbouring blocks are one cell apart"
+    )
     channels: tuple[Literal[0, 1, 2], ...] = Field(
-        (0, 1, 2), description="channels of the colour space that are described; [] for none"
+        (0, 1, 2), description="channels of the colour space that have HOG features; [] for none"
     )
 
     @model_validator(mode="after")
@@ -27,24 +31,28 @@ class HogSettings(Section):
 
 
 class HistogramSettings(Section):
-    """Colour histogram, one a channel."""
+    """Colour histogram of each channel."""
 
     bins: Literal[0, 8, 16, 32, 64, 128, 256] = Field(
-        32, description="equal bins over the values 0 … 255 of each channel; 0 for no histogram"
+        32, description="number of equal bins for values of 0 to 255; 0 for no histogram"
     )
 
 
 class SpatialSettings(Section):
-    """The patch itself, shrunk, as raw values."""
+    """The pixels of the shrunk patch."""
 
-    size: int = Field(0, ge=0, le=64, description="side of the shrunk patch, pixels; 0 for none")
+    size: int = Field(
+        0, ge=0, le=64, description="side of the shrunk patch, pixels; 0 for no such features"
+    )
 
 
 class FeatureSettings(Section):
-    """What a patch is described by. A model carries the settings that it was trained with."""
+    """Features of a patch; they must be those that the model was trained with."""
 
     patch: int = Field(32, ge=16, le=256, description="side of a patch, pixels")
-    color_space: ColorSpace = Field("YCrCb", description="YCrCb, HSV, LUV, HLS, YUV or RGB")
+    color_space: ColorSpace = Field(
+        "YCrCb", description="colour space: YCrCb, HSV, LUV, HLS, YUV or RGB"
+    )
     hog: HogSettings = HogSettings()
     histogram: HistogramSettings = HistogramSettings()
     spatial: SpatialSettings = SpatialSettings()

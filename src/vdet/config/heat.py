@@ -1,4 +1,4 @@
-"""The section `detector.heat`: windows of consecutive frames become detections."""
+"""The section `detector.heat`: how the hits of consecutive frames become detections."""
 
 from typing import Literal
 
@@ -8,41 +8,45 @@ from vdet.config.section import Fraction, Pixels, Section
 
 
 class VoteSettings(Section):
-    """Boxes from the windows that voted: those that agree on a vehicle are averaged."""
+    """How the boxes of hits that agree on a vehicle are averaged."""
 
     agreement: Fraction = Field(
-        0.35, description="intersection over union from which on two votes agree"
+        0.35, description="least intersection over union of two boxes that agree"
     )
     inside: Fraction = Field(
-        0.7, description="a vehicle of which this share lies in a larger one is a part of it"
+        0.7, description="a box with more than this share inside a larger vehicle is a part of it"
     )
-    least: float = Field(0.08, ge=0, description="weight of the votes that a vehicle needs")
+    least: float = Field(0.08, ge=0, description="least weight of the hits that agree on a vehicle")
     sharpness: float = Field(
         4.0,
         ge=0,
         le=16,
-        description="how much more the windows count that fit a vehicle best, where its box is "
-        "averaged: power of -log(1 - probability)",
+        description="weight of a hit in the average: -log(1 - probability) to this power, so that "
+        "the windows that fit the vehicle best count most",
     )
 
 
 class HeatSettings(Section):
-    """Detections of consecutive frames summed into a heatmap, and its regions."""
+    """How the hits of consecutive frames are summed into a heatmap, and become detections."""
 
-    frames: int = Field(2, ge=1, le=100, description="frames whose detections are summed")
+    frames: int = Field(2, ge=1, le=100, description="number of frames whose hits are summed")
     weight: Literal["none", "coverage"] = Field(
         "coverage",
-        description="none: a window adds its probability; coverage: divided by the number of "
-        "windows of its set that cover a pixel, so that the threshold does not depend on overlap",
+        description="none: a hit adds its probability; coverage: a hit adds its probability "
+        "divided by the number of windows of its set that cover a pixel, so that the threshold "
+        "does not depend on their overlap",
     )
     shrink: Literal[1, 2, 4, 8] = Field(
-        4, description="the map has one value for this many pixels across and down"
+        4, description="one value of the heatmap stands for this many pixels across and down"
     )
-    blur: Pixels = Field(15, description="side of the Gaussian blur, pixels; 0 or 1 for none")
-    threshold: float = Field(0.05, ge=0, description="a region is where the heat is above this")
+    blur: Pixels = Field(
+        15,
+        description="side of the Gaussian kernel that blurs the heat, pixels; 0 or 1 for no blur",
+    )
+    threshold: float = Field(0.05, ge=0, description="a region is hot where the heat is above this")
     regions: Literal["outline", "votes"] = Field(
         "votes",
-        description="outline: a region's box bounds the hot part; votes: the windows in it say how "
-        "many vehicles it is and where",
+        description="outline: each hot region is a detection, and its box bounds the region; "
+        "votes: the boxes of the hits in a region tell how many vehicles it shows, and where",
     )
     votes: VoteSettings = VoteSettings()

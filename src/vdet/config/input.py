@@ -10,8 +10,8 @@ class InputSettings(Section):
 
     max_damaged: Fraction = Field(
         0.05,
-        description="share of damaged or lost frames that is tolerated; above it the video fails",
+        description="tolerated share of damaged or lost frames; a video with more of them fails",
     )
     frame_rate: float = Field(
-        25.0, ge=0.01, le=1000, description="frames a second of numbered pictures (img_%04d.png)"
+        25.0, ge=0.01, le=1000, description="frames per second of numbered pictures (img_%04d.png)"
     )

@@ -1,29 +1,64 @@
 """Sections of which there are several kinds: the detectors and the trackers."""
 
-from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, Section, SvmSettings
+from dataclasses import dataclass
+
+from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, SvmSettings
+from vdet.config.section import Section
+from vdet.errors import ConfigError
 from vdet.plugins import DETECTORS, TRACKERS, load_plugin, plugin_names
 
-Kinds = dict[str, type[Section]]
-"""The section's class that was chosen, by the section's name."""
 
-UNIONS = {"detector": "kind", "tracker": "method"}
-"""The key by which each such section chooses its kind."""
+@dataclass(frozen=True, slots=True)
+class SectionKinds:
+    """The kinds of one section.
 
-_GROUPS = {"detector": DETECTORS, "tracker": TRACKERS}
-_OWN: dict[str, dict[str, type[Section]]] = {
-    "detector": {"svm": SvmSettings},
-    "tracker": {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings},
+    Attributes
+    ----------
+    key
+        The key of the section that names the kind.
+    group
+        The group of entry points in which other packages register theirs.
+    built_in
+        The settings' classes of vdet's own kinds, by name.
+    """
+
+    key: str
+    group: str
+    built_in: dict[str, type[Section]]
+
+    @property
+    def names(self) -> list[str]:
+        """All names, those of vdet first."""
+        return plugin_names(self.group)
+
+    def settings(self, name: str) -> type[Section]:
+        """Return the settings' class of a kind.
+
+        Raises
+        ------
+        ConfigError
+            There is no such kind, it cannot be loaded, or it has no settings of this name.
+        """
+        if name in self.built_in:
+            return self.built_in[name]
+        settings = getattr(load_plugin(self.group, name), "settings", None)
+        if (
+            isinstance(settings, type)
+            and issubclass(settings, Section)
+            and self.key in settings.model_fields
+            and settings.model_fields[self.key].default == name
+        ):
+            return settings
+        raise ConfigError(
+            f'{name}: its settings are no section with {self.key} = "{name}"; repair or reinstall '
+            "that package"
+        )
+
+
+SECTIONS_WITH_KINDS = {
+    "detector": SectionKinds("kind", DETECTORS, {"svm": SvmSettings}),
+    "tracker": SectionKinds(
+        "method", TRACKERS, {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings}
+    ),
 }
-
-
-def kind_names(section: str) -> list[str]:
-    """Return the names of all kinds of a section."""
-    return plugin_names(_GROUPS[section])
-
-
-def section_of_kind(section: str, name: str) -> type[Section]:
-    """Return the settings' class of a kind. Raises `ConfigError` where there is no such kind."""
-    if name in _OWN[section]:
-        return _OWN[section][name]
-    settings: type[Section] = load_plugin(_GROUPS[section], name).settings
-    return settings
+"""By the name of the section."""

@@ -1,5 +1,6 @@
-"""Layers of settings → one `Settings`: built-in, then a YAML file, then assignments."""
+"""Layers of settings → one `Settings`: the defaults, then a YAML file, then assignments."""
 
+import contextlib
 import difflib
 import itertools
 import reprlib
@@ -7,18 +8,27 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError, create_model
+from pydantic import ValidationError, create_model
 from pydantic_core import ErrorDetails
 
-from vdet.config.document import Document, Key, mistakes, parse_assignment, read_document
-from vdet.config.kinds import UNIONS, Kinds, kind_names, section_of_kind
+from vdet.config.document import (
+    Document,
+    Key,
+    config_error,
+    format_key,
+    parse_assignment,
+    read_document,
+)
+from vdet.config.kinds import SECTIONS_WITH_KINDS, SectionKinds
 from vdet.config.schema import Section, Settings
 from vdet.errors import ConfigError
-from vdet.files import printable
 
 _PACKAGE = Path(__file__).parents[1]
 # In a wheel the configs lie in the package; in a work tree beside `src`.
 _CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
+
+Chosen = Mapping[str, type[Section]]
+"""The class of the chosen kind, by the name of the section."""
 
 
 def find_config(name: str) -> Path:
@@ -39,40 +49,37 @@ def find_config(name: str) -> Path:
 
 
 def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> Settings:
-    """Read settings: defaults, then the file at `path`, then assignments such as `input.crf=18`.
+    """Read settings: defaults, then the file at `path`, then assignments such as `output.crf=18`.
 
     A list in a later layer replaces the whole list of an earlier one; an assignment may name one
     item of it (`detector.search.windows.0.step=2`). Where a layer chooses another kind of detector
     or method of tracking than the layers below, that section starts from the defaults of this kind.
+    All assignments are one layer.
 
     Raises
     ------
     ConfigError
         One line for each mistake, with file, line, column, key and what was expected.
     """
+    errors: list[str] = []
     layers = [read_document(path)] if path else []
-    assigned, errors = _read_assignments(assignments)
-    layers.append(assigned)
-    try:
-        values, places, kinds = _merge(layers)
-    except ConfigError as error:
-        raise mistakes([*errors, *str(error).splitlines()], len(errors) + 1) from error
+    layers.append(_read_assignments(assignments, errors))
+    merged, chosen = _merge(layers, errors)
     details: list[ErrorDetails] = []
     try:
-        settings = _validate(values, kinds)
+        settings = _validate(merged.values, chosen)
     except ValidationError as error:
         details = error.errors()
     if errors or details:
-        described = (_describe(detail, places, kinds) for detail in details)
-        raise mistakes(itertools.chain(errors, described), len(errors) + len(details))
+        described = (_describe(detail, merged, chosen) for detail in details)
+        raise config_error(itertools.chain(errors, described), len(errors) + len(details))
     return settings
 
 
-def _read_assignments(assignments: Sequence[str]) -> tuple[Document, list[str]]:
-    """Join assignments to one layer; what cannot be read is returned as lines of errors."""
+def _read_assignments(assignments: Sequence[str], errors: list[str]) -> Document:
+    """Join assignments to one layer; those that cannot be read are added to the errors."""
     values: Any = {}
     places: dict[Key, str] = {}
-    errors: list[str] = []
     for text in assignments:
         try:
             document = parse_assignment(text)
@@ -81,41 +88,36 @@ def _read_assignments(assignments: Sequence[str]) -> tuple[Document, list[str]]:
         else:
             values = _overlay(values, document.values)
             places |= document.places
-    return Document(values, places), errors
+    return Document("--set", values, places)
 
 
-def _merge(layers: Sequence[Document]) -> tuple[dict[str, Any], dict[Key, str], Kinds]:
-    """Lay the layers over the defaults; return values, places and the kind of each union."""
+def _merge(layers: Sequence[Document], errors: list[str]) -> tuple[Document, Chosen]:
+    """Lay the layers over the defaults; return them as one, and the kinds that they choose.
+
+    Where a layer chooses an unknown kind, an error is added and the layer's section is left out.
+    """
     values: dict[str, Any] = Settings().model_dump(mode="json")
-    kinds = {name: section_of_kind(name, values[name][key]) for name, key in UNIONS.items()}
+    chosen = {
+        name: kinds.settings(values[name][kinds.key]) for name, kinds in SECTIONS_WITH_KINDS.items()
+    }
     places: dict[Key, str] = {}
     for layer in layers:
-        for name, key in UNIONS.items():
-            given = layer.values.get(name)
-            kind = given.get(key) if isinstance(given, dict) else None
-            if isinstance(kind, str) and kind != values[name][key]:
-                kinds[name] = _chosen(name, kind, layer)
-                values[name] = kinds[name]().model_dump(mode="json")
-        values = _overlay(values, layer.values)
+        given = dict(layer.values)
+        for name, kinds in SECTIONS_WITH_KINDS.items():
+            section = given.get(name)
+            kind = section.get(kinds.key) if isinstance(section, dict) else None
+            if isinstance(kind, str) and kind != values[name][kinds.key]:
+                try:
+                    chosen[name] = kinds.settings(kind)
+                except ConfigError as error:
+                    key: Key = (name, kinds.key)
+                    errors.append(f"{layer.place_of(key)}: {format_key(key)}: {error}")
+                    del given[name]
+                else:
+                    values[name] = chosen[name]().model_dump(mode="json")
+        values = _overlay(values, given)
         places |= layer.places
-    return values, places, kinds
-
-
-def _chosen(name: str, kind: str, layer: Document) -> type[Section]:
-    try:
-        return section_of_kind(name, kind)
-    except ConfigError as error:
-        key: Key = (name, UNIONS[name])
-        raise ConfigError(f"{_place(key, layer.places)}: {format_key(key)}: {error}") from error
-
-
-def _validate(values: Mapping[str, Any], kinds: Kinds) -> Settings:
-    """Check values against the sections of the chosen kinds."""
-    fields: Any = {name: (kind, ...) for name, kind in kinds.items()}
-    checked = create_model("Settings", __base__=Settings, **fields).model_validate(values)
-    return Settings.model_construct(
-        **{name: getattr(checked, name) for name in Settings.model_fields}
-    )
+    return Document("settings", values, places), chosen
 
 
 def _overlay(below: Any, above: Any) -> Any:
@@ -132,80 +134,84 @@ def _overlay(below: Any, above: Any) -> Any:
     return above
 
 
-def _describe(detail: ErrorDetails, places: dict[Key, str], kinds: Kinds) -> str:
+def _validate(values: Mapping[str, Any], chosen: Chosen) -> Settings:
+    """Check values against the sections of the chosen kinds."""
+    fields: Any = {name: (section, ...) for name, section in chosen.items()}
+    checked = create_model("Settings", __base__=Settings, **fields).model_validate(values)
+    return Settings.model_construct(
+        **{name: getattr(checked, name) for name in Settings.model_fields}
+    )
+
+
+def _describe(detail: ErrorDetails, merged: Document, chosen: Chosen) -> str:
     key = tuple(detail["loc"])
-    place = _place(key, places)
-    expected = _expected(detail, kinds)
+    place, expected = merged.place_of(key), _expected(detail, chosen)
     return f"{place}: {format_key(key)}: {expected}" if key else f"{place}: {expected}"
 
 
-def _place(key: Key, places: Mapping[Key, str]) -> str:
-    """Return the place of `key`, or of the nearest thing in or around it that was written down."""
-    if within := [place for at, place in places.items() if at[: len(key)] == key]:
-        return within[0]
-    return _place(key[:-1], places)
-
-
-def format_key(key: Key) -> str:
-    """Write a path as a user would: `detector.search.windows[0].size`."""
-    text = ""
-    for part in key:
-        name = printable(str(part))
-        text += f"[{name}]" if isinstance(part, int) else f".{name}" if text else name
-    return text
-
-
+_KIND_KEYS: dict[Key, SectionKinds] = {
+    (name, kinds.key): kinds for name, kinds in SECTIONS_WITH_KINDS.items()
+}
 _EXPECTED = {
     "model_type": "should be a section, key: value",
     "tuple_type": "should be a list, or in --set the number of an item that it has, from 0",
 }
 
 
-def _expected(detail: ErrorDetails, kinds: Kinds) -> str:
+def _expected(detail: ErrorDetails, chosen: Chosen) -> str:
+    key = tuple(detail["loc"])
     match detail["type"]:
         case "extra_forbidden" | "invalid_key":
-            key = tuple(detail["loc"])
-            return _belongs(key, kinds) or f"is no setting{_suggestion(key, kinds)}"
+            return _other_kind(key, chosen) or f"is no setting{_suggestion(key, chosen)}"
         case "missing":
             return "is missing"
         case "value_error":
             return str(detail["ctx"]["error"])
-    message = _EXPECTED.get(detail["type"]) or detail["msg"].removeprefix("Input ")
+        case "literal_error" if known := _KIND_KEYS.get(key):
+            message = f"should be {' or '.join(known.names)}"
+        case _:
+            message = _EXPECTED.get(detail["type"]) or detail["msg"].removeprefix("Input ")
     return f"{message} (got {reprlib.repr(detail['input'])})"
 
 
-def _belongs(key: Key, kinds: Kinds) -> str:
+def _other_kind(key: Key, chosen: Chosen) -> str:
     """Say which other kind a key belongs to; nothing where it belongs to none."""
-    if len(key) < 2 or key[0] not in UNIONS:
+    section, *inside = key
+    if section not in chosen or not inside:
         return ""
-    name = str(key[0])
-    choice = UNIONS[name]
-    chosen = kinds[name].model_fields[choice].default
-    owners = [
-        kind
-        for kind in kind_names(name)
-        if kind != chosen and key[1] in section_of_kind(name, kind).model_fields
-    ]
+    kinds = SECTIONS_WITH_KINDS[str(section)]
+    current = chosen[str(section)].model_fields[kinds.key].default
+    owners = []
+    for kind in kinds.names:
+        with contextlib.suppress(ConfigError):  # another package's kind that cannot be loaded
+            if kind != current and inside[0] in kinds.settings(kind).model_fields:
+                owners.append(kind)
     if not owners:
         return ""
-    owner = " or ".join(owners)
-    return f"belongs to {name}.{choice}: {owner}, and has no effect with {chosen}"
+    return (
+        f"belongs to {section}.{kinds.key}: {' or '.join(owners)}, and has no effect with {current}"
+    )
 
 
-def _suggestion(key: Key, kinds: Kinds) -> str:
-    names = _names_beside(key, kinds)
+def _suggestion(key: Key, chosen: Chosen) -> str:
+    names = _names_beside(key, chosen)
     if close := difflib.get_close_matches(str(key[-1]), names, n=1):
         return f"; did you mean {close[0]}?"
     return f"; known here: {', '.join(names)}" if names else ""
 
 
-def _names_beside(key: Key, kinds: Kinds) -> list[str]:
-    section: Any = Settings
+def _names_beside(key: Key, chosen: Chosen) -> list[str]:
+    """Return the keys of the section that `key` was looked for in; nothing if it is no section."""
+    within: Any = Settings
     for depth, part in enumerate(key[:-1]):
-        if depth == 0 and part in kinds:
-            section = kinds[str(part)]
-        elif not isinstance(part, int):
-            section = section.model_fields[part].annotation
-        elif args := get_args(section):  # tuple[WindowSettings, ...]
-            section = args[0]
-    return list(section.model_fields) if issubclass(section, BaseModel) else []
+        if depth == 0 and part in chosen:
+            within = chosen[str(part)]
+        elif _is_section(within):
+            within = within.model_fields[str(part)].annotation
+        else:  # an item of a list
+            within = next(filter(_is_section, get_args(within)), None)
+    return list(within.model_fields) if _is_section(within) else []
+
+
+def _is_section(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, Section)

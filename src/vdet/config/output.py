@@ -10,9 +10,13 @@ from vdet.config.section import Section
 class OutputSettings(Section):
     """The video that is written."""
 
-    codec: Literal["libx264"] = Field("libx264", description="H.264, which browsers play")
-    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow"] = (
-        Field("superfast", description="ultrafast … slow: time against size")
+    codec: Literal["libx264"] = Field(
+        "libx264", description="video codec; libx264 writes H.264, which browsers play"
     )
-    crf: int = Field(20, ge=0, le=51, description="quality, 0 best, 51 worst")
-    scores: bool = Field(False, description="write the score of each box into its label")
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow"] = (
+        Field("superfast", description="speed of the encoder; slower presets write smaller files")
+    )
+    crf: int = Field(
+        20, ge=0, le=51, description="quality of the video: 0 is the best, 51 the worst"
+    )
+    scores: bool = Field(False, description="write the score of each vehicle into its label")

@@ -1,4 +1,4 @@
-"""The section `detector.search`: where vehicles are looked for in a frame."""
+"""The section `detector.search`: which windows of a frame are searched, and how."""
 
 from typing import Annotated, Literal
 
@@ -10,19 +10,22 @@ WindowShare = Annotated[float, Field(gt=0, le=1)]
 
 
 class WindowSettings(Section):
-    """One set of square windows over a band of rows, the whole width of the frame."""
+    """A set of square windows over a band of rows and the whole width of the frame."""
 
     size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH] = Field(
         description="side of a window, pixels"
     )
     overlap: float | None = Field(
-        None, ge=0, lt=1, description="share of a window that its neighbour covers too; or"
+        None,
+        ge=0,
+        lt=1,
+        description="share of a window that the next one covers too; give either overlap or step",
     )
     step: int | None = Field(
         None,
         ge=1,
-        description="distance to the next window in cells of the patch, which is what the dense "
-        "engine is fastest with; one of overlap and step is given",
+        description="distance to the next window, cells of the patch; the dense engine is faster "
+        "with step than with overlap",
     )
     top: Pixels = Field(description="first row of the band")
     bottom: Pixels = Field(description="first row below the band")
@@ -39,31 +42,38 @@ class WindowSettings(Section):
 
 
 class PerspectiveSettings(Section):
-    """Window sets whose rows follow from their size: vehicles stand on a flat road."""
+    """Window sets whose rows follow from their size, because vehicles stand on a flat road."""
 
     sizes: tuple[WindowShare, ...] = Field(
         (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3),
         max_length=32,
-        description="sides of the windows, shares of the frame's width (of 16/9 of its height, "
-        "where it is wider than that); [] for no sets",
+        description="one set for each size: side of its windows, share of the frame's width (of a "
+        "frame wider than 16:9, share of 16/9 of its height); [] for no sets",
     )
     zoom: float = Field(
-        1.0, ge=0.1, le=10, description="multiplies the sizes; above 1 for a longer lens"
+        1.0, ge=0.1, le=10, description="factor of all sizes; above 1 for a longer lens"
     )
     horizon: Fraction = Field(
         0.0,
-        description="row of the horizon, share of the frame's height; 0: it is where the lines of "
-        "the first frames meet",
+        description="row of the horizon, share of the frame's height; 0: found in the first "
+        "frames, where the lines of the road meet",
     )
     highest: float = Field(
         0.6,
         ge=0,
         le=10,
-        description="bottom of a set's highest windows below the horizon, in sides",
+        description="distance from the horizon down to the bottom of a set's highest windows, "
+        "sides of a window",
     )
-    lowest: float = Field(1.1, ge=0, le=10, description="the same of its lowest windows")
+    lowest: float = Field(
+        1.1,
+        ge=0,
+        le=10,
+        description="distance from the horizon down to the bottom of a set's lowest windows, "
+        "sides of a window",
+    )
     beyond: Fraction = Field(
-        0.7, description="share of a window that may lie beyond the left and right of the frame"
+        0.7, description="share of a window that may lie beyond the left or right of the frame"
     )
     step: int = Field(1, ge=1, le=64, description="distance to the next window, cells of the patch")
 
@@ -75,24 +85,27 @@ class PerspectiveSettings(Section):
 
 
 class SearchSettings(Section):
-    """Where vehicles are looked for in a frame."""
+    """Which windows of a frame are searched, and how."""
 
     engine: Literal["auto", "dense", "patch"] = Field(
         "auto",
-        description="patch: every window cropped, resized, described and scored on its own; dense: "
-        "each strip described once for all its windows, many times faster; auto: dense where the "
-        "features allow it",
+        description="patch: each window is cropped, resized and classified on its own; dense: the "
+        "features of a strip are computed once for all windows in it, which is many times faster; "
+        "auto: dense if it can compute the features, else patch",
     )
-    probability: Fraction = Field(0.3, description="a window is a detection from here on")
+    probability: Fraction = Field(
+        0.3, description="least probability of a hit, a window that counts as evidence"
+    )
     windows: tuple[WindowSettings, ...] = Field(
-        (), max_length=32, description="window sets over fixed rows; [] for none"
+        (), max_length=32, description="window sets over fixed rows ([] for none)"
     )
     perspective: PerspectiveSettings = PerspectiveSettings()
     alternate: int = Field(
         2,
         ge=1,
         le=10,
-        description="frames of a video over which the sets are dealt out, each searched in one",
+        description="number of frames in which all sets of a video are searched once: with 2, "
+        "every other set in each frame",
     )
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""What every part of the settings is made of."""
+"""What all sections of the settings have in common."""
 
 from typing import Annotated, Any, TypeVar
 
@@ -15,7 +15,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 class Section(BaseModel):
-    """A part of the settings: unchangeable, unknown keys refused, no NaN."""
+    """A part of the settings: immutable; unknown keys and NaN are refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -24,9 +24,9 @@ S = TypeVar("S", bound=Section)
 
 
 def scale_lengths(section: S, factor: float) -> S:
-    """Multiply every frame length of `section` and of the sections in it by `factor`.
+    """Multiply every length in frame pixels, in a section and the sections in it, by `factor`.
 
-    Products are rounded to whole pixels, halves up; fractions and counts stay as they are.
+    Products are rounded to whole pixels, halves up; fractions and counts are not changed.
     """
     if factor == 1:
         return section

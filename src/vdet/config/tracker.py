@@ -32,7 +32,8 @@ class MotionTrackerSettings(TrackerSettings):
     )
     leak: Fraction = Field(
         0.2,
-        description="detections with lower scores do not add evidence; so much is lost a second",
+        description="evidence that a vehicle loses in a second; detections with lower scores never "
+        "add up",
     )
     noise: Positive = Field(
         0.1,
@@ -40,7 +41,7 @@ class MotionTrackerSettings(TrackerSettings):
         "vehicle's own size",
     )
     acceleration: Positive = Field(
-        1.25,
+        1.0,
         description="standard deviation by which a vehicle's velocity changes in a second, sizes "
         "of the vehicle a second",
     )

@@ -8,7 +8,7 @@ from vdet.config.section import Fraction, Section
 
 
 class CalibrationSettings(Section):
-    """Probability from score: a sigmoid fitted on patches the SVM has not seen (Platt 1999)."""
+    """Sigmoid from decision values to probabilities, fitted on patches unknown to the SVM."""
 
     folds: int = Field(3, ge=2, le=20, description="cross-validation folds")
     ensemble: bool = Field(

@@ -1,1 +1,1 @@
-"""Vehicles in one frame: the detectors, each behind one protocol."""
+"""Detectors: which vehicles are in a frame. All of them have the same protocol."""

@@ -1,4 +1,4 @@
-"""What a detector finds in one frame, column by column."""
+"""What a detector finds in one frame: a table with a row for each vehicle."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,17 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import Box, Float32Array
+from vdet.geometry import Box, Float32Array, Int32Array
 
 if TYPE_CHECKING:
     import supervision
 
-ClassIds = npt.NDArray[np.int32]
-
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Detections:
-    """The vehicles that a detector sees in a frame: `n` rows, unchangeable.
+    """The vehicles that a detector finds in a frame: `n` rows, immutable.
 
     Attributes
     ----------
@@ -27,27 +25,28 @@ class Detections:
     scores
         float32 `(n,)`, 0 to 1: the share of boxes with such a score that are vehicles.
     classes
-        int32 `(n,)`, indices into `names`; None where the detector does not tell classes.
+        int32 `(n,)`: indices into `names`; None where the detector does not tell classes.
     names
-        Names of the classes.
+        The names of all classes.
     centroids
-        float32 `(n, 2)`: x, y of the centre of mass; the middle of the box where none is given.
+        float32 `(n, 2)`: x, y of the centre of mass, pixels of the frame; by default the middle of
+        the box.
     strengths
-        float32 `(n,)`: how strong the evidence is, in the detector's own unit; the score where
-        none is given.
+        float32 `(n,)`: how strong the evidence is, in the detector's own unit; by default the
+        score.
     trace
-        What the detector keeps for its stage pictures; nobody else looks at it.
+        What the detector needs for its stage pictures; of no use to others.
 
     Raises
     ------
     ValueError
         A column has another shape, a value is not finite, a box has no area, a score is not in
-        0 to 1.
+        0 to 1, a class has no name.
     """
 
     boxes: Float32Array
     scores: Float32Array
-    classes: ClassIds | None
+    classes: Int32Array | None
     names: tuple[str, ...]
     centroids: Float32Array
     strengths: Float32Array
@@ -64,26 +63,27 @@ class Detections:
         strengths: npt.ArrayLike | None = None,
         trace: Any = None,
     ) -> None:
-        corners = _column(boxes, np.float32, (-1, 4), "boxes")
-        count = len(corners)
-        chances = _column(scores, np.float32, (count,), "scores")
-        if ((corners[:, 2:] - corners[:, :2]) <= 0).any():
+        box_column = _column(boxes, np.float32, (-1, 4), "boxes")
+        count = len(box_column)
+        score_column = _column(scores, np.float32, (count,), "scores")
+        class_column = None if classes is None else _column(classes, np.int32, (count,), "classes")
+        if ((box_column[:, 2:] - box_column[:, :2]) <= 0).any():
             raise ValueError("boxes: a box has no area; give x1 < x2 and y1 < y2")
-        if ((chances < 0) | (chances > 1)).any():
+        if ((score_column < 0) | (score_column > 1)).any():
             raise ValueError("scores: a score is not in 0 to 1")
-        middles = (corners[:, :2] + corners[:, 2:]) / 2 if centroids is None else centroids
-        kinds = None if classes is None else _column(classes, np.int32, (count,), "classes")
-        if kinds is not None and ((kinds < 0) | (kinds >= len(names))).any():
+        if class_column is not None and ((class_column < 0) | (class_column >= len(names))).any():
             raise ValueError("classes: an index that `names` does not have")
+        if centroids is None:
+            centroids = (box_column[:, :2] + box_column[:, 2:]) / 2
+        if strengths is None:
+            strengths = score_column
         columns = {
-            "boxes": corners,
-            "scores": chances,
-            "classes": kinds,
+            "boxes": box_column,
+            "scores": score_column,
+            "classes": class_column,
             "names": tuple(names),
-            "centroids": _column(middles, np.float32, (count, 2), "centroids"),
-            "strengths": _column(
-                chances if strengths is None else strengths, np.float32, (count,), "strengths"
-            ),
+            "centroids": _column(centroids, np.float32, (count, 2), "centroids"),
+            "strengths": _column(strengths, np.float32, (count,), "strengths"),
             "trace": trace,
         }
         for name, column in columns.items():
@@ -93,9 +93,9 @@ class Detections:
         return len(self.boxes)
 
     def __getitem__(self, rows: slice | Sequence[int] | npt.NDArray[Any]) -> "Detections":
-        """Return only these rows, in this order; `trace` stays."""
+        """Return these rows in this order, with the same `names` and `trace`."""
         if not isinstance(rows, slice):
-            rows = np.asarray(rows) if len(rows) else slice(0)  # an empty list would be of floats
+            rows = np.asarray(rows) if len(rows) else slice(0)  # an empty array is one of floats
         return Detections(
             self.boxes[rows],
             self.scores[rows],
@@ -115,7 +115,7 @@ class Detections:
         ]
 
     def to_supervision(self) -> "supervision.Detections":
-        """Return the same as `supervision.Detections`. Needs the package supervision."""
+        """Return a `supervision.Detections` with copies; needs the package supervision."""
         import supervision
 
         return supervision.Detections(
@@ -131,7 +131,7 @@ class Detections:
 def _column(
     values: npt.ArrayLike, kind: type[np.generic], shape: tuple[int, ...], name: str
 ) -> npt.NDArray[Any]:
-    """Return a copy that nobody can change; -1 in `shape` stands for any length."""
+    """Return a read-only copy; -1 in `shape` stands for any length."""
     column = np.array(values, kind)
     if column.size == 0 and shape[0] <= 0:
         column = column.reshape(0, *shape[1:])

@@ -1,4 +1,4 @@
-"""A detector from settings and a model file, whatever its kind."""
+"""Detectors of any kind, loaded from settings and a model file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ def _no_model(_: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class DetectorKind:
-    """A kind of detector, as it is registered under its name.
+    """What is registered under the name of a kind of detector.
 
     Attributes
     ----------
     settings
-        Class of the section `detector` for this kind; its `kind` has the name as default.
+        The class of its section `detector`; the default of the field `kind` is the name.
     load
-        Takes these settings and the path of a model file, None for the shipped one.
+        Loads it from its settings and a model file; None stands for the shipped file.
     shipped
         Returns the shipped model file for some settings; None where the kind needs no file.
     """

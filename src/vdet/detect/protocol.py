@@ -1,4 +1,4 @@
-"""What the rest of the program knows of a detector."""
+"""The protocol of all detectors, which is all that the rest of the program knows of them."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -10,12 +10,12 @@ from vdet.media.images import Image
 class VideoDetector(Protocol):
     """Finds vehicles in the frames of one video, or in one still picture.
 
-    A frame passes two steps: `search` in parallel with other frames, then `detect` in the order of
-    the frames.
+    Each frame takes two steps: `search`, in parallel with other frames, then `detect`, in the order
+    of the frames.
     """
 
     def search(self, image: Image, index: int | None) -> Any:
-        """Return the candidates of a frame; called by several threads at once, in any order.
+        """Return the candidates of a frame; several threads call this at once, in any order.
 
         Parameters
         ----------
@@ -26,20 +26,20 @@ class VideoDetector(Protocol):
         """
 
     def detect(self, candidates: Any) -> Detections:
-        """Return the detections of the next frame; called in the order of the frames.
+        """Return the detections of the next frame, from what `search` returned for it.
 
-        May remember what it needs of the frames before.
+        It is called in the order of the frames, and may keep what it needs of earlier ones.
         """
 
     def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
-        """Return a picture of each stage of the detection of a frame, by name, the first one first.
+        """Return a picture of each stage of the detection by its name, in the order of the stages.
 
         `detections` is what `detect` returned for this `image`.
         """
 
 
 class DetectorModel(Protocol):
-    """What is loaded once, from settings and a model file; may be shared by threads."""
+    """A detector as it is loaded from settings and a model file; threads may share it."""
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> VideoDetector:
         """Return a detector for the frames of one video, or for one still picture.

@@ -6,8 +6,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
-from vdet.config.document import Document, Key, mistakes, read_document
-from vdet.config.loading import format_key
+from vdet.config.document import Document, config_error, format_key, read_document
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 from vdet.files import replacing
@@ -66,8 +65,8 @@ def load_camera(path: Path) -> CalibratedCamera:
     try:
         read = _CameraFile.model_validate(document.values)
     except ValidationError as error:
-        lines = (_describe(detail, document, path) for detail in error.errors())
-        raise mistakes(lines, error.error_count()) from error
+        lines = (_describe(detail, document) for detail in error.errors())
+        raise config_error(lines, error.error_count()) from error
     (fx, _, cx), (_, fy, cy), _ = read.matrix
     camera = CalibratedCamera(
         read.width, read.height, (fx, fy), (cx, cy), read.distortion, read.rms
@@ -77,7 +76,7 @@ def load_camera(path: Path) -> CalibratedCamera:
     return camera
 
 
-def _describe(detail: ErrorDetails, document: Document, path: Path) -> str:
+def _describe(detail: ErrorDetails, document: Document) -> str:
     key = tuple(detail["loc"])
     match detail["type"]:
         case "missing":
@@ -87,12 +86,5 @@ def _describe(detail: ErrorDetails, document: Document, path: Path) -> str:
             text = f"is not a key of camera files; known: {known}"
         case _:
             text = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    place = _place(document, key, path)
+    place = document.place_of(key)
     return f"{place}: {format_key(key)}: {text}" if key else f"{place}: {text}"
-
-
-def _place(document: Document, key: Key, path: Path) -> str:
-    """Return the place of `key`, or of the nearest key around it that the file has."""
-    if key in document.places or not key:
-        return document.places.get(key, str(path))
-    return _place(document, key[:-1], path)

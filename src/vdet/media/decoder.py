@@ -1,8 +1,8 @@
-"""Decode a picture stream from end to end, whatever is damaged in it."""
+"""Decode a picture stream from end to end, in spite of damage."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
-from itertools import chain
+from itertools import chain, dropwhile, pairwise
 from pathlib import Path
 
 import av
@@ -11,22 +11,21 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 from av.video.stream import VideoStream
 
-from vdet.media.backlog import Backlog
 from vdet.media.demux import MAX_PIXELS, open_input, packets
 from vdet.media.losses import Losses
 from vdet.media.probe import check_size, period_of, picture_stream
 
 _HIDING = ("vp8", "libvpx")  # decoders of codecs with packets that hold no picture to be shown
-_MOST_EXTRA = 64  # pictures that one thread finds before the last that several have shown
-_QUIET = ("vp8", "vp9")  # decoders of which some errors get lost when pictures share the threads
+_MAX_RECENT = 500  # packets; key frames further apart than that are rare
+_QUIET = ("vp8", "vp9")  # decoders that hide some errors when several pictures are decoded at once
 
 
 class Decoder:
     """The pictures of the first stream of moving pictures, in order of presentation.
 
-    Several threads decode several pictures at once until something turns out to be damaged. Then a
-    single one goes on from the last key frame before, so that what is left of the file, and what is
-    counted as lost, hardly depends on the number of threads.
+    Several threads decode several pictures at once until there is damage. Then a single thread goes
+    on, from a key frame before the damage. So the pictures, and the number counted as lost, hardly
+    depend on the number of threads.
 
     Parameters
     ----------
@@ -42,19 +41,17 @@ class Decoder:
     """
 
     def __init__(self, path: Path, *, threads: int | None, frame_rate: float) -> None:
-        self._open = partial(_opened, path, frame_rate)
-        self._begun_anew = False
-        self._backlog = Backlog()
-        self._to_skip = 0
-        self._catching_up = False
-        self._last: int | None = None
+        self._open = partial(_open, path, frame_rate)
         self.container, self.stream = self._open(threads or 0)
-        self._sources = [self.container]
+        self._opened = [self.container]
         self._context = self.stream.codec_context
-        # In Matroska damage shows only as a hole between packets, so that all are looked at.
-        self._all = "matroska" in self.container.format.name
+        # The packets from the last key frame that was shown on, and the times shown since then.
+        self._recent: list[Packet[Stream]] | None = []
+        self._shown: list[int | None] = []
+        # In Matroska, damage shows only as a hole between the packets of all streams.
+        self._all_streams = "matroska" in self.container.format.name
         for other in self.container.streams:
-            if other is not self.stream and not self._all:
+            if other is not self.stream and not self._all_streams:
                 other.discard = Discard.all
         paired = self._context.name not in _HIDING
         self.losses = Losses(period_of(self.stream), paired=paired)
@@ -63,86 +60,91 @@ class Decoder:
         """Yield the pictures that can be decoded."""
         for packet in chain(self._packets(), [None]):
             for picture in self._decode(packet):
-                if self._is_new(picture):
-                    self._last = picture.pts
+                if self._is_new(picture) and self.losses.receive(picture):
                     yield picture
+        self.losses.finish()
 
     def close(self) -> None:
-        """Let go of the file."""
-        for source in self._sources:
-            source.close()
+        """Close the file."""
+        for container in self._opened:
+            container.close()
 
     def _packets(self) -> "Iterator[Packet[Stream]]":
-        held: Packet[Stream] | None = None
-        streams = self.container.streams if self._all else [self.stream]
-        for packet in packets(self.container, *streams, on_error=self._note_read_error):
-            if self._all and packet.pos is not None:
+        for packet, following in pairwise(chain(self._read(), [None])):
+            if packet is None:
+                return
+            if following is None and packet.is_corrupt:  # the file was cut off within it
+                self.losses.cut_off()
+            else:
+                self.losses.send(packet)
+                yield packet
+
+    def _read(self) -> "Iterator[Packet[Stream]]":
+        streams = self.container.streams if self._all_streams else [self.stream]
+        for packet in packets(self.container, *streams, on_error=self.losses.fail_to_read):
+            if self._all_streams and packet.pos is not None:
                 self.losses.pass_bytes(packet.pos, packet.size)
             if packet.stream.index == self.stream.index:
-                if held is not None:
-                    yield held
-                held = packet
-        if held is not None and held.is_corrupt:  # by the end of the file: not a whole picture
-            self.losses.cut_off()
-        elif held is not None:
-            yield held
+                yield packet
 
-    def _note_read_error(self) -> None:
-        self.losses.fail_to_read()
-
-    def _decode(self, packet: "Packet[Stream] | None") -> Iterator[av.VideoFrame]:
+    def _decode(self, packet: "Packet[Stream] | None") -> Iterable[av.VideoFrame]:
+        """Return the pictures that the decoder has ready; for None, all that are left."""
         pictures = self._attempt(packet)
-        if not self._begun_anew:
-            if packet is not None:
-                self._backlog.add(packet)
-            if self.losses.evident or self.losses.unpaired:
-                self._begun_anew = True
-                if backlog := self._backlog.take():
-                    yield from self._decode_again(*backlog, at_end=packet is None)
-                    return
-            for picture in pictures:
-                self._backlog.show(picture.pts)
-        yield from pictures
+        if self._recent is None:
+            return pictures
+        if packet is not None:
+            self._recent.append(packet)
+        damaged = self.losses.evident or any(picture.is_corrupt for picture in pictures)
+        # Several threads may lose the last errors.
+        if damaged or (packet is None and len(self._recent) > len(self._shown) + len(pictures)):
+            return self._decode_again(self._recent, at_end=packet is None)
+        if len(self._recent) > _MAX_RECENT:
+            self._recent = None
+            self._shown.clear()
+        return pictures
 
     def _decode_again(
-        self, backlog: "list[Packet[Stream]]", shown: int, *, at_end: bool
+        self, recent: "list[Packet[Stream]]", *, at_end: bool
     ) -> Iterator[av.VideoFrame]:
-        """Let a single thread go on, from the backlog, of which some pictures were `shown`."""
-        source, stream = self._open(1)
-        self._sources.append(source)
+        self._recent = None
+        container, stream = self._open(1)
+        self._opened.append(container)
         self._context = stream.codec_context
-        self._to_skip, self._catching_up = shown, True
-        self.losses = self.losses.begun_anew(self._backlog.shown)
-        for packet in chain(backlog, [None] * at_end):
+        self.losses.decode_again()
+        for packet in chain(recent, [None] * at_end):
             yield from self._attempt(packet)
 
     def _attempt(self, packet: "Packet[Stream] | None") -> list[av.VideoFrame]:
-        if packet is not None:
-            self.losses.send(packet)
         try:
-            pictures = self._context.decode(packet)
+            return self._context.decode(packet)
         except av.FFmpegError:
             self.losses.fail_to_decode()
-            pictures = []
-        useful = [picture for picture in pictures if self.losses.receive(picture)]
-        if packet is None:
-            self.losses.finish()
-        return useful
+            return []
 
     def _is_new(self, picture: av.VideoFrame) -> bool:
-        """Tell whether a picture was not shown before the decoder began anew."""
-        if self._catching_up:
-            self._to_skip -= 1
-            if picture.pts is not None and self._last is not None:
-                self._catching_up = picture.pts <= self._last and self._to_skip > -_MOST_EXTRA
-            else:
-                self._catching_up = self._to_skip >= 0
-            if self._catching_up:
-                self.losses.repeat()
-        return not self._catching_up
+        """Return whether a picture was not shown yet."""
+        if self._recent is not None:
+            self._remember(self._recent, picture)
+        elif picture.pts in self._shown:
+            self._shown.remove(picture.pts)
+            return False
+        return True
+
+    def _remember(self, recent: "list[Packet[Stream]]", picture: av.VideoFrame) -> None:
+        for index, key in enumerate(recent):
+            if key.is_keyframe and key.pts == picture.pts is not None:
+                # Packets right after the key frame that are shown before it need older ones.
+                recent[:] = [key, *dropwhile(partial(_is_before, key), recent[index + 1 :])]
+                self._shown.clear()
+                break
+        self._shown.append(picture.pts)
 
 
-def _opened(path: Path, frame_rate: float, threads: int) -> tuple[InputContainer, VideoStream]:
+def _is_before(key: "Packet[Stream]", packet: "Packet[Stream]") -> bool:
+    return key.pts is not None and packet.pts is not None and packet.pts < key.pts
+
+
+def _open(path: Path, frame_rate: float, threads: int) -> tuple[InputContainer, VideoStream]:
     container = open_input(path, frame_rate)
     try:
         stream = picture_stream(container, path)

@@ -1,11 +1,10 @@
-"""What passes between the video reader, the pipeline and the writer."""
+"""A frame of a video, and what is known of a video: given by the reader, taken by the writer."""
 
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
+from vdet.media.images import Image
 
 UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 
@@ -14,19 +13,19 @@ UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 class Frame:
     """One frame of a video.
 
-    `index` counts the frames of the file from 0, whichever of them are delivered. `time` is the
-    exact presentation time in seconds as the file has it (its first frame need not be at 0).
+    `index` counts all frames of the file from 0. `time` is the exact presentation time in seconds
+    as the file has it (its first frame need not be at 0).
     `image` is upright, BGR uint8, shape (height, width, 3).
     """
 
     index: int
     time: Fraction
-    image: NDArray[np.uint8]
+    image: Image
 
 
 @dataclass(frozen=True, slots=True)
 class ColorTags:
-    """How a video says that its colours are coded, in codes of ITU-T H.273."""
+    """How the colours of a video are coded, as the file says, in codes of ITU-T H.273."""
 
     primaries: int = UNSPECIFIED
     transfer: int = UNSPECIFIED
@@ -40,7 +39,7 @@ class VideoInfo:
     `width` and `height` are of the upright picture in pixels. `rate` is the average in frames per
     second (25 where the file gives none), `time_base` the unit of the file's times in seconds,
     `start` the time of the first frame. `frames` and `duration` (seconds) are what the file
-    declares or lets one estimate: never exact, None where unknown. `rotation` is how many degrees
+    declares, or an estimate: not exact, None where unknown. `rotation` is how many degrees
     counter-clockwise the coded picture was turned to stand upright: 0, 90, 180 or 270.
     `pixel_aspect` is the width of an upright pixel over its height.
     """

@@ -1,9 +1,10 @@
-"""Decoded pictures to upright BGR images, and BGR images to pictures for the encoder."""
+"""Convert decoded pictures to upright BGR images, and BGR images to pictures to be encoded."""
 
 import av
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from vdet.media.images import Image
 
 _TURNS = {
     90: cv2.ROTATE_90_COUNTERCLOCKWISE,
@@ -17,7 +18,7 @@ def quarter_turns(picture: av.VideoFrame) -> int:
     return round(picture.rotation / 90) * 90 % 360
 
 
-def to_bgr(picture: av.VideoFrame, rotation: int) -> NDArray[np.uint8]:
+def to_bgr(picture: av.VideoFrame, rotation: int) -> Image:
     """Return `picture` turned by `rotation` degrees counter-clockwise, BGR uint8, (H, W, 3).
 
     Colour matrix and range are the picture's own; BT.601 and limited where it names none.
@@ -30,15 +31,15 @@ def to_bgr(picture: av.VideoFrame, rotation: int) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image)
 
 
-def fitted(image: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
-    """Return `image` scaled to `width` × `height` pixels, itself where it has that size."""
+def fitted(image: Image, width: int, height: int) -> Image:
+    """Return `image` scaled to `width` × `height` pixels; unchanged where it has that size."""
     if image.shape[:2] == (height, width):
         return image
     scaled = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
     return scaled.astype(np.uint8, copy=False)
 
 
-def to_i420(image: NDArray[np.uint8]) -> av.VideoFrame:
+def to_i420(image: Image) -> av.VideoFrame:
     """Return a BGR image (H, W, 3) as a yuv420p picture, BT.601, limited range.
 
     4:2:0 needs even sides: an odd one gets its last row or column twice.

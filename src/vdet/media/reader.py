@@ -9,47 +9,45 @@ from pathlib import Path
 from typing import Self
 
 import av
-import numpy as np
-from numpy.typing import NDArray
 
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media.clock import Clock
 from vdet.media.decoder import Decoder
 from vdet.media.demux import MAX_PIXELS
 from vdet.media.frame import Frame, VideoInfo
+from vdet.media.images import Image
 from vdet.media.pixels import fitted, to_bgr
 from vdet.media.probe import check_size, describe, stated_duration
 
 _log = logging.getLogger("vdet")
 _USUAL = InputSettings()
-_SHORTFALL = Fraction(1, 100)  # of its duration that a whole file may lack
+_TOLERANCE = Fraction(1, 100)  # share of its duration, or frames, that a whole file may lack
 
 
 class VideoReader:
-    """The frames of a video file, in order; a context manager, to be gone through once.
+    """The frames of a video file, in order; a context manager. They can be read once.
 
-    Delivered are the frames with ``start <= time - info.start < end``, seconds counted from the
-    file's first frame as a player does, and at most `frames` of them. What lies before `start` is
-    decoded and dropped, for only so are the indices exact in every file.
+    It gives the frames with ``start <= time - info.start < end``, and at most `frames` of them.
+    Seconds count from the file's first frame, as in a player. Frames before `start` are decoded and
+    dropped: only so are the indices exact in every file.
 
-    The first stream of moving pictures is read. Frames are turned upright; one of another size
+    The first stream of moving pictures is read. Frames are turned upright. A frame of another size
     than the first is scaled to it. A time that is missing, or not later than the one before, is
-    guessed from the rate. Damaged packets are skipped. At the end one warning (logger "vdet") tells
-    of frames lost, or shown with errors, of an end that comes before the declared one, of gaps in
-    otherwise regular times, and of frames that were scaled.
+    guessed from the rate. Damaged packets are skipped. At the end, one warning (logger "vdet") says
+    how many frames were lost or damaged, whether the file ends before its declared end, whether
+    otherwise regular times have gaps, and which frames were scaled.
 
     Parameters
     ----------
     path
-        The file; or numbered pictures, as `img_%04d.png`, without a gap, from whichever number on.
+        The file; or numbered pictures, as `img_%04d.png`, from any number on, without a gap.
     start, end
         Seconds after the file's first frame; None for no limit.
     frames
-        Most frames to deliver; None for no limit.
+        Most frames to give; None for no limit.
     threads
-        Of the decoder; None lets it choose. The frames are the same whatever their number; of a
-        damaged file, nearly always.
+        Of the decoder; None lets it choose. The frames do not depend on it; those of a damaged
+        file hardly ever do.
     settings
         How much damage is tolerated, and the rate of numbered pictures.
 
@@ -57,7 +55,7 @@ class VideoReader:
     ------
     VideoError
         The file is missing, is not a video, or not one frame of it can be decoded. After the last
-        frame: more of those gone through were damaged or lost than is tolerated.
+        frame: more of the frames read were lost or damaged than `settings` tolerates.
     """
 
     def __init__(
@@ -101,7 +99,7 @@ class VideoReader:
 
     @property
     def expected(self) -> int | None:
-        """About how many frames will be delivered; None where the file gives no idea."""
+        """About how many frames there will be; None where the file does not say."""
         if self.info.frames is None:
             return None
         last = self.info.frames
@@ -120,14 +118,14 @@ class VideoReader:
         self.close()
 
     def close(self) -> None:
-        """Let go of the file; the reader gives no more frames."""
+        """Close the file; there are no more frames."""
         self._frames.close()
         self._decoder.close()
 
     def _deliver(self, first: av.VideoFrame) -> Generator[Frame, None, None]:
         try:
             yield from itertools.islice(self._selected(first), self._limit)
-            self._judge()
+            self._report()
         finally:
             self._decoder.close()
 
@@ -139,7 +137,7 @@ class VideoReader:
             if since >= self._start:
                 yield Frame(index, time, self._image(picture))
 
-    def _image(self, picture: av.VideoFrame) -> NDArray[np.uint8]:
+    def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
             image = to_bgr(picture, info.rotation)
@@ -160,19 +158,19 @@ class VideoReader:
             time = clock.time(picture.pts)
             yield index, time, picture
         shown = max(period, picture.duration * self.info.time_base)
-        self._compare(index + 1, time + shown - self.info.start)
+        self._check_length(index + 1, time + shown - self.info.start)
 
-    def _compare(self, frames: int, duration: Fraction) -> None:
-        """Note it if what was read, to the end of the file, is less than the file declares."""
+    def _check_length(self, frames: int, duration: Fraction) -> None:
+        """Note a file that ends earlier than it declares."""
         stated = stated_duration(self._decoder.stream, self.info.start)
-        if stated is None or stated - duration <= max(2 / self.info.rate, stated * _SHORTFALL):
+        if stated is None or stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
             return
         missing = round((stated - duration) * self.info.rate)
         if not self._decoder.losses.end(missing, self._decoder.container.size):
             self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
 
-    def _judge(self) -> None:
-        """Refuse the video if it is damaged too much, else warn of what is wrong with it."""
+    def _report(self) -> None:
+        """Refuse a video that is too damaged; warn of any other fault."""
         damaged, total = self.damaged, self._decoder.losses.total
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
@@ -181,9 +179,9 @@ class VideoReader:
                 f"{self.info.path}: {self._faults[0]}, more than input.max_damaged "
                 f"({self._tolerated:g}) allows; raise it to take what is left"
             )
-        jumped = self._decoder.losses.jumped
-        if not damaged and jumped > _SHORTFALL * total:
-            share = f"{jumped} of {total + jumped}"
+        skipped = self._decoder.losses.skipped
+        if not damaged and skipped > _TOLERANCE * total:
+            share = f"{skipped} of {total + skipped}"
             self._faults.append(f"times jump as if {share} frames were missing")
         if self._scaled:
             sizes = ", ".join(f"{width}×{height}" for width, height in sorted(self._scaled))
@@ -192,3 +190,27 @@ class VideoReader:
             )
         if self._faults:
             _log.warning("%s: %s", self.info.path, "; ".join(self._faults))
+
+
+class Clock:
+    """Gives each frame its time, later than the time of the frame before.
+
+    It is the file's own time where that is so, else one frame period (`period`, seconds) after the
+    frame before.
+    """
+
+    def __init__(self, time_base: Fraction, period: Fraction) -> None:
+        self._time_base = time_base
+        self._period = period
+        self._last: Fraction | None = None
+
+    def time(self, pts: int | None) -> Fraction:
+        """Return the time, in seconds, of the next frame, whose timestamp is `pts` time bases."""
+        stated = None if pts is None else pts * self._time_base
+        if self._last is None:
+            self._last = stated or Fraction(0)
+        elif stated is None or stated <= self._last:
+            self._last += self._period
+        else:
+            self._last = stated
+        return self._last

@@ -1,8 +1,11 @@
-"""Carry the sound of one video file over into another, as it is."""
+"""Copy the sound of one video file into another, as it is."""
 
+import io
 import logging
+from collections import Counter
 from collections.abc import Generator
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 
 import av
@@ -12,18 +15,20 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 
 from vdet.media.demux import open_input, packets
-from vdet.media.sound_trial import try_sounds
 
 _log = logging.getLogger("vdet")
+
+_MAX_TRIALS = 20  # packets of one stream; the first ones may be damaged
+_MAX_PACKETS = 100_000  # read in search of sound; about half an hour of it
 
 
 class SoundCopy:
     """Copies the packets of every sound stream of `source` to `target`, bit for bit.
 
-    Times are kept relative to the picture: second `origin` of the source becomes second 0 of the
-    target. What begins earlier is left out, but for one packet where the target can hide it (mp4
-    and mov): a decoder needs it to start from. Damaged packets, and a stream that the target cannot
-    hold, are left out with a warning (logger "vdet"). To be made before anything is written to
+    Times stay relative to the picture: second `origin` of the source becomes second 0 of the
+    target. What begins earlier is left out, except one packet where the target can hide it (mp4 and
+    mov): a decoder needs it to start from. Damaged packets, and a stream that the target cannot
+    hold, are left out with a warning (logger "vdet"). Make the copy before anything is written to
     `target`.
 
     Raises
@@ -47,26 +52,26 @@ class SoundCopy:
         self._next = next(self._packets, None)
 
     def copy(self, until: Fraction | None) -> None:
-        """Copy what begins before second `until` of the target; None: all that is left."""
+        """Copy what begins before second `until` of the target; for None, all that is left."""
         while self._next is not None and (until is None or _begin(self._next) < until):
             try:
                 self._target.mux(self._next)
-            except av.InvalidDataError:  # found when it was to be repacked for another container
+            except av.InvalidDataError:  # found while it is repacked for another container
                 self._damaged += 1
             self._next = next(self._packets, None)
 
     def close(self) -> None:
-        """Let go of the source; warn of what could not be copied."""
+        """Close the source; warn of packets that could not be copied."""
         if self._damaged:
             _log.warning("%s: %d damaged sound packets left out", self._path, self._damaged)
         self._packets.close()
         self._source.close()
 
     def _add_streams(self) -> dict[int, AudioStream]:
-        """Make the streams of the target; the keys are the indices of the same in the source."""
+        """Add streams to the target; return them by their index in the source."""
         streams = {}
         kind = self._target.format.name
-        held = try_sounds(self._path, kind)
+        held = _try_sounds(self._path, kind)
         for stream in self._source.streams:
             if not isinstance(stream, AudioStream):
                 stream.discard = Discard.all
@@ -82,7 +87,7 @@ class SoundCopy:
         return streams
 
     def _moved(self) -> "Generator[Packet[Stream], None, None]":
-        """Yield the packets to copy, with the times and the stream they have in the target."""
+        """Yield the packets to copy, with their times and their stream in the target."""
         if not self._streams:
             return
         wanted = [stream for stream in self._source.streams if stream.index in self._streams]
@@ -113,3 +118,40 @@ class SoundCopy:
 
 def _begin(packet: "Packet[Stream]") -> Fraction:
     return (packet.pts or 0) * packet.time_base
+
+
+def _try_sounds(path: Path, kind: str) -> dict[int, bool]:
+    """Return whether a file of the format `kind` can hold each sound stream of `path`, by index.
+
+    Streams without packets are left out. It is tried in memory: an unknown codec and damaged
+    parameters show only when a file is written, and there they would cost the picture too.
+    """
+    found: dict[int, bool] = {}
+    trials: Counter[int] = Counter()
+    with open_input(path) as source:
+        sounds = source.streams.audio
+        for stream in source.streams:
+            if stream not in sounds:
+                stream.discard = Discard.all
+        for packet in islice(packets(source, *sounds, on_error=lambda: None), _MAX_PACKETS):
+            index = packet.stream.index
+            if not found.get(index) and trials[index] < _MAX_TRIALS:
+                trials[index] += 1
+                found[index] = _can_hold(kind, packet)
+            if len(found) == len(sounds) and all(
+                held or trials[index] == _MAX_TRIALS for index, held in found.items()
+            ):
+                break
+    return found
+
+
+def _can_hold(kind: str, packet: "Packet[Stream]") -> bool:
+    try:
+        with av.open(io.BytesIO(), "w", kind) as trial:
+            copy = trial.add_stream_from_template(packet.stream)
+            packet.stream = copy
+            packet.pts = packet.dts = 0
+            trial.mux(packet)
+    except (ValueError, av.FFmpegError):
+        return False
+    return True

@@ -12,7 +12,7 @@ from vdet.errors import OutputError, VideoError
 from vdet.media.encoder import Encoder
 from vdet.media.frame import Frame, VideoInfo
 
-SUFFIXES = (".mp4", ".mov", ".mkv")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 
 class FrameWriter(Protocol):
@@ -80,8 +80,9 @@ class VideoWriter:
         whole_sound: bool = True,
         threads: int | None = None,
     ) -> None:
-        if path.suffix.lower() not in SUFFIXES:
-            raise OutputError(f"{path}: videos are written as {', '.join(SUFFIXES)}; name it so")
+        if path.suffix.lower() not in VIDEO_SUFFIXES:
+            names = ", ".join(VIDEO_SUFFIXES)
+            raise OutputError(f"{path}: videos are written as {names}; name it so")
         self._file = path
         self._path = name or path
         self._info = info

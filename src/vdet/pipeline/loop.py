@@ -20,7 +20,7 @@ from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sink, open_sink
+from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import (
     StalledError,
     map_ordered,
@@ -82,8 +82,7 @@ class Summary:
 
 def check_job(job: VideoJob, *, overwrite: bool) -> None:
     """Refuse, before any work, a job whose outputs could not be written. Raises `OutputError`."""
-    for output in job.outputs:
-        check_sink(output, overwrite=overwrite, inputs=[job.source])
+    check_sinks(job.outputs, overwrite=overwrite, inputs=[job.source])
 
 
 def run_video(

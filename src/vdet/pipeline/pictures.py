@@ -18,7 +18,7 @@ from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.media.images import PICTURE_SUFFIXES, Image, read_image
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sink, open_sink
+from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.track import Track
 
@@ -89,8 +89,7 @@ def plan_pictures(
             )
     if out is not None and not is_file:
         make_folder(out)
-    for output in outputs:
-        check_sink(output, overwrite=overwrite, inputs=sources)
+    check_sinks(outputs, overwrite=overwrite, inputs=sources)
     return jobs
 
 

@@ -1,4 +1,4 @@
-"""The tests search as the pipeline does: one thread, and the libraries start no others."""
+"""The tests search as the pipeline does: libraries use a single thread."""
 
 from collections.abc import Iterator
 

@@ -20,7 +20,7 @@ from vdet.synthetic import background_patches, demo_scene, render, vehicle_patch
 Exact = npt.NDArray[np.float64]
 
 SEED_FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
-_EACH = 120  # patches of a class
+_EACH = 120  # patches of each class
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +84,7 @@ def with_boxes(model: LinearModel) -> LinearModel:
     weights, biases = _ridge(hogs, targets - targets.mean(axis=0))
     biases = biases + targets.mean(axis=0)
     boxes = BoxRegression(weights.T.astype(np.float32), biases.astype(np.float32))
-    return replace(model, boxes=boxes)
+    return replace(model, box_regression=boxes)
 
 
 def _crop(patch: Image, zoom: float, rng: np.random.Generator) -> tuple[Image, list[float]]:

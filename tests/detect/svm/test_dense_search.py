@@ -58,7 +58,7 @@ def texture(side: int) -> Image:
 
 
 def texture_finder(members: int) -> LinearModel:
-    """Return a model that is surest of the texture."""
+    """Return a model for which the texture is the most probable vehicle."""
     vector = FeatureExtractor(FEATURES).describe(texture(64))
     weights = np.tile(vector / np.linalg.norm(vector) ** 2, (members, 1))
     return LinearModel(
@@ -74,7 +74,7 @@ def texture_finder(members: int) -> LinearModel:
 
 @pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
 @pytest.mark.parametrize("members", [1, 2])
-def test_a_texture_scores_highest_in_the_window_it_fills(
+def test_a_texture_is_most_probable_in_the_window_that_it_fills(
     kind: type, size: int, step: int, members: int
 ) -> None:
     grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
@@ -106,7 +106,9 @@ def test_a_grid_may_be_a_window_a_row_or_a_column(
 
 
 @pytest.mark.parametrize(("kind", "size", "step"), GRIDS)
-def test_the_hog_of_each_window_is_what_it_was_scored_by(kind: type, size: int, step: int) -> None:
+def test_the_hog_features_of_a_window_give_its_probability(
+    kind: type, size: int, step: int
+) -> None:
     grid = WindowGrid(size, Fraction(step), Fraction(4), Fraction(6), 7, 5)
     model = texture_finder(2)
     search = dense_search(model, grid)
@@ -116,12 +118,12 @@ def test_the_hog_of_each_window_is_what_it_was_scored_by(kind: type, size: int, 
     hogs = found.hogs(numbers)
     assert hogs.shape == (len(grid), FeatureExtractor(FEATURES).layout.hog_length)
     assert hogs.dtype == np.float32
-    scored = model.probabilities(hogs)  # there are no other features
-    np.testing.assert_allclose(scored, found.probabilities[numbers], atol=1e-5)
-    assert len(np.unique(scored.round(4))) > len(grid) / 2
+    expected = model.probabilities(hogs)  # there are no other features
+    np.testing.assert_allclose(found.probabilities[numbers], expected, atol=1e-5)
+    assert len(np.unique(expected.round(4))) > len(grid) / 2
 
 
-def test_a_search_remembers_nothing() -> None:
+def test_a_search_does_not_change_later_searches() -> None:
     for _, size, step in GRIDS:
         grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
         search = dense_search(texture_finder(1), grid)
@@ -172,12 +174,12 @@ def by_patch(features: FeatureSettings) -> np.ndarray:
 
 @pytest.fixture(autouse=True)
 def log(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(logging.getLogger("vdet"), "propagate", True)  # the program stops it
+    monkeypatch.setattr(logging.getLogger("vdet"), "propagate", True)  # the program turns this off
     caplog.set_level(logging.INFO, logger="vdet")
 
 
 @pytest.mark.parametrize("reason", REASONS)
-def test_features_that_cannot_be_dense_are_searched_by_patch_with_one_line(
+def test_features_that_cannot_be_dense_are_searched_by_patch_and_logged(
     reason: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     features = REASONS[reason]
@@ -190,14 +192,14 @@ def test_features_that_cannot_be_dense_are_searched_by_patch_with_one_line(
 
 
 @pytest.mark.parametrize("reason", REASONS)
-def test_the_dense_engine_asked_for_with_them_is_refused(reason: str) -> None:
+def test_the_dense_engine_refuses_features_that_cannot_be_dense(reason: str) -> None:
     message = rf"^detector\.search\.engine: dense cannot compute {reason}; take auto or patch$"
     with pytest.raises(ConfigError, match=message):
         searched(REASONS[reason], "dense")
 
 
 @pytest.mark.parametrize("features", [FeatureSettings(), SPATIAL, NO_HOG])
-def test_the_patch_engine_asked_for_searches_without_a_word(
+def test_the_patch_engine_takes_any_features_and_logs_nothing(
     features: FeatureSettings, caplog: pytest.LogCaptureFixture
 ) -> None:
     np.testing.assert_array_equal(searched(features, "patch"), by_patch(features))
@@ -205,7 +207,7 @@ def test_the_patch_engine_asked_for_searches_without_a_word(
 
 
 @pytest.mark.parametrize("engine", ["auto", "dense"])
-def test_all_else_is_searched_densely_without_a_word(
+def test_other_features_are_searched_densely_and_nothing_is_logged(
     engine: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     dense = searched(FeatureSettings(), engine)
@@ -214,7 +216,7 @@ def test_all_else_is_searched_densely_without_a_word(
     assert caplog.records == []
 
 
-def test_what_is_dense_by_its_features() -> None:
+def test_the_reason_against_the_dense_engine_is_named() -> None:
     assert why_not_dense(FeatureSettings()) is None
     assert why_not_dense(FeatureSettings(histogram=HistogramSettings(bins=0))) is None
     assert why_not_dense(SPATIAL) == "detector.features.spatial"

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, red_finder, road
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
-from vdet.detect.svm.detector import SvmModel, detection_scores, horizon_of
+from vdet.detect.svm.detector import SvmModel, horizon_of
+from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
@@ -164,10 +165,10 @@ class TestDefaultSettings:
 
 
 class TestStillPictures:
-    """A still picture gives what a video of `heat.frames` times the same frame gives at its end."""
+    """A still picture equals the last of `heat.frames` equal frames of a video."""
 
     @pytest.mark.parametrize("frames", [1, 2, 5])
-    def test_is_as_hot_as_a_video_that_stands_still(self, frames: int) -> None:
+    def test_a_still_picture_is_as_hot_as_a_video_of_the_same_frame(self, frames: int) -> None:
         settings = but(ROWS, "heat", frames=frames)
         *_, video = detect_video(*[road(CAR)] * frames, settings=settings)
         still = detect_still(road(CAR), settings)
@@ -176,7 +177,7 @@ class TestStillPictures:
 
     @pytest.mark.parametrize("frames", [2, 3, 4])
     @pytest.mark.parametrize("alternate", [1, 2])
-    def test_is_as_hot_as_a_video_that_stands_still_with_alternating_sets(
+    def test_a_still_picture_is_as_hot_as_a_video_with_alternating_sets(
         self, alternate: int, frames: int
     ) -> None:
         settings = but(but(DEFAULT, "search", alternate=alternate), "heat", frames=frames)
@@ -190,7 +191,7 @@ class TestStillPictures:
             np.testing.assert_allclose(getattr(still, name), getattr(video, name), rtol=1e-5)
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
-    def test_is_searched_once_with_every_set(
+    def test_a_still_picture_is_searched_once_with_every_set(
         self, settings: SvmSettings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         calls = []
@@ -204,7 +205,7 @@ class TestStillPictures:
         detections = detect_still(road(CAR), but(settings, "heat", frames=6))
         assert calls == [len(trace_of(detections).grids)]
 
-    def test_its_windows_are_those_of_every_set(self) -> None:
+    def test_the_windows_of_a_still_picture_are_those_of_every_set(self) -> None:
         trace = trace_of(detect_still(road(CAR), DEFAULT))
         assert len(trace.windows) == sum(len(grid) for grid in trace.grids)
         assert set(trace.hits.boxes[:, 2].tolist()) == {48, 64}
@@ -240,23 +241,27 @@ class TestStillPictures:
 
 
 class TestHorizon:
-    def test_from_the_settings_needs_no_search(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_horizon_in_the_settings_is_not_searched_for(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
         assert horizon_of(DEFAULT, [road()]) == 0.35
 
-    def test_is_not_searched_for_where_no_set_depends_on_it(
+    def test_the_horizon_is_not_searched_for_where_no_set_depends_on_it(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
         horizon_of(ROWS, [road()])
 
-    def test_is_found_in_the_pictures_otherwise(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_the_horizon_is_found_in_the_pictures_otherwise(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         images = [road(), road(CAR)]
         found = {id(images): 0.4}  # in these pictures and no others
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda asked: found[id(asked)])
+        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda given: found[id(given)])
         assert horizon_of(SvmSettings(), images) == 0.4
 
-    def test_of_a_still_picture_is_its_own(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_each_still_picture_has_its_own_horizon(self, monkeypatch: pytest.MonkeyPatch) -> None:
         for horizon in (0.35, 0.45):
             monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda _, h=horizon: h)
             first = trace_of(detect_still(road(CAR), by_perspective(0).svm)).grids[0]
@@ -275,7 +280,7 @@ def test_a_picture_of_one_colour_is_searched_without_warnings(value: int) -> Non
     assert len(trace_of(detect_still(image)).windows) > 0
 
 
-def test_a_picture_is_left_as_it_was() -> None:
+def test_a_picture_is_not_changed() -> None:
     image = road(CAR)
     detect_still(image)
     np.testing.assert_array_equal(image, road(CAR))
@@ -323,7 +328,7 @@ class TestScores:
         assert (scores >= 0).all()
         assert (scores <= 1).all()
 
-    def test_no_evidence_has_the_score_0_and_endless_evidence_nears_1(self) -> None:
+    def test_no_evidence_has_the_score_0_and_much_evidence_a_score_near_1(self) -> None:
         for slope in (0.5, 2, 100):
             scores = scores_of(0, 1e-45, 1e38, slope=slope)
             assert scores.tolist() == [0, pytest.approx(0), pytest.approx(1)]
@@ -339,7 +344,7 @@ class TestScores:
         (score,) = scores_of(strength, middle=middle, slope=slope)  # warnings are errors here
         assert np.isfinite(score)
 
-    def test_the_settings_allow_nothing_that_has_no_score(self) -> None:
+    def test_every_setting_gives_finite_scores(self) -> None:
         for middle, slope in ((1e-300, 100), (1e6, 100), (1e6, 1e-300)):
             settings = ScoreSettings(middle=middle, slope=slope)
             assert np.isfinite(

@@ -73,15 +73,15 @@ FEATURES = {
 
 
 STEPS = {AlignedSearch: 12, PhasedSearch: 18, LocatedSearch: 19}
-"""Of windows of 96 pixels."""
+"""Steps of windows of 96 pixels that each search is chosen for."""
 HORIZON = 0.57
-"""Of the drawn road."""
+"""Row of the horizon of the drawn road."""
 
 PROBABILITY = 0.5
-"""Of a detection; only these are asked where their vehicle is."""
+"""Least probability of a hit."""
 
 FEW = 0.92
-"""Decisions of so small a grid that one or two near 0.5 are a few percent."""
+"""Least share of equal decisions in a small grid, where a few near 0.5 are some percent."""
 
 
 def assert_agree(results: EngineResults, correlation: float = 0.99, same: float = 0.99) -> None:
@@ -98,7 +98,7 @@ def test_the_engines_agree_on_a_drawn_road(name: str, members: int) -> None:
 
 
 @pytest.mark.parametrize("kind", GRIDS)
-def test_they_agree_whatever_the_step(kind: str) -> None:
+def test_the_engines_agree_for_any_step(kind: str) -> None:
     search, grid = GRIDS[kind]
     model = fitted(SEED_FEATURES, members=2)
     assert type(dense_search(model, grid)) is search
@@ -106,7 +106,7 @@ def test_they_agree_whatever_the_step(kind: str) -> None:
 
 
 @pytest.mark.parametrize("name", FEATURES)
-def test_they_agree_whatever_the_features(name: str) -> None:
+def test_the_engines_agree_for_any_features(name: str) -> None:
     grids = [grid_of(96, step=1), grid_of(96, overlap=0.7)]
     model = fitted(FEATURES[name])
     assert {type(dense_search(model, grid)) for grid in grids} == {AlignedSearch, LocatedSearch}
@@ -114,7 +114,7 @@ def test_they_agree_whatever_the_features(name: str) -> None:
 
 
 def _a_car_cut_off(side: str) -> Image:
-    """Give the nearest of the drawn cars cut off by a side of the frame."""
+    """Return a picture in which the nearest of the drawn cars is cut off by this side."""
     return cars()[:, 280:440] if side == "left" else cars()[:, 160:320]
 
 
@@ -123,22 +123,24 @@ def _right_of_the_middle(grids: list[WindowGrid]) -> list[WindowGrid]:
 
 
 @pytest.mark.parametrize(("width", "height"), [(640, 360), (960, 540), (1920, 1080), (1277, 719)])
-def test_they_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
+def test_the_engines_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
     model = fitted(SEED_FEATURES)
     grids = _right_of_the_middle(lay_grids(SEED.svm, model.features, width, height))
     assert_agree(compare(model, grids, road(width, height)))
 
 
 @pytest.mark.parametrize(("width", "height"), [(853, 480), (960, 540), (1242, 375), (1920, 1080)])
-def test_the_default_sets_agree_in_frames_of_any_size(width: int, height: int) -> None:
-    # Their strips are halved as the windows would be, whatever the size of the frame.
+def test_the_engines_agree_for_the_default_sets_in_frames_of_any_size(
+    width: int, height: int
+) -> None:
+    # In frames of any size, their strips are halved in the same way as the windows.
     model = fitted(FeatureSettings())
     grids = lay_grids(SvmSettings(), model.features, width, height, horizon=HORIZON)
     assert_agree(compare(model, grids, road(width, height)), correlation=0.999)
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_they_agree_beyond_the_sides(side: str) -> None:
+def test_the_engines_agree_beyond_the_sides_of_the_frame(side: str) -> None:
     grids = [
         WindowGrid(96, Fraction(step), Fraction(-48), Fraction(8), columns=160 // step + 1, rows=5)
         for step in STEPS.values()
@@ -150,7 +152,7 @@ def test_they_agree_beyond_the_sides(side: str) -> None:
 
 @pytest.fixture(scope="module")
 def real_frames(real_data: Path) -> list[Image]:
-    """Give frames 250, 500 and 750 of the project video, those that can be sought."""
+    """Frames 250, 500 and 750 of the project video, which are key frames."""
     images = []
     with av.open(real_data / "project_video.mp4") as container:
         for second in (10, 20, 30):
@@ -174,7 +176,7 @@ def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image])
 
 
 def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -> Windows:
-    """Search a frame by one set of windows, that of the grid."""
+    """Search a frame with the windows of one grid."""
     search = SearchSettings.model_validate({"engine": engine, "probability": PROBABILITY})
     settings = SvmSettings(search=search)
     with pytest.MonkeyPatch.context() as patched:
@@ -185,18 +187,18 @@ def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -
 
 
 def _without_edges(model: LinearModel) -> LinearModel:
-    """Leave out of the regression the blocks at the edge of a patch, in which engines differ."""
-    assert model.boxes is not None
-    inner = np.zeros_like(model.boxes.weights)
+    """Remove the blocks at the edges of a patch from the regression: there, engines differ."""
+    assert model.box_regression is not None
+    inner = np.zeros_like(model.box_regression.weights)
     for part in Layout.of(model.features).hog:
-        blocks = model.boxes.weights[:, part].reshape(4, 7, 7, -1).copy()
+        blocks = model.box_regression.weights[:, part].reshape(4, 7, 7, -1).copy()
         blocks[:, [0, -1]] = blocks[:, :, [0, -1]] = 0
         inner[:, part] = blocks.reshape(4, -1)
-    return replace(model, boxes=BoxRegression(inner, model.boxes.biases))
+    return replace(model, box_regression=BoxRegression(inner, model.box_regression.biases))
 
 
 def _vehicles_by_both(model: LinearModel, kind: type) -> tuple[Windows, Windows]:
-    """Return those of the dense and of the patch engine, by a grid that reaches beyond."""
+    """Search with a grid that reaches beyond the frame; return the results of dense and patch."""
     step = STEPS[kind]
     left, columns = Fraction(-2 * step), (440 + 4 * step - 96) // step + 1
     grid = WindowGrid(96, Fraction(step), left, Fraction(8), columns, rows=5)
@@ -219,7 +221,7 @@ def _only(windows: Windows, keep: np.ndarray) -> Windows:
 
 
 @pytest.mark.parametrize("kind", STEPS)
-def test_they_agree_on_the_vehicles_that_windows_show(kind: type) -> None:
+def test_the_engines_agree_on_the_vehicles_in_hits(kind: type) -> None:
     dense, patch = _vehicles_by_both(with_boxes(fitted(FeatureSettings())), kind)
     hits = patch.probabilities >= PROBABILITY
     assert (patch.vehicles[hits] != patch.boxes[hits]).any(axis=1).all()
@@ -230,7 +232,7 @@ def test_they_agree_on_the_vehicles_that_windows_show(kind: type) -> None:
 
 
 @pytest.mark.parametrize("kind", [AlignedSearch, PhasedSearch])
-def test_they_differ_about_vehicles_by_the_edges_of_patches_alone(kind: type) -> None:
+def test_the_vehicles_differ_only_because_of_the_edges_of_patches(kind: type) -> None:
     dense, patch = _vehicles_by_both(_without_edges(with_boxes(fitted(FeatureSettings()))), kind)
     np.testing.assert_allclose(dense.vehicles, patch.vehicles, atol=0.05)
 
@@ -261,7 +263,7 @@ def test_blocks_away_from_the_edge_of_a_patch_are_the_same(
     assert np.abs(by_patch).max() > 0.1
 
 
-def test_a_frame_is_searched_at_all_windows_of_all_sets_in_order() -> None:
+def test_a_frame_is_searched_with_all_windows_of_all_sets_in_order() -> None:
     model, image = fitted(FeatureSettings()), road()
     search = FrameSearch(model, SvmSettings(), 1280, 720, horizon=HORIZON)
     found = join_windows(search.search(image))

@@ -155,7 +155,7 @@ def test_describe_all_stacks_the_vectors_of_the_patches() -> None:
     np.testing.assert_array_equal(vectors, [extractor.describe(patch) for patch in patches])
 
 
-def test_describe_all_of_nothing_has_no_rows() -> None:
+def test_describe_all_of_no_patches_has_no_rows() -> None:
     vectors = FeatureExtractor(FEATURES).describe_all([])
     assert vectors.shape == (0, 4800)
     assert vectors.dtype == np.float32
@@ -166,34 +166,36 @@ def test_a_patch_of_the_right_size_is_taken_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("side", [33, 48, 63, 65, 100, 128])
-def test_less_than_half_or_larger_is_resized_bilinearly(side: int) -> None:
+def test_a_crop_less_than_twice_too_large_is_resized_bilinearly(side: int) -> None:
     expected = cv2.resize(PATCH, (side, side), interpolation=cv2.INTER_LINEAR)
     np.testing.assert_array_equal(to_patch(PATCH, side), expected)
 
 
-def test_twice_too_large_is_halved_each_pixel_the_mean_of_four() -> None:
+def test_a_crop_twice_too_large_is_halved_each_pixel_the_mean_of_four() -> None:
     means = PATCH.reshape(32, 2, 32, 2, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(halve(PATCH), means, atol=0.5)
     np.testing.assert_array_equal(to_patch(PATCH, 32), halve(PATCH))
     np.testing.assert_array_equal(to_patch(PATCH, 16), halve(halve(PATCH)))
 
 
-def test_what_is_left_after_halving_is_resized_bilinearly() -> None:
+def test_after_halving_a_crop_is_resized_bilinearly() -> None:
     expected = cv2.resize(halve(PATCH), (24, 24), interpolation=cv2.INTER_LINEAR)
     np.testing.assert_array_equal(to_patch(PATCH, 24), expected)
 
 
 @pytest.mark.parametrize(("height", "width"), [(64, 63), (63, 64), (61, 61)])
-def test_twice_too_large_with_an_odd_side_is_averaged_by_area(height: int, width: int) -> None:
+def test_a_crop_twice_too_large_with_an_odd_side_is_averaged_by_area(
+    height: int, width: int
+) -> None:
     crop = PATCH[:height, :width]
     expected = cv2.resize(crop, (16, 16), interpolation=cv2.INTER_AREA)
     np.testing.assert_array_equal(to_patch(crop, 16), expected)
 
 
-def test_no_pixel_is_skipped_however_small_the_patch() -> None:
+def test_every_pixel_counts_however_small_the_patch() -> None:
     for size in (64, 60, 50, 37):
         crop = np.zeros((size, size, 3), np.uint8)
-        crop[:, ::2] = 200  # stripes of a pixel are an even grey from afar
+        crop[:, ::2] = 200  # on average, stripes of one pixel are an even grey
         assert np.abs(to_patch(crop, 8).astype(int) - 100).max() <= 20
 
 

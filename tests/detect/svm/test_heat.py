@@ -62,7 +62,7 @@ def test_heat_is_summed_over_the_last_frames_and_the_oldest_is_forgotten() -> No
     assert peaks == [0.5, 0.75, 1.75, 1.375]
 
 
-def test_frames_without_detections_cool_the_map_down() -> None:
+def test_frames_without_hits_cool_the_map_down() -> None:
     heat = heat_map(frames=2)
     heat.update(found((0, 0, 5, 5, 1)))
     assert heat.update(found()).peak == 1
@@ -84,7 +84,7 @@ def test_blur_spreads_heat_and_conserves_it() -> None:
     np.testing.assert_allclose(blurred, cv2.GaussianBlur(sharp, (15, 15), 0), atol=1e-6)
 
 
-def test_blur_is_of_the_sum_not_of_what_is_kept() -> None:
+def test_the_sum_is_blurred_and_not_the_frames_that_are_kept() -> None:
     heat = heat_map(frames=2, blur=9)
     heat.update(found((40, 20, 20, 20, 1)))
     twice = values_of(heat, found((40, 20, 20, 20, 1)))
@@ -114,18 +114,18 @@ def test_a_blur_of_a_pixel_or_none_changes_nothing(blur: int) -> None:
         ((100, 0, 10, 10), 0),
     ],
 )
-def test_of_a_window_partly_outside_the_frame_only_the_inside_is_heated(
+def test_a_hit_partly_outside_the_frame_heats_the_inside(
     window: tuple[int, int, int, int], pixels: int
 ) -> None:
     assert values_of(heat_map(), found((*window, 1))).sum() == pixels
 
 
-def test_the_peak_is_the_highest_value_and_of_no_values_zero() -> None:
+def test_the_peak_is_the_highest_value_or_zero_without_values() -> None:
     assert drawn((3, 4, 1, 1, 2.5), (9, 9, 5, 5, 1)).peak == 2.5
     assert Heat(np.zeros((0, 0), np.float32)).peak == 0
 
 
-def test_by_coverage_a_window_adds_its_share_of_its_probability() -> None:
+def test_by_coverage_a_hit_adds_its_probability_times_its_share() -> None:
     quarters = found((10, 10, 20, 20, 0.5), (20, 20, 20, 20, 1), share=0.25)
     values = values_of(heat_map(weight="coverage"), quarters)
     assert values[10, 10] == 0.125
@@ -157,7 +157,7 @@ def test_by_coverage_sets_that_agree_add_up() -> None:
     assert values_of(heat, both)[30, 30] == 0.3125
 
 
-def test_a_window_heats_the_vehicle_that_it_shows_not_itself() -> None:
+def test_a_hit_heats_its_vehicle_and_not_its_window() -> None:
     window = found((10, 10, 20, 20, 0.5))
     shown = replace(window, vehicles=np.array([[14, 12, 30, 10]], np.float32))
     expected = values_of(heat_map(), found((14, 12, 30, 10, 0.5)))
@@ -165,7 +165,7 @@ def test_a_window_heats_the_vehicle_that_it_shows_not_itself() -> None:
 
 
 @pytest.mark.parametrize(("x", "first"), [(9.4, 9), (9.6, 10), (-0.4, 0)])
-def test_sides_of_a_vehicle_between_pixels_go_to_the_nearest(x: float, first: int) -> None:
+def test_the_sides_of_a_vehicle_are_rounded_to_pixels(x: float, first: int) -> None:
     window = found((10, 10, 20, 20, 1))
     shown = replace(window, vehicles=np.array([[x, 5, 20, 10]], np.float32))
     (columns,) = np.nonzero(values_of(heat_map(), shown)[7])
@@ -188,8 +188,10 @@ class TestShrunk:
             assert height <= rows * shrink < height + shrink
             assert width <= columns * shrink < width + shrink
 
-    def test_sides_go_to_the_nearest_value(self, shrink: Literal[2, 4, 8]) -> None:
-        near = shrink // 2 - 1  # pixels beyond a multiple of n: not yet the next one
+    def test_the_sides_of_a_vehicle_are_rounded_to_values(self, shrink: Literal[2, 4, 8]) -> None:
+        near = (
+            shrink // 2 - 1
+        )  # pixels beyond a multiple of n, but nearer to it than to the next one
         moved = found((8 + near, 8 + near, 24, 24, 1))
         np.testing.assert_array_equal(
             values_of(heat_map(shrink=shrink), moved),
@@ -201,7 +203,7 @@ class TestShrunk:
             values_of(heat_map(shrink=shrink), found((8 + shrink, 8, 24, 24, 1))),
         )
 
-    def test_a_window_partly_outside_heats_the_inside(self, shrink: Literal[2, 4, 8]) -> None:
+    def test_a_hit_partly_outside_heats_the_inside(self, shrink: Literal[2, 4, 8]) -> None:
         values = values_of(heat_map(shrink=shrink), found((-8, -8, 24, 16, 1), (88, 48, 24, 24, 1)))
         rows, columns = values.shape
         expected = np.zeros_like(values)
@@ -209,7 +211,7 @@ class TestShrunk:
         expected[48 // shrink : rows, 88 // shrink : columns] = 1
         np.testing.assert_array_equal(values, expected)
 
-    def test_blur_is_as_wide_in_the_frame(self, shrink: Literal[2, 4, 8]) -> None:
+    def test_blur_is_as_wide_in_pixels_of_the_frame(self, shrink: Literal[2, 4, 8]) -> None:
         window = found((32, 16, 16, 16, 1))
         sharp = values_of(heat_map(shrink=shrink), window)
         blurred = values_of(heat_map(shrink=shrink, blur=24), window)
@@ -231,14 +233,14 @@ class TestShrunk:
         assert region.box == Box(5 * shrink, 3 * shrink, shrink, shrink)
         assert region.centroid == region.box.center
 
-    def test_a_window_comes_back_as_a_region(self, shrink: Literal[2, 4, 8]) -> None:
+    def test_a_hit_becomes_a_region(self, shrink: Literal[2, 4, 8]) -> None:
         heat = heat_map(shrink=shrink).update(found((16, 8, 32, 24, 2)))
         (region,) = find_regions(heat, 1)
         assert region.box == Box(16, 8, 32, 24)
         assert region.centroid == pytest.approx((31.5, 19.5))
 
 
-def test_a_drawn_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
+def test_a_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
     heat = drawn((20, 10, 31, 21, 2))
     heat.values[15, 30] = 5
     (region,) = find_regions(heat, 1.4)
@@ -255,7 +257,7 @@ def test_each_region_has_its_own_peak() -> None:
     ]
 
 
-def test_regions_come_topmost_first_and_then_leftmost() -> None:
+def test_regions_are_ordered_from_the_top_and_then_from_the_left() -> None:
     heat = drawn((60, 5, 4, 4, 2), (5, 5, 4, 4, 2), (30, 40, 4, 4, 2), (2, 20, 4, 4, 2))
     corners = [(region.box.x, region.box.y) for region in find_regions(heat, 1)]
     assert corners == [(5, 5), (60, 5), (2, 20), (30, 40)]
@@ -278,8 +280,8 @@ def test_a_hole_does_not_split_a_region() -> None:
     assert region.strength == 2
 
 
-def test_what_lies_in_the_box_but_not_in_the_region_does_not_count_for_its_peak() -> None:
-    # an L around a hotter spot that does not touch it
+def test_the_strength_is_the_peak_of_the_region_and_not_of_its_box() -> None:
+    # an L around a hotter spot that it does not touch
     heat = drawn((10, 10, 5, 40, 2), (10, 45, 40, 5, 2), (30, 15, 5, 5, 9))
     peaks = {region.box: region.strength for region in find_regions(heat, 1)}
     assert peaks == {Box(10, 10, 40, 40): 2.0, Box(30, 15, 5, 5): 9.0}

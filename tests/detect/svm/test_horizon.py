@@ -12,7 +12,7 @@ from vdet.media.images import Image
 from vdet.synthetic import Renderer, demo_scene, empty_road, frames
 from vdet.synthetic.camera import PinholeCamera
 
-STEP = 0.01  # of the rows that are looked at
+STEP = 0.01  # between the rows that get votes
 RNG = np.random.default_rng(0)
 
 
@@ -56,7 +56,7 @@ def test_the_road_may_bend_and_the_camera_be_in_any_lane(
     assert find_horizon(images) == pytest.approx(0.5, abs=2 * STEP)
 
 
-def test_traffic_does_not_hide_it() -> None:
+def test_the_horizon_is_found_behind_traffic() -> None:
     scene = replace(demo_scene(1, width=640, height=360), frames=5)
     found = find_horizon([frame.image for frame in frames(scene)])
     assert found == pytest.approx(scene.camera.horizon / 360, abs=2 * STEP)
@@ -66,12 +66,12 @@ def test_one_frame_may_be_enough() -> None:
     assert find_horizon(road(0.45, count=1)) == pytest.approx(0.45, abs=STEP)
 
 
-def test_it_does_not_depend_on_the_order_of_the_frames() -> None:
+def test_the_order_of_the_frames_does_not_matter() -> None:
     images = road(0.62)
     assert find_horizon(images[::-1]) == find_horizon(images)
 
 
-def test_a_mirrored_road_has_the_same() -> None:
+def test_a_mirrored_road_has_the_same_horizon() -> None:
     images = [np.ascontiguousarray(image[:, ::-1]) for image in road(0.42, lane=2)]
     assert find_horizon(images) == pytest.approx(0.42, abs=2 * STEP)
 
@@ -88,11 +88,11 @@ def test_a_mirrored_road_has_the_same() -> None:
     ],
     ids=["black", "white", "noise", "upright lines", "a pixel", "a row"],
 )
-def test_where_no_lines_tell_it_is_where_it_usually_is(image: Image) -> None:
+def test_without_lines_the_horizon_is_the_default_one(image: Image) -> None:
     assert find_horizon([image]) == DEFAULT_HORIZON
 
 
-def test_no_frames_tell_nothing() -> None:
+def test_without_frames_the_horizon_is_the_default_one() -> None:
     assert find_horizon([]) == DEFAULT_HORIZON
 
 
@@ -124,7 +124,7 @@ def test_lines_that_meet_below_themselves_do_not_count() -> None:
     assert find_horizon([road_lines, roofs, roofs]) == pytest.approx(0.4, abs=STEP)
 
 
-def test_a_picture_far_taller_than_wide_is_not_enlarged() -> None:
+def test_a_very_tall_picture_is_not_enlarged() -> None:
     tracemalloc.start()
     assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == DEFAULT_HORIZON
     _, peak = tracemalloc.get_traced_memory()

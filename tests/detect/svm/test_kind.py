@@ -8,7 +8,7 @@ from red_cars import red_finder
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import FeatureSettings, HeatSettings, SvmSettings
 from vdet.detect.factory import load_detector, model_file
-from vdet.detect.svm.kind import asked_features, shipped_model
+from vdet.detect.svm.kind import requested_features, shipped_model
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ModelError
 
@@ -37,9 +37,9 @@ def test_features_that_no_shipped_model_has_are_refused_with_advice() -> None:
 
 
 def test_features_are_asked_for_where_they_differ_from_the_default() -> None:
-    assert asked_features(SvmSettings(features=HSV)) == HSV
-    assert asked_features(SvmSettings(features=FeatureSettings(patch=32))) is None
-    assert asked_features(SvmSettings(heat=HeatSettings(frames=3))) is None
+    assert requested_features(SvmSettings(features=HSV)) == HSV
+    assert requested_features(SvmSettings(features=FeatureSettings(patch=32))) is None
+    assert requested_features(SvmSettings(heat=HeatSettings(frames=3))) is None
 
 
 def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for() -> None:

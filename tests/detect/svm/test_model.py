@@ -39,12 +39,12 @@ def model_with_boxes() -> LinearModel:
     rng = np.random.default_rng(9)
     weights, biases = rng.normal(size=(4, 32)), rng.normal(size=4)
     boxes = BoxRegression(weights.astype(np.float32), biases.astype(np.float32))
-    return replace(model_of(2, WITH_HOG, 56), boxes=boxes)
+    return replace(model_of(2, WITH_HOG, 56), box_regression=boxes)
 
 
 def boxes_of(model: LinearModel) -> BoxRegression:
-    assert model.boxes is not None
-    return model.boxes
+    assert model.box_regression is not None
+    return model.box_regression
 
 
 def header_of(asked: FeatureSettings = SMALL, **changes: Any) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "model.npz"
 
 
-def test_a_score_is_the_dot_product_plus_the_bias() -> None:
+def test_a_decision_value_is_the_dot_product_plus_the_bias() -> None:
     weights = np.array([[1, 2, 3], [0, -1, 0.5]], np.float32)
     ones = np.ones(2, np.float32)
     model = LinearModel(SMALL, weights, np.array([10, 20], np.float32), ones, ones)
@@ -129,7 +129,7 @@ def test_the_probability_is_the_mean_of_the_members_sigmoids() -> None:
     assert probability.tolist() == [pytest.approx((first + second) / 2, abs=1e-6)]
 
 
-def test_huge_scores_give_probabilities_of_0_and_1_without_overflow() -> None:
+def test_huge_decision_values_give_probabilities_of_0_and_1_without_overflow() -> None:
     one = np.ones(1, np.float32)
     model = LinearModel(SMALL, np.array([[1e30]], np.float32), 0 * one, -one, 0 * one)
     probabilities = model.probabilities(np.array([[-1.0], [0.0], [1.0]], np.float32))
@@ -180,8 +180,8 @@ def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
 
 
 def test_a_model_without_boxes_is_loaded_without(path: Path) -> None:
-    save_model(replace(model_with_boxes(), boxes=None), path)
-    assert load_model(path).boxes is None
+    save_model(replace(model_with_boxes(), box_regression=None), path)
+    assert load_model(path).box_regression is None
 
 
 @pytest.mark.parametrize(
@@ -207,7 +207,7 @@ def test_a_regression_that_does_not_fit_is_refused(
 
 
 @pytest.mark.parametrize("missing", ["box_weights", "box_biases"])
-def test_half_a_regression_is_damage(path: Path, missing: str) -> None:
+def test_a_regression_with_one_of_its_two_arrays_is_damaged(path: Path, missing: str) -> None:
     arrays = {name: array for name, array in box_arrays().items() if name != missing}
     with pytest.raises(ModelError, match="damaged"):
         load_model(write_npz(path, header_of(WITH_HOG), **arrays_of(model_with_boxes()), **arrays))
@@ -247,7 +247,7 @@ def test_a_folder_is_no_model(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
-def test_what_is_no_zip_file_is_no_model(path: Path, data: bytes) -> None:
+def test_a_file_that_is_not_a_zip_file_is_no_model(path: Path, data: bytes) -> None:
     path.write_bytes(data)
     with pytest.raises(ModelError, match="is not a vdet model, or is damaged; make one with"):
         load_model(path)
@@ -287,9 +287,7 @@ def test_a_mutated_model_is_refused_or_loads_with_all_its_parts(path: Path) -> N
 
 
 @pytest.mark.parametrize("method", [1, 12, 14, 99])
-def test_another_compression_than_the_one_that_is_declared_is_damage(
-    path: Path, method: int
-) -> None:
+def test_a_wrongly_declared_compression_is_damage(path: Path, method: int) -> None:
     save_model(model_of(3), path)
     data = bytearray(path.read_bytes())
     for mark, offset in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
@@ -407,9 +405,7 @@ def test_pickled_objects_are_refused_and_not_run(path: Path, tmp_path: Path) -> 
     assert not (tmp_path / "sprung").exists()
 
 
-def test_a_pickle_as_long_as_the_array_that_it_claims_to_be_is_not_run(
-    path: Path, tmp_path: Path
-) -> None:
+def test_a_pickle_of_the_declared_length_is_not_run(path: Path, tmp_path: Path) -> None:
     pickled = pickle.dumps(_Trap(tmp_path / "sprung"))
     pickled += bytes(-len(pickled) % 8)
     data = npy_header("|O", f"({len(pickled) // 8},)") + pickled
@@ -418,7 +414,7 @@ def test_a_pickle_as_long_as_the_array_that_it_claims_to_be_is_not_run(
     assert not (tmp_path / "sprung").exists()
 
 
-def test_no_memory_is_set_aside_for_a_shape_that_the_file_does_not_hold(path: Path) -> None:
+def test_no_memory_is_allocated_for_a_shape_that_the_file_does_not_hold(path: Path) -> None:
     data = npy_header("<f4", "(1000000000,)") + bytes(192)
     write_members(path, members_of(model_of(2), weights=data))
     tracemalloc.start()

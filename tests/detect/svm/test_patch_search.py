@@ -35,7 +35,9 @@ def model_of(features: FeatureSettings, members: int = 2) -> LinearModel:
     [SEED.svm.features, FeatureSettings(), COLOUR, FeatureSettings(patch=16, color_space="HSV")],
     ids=["seed", "default", "colour only", "smaller patch"],
 )
-def test_every_window_is_cropped_resized_described_and_scored(features: FeatureSettings) -> None:
+def test_every_window_is_cropped_resized_described_and_classified(
+    features: FeatureSettings,
+) -> None:
     model, extractor = model_of(features), FeatureExtractor(features)
     found = PatchSearch(model, GRID).search(FramePyramid(FRAME)).probabilities
     assert len(found) == 28
@@ -52,7 +54,7 @@ def test_probabilities_differ_from_window_to_window() -> None:
     assert len(np.unique(found)) == 28
 
 
-def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing() -> None:
+def test_a_search_does_not_change_the_frame_or_later_searches() -> None:
     engine, frame = PatchSearch(model_of(COLOUR), GRID), FRAME.copy()
     first = engine.search(FramePyramid(frame)).probabilities
     engine.search(FramePyramid(255 - frame))
@@ -63,7 +65,7 @@ def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing() -> None:
 @pytest.mark.parametrize(
     ("engine", "module"), [(PatchSearch, patch_search), (LocatedSearch, dense_search)]
 )
-def test_windows_scored_some_at_a_time_are_scored_alike(
+def test_the_size_of_a_batch_does_not_matter(
     engine: type[PatchSearch | LocatedSearch],
     module: ModuleType,
     monkeypatch: pytest.MonkeyPatch,
@@ -84,7 +86,7 @@ def test_what_lies_outside_a_window_does_not_matter() -> None:
     assert one == two
 
 
-def test_the_hog_of_chosen_windows_is_given_without_the_other_features() -> None:
+def test_the_hog_features_of_some_windows_come_without_the_others() -> None:
     features = FeatureSettings(patch=16)
     model, extractor = model_of(features), FeatureExtractor(features)
     numbers = np.array([27, 3, 3])

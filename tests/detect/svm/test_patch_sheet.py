@@ -47,7 +47,7 @@ def random_patch() -> Image:
 
 class TestShape:
     @pytest.mark.parametrize("patches", [1, 2, 3])
-    def test_a_row_a_patch_of_patch_channels_hog_and_histogram(self, patches: int) -> None:
+    def test_each_patch_has_a_row_of_patch_channels_hog_and_histogram(self, patches: int) -> None:
         sheet = patch_sheet({f"patch {i}": random_patch() for i in range(patches)}, SEED)
         assert sheet.shape == (patches * PITCH[0], 8 * PITCH[1], 3)
         assert sheet.dtype == np.uint8
@@ -60,17 +60,17 @@ class TestShape:
             ({"histogram": HistogramSettings(bins=0)}, 7),
         ],
     )
-    def test_what_is_not_described_has_no_tile(self, change: dict[str, Any], tiles: int) -> None:
+    def test_features_that_are_off_have_no_tile(self, change: dict[str, Any], tiles: int) -> None:
         sheet = patch_sheet({"": random_patch()}, SEED.model_copy(update=change))
         assert sheet.shape[1] == tiles * PITCH[1]
 
     @pytest.mark.parametrize("size", [(64, 64), (128, 128), (20, 31), (1, 1)])
-    def test_crops_of_any_size_will_do(self, size: tuple[int, int]) -> None:
+    def test_crops_may_have_any_size(self, size: tuple[int, int]) -> None:
         sheet = patch_sheet({"": np.full((*size, 3), 90, np.uint8)}, SEED)
         assert sheet.shape == (PITCH[0], 8 * PITCH[1], 3)
 
     @pytest.mark.parametrize("bins", [8, 256])
-    def test_cells_blocks_and_bins_of_other_sizes(self, bins: Any) -> None:
+    def test_cells_blocks_and_bins_may_have_other_sizes(self, bins: Any) -> None:
         settings = FeatureSettings(
             patch=48,
             hog=HogSettings(cell=6, block=3, orientations=9),
@@ -80,7 +80,7 @@ class TestShape:
 
 
 class TestCaptions:
-    def test_name_the_patch_its_channels_and_what_is_described(
+    def test_captions_name_the_patch_its_channels_and_its_features(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         written: list[str] = []
@@ -91,7 +91,9 @@ class TestCaptions:
             "histogram, 32 bins",
         ]  # fmt: skip
 
-    def test_of_hog_keep_the_number_of_the_channel(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_captions_of_hog_keep_the_number_of_the_channel(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
         written: list[str] = []
         monkeypatch.setattr(cv2, "putText", lambda _, text, *__: written.append(text))
         patch_sheet(
@@ -100,7 +102,7 @@ class TestCaptions:
         assert "HOG [2]" in written
         assert "HOG [0]" not in written
 
-    def test_are_written_over_the_tile_not_on_it(self) -> None:
+    def test_captions_are_written_above_the_tile(self) -> None:
         patch = random_patch()
         plain, captioned = (patch_sheet({name: patch}, SEED) for name in ("", "not car"))
         assert (plain[:28] != captioned[:28]).any()
@@ -155,7 +157,7 @@ class TestHog:
         ):
             assert strokes[:, 2 * cell : 3 * cell].sum() > 0.95 * strokes.sum() > 0
 
-    def test_a_patch_of_one_colour_has_none(self) -> None:
+    def test_a_patch_of_one_colour_has_no_strokes(self) -> None:
         assert not hog_tile(np.full((64, 64, 3), 90, np.uint8)).any()
 
 

@@ -32,40 +32,40 @@ def rows_of(grid: WindowGrid) -> tuple[int, int]:
 
 
 class TestSizes:
-    def test_are_shares_of_the_frames_width_in_their_order(self) -> None:
+    def test_sizes_are_shares_of_the_frames_width_in_their_order(self) -> None:
         assert [grid.size for grid in laid()] == [round(1280 * share) for share in SIZES]
         assert [grid.size for grid in laid(sizes=(0.25, 0.05))] == [320, 64]
 
     @pytest.mark.parametrize(("zoom", "size"), [(0.5, 64), (1, 128), (1.5, 192), (2, 256)])
-    def test_are_multiplied_by_the_zoom(self, zoom: float, size: int) -> None:
+    def test_sizes_are_multiplied_by_the_zoom(self, zoom: float, size: int) -> None:
         (grid,) = laid(sizes=(0.1,), zoom=zoom, horizon=0.3)
         assert grid.size == size
 
-    def test_do_not_depend_on_the_height_of_a_frame_of_16_by_9_or_higher(self) -> None:
+    def test_sizes_do_not_depend_on_the_height_of_a_frame_of_16_by_9_or_higher(self) -> None:
         small, large = ([grid.size for grid in laid(1280, height)] for height in (720, 1000))
         assert small == large
 
-    def test_of_a_wider_frame_are_those_of_one_of_16_by_9_and_its_height(self) -> None:
+    def test_sizes_in_a_wider_frame_are_those_of_a_frame_of_16_by_9(self) -> None:
         assert [grid.size for grid in laid(2560, 720)] == [grid.size for grid in laid(1280, 720)]
 
     @given(st.floats(0.02, 0.4), st.sampled_from([320, 640, 854, 960, 1242, 1280, 1920]))
-    def test_are_rounded_by_no_more_than_a_cell(self, share: float, width: int) -> None:
+    def test_sizes_are_rounded_by_no_more_than_a_cell(self, share: float, width: int) -> None:
         (grid,) = laid(width, 2 * width, sizes=(share,), horizon=0.3)
         cell = share * width * FEATURES.hog.cell / FEATURES.patch
         assert abs(grid.size - share * width) <= max(cell, 4)
 
-    def test_that_are_rounded_to_the_same_are_laid_once(self) -> None:
+    def test_sizes_that_are_rounded_to_the_same_are_laid_once(self) -> None:
         # 16 and 20 pixels would both be 16, windows of whole cells: their hits would count twice
         assert [grid.size for grid in laid(320, 180, sizes=(0.05, 0.0625, 0.125))] == [16, 40]
 
-    def test_none_are_no_sets(self) -> None:
+    def test_without_sizes_there_are_no_sets(self) -> None:
         assert laid(sizes=()) == []
 
 
 class TestRows:
     @pytest.mark.parametrize("horizon", [0.35, 0.5, 0.6])
     @pytest.mark.parametrize(("highest", "lowest"), [(0.6, 1.1), (0.8, 0.8), (0, 0.5)])
-    def test_end_below_the_horizon_by_their_windows_sides(
+    def test_windows_end_below_the_horizon_by_a_number_of_their_sides(
         self, horizon: float, highest: float, lowest: float
     ) -> None:
         grids = laid(height=2000, horizon=horizon, highest=highest, lowest=lowest)
@@ -77,24 +77,24 @@ class TestRows:
             assert abs(first - highest * grid.size) <= rounding
             assert abs(last - lowest * grid.size) <= rounding + grid.step / 2
 
-    def test_follow_the_horizon(self) -> None:
+    def test_windows_follow_the_horizon(self) -> None:
         high, low = laid(horizon=0.3), laid(horizon=0.4)
         assert [b.top - a.top for a, b in zip(high, low, strict=True)] == [72] * len(SIZES)
         assert [grid.rows for grid in high] == [grid.rows for grid in low]
 
-    def test_of_larger_windows_end_lower(self) -> None:
+    def test_larger_windows_end_lower(self) -> None:
         ends = [rows_of(grid)[1] for grid in laid(height=2000)]
         assert ends == sorted(ends)
         assert len(set(ends)) == len(ends)
 
-    def test_below_the_frame_are_left_out(self) -> None:
+    def test_rows_below_the_frame_are_left_out(self) -> None:
         whole = laid(height=2000, horizon=0.3, sizes=(0.25,), highest=0.5, lowest=1.5)[0]
         bottom = rows_of(whole)[1] - 100
         (grid,) = laid(height=bottom, horizon=600 / bottom, sizes=(0.25,), highest=0.5, lowest=1.5)
         assert grid.top == whole.top
         assert grid.rows == whole.rows - math.ceil(100 / grid.step)
 
-    def test_above_the_frame_begin_at_its_top(self) -> None:
+    def test_rows_above_the_frame_begin_at_its_top(self) -> None:
         (grid,) = laid(horizon=0.05, sizes=(0.25,))
         assert grid.top == 0
         assert grid.rows >= 1
@@ -106,7 +106,7 @@ class TestRows:
 
 class TestBeyondTheSides:
     @pytest.mark.parametrize("beyond", [0, 0.25, 0.5, 1])
-    def test_lies_a_share_of_a_window_on_both_sides(self, beyond: float) -> None:
+    def test_windows_reach_beyond_both_sides_by_a_share_of_their_size(self, beyond: float) -> None:
         for grid in laid(beyond=beyond):
             x = grid.boxes[:, 0]
             assert x.min() == -beyond * grid.size
@@ -114,7 +114,7 @@ class TestBeyondTheSides:
             assert beyond * grid.size - grid.step < over <= beyond * grid.size
 
     @given(st.floats(0, 1), st.integers(1, 8), st.sampled_from(FRAMES), st.floats(0.05, 0.3))
-    def test_lies_never_more(
+    def test_windows_never_reach_farther_beyond_the_sides(
         self, beyond: float, step: int, frame: tuple[int, int], share: float
     ) -> None:
         for grid in laid(*frame, beyond=beyond, step=step, sizes=(share,)):
@@ -126,7 +126,7 @@ class TestBeyondTheSides:
 class TestHalving:
     @pytest.mark.parametrize(("width", "height"), FRAMES)
     @pytest.mark.parametrize("horizon", [0.4, 0.57, 0.61])
-    def test_windows_lie_at_whole_pixels_of_every_level_down_to_twice_a_patch(
+    def test_windows_lie_at_whole_pixels_of_every_halved_frame(
         self, width: int, height: int, horizon: float
     ) -> None:
         for grid in laid(width, height, horizon):
@@ -160,7 +160,7 @@ class TestHalving:
         (96, 64, [8, 16, 24, 32]),
     ],
 )
-def test_what_the_default_lays_over_frames_of_other_shapes(
+def test_the_default_sets_in_frames_of_other_shapes(
     width: int, height: int, sizes: list[int]
 ) -> None:
     grids = laid(width, height)

@@ -28,7 +28,7 @@ def test_a_cut_is_the_resized_crop(
     st.sampled_from([1, 2, 4, 8]),
     st.sampled_from([2, 3, 4]),
 )
-def test_a_cut_that_can_be_halved_is_so_from_odd_and_from_even_pixels(
+def test_a_cut_of_halvable_size_is_halved_from_odd_and_even_pixels(
     top: int, left: int, factor: int, side: int
 ) -> None:
     rows = slice(top, top + factor * side * 2)
@@ -48,7 +48,7 @@ def test_cuts_do_not_depend_on_what_was_cut_before() -> None:
             np.testing.assert_array_equal(one.cut(rows, columns, side, side), fresh)
 
 
-def test_rows_that_nobody_asks_for_are_never_looked_at() -> None:
+def test_pixels_outside_the_searched_rows_do_not_matter() -> None:
     other = np.array(FRAME)
     other[:32] = other[80:] = 0
     rows, columns = slice(40, 72), slice(0, 64)
@@ -57,7 +57,7 @@ def test_rows_that_nobody_asks_for_are_never_looked_at() -> None:
     np.testing.assert_array_equal(first, second)
 
 
-def test_the_frame_is_left_untouched() -> None:
+def test_the_frame_is_not_changed() -> None:
     image = FRAME.copy()
     frame = FramePyramid(image, 16, 80, margin=16)
     frame.cut(slice(16, 80), slice(-16, 48), 8, 8)

@@ -20,8 +20,9 @@ from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.search import FrameSearch, lay_grids
-from vdet.detect.svm.windows import Int32Array, Windows, join_windows
+from vdet.detect.svm.windows import Windows, join_windows
 from vdet.errors import ConfigError, FrameSizeError, ImageError
+from vdet.geometry import Int32Array
 from vdet.media.images import Image
 
 Sides = tuple[float, float, float, float]
@@ -61,7 +62,7 @@ def search_of(
 def fixed(
     *sets: WindowSettings, engine: Literal["auto", "dense", "patch"] = "auto"
 ) -> SearchSettings:
-    """Search by these sets and no others."""
+    """Return settings with these sets and no others."""
     none = PerspectiveSettings(sizes=())
     return SearchSettings(engine=engine, windows=sets, perspective=none)
 
@@ -75,7 +76,7 @@ PERSPECTIVE = SvmSettings(
 
 
 def by_perspective(alternate: int = 2) -> FrameSearch:
-    """Search by four sets that follow the perspective."""
+    """Return a search with four sets that follow the perspective."""
     search = PERSPECTIVE.search.model_copy(update={"alternate": alternate})
     settings = PERSPECTIVE.model_copy(update={"search": search})
     return FrameSearch(model_of(SMALL), settings, 160, 120, horizon=0.3)
@@ -86,14 +87,14 @@ def with_sides(
     engine: Literal["auto", "dense", "patch"] = "auto",
     probability: float | None = None,
 ) -> FrameSearch:
-    """Search with a regression that gives the same sides for all windows; half are detections."""
+    """Return a search whose regression gives equal sides for all hits, half of the windows."""
     length = Layout.of(SMALL).hog_length
     boxes = BoxRegression(np.zeros((4, length), np.float32), np.array(sides, np.float32))
     search = fixed(*SETS, engine=engine).model_copy(
         update={"probability": MEDIAN if probability is None else probability}
     )
     settings = SvmSettings(reference_height=120, features=SMALL, search=search)
-    return FrameSearch(replace(model_of(SMALL), boxes=boxes), settings, 160, 120)
+    return FrameSearch(replace(model_of(SMALL), box_regression=boxes), settings, 160, 120)
 
 
 def search_all(search: FrameSearch, image: Image = FRAME) -> Windows:
@@ -110,7 +111,7 @@ MEDIAN = float(np.median(search_all(search_of(SMALL)).probabilities))
 
 
 def rows_of(windows: Windows) -> list[tuple[float, ...]]:
-    """Give what is known of each window, in the windows' order."""
+    """Return box, probability and vehicle of each window, in their order."""
     columns = [windows.boxes, windows.probabilities[:, np.newaxis], windows.vehicles]
     return [tuple(row) for row in np.hstack(columns).round(4).tolist()]
 
@@ -123,7 +124,7 @@ class TestLayingGrids:
     def test_the_seed_has_831_windows_on_a_720p_frame_the_large_ones_first(self) -> None:
         assert laid(1280, 720)[:, 2].tolist() == [128] * 423 + [64] * 408
 
-    def test_all_default_sets_find_room_on_a_720p_frame(self) -> None:
+    def test_all_default_sets_fit_into_a_720p_frame(self) -> None:
         settings = SvmSettings()
         grids = lay_grids(settings, settings.features, 1280, 720)
         shares = settings.search.perspective.sizes
@@ -142,7 +143,7 @@ class TestLayingGrids:
         )
         assert grids[1:] == lay_perspective(perspective, SMALL, 1280, 720, horizon=0.5)
 
-    def test_a_horizon_moves_the_perspective_alone(self) -> None:
+    def test_the_horizon_moves_only_the_sets_that_follow_the_perspective(self) -> None:
         assert laid(1280, 720, SEED).tolist() == laid(1280, 720, SEED, horizon=0.4).tolist()
         high, low = (laid(1280, 720, SvmSettings(), horizon=horizon) for horizon in (0.25, 0.35))
         assert (low[:, 1] - high[:, 1]).tolist() == [72] * len(high)
@@ -160,7 +161,7 @@ class TestLayingGrids:
     @pytest.mark.parametrize(
         ("width", "height"), [(1280, 720), (1277, 719), (1281, 721), (129, 720), (333, 77)]
     )
-    def test_all_windows_lie_inside_the_frame_but_for_what_is_asked_for(
+    def test_windows_lie_inside_the_frame_or_beyond_its_sides_as_far_as_set(
         self, settings: SvmSettings, width: int, height: int
     ) -> None:
         x, y, w, h = laid(width, height, settings).T
@@ -220,7 +221,7 @@ class TestSearching:
             search_all(search, other).probabilities, search_all(search).probabilities
         )
 
-    def test_a_search_leaves_the_frame_as_it_was_and_remembers_nothing(self) -> None:
+    def test_a_search_does_not_change_the_frame_or_later_searches(self) -> None:
         search, frame = search_of(SMALL), FRAME.copy()
         first = search_all(search, frame)
         search_all(search, 255 - frame)
@@ -284,16 +285,16 @@ class TestAlternatingSets:
 
 
 class TestVehicles:
-    def test_are_the_windows_without_a_regression(self) -> None:
+    def test_without_a_regression_vehicles_are_the_windows(self) -> None:
         found = search_all(by_perspective())
         np.testing.assert_array_equal(found.vehicles, found.boxes)
         assert found.vehicles.dtype == np.float32
 
     @pytest.mark.parametrize("engine", ["dense", "patch"])
-    def test_are_where_the_regression_says_in_detections(
+    def test_the_vehicles_of_hits_are_where_the_regression_puts_them(
         self, engine: Literal["dense", "patch"]
     ) -> None:
-        # left, top, right, bottom from the middle, in windows: the same for all
+        # left, top, right, bottom from the middle, in sides of the window
         found = search_all(with_sides((-0.25, 0, 0.5, 0.375), engine))
         hits = found.probabilities >= MEDIAN
         assert 10 < hits.sum() < len(found) - 10
@@ -304,14 +305,14 @@ class TestVehicles:
         np.testing.assert_allclose(found.vehicles[hits], expected, rtol=1e-6)
         np.testing.assert_array_equal(found.vehicles[~hits], found.boxes[~hits])
 
-    def test_may_reach_beyond_their_window(self) -> None:
+    def test_a_vehicle_may_reach_beyond_its_window(self) -> None:
         found = search_all(with_sides((-1, -0.5, 1, 0.5)))
         hits = found.probabilities >= MEDIAN
         expected = found.boxes[hits] * [1, 1, 2, 1] - found.boxes[hits][:, 2:3] * [0.5, 0, 0, 0]
         np.testing.assert_allclose(found.vehicles[hits], expected)
 
     @pytest.mark.parametrize("sides", [(0.3, 0.4, 0.1, 0.2), (0.2, 0.3, 0.2, 0.3)])
-    def test_have_a_size_whatever_the_regression_says(self, sides: Sides) -> None:
+    def test_vehicles_have_a_least_size_whatever_the_regression_gives(self, sides: Sides) -> None:
         found = search_all(with_sides(sides))
         hits = found.probabilities >= MEDIAN
         x, y, size, _ = found.boxes[hits].T
@@ -321,13 +322,13 @@ class TestVehicles:
         np.testing.assert_allclose(middle[:, 0], x + size / 2 + 0.2 * size, rtol=1e-6)
         np.testing.assert_allclose(middle[:, 1], y + size / 2 + 0.3 * size, rtol=1e-6)
 
-    def test_of_no_detection_at_all_are_the_windows(self) -> None:
+    def test_without_hits_vehicles_are_the_windows(self) -> None:
         found = search_all(with_sides((-1, -1, 1, 1), probability=1))
         np.testing.assert_array_equal(found.vehicles, found.boxes)
 
 
-class TestTheChoiceOfAnEngine:
-    def test_auto_takes_the_dense_one_where_it_can(self) -> None:
+class TestEngines:
+    def test_auto_takes_the_dense_engine_if_it_can_compute_the_features(self) -> None:
         auto, dense = (search_all(search_of(SMALL, engine)) for engine in ("auto", "dense"))
         np.testing.assert_array_equal(auto.probabilities, dense.probabilities)
 
@@ -342,7 +343,7 @@ class TestTheChoiceOfAnEngine:
         ],
         ids=["colour only", "spatial"],
     )
-    def test_what_the_dense_one_cannot_compute_goes_to_the_other(
+    def test_auto_takes_the_patch_engine_for_other_features(
         self, features: FeatureSettings, missing: str, caplog: pytest.LogCaptureFixture
     ) -> None:
         with caplog.at_level(logging.INFO, "vdet"):

@@ -1,4 +1,4 @@
-"""What the settings of search and heat refuse, in the words that a user reads."""
+"""The values that the settings of search and heat refuse, and the messages."""
 
 import pytest
 
@@ -57,7 +57,7 @@ WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
         ),
     ],
 )
-def test_what_makes_no_sense_is_refused(assignment: str, message: str) -> None:
+def test_a_value_that_makes_no_sense_is_refused(assignment: str, message: str) -> None:
     with pytest.raises(ConfigError) as error:
         load_settings(None, [assignment])
     assert str(error.value).startswith(f"--set: {message}")
@@ -73,10 +73,10 @@ def test_fixed_sets_may_stand_alone_and_beside_those_of_the_perspective() -> Non
     assert alone.perspective.sizes == ()
 
 
-def test_a_heat_of_as_many_frames_as_the_sets_are_dealt_out_over_is_enough() -> None:
+def test_the_heat_may_sum_as_few_frames_as_the_sets_alternate_over() -> None:
     settings = SvmSettings(search=SearchSettings(alternate=3), heat=HeatSettings(frames=3))
     assert settings.heat.frames == settings.search.alternate
 
 
-def test_rows_may_be_those_of_one_row_of_windows() -> None:
+def test_the_highest_and_lowest_windows_may_be_one_row() -> None:
     assert PerspectiveSettings(highest=0.8, lowest=0.8).lowest == 0.8

@@ -94,7 +94,7 @@ def test_a_set_without_room_in_the_frame_is_not_drawn() -> None:
 
 
 def beyond(share: float) -> SvmSettings:
-    """Search by windows that reach beyond the frame's sides."""
+    """Return settings with windows that reach beyond the frame's sides."""
     settings = PERSPECTIVE.svm
     perspective = settings.search.perspective.model_copy(update={"beyond": share})
     search = settings.search.model_copy(update={"perspective": perspective})
@@ -139,12 +139,12 @@ def flat(value: float) -> Heat:
 
 
 class TestHeat:
-    def test_without_heat_the_picture_is_only_darker(self) -> None:
+    def test_without_heat_the_picture_is_only_darkened(self) -> None:
         image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), np.uint8)
         blended = blend_heat(image, flat(0))
         np.testing.assert_allclose(blended, image / 2, atol=1)
 
-    def test_is_white_at_its_peak_and_red_below(self) -> None:
+    def test_heat_is_white_at_its_peak_and_red_below(self) -> None:
         heat = flat(0)
         heat.values[5, 7], heat.values[9, 9] = 8.0, 2.0
         blended = blend_heat(np.zeros((24, 32, 3), np.uint8), heat)
@@ -153,7 +153,7 @@ class TestHeat:
         assert red > 100 > green == blue == 0
         assert blended[0, 0].max() < 12
 
-    def test_does_not_depend_on_the_unit_of_heat(self) -> None:
+    def test_the_unit_of_heat_does_not_matter(self) -> None:
         rng = np.random.default_rng(0)
         image = rng.integers(0, 256, (24, 32, 3), np.uint8)
         values = rng.integers(0, 9, (24, 32)).astype(np.float32)
@@ -165,7 +165,7 @@ class TestHeat:
         assert blend_heat(np.zeros((24, 32, 3), np.uint8), flat(3)).min() > 190
 
     @pytest.mark.parametrize("shrink", [2, 4, 8])
-    def test_of_a_shrunk_map_lies_where_it_belongs(self, shrink: int) -> None:
+    def test_heat_of_a_shrunk_map_lies_in_its_place(self, shrink: int) -> None:
         values = np.zeros((-(-21 // shrink), -(-30 // shrink)), np.float32)
         values[1, 2] = 5
         blended = blend_heat(np.zeros((21, 30, 3), np.uint8), Heat(values, shrink))

@@ -48,7 +48,7 @@ def test_a_strip_reaches_from_the_first_window_to_the_last(
 
 @pytest.mark.parametrize(("size", "step"), [(64, 8), (64, 12), (128, 16), (128, 50), (32, 12)])
 @pytest.mark.parametrize("color_space", ["YCrCb", "HLS"])
-def test_a_window_lies_at_its_place_in_the_frame_times_patch_over_size(
+def test_the_position_of_a_window_is_scaled_by_patch_over_size(
     size: int, step: int, color_space: str
 ) -> None:
     features = FeatureSettings.model_validate(
@@ -60,13 +60,13 @@ def test_a_window_lies_at_its_place_in_the_frame_times_patch_over_size(
         row, column = divmod(i, grid.columns)
         left, top = column * step * 64 // size, row * step * 64 // size
         patch = convert(to_patch(FRAME[y : y + h, x : x + w], 64), features)
-        inner = np.s_[1:-1, 1:-1]  # enlarging looks beyond the edge
+        inner = np.s_[1:-1, 1:-1]  # enlarging uses pixels beyond the edge
         ours = strip[top : top + 64, left : left + 64]
         assert levels_apart(ours[inner], patch[inner], color_space).max() <= 1
 
 
 def levels_apart(ours: Image, other: Image, color_space: str) -> npt.NDArray[np.int64]:
-    """Return how far values are apart; hue, the first channel of HLS, goes round at 180.
+    """Return the differences of values; hue, the first channel of HLS, is circular (period 180).
 
     OpenCV's conversion of a crop and of its frame may differ by one level: vectorised code rounds
     otherwise than the code for the last few pixels of a row.
@@ -85,7 +85,7 @@ STRIP = RNG.integers(0, 256, (96, 160, 3), dtype=np.uint8)
     ("members", "side", "columns", "rows"),
     [(1, 7, 20, 9), (3, 7, 20, 9), (2, 3, 3, 8), (2, 3, 8, 3), (1, 5, 5, 5), (4, 1, 6, 4)],
 )
-def test_a_block_sums_its_blocks_each_times_its_weights(
+def test_the_sum_of_a_window_is_that_of_its_weighted_blocks(
     members: int, side: int, columns: int, rows: int
 ) -> None:
     rng = np.random.default_rng(columns * rows)
@@ -104,7 +104,7 @@ def test_every_block_of_a_strip_is_described_once() -> None:
     assert describe_blocks(STRIP, large).shape == (18, 10, 9 * 9)
 
 
-def test_a_block_is_what_the_descriptor_gives_for_its_pixels_and_their_neighbours() -> None:
+def test_a_block_equals_that_of_a_descriptor_around_it() -> None:
     blocks = describe_blocks(STRIP, SEED_FEATURES)
     block = cv2.HOGDescriptor((32, 32), (16, 16), (8, 8), (8, 8), 8)
     for column, row in ((1, 1), (5, 2), (17, 9)):
@@ -128,7 +128,7 @@ def test_channels_are_described_in_the_order_of_the_settings() -> None:
     [SEED_FEATURES, FeatureSettings(patch=64, hog=HogSettings(block=3, channels=(2, 0)))],
     ids=["seed", "large blocks"],
 )
-def test_the_blocks_of_a_window_in_the_order_of_the_features(features: FeatureSettings) -> None:
+def test_the_blocks_of_a_window_have_the_order_of_the_features(features: FeatureSettings) -> None:
     patch = STRIP[:64, :64]
     extractor = FeatureExtractor(features)
     blocks = describe_blocks(convert(patch, features), features)
@@ -138,7 +138,7 @@ def test_the_blocks_of_a_window_in_the_order_of_the_features(features: FeatureSe
     np.testing.assert_allclose(hog, expected, atol=1e-6)
 
 
-def test_windows_are_at_their_block_positions() -> None:
+def test_the_blocks_of_a_window_are_those_at_its_position() -> None:
     blocks = describe_blocks(STRIP, SEED_FEATURES)
     columns, rows = np.array([0, 12, 5]), np.array([4, 0, 2])
     windows = window_blocks(blocks, columns, rows, SEED_FEATURES)
@@ -183,7 +183,7 @@ def test_a_window_sums_the_weights_of_its_histogram(bins: int, members: int) -> 
         assert sums[m, i, j] == pytest.approx(np.sum(counts * weights[m]), abs=2e-3)
 
 
-def test_windows_may_be_anywhere() -> None:
+def test_tables_are_summed_for_a_list_of_windows_too() -> None:
     tables = weights_of(16, 2)[0].tables
     grid = table_sums(SMALL_STRIP, tables, 32, X, Y)
     listed = table_sums(SMALL_STRIP, tables, 32, np.array([38, 0]), np.array([7, 8]))

@@ -1,4 +1,4 @@
-"""Vehicles from votes whose truth is known: windows laid around drawn boxes."""
+"""Vehicles from votes around known boxes."""
 
 from collections.abc import Sequence
 from random import Random
@@ -22,7 +22,7 @@ EVERYWHERE = Box(-1000, -1000, 5000, 5000)
 
 
 def votes_of(*votes: Vote) -> Votes:
-    """Make votes that weigh the same for whether and where."""
+    """Return votes whose weights for presence and position are equal."""
     table = np.array(votes, np.float64).reshape(-1, 5)
     return Votes(table[:, :4], table[:, 4], table[:, 4])
 
@@ -39,7 +39,7 @@ def exactly(box: Box, weight: float) -> Vote:
 
 
 def split(votes: Sequence[Vote], *regions: Box, **settings: float) -> list[HotRegion]:
-    """Give the vehicles in regions, of one that is everywhere where none is given."""
+    """Return the vehicles in regions; by default in one region that covers all votes."""
     hot = [HotRegion(box, box.center, 1.0) for box in regions or [EVERYWHERE]]
     return split_regions(hot, votes_of(*votes), VoteSettings.model_validate(settings))
 
@@ -53,18 +53,18 @@ class TestVehicles:
         (vehicle,) = split(around(LEFT))
         assert vehicle.box.iou(LEFT) > 0.9
 
-    def test_votes_that_are_the_same_are_the_vehicle(self) -> None:
+    def test_equal_votes_are_the_vehicle(self) -> None:
         (vehicle,) = split([exactly(LEFT, 0.25)] * 4)
         assert vehicle == HotRegion(LEFT, LEFT.center, 1.0)
 
-    def test_two_that_overlap_are_told_apart(self) -> None:
+    def test_two_vehicles_that_overlap_are_told_apart(self) -> None:
         found = split(around(LEFT, seed=1) + around(RIGHT, seed=2), LEFT.union(RIGHT))
         assert len(found) == 2
         left, right = sorted(boxes(found), key=lambda box: box.x)
         assert left.iou(LEFT) > 0.9
         assert right.iou(RIGHT) > 0.9
 
-    def test_the_one_that_more_votes_agree_with_comes_first(self) -> None:
+    def test_the_vehicle_that_more_votes_agree_with_comes_first(self) -> None:
         weak, strong = around(LEFT, 0.05), around(RIGHT, 0.1)
         first, second = split(weak + strong)
         assert first.box.iou(RIGHT) > 0.9
@@ -82,31 +82,31 @@ class TestVehicles:
         assert 105 < even.box.x < 115
         assert 115 < uneven.box.x < 120
 
-    def test_sides_between_pixels_go_to_the_nearest(self) -> None:
+    def test_the_sides_of_a_vehicle_are_rounded_to_pixels(self) -> None:
         (vehicle,) = split([(10.4, 20.6, 30.3, 40.3, 1)])
         assert vehicle.box == Box(10, 21, 31, 40)
         assert vehicle.centroid == pytest.approx((25.55, 40.75))
 
-    def test_one_beyond_the_sides_is_not_cut_off_here(self) -> None:
+    def test_a_vehicle_beyond_the_sides_is_not_cut_off_here(self) -> None:
         (vehicle,) = split([exactly(Box(-30, 40, 80, 60), 1)])
         assert vehicle.box == Box(-30, 40, 80, 60)
 
 
 class TestWeights:
-    def test_the_peak_is_the_weight_that_agrees(self) -> None:
+    def test_the_strength_is_the_weight_of_the_votes_that_agree(self) -> None:
         other = LEFT.moved_to(110, 100)
         (vehicle,) = split([exactly(LEFT, 0.5), exactly(other, 0.25)])
         assert vehicle.strength == pytest.approx(0.5 + 0.25 * LEFT.iou(other))
 
     @pytest.mark.parametrize(("least", "count"), [(0, 1), (0.299, 1), (0.301, 0)])
-    def test_a_vehicle_needs_some(self, least: float, count: int) -> None:
+    def test_a_vehicle_needs_a_least_weight(self, least: float, count: int) -> None:
         assert len(split([exactly(LEFT, 0.1)] * 3, least=least)) == count
 
-    def test_many_weak_votes_are_a_vehicle_and_one_is_none(self) -> None:
+    def test_many_weak_votes_are_a_vehicle_but_one_is_not(self) -> None:
         assert len(split(around(LEFT, 0.02, count=20))) == 1
         assert split(around(LEFT, 0.02, count=1)) == []
 
-    def test_whether_and_where_are_weighed_apart(self) -> None:
+    def test_presence_and_position_have_weights_of_their_own(self) -> None:
         off = LEFT.moved_to(120, 100)
         table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
         votes = Votes(table, presence=np.array([0.2, 0.6]), position=np.array([1e4, 1.0]))
@@ -114,7 +114,7 @@ class TestWeights:
         assert vehicle.box == LEFT
         assert vehicle.strength == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
 
-    def test_a_lone_sure_vote_keeps_no_vehicle_from_being_found(self) -> None:
+    def test_a_single_vote_of_high_position_weight_does_not_hide_a_vehicle(self) -> None:
         lone = exactly(LEFT.moved_to(300, 100), 0)[:4]
         table = np.array([lone, *[exactly(LEFT, 0)[:4]] * 3], np.float64)
         votes = Votes(
@@ -123,34 +123,34 @@ class TestWeights:
         (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
         assert vehicle.box == LEFT
 
-    def test_votes_without_weight_are_none(self) -> None:
+    def test_votes_without_weight_do_not_count(self) -> None:
         assert split([exactly(LEFT, 0)], least=0) == []
 
 
 class TestParts:
     BONNET = Box(110, 130, 36, 28)  # in LEFT
 
-    def test_of_a_vehicle_found_after_it_are_not_reported(self) -> None:
+    def test_a_part_found_after_its_vehicle_is_not_reported(self) -> None:
         found = split(around(LEFT, 0.1) + around(self.BONNET, 0.05, seed=3))
         assert len(found) == 1
         assert found[0].box.iou(LEFT) > 0.8
 
-    def test_of_a_vehicle_found_before_it_are_not_reported_either(self) -> None:
+    def test_a_part_found_before_its_vehicle_is_not_reported(self) -> None:
         found = split([exactly(LEFT, 0.6), exactly(self.BONNET, 1)])
         assert boxes(found) == [LEFT]
 
-    def test_that_are_far_stronger_than_what_holds_them_are_vehicles(self) -> None:
+    def test_a_box_far_stronger_than_the_one_around_it_is_a_vehicle(self) -> None:
         found = split([exactly(LEFT, 0.4), exactly(self.BONNET, 1)])
         assert boxes(found) == [self.BONNET, LEFT]
 
     def test_votes_for_a_part_of_one_vehicle_do_not_count_for_another(self) -> None:
-        part = Box(140, 110, 44, 40)  # in LEFT but for its end, which lies in RIGHT
+        part = Box(140, 110, 44, 40)  # in LEFT, except its end, which lies in RIGHT
         assert RIGHT.iou(part) > 0.1
         found = split([exactly(LEFT, 1), exactly(RIGHT, 0.5), exactly(part, 0.25)])
         assert boxes(found) == [LEFT, RIGHT]
         assert found[1].strength == 0.5
 
-    def test_what_sticks_out_far_enough_is_no_part(self) -> None:
+    def test_a_box_that_reaches_far_enough_outside_is_not_a_part(self) -> None:
         beside = self.BONNET.moved_to(LEFT.right - 18, 130)  # half of it in LEFT
         found = split([exactly(LEFT, 1), exactly(beside, 0.5)])
         assert boxes(found) == [LEFT, beside]
@@ -158,19 +158,19 @@ class TestParts:
 
 
 class TestRegions:
-    def test_hear_the_votes_whose_middle_lies_in_them(self) -> None:
+    def test_a_region_has_the_votes_whose_middle_lies_in_it(self) -> None:
         one, other = Box(0, 0, 200, 200), Box(200, 0, 200, 200)
         votes = [exactly(LEFT, 1), exactly(LEFT.moved_to(300, 100), 1)]
         assert boxes(split(votes, one)) == [LEFT]
         assert boxes(split(votes, other)) == [LEFT.moved_to(300, 100)]
         assert boxes(split(votes, other, one)) == [LEFT.moved_to(300, 100), LEFT]
 
-    def test_of_one_border_hear_a_vote_once(self) -> None:
+    def test_a_vote_on_a_border_belongs_to_one_region(self) -> None:
         vote = exactly(Box(90, 90, 20, 20), 1)  # its middle is (100, 100)
         quarters = [Box(x, y, 100, 100) for x in (0, 100) for y in (0, 100)]
         assert boxes(split([vote], *quarters)) == [Box(90, 90, 20, 20)]
 
-    def test_without_votes_have_no_vehicles(self) -> None:
+    def test_a_region_without_votes_has_no_vehicles(self) -> None:
         assert split([]) == []
         assert split(around(LEFT), Box(0, 0, 10, 10)) == []
         assert split_regions([], votes_of(*around(LEFT)), VoteSettings()) == []
@@ -182,7 +182,7 @@ def collected(*windows: Windows, **settings: float) -> Votes:
 
 
 class TestCollecting:
-    def test_each_detection_of_each_frame_votes_by_probability_times_share(self) -> None:
+    def test_presence_is_probability_times_share_for_the_hits_of_all_frames(self) -> None:
         def windows(count: int, x: int) -> Windows:
             vehicles = np.tile(np.array([x, 0, 10, 20], np.float32), (count, 1))
             vehicles[:, 0] += np.arange(count)
@@ -195,7 +195,7 @@ class TestCollecting:
         assert votes.presence.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
         assert votes.boxes.dtype == votes.presence.dtype == votes.position.dtype == np.float64
 
-    def test_where_a_vehicle_is_the_surest_know_best(self) -> None:
+    def test_position_grows_without_bound_with_the_probability(self) -> None:
         box = np.tile(np.array([10, 10, 20, 20], np.float32), (3, 1))
         sure, ones = np.array([0.5, 0.9, 1], np.float32), np.ones(3, np.float32)
         windows = Windows(np.zeros((3, 4), np.int32), sure, ones, box)
@@ -206,7 +206,7 @@ class TestCollecting:
         assert where[2] > 10 * where[1]
         assert collected(windows, sharpness=0).position.tolist() == [1, 1, 1]
 
-    def test_a_vehicle_is_voted_for_as_far_as_the_frame_shows_it(self) -> None:
+    def test_boxes_are_cut_off_at_the_sides_of_the_frame(self) -> None:
         vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
         ones = np.ones(4, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
@@ -214,7 +214,7 @@ class TestCollecting:
         assert votes.boxes.tolist() == [[90, 10, 10, 20], [0, 0, 5, 5], [60, 95, 20, 5]]
         assert len(votes.presence) == len(votes.position) == 3
 
-    def test_votes_for_a_cut_off_vehicle_agree_whatever_they_guess_of_its_rest(self) -> None:
+    def test_votes_for_a_vehicle_that_is_cut_off_agree(self) -> None:
         votes = np.array([[60, 40, width, 30] for width in (45, 60, 90, 120)], np.float32)
         quarters = np.full(4, 0.25, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
@@ -223,14 +223,14 @@ class TestCollecting:
         assert vehicle.box == Box(60, 40, 40, 30)
         assert vehicle.strength == pytest.approx(0.25)
 
-    def test_of_too_many_the_surest_are_heard_in_their_order(self) -> None:
+    def test_of_too_many_votes_the_best_positioned_are_kept_in_their_order(self) -> None:
         rng = np.random.default_rng(0)
         weights = rng.permutation(MAX_VOTES + 100) / 1000
         votes = votes_of(*((i, 0, 10, 10, weight) for i, weight in enumerate(weights.tolist())))
-        heard = votes.within(EVERYWHERE)
-        assert len(heard.position) == MAX_VOTES
-        assert heard.position.min() == 0.1
-        assert (np.diff(heard.boxes[:, 0]) > 0).all()
+        kept = votes.within(EVERYWHERE)
+        assert len(kept.position) == MAX_VOTES
+        assert kept.position.min() == 0.1
+        assert (np.diff(kept.boxes[:, 0]) > 0).all()
 
     def test_too_many_votes_of_a_vehicle_are_one_vehicle(self) -> None:
         (vehicle,) = split(around(LEFT, 0.01, count=2 * MAX_VOTES))
@@ -239,13 +239,13 @@ class TestCollecting:
 
 @pytest.mark.parametrize("agreement", [0, 1])
 @pytest.mark.parametrize("inside", [0, 1])
-def test_it_comes_to_an_end_whatever_the_settings(agreement: float, inside: float) -> None:
+def test_the_split_ends_for_any_settings(agreement: float, inside: float) -> None:
     votes = around(LEFT) + around(RIGHT)
     found = split(votes, agreement=agreement, inside=inside, least=0)
     assert 1 <= len(found) <= len(votes)
 
 
-some_votes = st.lists(  # no two of the same weight: of equal ones the first comes first
+some_votes = st.lists(  # no two of equal weight, because their order would matter
     st.tuples(
         st.floats(-50, 400),
         st.floats(-50, 300),

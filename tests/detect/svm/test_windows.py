@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from seed import SEED
 from vdet.config.schema import WindowSettings
-from vdet.detect.svm.windows import Int32Array, WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
+from vdet.geometry import Int32Array
 
 LARGE, SMALL = SEED.svm.search.windows
-ROWS = 2000  # of a frame that no band here reaches the end of
+ROWS = 2000  # of a frame that is higher than all bands here
 
 
 def band(size: int, overlap: float, top: int, bottom: int) -> WindowSettings:
@@ -68,8 +69,8 @@ def test_a_frame_narrower_than_a_window_has_none() -> None:
     assert boxes.dtype == np.int32
 
 
-def test_a_band_that_rounding_left_too_low_holds_its_windows_all_the_same() -> None:
-    low = band(64, 0.5, 0, 64).model_copy(update={"bottom": 63})  # as scaling may leave it
+def test_a_band_that_lost_a_row_to_rounding_still_has_its_windows() -> None:
+    low = band(64, 0.5, 0, 64).model_copy(update={"bottom": 63})  # as after scaling
     np.testing.assert_array_equal(boxes_of(low, 640), boxes_of(band(64, 0.5, 0, 64), 640))
 
 
@@ -84,7 +85,7 @@ def test_a_window_scaled_down_to_nothing_is_not_laid() -> None:
     assert boxes_of(nothing, 640).shape == (0, 4)
 
 
-def test_a_last_window_that_would_stick_out_by_a_pixel_is_left_out() -> None:
+def test_a_window_that_would_end_a_pixel_beyond_the_frame_is_left_out() -> None:
     # step 25 and buffer 102 are together a pixel short of 128, so 47 windows would end at 1278
     boxes = boxes_of(LARGE, 1277)
     assert (boxes[:, 0] + boxes[:, 2]).max() == 1253
@@ -144,7 +145,7 @@ def test_a_step_fills_the_span_to_its_last_pixel() -> None:
     st.integers(0, 300),
     st.integers(0, 400),
 )
-def test_stepped_windows_lie_inside_and_no_further_one_would(
+def test_windows_with_a_step_fill_the_band_as_far_as_they_fit(
     size: int, step: int, cells: int, top: int, spare: int
 ) -> None:
     settings = stepped(size, step, top, top + size + spare)
@@ -158,7 +159,7 @@ def test_stepped_windows_lie_inside_and_no_further_one_would(
     assert grid.columns * grid.step + size > width
 
 
-def test_the_share_of_a_window_is_one_over_the_windows_that_cover_a_pixel() -> None:
+def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> None:
     for settings in (band(64, 0.75, 0, 320), stepped(64, 2, 0, 320)):
         grid = lay_grid(settings, 320, 320)
         covered = np.zeros((320, 320))
@@ -168,7 +169,7 @@ def test_the_share_of_a_window_is_one_over_the_windows_that_cover_a_pixel() -> N
         assert grid.share == 1 / 16
 
 
-def test_windows_of_few_rows_share_with_fewer() -> None:
+def test_in_a_grid_of_few_rows_fewer_windows_cover_a_pixel() -> None:
     grid = WindowGrid(64, Fraction(16), Fraction(0), Fraction(100), columns=17, rows=2)
     covered = np.zeros((320, 320))
     for x, y, w, h in grid.boxes.tolist():
@@ -177,13 +178,13 @@ def test_windows_of_few_rows_share_with_fewer() -> None:
     assert grid.share == 1 / 8
 
 
-def test_windows_without_overlap_share_with_none() -> None:
+def test_without_overlap_the_share_is_one() -> None:
     assert lay_grid(band(10, 0, 0, 20), 30, 20).share == 1
     assert lay_grid(stepped(10, 12, 0, 20), 30, 20).share == 1  # with gaps between them
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
-def test_grids_of_every_nth_window_are_together_the_whole_grid(n: int) -> None:
+def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> None:
     grid = lay_grid(stepped(100, 1, 40, 300), 555, 720)  # of a fractional step
     parts = [grid.every_nth(n, column, row) for column in range(n) for row in range(n)]
     together = np.concatenate([part.boxes for part in parts])
@@ -191,7 +192,7 @@ def test_grids_of_every_nth_window_are_together_the_whole_grid(n: int) -> None:
     assert {tuple(box) for box in together.tolist()} == {tuple(b) for b in grid.boxes.tolist()}
 
 
-def test_every_second_window_from_the_second_column_and_row_on() -> None:
+def test_every_nth_window_starts_at_the_given_column_and_row() -> None:
     grid = lay_grid(band(10, 0.5, 0, 30), 30, 30).every_nth(2, 1, 1)
     assert grid.boxes[:, :2].tolist() == [[5, 5], [15, 5], [5, 15], [15, 15]]
 

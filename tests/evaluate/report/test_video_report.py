@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.evaluate.clips.evaluate import RunResult, judge, total
+from vdet.evaluate.clips.evaluate import RunResult, score_video, total
 from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
 from vdet.evaluate.report.video_charts import sweep_chart, tightness_chart, timeline_chart
 from vdet.evaluate.report.video_page import FOUND_COLOR, TILE, TRUE_COLOR, loss_pictures
@@ -21,19 +21,19 @@ def drive(id_: int, frames: range, x: float = 0) -> list[Row]:
 
 
 def run(assignments: tuple[str, ...], found: range) -> RunResult:
-    clip = judge("clip", video(*drive(1, found)), video(*drive(7, TEN)))
+    clip = score_video("clip", video(*drive(1, found)), video(*drive(7, TEN)))
     return RunResult(assignments, (clip,), total([clip]))
 
 
 def test_a_timeline_names_vehicles_tracks_and_false_alarms() -> None:
     found = video(*drive(4, range(1, 5)), *drive(9, range(6, 11)), *drive(5, TEN, x=200))
-    svg = timeline_chart(judge("clip", found, video(*drive(7, TEN))))
+    svg = timeline_chart(score_video("clip", found, video(*drive(7, TEN))))
     for name in ("vehicle 7", "#4", "#9", "false alarms"):
         assert f"<!-- {name} -->" in svg
 
 
 def test_a_timeline_without_vehicles_can_be_drawn() -> None:
-    svg = timeline_chart(judge("clip", video(), video()))
+    svg = timeline_chart(score_video("clip", video(), video()))
     assert "<!-- false alarms -->" in svg
 
 
@@ -60,7 +60,7 @@ def test_the_same_chart_twice_is_the_same_file() -> None:
 
 def test_a_loss_is_shown_by_its_middle_frame_with_boxes(clip_path: Path) -> None:
     found = video(*drive(1, TEN, x=20), *drive(2, range(2, 5), x=250))
-    result = judge("clip", found, video(*drive(7, TEN)), video=clip_path)
+    result = score_video("clip", found, video(*drive(7, TEN)), video=clip_path)
     (missed,) = loss_pictures(result, "missed")
     assert missed.title == "vehicle 7 missed, frame 5"
     assert missed.image.shape == (TILE[1], TILE[0], 3)
@@ -71,10 +71,10 @@ def test_a_loss_is_shown_by_its_middle_frame_with_boxes(clip_path: Path) -> None
 
 
 def test_the_picture_of_a_loss_at_the_edge_lies_inside_the_frame(clip_path: Path) -> None:
-    result = judge("clip", video(), video(*drive(7, TEN, x=290)), video=clip_path)
+    result = score_video("clip", video(), video(*drive(7, TEN, x=290)), video=clip_path)
     (picture,) = loss_pictures(result, "missed")
     assert picture.image[:, -8:].any(axis=2).mean() > 0.9, "no black border"
 
 
 def test_without_a_video_there_are_no_pictures() -> None:
-    assert loss_pictures(judge("clip", video(), video(*drive(7, TEN))), "missed") == []
+    assert loss_pictures(score_video("clip", video(), video(*drive(7, TEN))), "missed") == []

@@ -41,12 +41,12 @@ def read(text: str) -> list[dict[str, Any]]:
 
 def test_there_is_an_item_a_picture_with_a_list_of_boxes(tmp_path: Path) -> None:
     path = tmp_path / "boxes.json"
-    write(Output("json", path), RESULTS)
+    write(Output("json", path), RESULTS, video=None)
     assert read(path.read_text(encoding="utf-8")) == list(ITEMS)
 
 
 def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
-    write(Output("json", Path("-")), RESULTS)
+    write(Output("json", Path("-")), RESULTS, video=None)
     assert read(capsys.readouterr().out) == list(ITEMS)
 
 
@@ -54,11 +54,11 @@ def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
 def test_of_no_pictures_nothing_is_written(
     tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write(Output("json", Path("-") if name == "-" else tmp_path / name), [])
+    write(Output("json", Path("-") if name == "-" else tmp_path / name), [], video=None)
     assert list(tmp_path.iterdir()) == []
     assert capsys.readouterr().out == ""
 
 
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"boxes\.json: cannot be written"):
-        write(Output("json", tmp_path / "none" / "boxes.json"), RESULTS)
+        write(Output("json", tmp_path / "none" / "boxes.json"), RESULTS, video=None)

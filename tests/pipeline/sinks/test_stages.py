@@ -10,13 +10,16 @@ import pytest
 from pipeline.red_runs import model_for, result_of, video_info, write
 from pipeline.sinks.test_video import LANE, LENS, road_seen
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
+from vdet.detect.detections import Detections
 from vdet.draw.boxes import color_of
 from vdet.geometry import Box
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import Road
-from vdet.media.images import read_image
+from vdet.media.images import Image, read_image
+from vdet.pipeline.loop import BlindDetector
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output
+from vdet.track.track import Track
 
 NAMES = ["1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png"]
 
@@ -78,15 +81,35 @@ def test_pictures_show_the_lane_where_it_is_looked_for(tmp_path: Path, lane: Lan
 
 def test_pictures_of_an_earlier_run_are_replaced(tmp_path: Path) -> None:
     stages(tmp_path, Fraction(0), detected(CAR))
-    stages(tmp_path, Fraction(0), result_of(image=road()))
-    assert "1-boxes.png" in {path.name for path in tmp_path.iterdir()}
-    np.testing.assert_array_equal(read_image(tmp_path / "1-boxes.png"), road())
+    before = (tmp_path / "5-boxes.png").read_bytes()
+    assert stages(tmp_path, Fraction(0), detected()) == NAMES
+    assert (tmp_path / "5-boxes.png").read_bytes() != before
+
+
+def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path: Path) -> None:
+    assert stages(tmp_path, Fraction(0), result_of(CAR)) == ["1-boxes.png"]
+    lane = result_of(CAR, found=road_seen(None))
+    names = ["1-boxes.png", "2-road.png", "3-above.png", "4-mask.png", "5-fit.png"]
+    assert stages(tmp_path / "lanes", Fraction(0), lane) == names
+
+
+def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> None:
+    class Pictures(BlindDetector):
+        def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+            assert len(detections) == 0
+            return {"z-first": image // 2, "a-second": 255 - image}
+
+    result = replace(result_of(), detector=Pictures())
+    assert stages(tmp_path, Fraction(0), result) == [
+        *("1-z-first.png", "2-a-second.png", "3-boxes.png")
+    ]
+    np.testing.assert_array_equal(read_image(tmp_path / "2-a-second.png"), 255 - road(CAR))
 
 
 class TestBoxes:
     """The picture of the detections and the shown vehicles."""
 
-    def picture(self, folder: Path, result: FrameResult) -> np.ndarray:
+    def picture(self, folder: Path, result: FrameResult) -> Image:
         before = result.frame.image.copy()
         name = stages(folder, Fraction(0), result)[-1]
         np.testing.assert_array_equal(result.frame.image, before)
@@ -104,6 +127,12 @@ class TestBoxes:
         side = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
         assert (boxed[side] != plain[side]).any(axis=1).all()
         assert (boxed[: CAR.y] != plain[: CAR.y]).any(), "the label stands above the box"
+
+    def test_predicted_vehicles_are_drawn_dashed(self, tmp_path: Path) -> None:
+        track = Track(1, CAR, 0.9, predicted=True)
+        picture = self.picture(tmp_path, result_of(track, image=road()))
+        side = (picture[CAR.bottom - 1, CAR.x : CAR.right] == color_of(1)).all(axis=1)
+        assert 0.2 < side.mean() < 0.8
 
     def test_detections_are_drawn_even_where_no_vehicle_is_shown(self, tmp_path: Path) -> None:
         result = detected()

@@ -17,7 +17,7 @@ from vdet.geometry import Box
 from vdet.lanes.lane import Lane, lane_record
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, check_sink
+from vdet.pipeline.sinks.protocol import Output, check_sinks
 from vdet.track.track import Track
 
 RESULTS = (
@@ -117,7 +117,7 @@ def test_the_case_of_the_suffix_does_not_matter(tmp_path: Path) -> None:
 def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str) -> None:
     output = Output("tracks", tmp_path / name)
     with pytest.raises(OutputError, match=r"tracks are written as \.txt, \.csv, \.jsonl"):
-        check_sink(output, overwrite=False)
+        check_sinks([output], overwrite=False)
     with pytest.raises(OutputError, match="tracks are written as"):
         write(output, RESULTS)
     assert list(tmp_path.iterdir()) == []

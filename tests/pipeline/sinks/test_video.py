@@ -15,6 +15,7 @@ from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media.images import Image
 from vdet.pipeline.sinks.video import annotated
+from vdet.track.track import Track
 
 LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 CORNER = Box(0, 0, 12, 12)
@@ -45,6 +46,19 @@ def test_scores_stand_beside_the_ids_where_they_are_asked_for() -> None:
     np.testing.assert_array_equal(annotated(result_of(CAR), scores=True), expected)
 
 
+def test_predicted_vehicles_are_drawn_dashed() -> None:
+    seen, predicted = (Track(1, CAR, 0.9, predicted=flag) for flag in (False, True))
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1), "#1", dashed=True)
+    dashed = annotated(result_of(predicted), scores=False)
+    np.testing.assert_array_equal(dashed, expected)
+    solid = annotated(result_of(seen), scores=False)
+    lower = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
+    drawn, gaps = (solid[lower] == color_of(1)).all(1), (dashed[lower] != solid[lower]).any(1)
+    assert drawn.all()
+    assert 0.2 < gaps.mean() < 0.8
+
+
 def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     undistorted = road_seen(LENS)
     assert undistorted.place(CAR) != CAR
@@ -64,6 +78,16 @@ def test_a_vehicle_that_undistortion_moves_out_of_the_picture_is_not_drawn() -> 
 def test_without_a_camera_vehicles_stay_where_they_are() -> None:
     assert road_seen(None).place(CAR) == CAR
     assert (road_seen(None).image == road(CAR)).all()
+
+
+def test_the_frames_of_the_result_are_not_drawn_on() -> None:
+    with_lane = replace(road_seen(LENS), lane=LANE)
+    undistorted = with_lane.image.copy()
+    for found in (None, with_lane):
+        result = result_of(CAR, found=found)
+        annotated(result, scores=True)
+        np.testing.assert_array_equal(result.frame.image, road(CAR))
+    np.testing.assert_array_equal(with_lane.image, undistorted)
 
 
 def test_the_lane_lies_under_the_boxes() -> None:

@@ -17,8 +17,7 @@ from vdet.track.motion.association import (
     take_over_ids,
     without_duplicates,
 )
-from vdet.track.motion.state import MotionState
-from vdet.track.motion.vehicle import Vehicle
+from vdet.track.motion.vehicle import Observation, Vehicle
 
 # How well boxes fit
 
@@ -117,12 +116,13 @@ def vehicle(
     box: Float64Array = BOX,
     *,
     number: int | None = None,
-    evidence: float = SETTINGS.needed,
+    score: float = 1.0,
     confirmed: bool = True,
     unseen: float = 0,
 ) -> Vehicle:
-    state = MotionState.at_rest(box, 0.1, 2.5)
-    return Vehicle(state, evidence, confirmed, number, unseen)
+    made = Vehicle.new(Observation(box, score), 0.04, SETTINGS)
+    made.confirmed, made.id, made.unseen = confirmed, number, unseen
+    return made
 
 
 def moved(dx: float, dy: float = 0) -> Float64Array:
@@ -168,19 +168,35 @@ def without(*vehicles: Vehicle) -> list[Vehicle]:
     return without_duplicates(vehicles, SIZE, SETTINGS)
 
 
-def test_of_two_tracks_with_equal_evidence_of_one_vehicle_the_older_stays() -> None:
+def test_of_two_tracks_with_equal_scores_the_older_one_stays() -> None:
     older, younger = vehicle(number=1), vehicle(moved(10), number=2)
     assert without(older, younger) == [older]
+    assert older.id == 1
 
 
-def test_of_others_the_one_with_more_evidence_stays() -> None:
-    older, younger = vehicle(number=1, evidence=SETTINGS.needed / 2), vehicle(moved(10), number=2)
-    assert without(older, younger) == [younger]
+@pytest.mark.parametrize(("first", "second", "kept"), [(1, 2, 1), (2, 1, 1), (3, None, 3)])
+def test_of_others_the_one_with_the_higher_score_stays_under_the_older_id(
+    first: int, second: int | None, kept: int
+) -> None:
+    weaker, stronger = vehicle(number=first, score=0.6), vehicle(moved(10), number=second)
+    assert without(weaker, stronger) == [stronger]
+    assert stronger.id == kept
 
 
-def test_an_unconfirmed_track_never_pushes_a_confirmed_one_out() -> None:
-    older, younger = vehicle(number=1, evidence=0.0), vehicle(moved(10), confirmed=False)
-    assert without(younger, older) == [older]
+AROUND = np.array([430.0, 195.0, 160.0, 66.0])  # stands level with BOX, and covers most of it
+
+
+def test_an_unconfirmed_track_with_a_higher_score_waits_beside_the_confirmed_one() -> None:
+    weaker, unconfirmed = vehicle(number=1, score=0.6), vehicle(AROUND, confirmed=False)
+    assert without(weaker, unconfirmed) == [weaker, unconfirmed]
+    unconfirmed.confirmed = True
+    assert without(weaker, unconfirmed) == [unconfirmed]
+    assert unconfirmed.id == 1
+
+
+def test_an_unconfirmed_track_with_a_lower_score_is_dropped() -> None:
+    stronger, unconfirmed = vehicle(number=1), vehicle(AROUND, score=0.6, confirmed=False)
+    assert without(unconfirmed, stronger) == [stronger]
 
 
 PART = np.array([420.0, 205.0, 50.0, 30.0])

@@ -134,6 +134,17 @@ def test_traffic_with_real_differences_of_speed_is_followed_alike(seed: int, rat
     assert other.false_tracks == 0
 
 
+@every_rate
+def test_many_weak_false_detections_do_not_become_tracks(rate: int) -> None:
+    clip = [truth_at(OVERTAKING, n / rate) for n in range(int(SECONDS * rate))]
+    scores = track_scores(clip, rate, Noise(sides=0.03, missed=0.03, false=2.0, surest=0.4))
+    assert scores.false_tracks == 0
+    assert scores.id_switches == 0
+    assert scores.f1 > 0.93
+    shown_after = [(first.delay or 0) / rate for first in scores.first_detections]
+    assert max(shown_after) <= max(0.4, 3 / rate)
+
+
 @cache
 def drawn_clip() -> list[list[TrueVehicle]]:
     scene = demo_scene(1, width=1280, height=720)

@@ -25,13 +25,13 @@ def after(boxes: list[Float64Array], noise: float = 0.1) -> MotionState:
     """Follow boxes, one a frame; the state is that expected for the next."""
     state = still(boxes[0], noise)
     for box in boxes[1:]:
-        state = state.predicted(FRAME, 1.25).corrected(measurement_of(box), noise, ALL)
-    return state.predicted(FRAME, 1.25)
+        state = state.predicted(FRAME, 1.0).corrected(measurement_of(box), noise, ALL)
+    return state.predicted(FRAME, 1.0)
 
 
 def test_a_new_state_is_its_box_and_stands_still() -> None:
     assert still().box == pytest.approx(BOX)
-    assert still().predicted(FRAME, 1.25).box == pytest.approx(BOX)
+    assert still().predicted(FRAME, 1.0).box == pytest.approx(BOX)
 
 
 def test_a_steady_motion_is_predicted_without_lag() -> None:
@@ -46,7 +46,7 @@ def test_steady_growth_is_predicted_without_lag() -> None:
 
 def test_the_uncertainty_grows_with_prediction_and_falls_with_measurement() -> None:
     variance = still().covariance[:, 0, 0]
-    predicted = still().predicted(FRAME, 1.25)
+    predicted = still().predicted(FRAME, 1.0)
     corrected = predicted.corrected(measurement_of(BOX), 0.1, ALL)
     assert (predicted.covariance[:, 0, 0] > variance).all()
     assert (corrected.covariance[:, 0, 0] < variance).all()
@@ -61,7 +61,7 @@ def test_a_measurement_counts_as_much_as_it_is_surer_than_the_state(
 
 
 def test_what_was_not_seen_is_not_corrected() -> None:
-    before = still().predicted(FRAME, 1.25)
+    before = still().predicted(FRAME, 1.0)
     state = before.corrected(measurement_of(BOX * 2), 0.1, np.array([1.0, 1.0, 0.0, 1.0]))
     assert (state.mean[2] == before.mean[2]).all()
     assert (state.covariance[2] == before.covariance[2]).all()
@@ -129,7 +129,7 @@ def test_an_entering_vehicle_is_as_wide_as_what_is_seen_of_it() -> None:
 def test_entering_gives_the_velocity_of_the_inner_edge_and_no_growth() -> None:
     state = expecting(960, 200, 40, 50)
     for left in range(955, 900, -5):
-        seen = measure(state.predicted(FRAME, 1.25), np.array([left, 200, 1000 - left, 50.0]), SIZE)
+        seen = measure(state.predicted(FRAME, 1.0), np.array([left, 200, 1000 - left, 50.0]), SIZE)
         state = seen.state.corrected(seen.measured, 0.1, seen.seen)
     assert state.mean[0, 1] == pytest.approx(-5 / FRAME, abs=0.5 / FRAME)
     assert state.mean[2, 1] == 0

@@ -98,13 +98,15 @@ def truth_at(vehicles: Sequence[RoadVehicle], time: float) -> list[TrueVehicle]:
 class Noise:
     """What a detector does wrong.
 
-    `sides` is the standard deviation of a box's sides, share of its size; `missed` the share of
-    vehicles that it does not see; `false` the mean number of false detections in a frame.
+    `sides` is the standard deviation of the sides of a box, share of its size. `missed` is the
+    share of vehicles that it does not see. `false` is the mean number of false detections in a
+    frame; their scores go up to `surest`.
     """
 
     sides: float = 0.05
     missed: float = 0.1
     false: float = 0.1
+    surest: float = 0.6
 
 
 PERFECT = Noise(0, 0, 0)
@@ -125,7 +127,7 @@ def detect(truth: Iterable[TrueVehicle], noise: Noise, rng: np.random.Generator)
         width = np.exp(rng.uniform(np.log(30), np.log(200)))
         left, top = rng.uniform(0, WIDTH - width), rng.uniform(350, 600)
         boxes.append([left, top, left + width, top + 0.8 * width])
-        scores.append(rng.uniform(0.1, 0.6))
+        scores.append(rng.uniform(0.1, noise.surest))
     return Detections(np.reshape(boxes, (-1, 4)), scores)
 
 

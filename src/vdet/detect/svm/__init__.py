@@ -1,1 +1,1 @@
-"""The default detector: HOG and colour features, a linear SVM, windows, a heatmap, votes."""
+"""The detector `svm`: HOG and colour features, a linear SVM, windows, a heatmap, votes."""

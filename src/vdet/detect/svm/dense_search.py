@@ -113,7 +113,7 @@ class PhasedSearch:
     def _hogs(
         self, results: dict[tuple[int, int], GridResult], indices: IndexArray
     ) -> Float32Array:
-        """Ask the part that each window belongs to."""
+        """Return the HOG features of some windows, each from its part."""
         rows, columns = np.divmod(indices, self._shape[1])
         hogs: list[Float32Array] = []
         for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
@@ -165,9 +165,9 @@ class LocatedSearch:
         """Describe some windows, each on its own strip."""
         hogs = np.zeros((len(indices), Layout.of(self._model.features).hog_length), np.float32)
         for phase, strip in zip(self._phases, strips, strict=True):
-            asked, found = np.nonzero(indices[:, np.newaxis] == phase.indices)
-            if len(asked):
-                hogs[asked] = self._describe(strip, phase.x[found], phase.y[found])
+            rows, places = np.nonzero(indices[:, np.newaxis] == phase.indices)
+            if len(rows):
+                hogs[rows] = self._describe(strip, phase.x[places], phase.y[places])
         return hogs
 
     def _decision_values(self, strip: Image, x: IndexArray, y: IndexArray) -> Float32Array:

@@ -13,11 +13,11 @@ from vdet.detect.detections import Detections
 from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows, join_windows
-from vdet.geometry import Float32Array
 from vdet.media.images import Image
 
 log = logging.getLogger("vdet")
@@ -156,14 +156,3 @@ def horizon_of(settings: SvmSettings, images: Sequence[Image]) -> float:
     if not perspective.sizes:
         return DEFAULT_HORIZON  # no window set depends on it
     return perspective.horizon or find_horizon(images)
-
-
-def detection_scores(strengths: Float32Array, middle: float, slope: float) -> Float32Array:
-    """Return 1 / (1 + (middle / strength) ** slope), float32 `(n,)`, 0 to 1.
-
-    This is a sigmoid of the strength's logarithm (Platt 1999, "Probabilistic outputs for support
-    vector machines"). A strength of 0 has the score 0.
-    """
-    with np.errstate(divide="ignore", over="ignore"):
-        odds = (middle / strengths.astype(np.float64)) ** slope
-    return np.asarray(1 / (1 + odds), np.float32)

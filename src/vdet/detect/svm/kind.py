@@ -1,4 +1,4 @@
-"""The linear model under its name `svm`: its settings, its model file, how it is loaded."""
+"""The linear model as the kind of detector `svm`: its model files, and how it is loaded."""
 
 from pathlib import Path
 
@@ -29,22 +29,22 @@ def shipped_model(settings: SvmSettings) -> Path:
 
 
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
-    """Load a linear model.
+    """Load a linear model; `path` is its file, None for the shipped one.
 
-    Features that differ from the default must be those that the model was trained with; else the
-    model's own are taken.
+    Where the settings leave the default features, the model's own are used; other features must be
+    those that the model was trained with.
 
     Raises
     ------
     ModelError
-        The file cannot be used, or was trained with other features than the settings ask for.
+        The file cannot be used, or the model was trained with other features.
     """
-    model = load_model(path or shipped_model(settings), asked_features(settings))
+    model = load_model(path or shipped_model(settings), requested_features(settings))
     return SvmModel(model, settings)
 
 
-def asked_features(settings: SvmSettings) -> FeatureSettings | None:
-    """Return the features that a model must have; None where the default ones were left."""
+def requested_features(settings: SvmSettings) -> FeatureSettings | None:
+    """Return the features that a model must have; None where the settings leave the default."""
     return None if settings.features == FeatureSettings() else settings.features
 
 

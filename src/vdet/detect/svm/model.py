@@ -69,7 +69,7 @@ class LinearModel:
         float32 `(k,)`.
     provenance
         Where the model comes from: data set, metrics, versions; JSON values.
-    boxes
+    box_regression
         None where no training patch came with the box of its vehicle.
     """
 
@@ -79,7 +79,7 @@ class LinearModel:
     slopes: Float32Array
     offsets: Float32Array
     provenance: dict[str, Any] = field(default_factory=dict)
-    boxes: BoxRegression | None = None
+    box_regression: BoxRegression | None = None
 
     def probabilities(self, vectors: Float32Array) -> Float32Array:
         """Return the probability that each vector is of a vehicle, `(m, n)` → `(m,)`."""
@@ -104,8 +104,8 @@ def save_model(model: LinearModel, path: Path) -> None:
         "provenance": model.provenance,
     }
     arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
-    if model.boxes is not None:
-        parts = (model.boxes.weights, model.boxes.biases)
+    if model.box_regression is not None:
+        parts = (model.box_regression.weights, model.box_regression.biases)
         arrays |= {
             name: part.astype(np.float32) for name, part in zip(_BOX_ARRAYS, parts, strict=True)
         }
@@ -132,7 +132,7 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         _features(header, path),
         **arrays,
         provenance=header.get("provenance", {}),
-        boxes=BoxRegression(*boxes) if boxes else None,
+        box_regression=BoxRegression(*boxes) if boxes else None,
     )
     _check_arrays(model, path)
     if features is not None and features != model.features:
@@ -150,8 +150,8 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Float32Array]]:
             unpacked = sum(member.file_size for member in archive.infolist())
             if unpacked > _MAX_BYTES:
                 raise ModelError(
-                    f"{path}: is too large for a model: {unpacked:,} bytes when unpacked, at most "
-                    f"{_MAX_BYTES:,} are read"
+                    f"{path}: is far too large for a model: {unpacked:,} bytes when unpacked, "
+                    f"at most {_MAX_BYTES:,} are read"
                 )
             header = _parse_header(_read_array(archive, "header", path), path)
             with_boxes = any(f"{name}.npy" in archive.namelist() for name in _BOX_ARRAYS)
@@ -224,9 +224,9 @@ def _check_arrays(model: LinearModel, path: Path) -> None:
     for name in _ARRAYS[1:]:
         _check_array(getattr(model, name), (members,), name, path)
     _check_array(model.weights, expected, "weights", path)
-    if model.boxes is not None:
-        _check_array(model.boxes.weights, (4, layout.hog_length), _BOX_ARRAYS[0], path)
-        _check_array(model.boxes.biases, (4,), _BOX_ARRAYS[1], path)
+    if model.box_regression is not None:
+        _check_array(model.box_regression.weights, (4, layout.hog_length), _BOX_ARRAYS[0], path)
+        _check_array(model.box_regression.biases, (4,), _BOX_ARRAYS[1], path)
 
 
 def _check_array(array: Float32Array, shape: tuple[int, ...], name: str, path: Path) -> None:
@@ -238,9 +238,9 @@ def _check_array(array: Float32Array, shape: tuple[int, ...], name: str, path: P
         raise ModelError(f"{path}: {name} hold a value beyond {MAX_VALUE:g}; train it again")
 
 
-def _difference(ours: FeatureSettings, asked: FeatureSettings) -> str:
+def _difference(trained: FeatureSettings, requested: FeatureSettings) -> str:
     return ", ".join(
-        f"detector.features.{name}: {getattr(ours, name)}, asked for {getattr(asked, name)}"
-        for name in type(ours).model_fields
-        if getattr(ours, name) != getattr(asked, name)
+        f"detector.features.{name}: {getattr(trained, name)}, asked for {getattr(requested, name)}"
+        for name in type(trained).model_fields
+        if getattr(trained, name) != getattr(requested, name)
     )

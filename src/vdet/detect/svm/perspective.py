@@ -1,4 +1,4 @@
-"""Window sets that follow the perspective: the size of a vehicle tells how far it stands.
+"""Window sets that follow the perspective: the size of a vehicle gives its row.
 
 On a flat road, a vehicle of width w stands on the row horizon + w · (height of the camera) /
 (real width of the vehicle): the farther, the smaller and the nearer to the horizon. So the horizon

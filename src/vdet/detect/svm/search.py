@@ -87,7 +87,7 @@ class FrameSearch:
         self._sets = [_WindowSet(grid, engine(model, grid)) for grid in grids]
         self._alternate = min(settings.search.alternate, len(grids))
         self._probability = settings.search.probability
-        self._regression = model.boxes
+        self._regression = model.box_regression
 
     def sets_of(self, index: int) -> range:
         """Return the indices of the sets that are searched in frame `index` of a video."""

@@ -123,7 +123,7 @@ def _average(
 
 
 def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox], inside: float) -> bool:
-    """Tell whether this box lies in a larger one on which at least half as many votes agree."""
+    """Return whether it lies in a larger box that has more than half its `position` weight."""
     box = vehicle.box
     return any(
         other.box[2] * other.box[3] > box[2] * box[3]

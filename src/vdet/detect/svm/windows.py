@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import WindowSettings
-from vdet.geometry import Float32Array
+from vdet.geometry import Float32Array, Int32Array
 
 IndexArray = npt.NDArray[np.intp]
-Int32Array = npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,22 +1,27 @@
-"""A video with its truth, and the boxes that are found in it."""
+"""A labelled video, and the vehicles that are found in it under one or several settings.
 
-from collections.abc import Callable, Sequence
+The search takes nearly all the time, so settings that search alike share it: every frame is
+searched once for them, and only what follows the search runs for each.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
+from vdet.detect.protocol import DetectorModel
 from vdet.errors import ImageError, VideoError
-from vdet.evaluate.clips.following import follow_under_all
 from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.truth import read_truth
 from vdet.files import OutputFiles
-from vdet.media import VideoReader
+from vdet.media import Frame, VideoInfo, VideoReader
+from vdet.pipeline.loop import Progress, peek
+from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, SinkContext, open_sink
+from vdet.pipeline.threads import single_threaded_libraries
+from vdet.track.factory import make_tracker
 from vdet.track.track import Track
-
-Advance = Callable[[int], object]
-Progress = Callable[[int | None], Advance]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,13 +34,25 @@ class Clip:
     until: int | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Variant:
+    """Settings to compare with others, and the detector that was loaded with them.
+
+    `assignments` are those in which the settings differ from the others, as `--set` takes them.
+    """
+
+    settings: Settings
+    model: DetectorModel
+    assignments: tuple[str, ...] = ()
+
+
 def open_clip(video: Path, truth_path: Path, until: int | None = None) -> Clip:
     """Read the truth of a video.
 
     Parameters
     ----------
     until
-        Number of the last frame to look at, from 1; without it, the last that the truth knows of.
+        Number of the last frame to use, from 1; None: the last that the truth covers.
 
     Raises
     ------
@@ -48,10 +65,9 @@ def open_clip(video: Path, truth_path: Path, until: int | None = None) -> Clip:
     return Clip(video, truth_path, truth, until or truth.last_frame or None)
 
 
-def detect(
+def find_tracks(
     clip: Clip,
-    variants: Sequence[Settings],
-    model: Path | None,
+    variants: Sequence[Variant],
     progress: Progress,
     outputs: Sequence[Output] = (),
 ) -> list[LabelledVideo]:
@@ -59,33 +75,33 @@ def detect(
 
     Parameters
     ----------
-    model
-        Model file of the detector; None for the shipped one.
-    outputs
-        What else gets the results under the first of the settings.
     progress
         Called with the expected number of frames (None: unknown); what it returns is called with
         the number of frames done since the last call.
+    outputs
+        Outputs that get the results under the first of the settings.
 
     Raises
     ------
     VideoError
         The video cannot be read or searched.
     TruthError
-        The truth knows of frames beyond the end of the video.
+        The truth covers frames beyond the end of the video.
+    OutputError
+        An output cannot be written.
     """
     rows: list[list[Row]] = [[] for _ in variants]
     frames = 0
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles())
         reader = stack.enter_context(
-            VideoReader(clip.video, frames=clip.until, settings=variants[0].input)
+            VideoReader(clip.video, frames=clip.until, settings=variants[0].settings.input)
         )
-        context = SinkContext(files, variants[0], reader.info)
+        context = SinkContext(files, variants[0].settings, reader.info)
         sinks = [stack.enter_context(open_sink(output, context)) for output in outputs]
         advance = progress(reader.expected)
         try:
-            for results in follow_under_all(reader, variants, model, reader.info):
+            for results in follow_variants(reader, variants, reader.info):
                 for sink in sinks:
                     sink.write(results[0])
                 for row, result in zip(rows, results, strict=True):
@@ -94,10 +110,43 @@ def detect(
                 advance(1)
         except ImageError as error:
             raise VideoError(f"{clip.video}: {error}") from error
+        if clip.until is not None and frames < clip.until:
+            read_truth(clip.truth_path, frame_count=frames)  # raises an error with the line
         rate = float(reader.info.rate)
-    if clip.until is not None and frames < clip.until:
-        read_truth(clip.truth_path, frame_count=frames)  # refuses it, and names the line
     return [LabelledVideo.from_rows(each, frame_count=frames, rate=rate) for each in rows]
+
+
+def follow_variants(
+    frames: Iterable[Frame], variants: Sequence[Variant], video: VideoInfo
+) -> Iterator[list[FrameResult]]:
+    """Return for each frame a result for each of the settings, in their order.
+
+    The results under one of the settings do not depend on the others, and are those of
+    `vdet.pipeline.loop.follow_frames`.
+
+    Raises
+    ------
+    ImageError
+        Such frames cannot be searched.
+    """
+    images, frames = peek(frames)
+    size = video.width, video.height
+    detectors = [each.model.for_video(*size, images) for each in variants]
+    trackers = [make_tracker(each.settings, *size) for each in variants]
+    keys = [each.settings.detector.search_key for each in variants]
+    searchers = dict(zip(keys, detectors, strict=True))
+    with single_threaded_libraries():
+        for frame in frames:
+            candidates = {
+                key: searcher.search(frame.image, frame.index)
+                for key, searcher in searchers.items()
+            }
+            results = []
+            for key, detector, tracker in zip(keys, detectors, trackers, strict=True):
+                detections = detector.detect(candidates[key])
+                tracks = tuple(tracker.update(detections, float(frame.time), frame.image))
+                results.append(FrameResult(video.path, frame, detections, tracks, None, detector))
+            yield results
 
 
 def _row(number: int, track: Track) -> Row:

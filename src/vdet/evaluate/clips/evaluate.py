@@ -1,12 +1,11 @@
-"""Labelled videos × settings → scores."""
+"""Scores of labelled videos under one or several settings."""
 
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.config.schema import Settings
-from vdet.evaluate.clips.clip import Clip, Progress, detect
+from vdet.evaluate.clips.clip import Clip, Variant, find_tracks
 from vdet.evaluate.clips.losses import Loss, losses
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.labelled_video import LabelledVideo
@@ -15,6 +14,7 @@ from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.scores import Scores, score_comparison
 from vdet.evaluate.timelines import Timeline, timelines
 from vdet.evaluate.truth import read_truth
+from vdet.pipeline.loop import Progress, no_progress
 from vdet.pipeline.sinks.protocol import Output
 
 log = logging.getLogger("vdet")
@@ -22,9 +22,9 @@ log = logging.getLogger("vdet")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClipResult:
-    """One video under one setting.
+    """The scores of one video under one of the settings.
 
-    `name` is what tables call it; `video` is the file, None where only its tracks are known.
+    `name` stands in tables; `video` is the file, None where a file of tracks is scored.
     """
 
     name: str
@@ -37,9 +37,9 @@ class ClipResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunResult:
-    """All videos under one setting, and their total.
+    """The scores of all videos under one of the settings, and their total.
 
-    `assignments` are what sets this one apart, as `--set` takes them.
+    `assignments` are those in which these settings differ from the others, as `--set` takes them.
     """
 
     assignments: tuple[str, ...]
@@ -47,50 +47,38 @@ class RunResult:
     total: Scores
 
 
-@dataclass(frozen=True, slots=True)
-class Variant:
-    """Settings, and the assignments that set them apart from the others."""
-
-    assignments: tuple[str, ...]
-    settings: Settings
-
-
 def evaluate_clips(
     clips: Sequence[Clip],
-    model: Path | None,
     variants: Sequence[Variant],
-    progress: Progress = lambda _: lambda _: None,
+    progress: Progress = no_progress,
     *,
     outputs: Sequence[Output] = (),
 ) -> list[RunResult]:
-    """Run detection on every clip, once for all settings, and score each.
+    """Find the vehicles in every clip, in one pass for all settings, and score each.
 
     Parameters
     ----------
-    model
-        Model file of the detector; None for the shipped one.
-    outputs
-        What else gets the results: only with one clip and one variant.
     progress
-        As `detect` takes it, called for each clip.
+        As `find_tracks` takes it, called for each clip.
+    outputs
+        Outputs that get the results; only with one clip and one variant.
 
     Raises
     ------
-    VideoError, TruthError
-        As `detect`.
+    VideoError, TruthError, OutputError
+        As `find_tracks`.
     """
-    settings = [variant.settings for variant in variants]
-    found = [detect(clip, settings, model, progress, outputs) for clip in clips]
+    found = [find_tracks(clip, variants, progress, outputs) for clip in clips]
     results = []
     for number, variant in enumerate(variants):
         of_clips = [
-            _judge_clip(clip, each[number]) for clip, each in zip(clips, found, strict=True)
+            _score_clip(clip, each[number]) for clip, each in zip(clips, found, strict=True)
         ]
         results.append(RunResult(variant.assignments, tuple(of_clips), total(of_clips)))
     return results
 
 
-def judge(
+def score_video(
     name: str,
     prediction: LabelledVideo,
     truth: LabelledVideo,
@@ -98,7 +86,7 @@ def judge(
     video: Path | None = None,
     rate: float | None = None,
 ) -> ClipResult:
-    """Score the predictions for a video, and say where they fail; arguments as `compare`'s."""
+    """Score the predictions for a video and list their errors; arguments as in `compare`."""
     comparison = compare(prediction, truth, rate=rate)
     matched = match(comparison)
     return ClipResult(
@@ -111,12 +99,12 @@ def judge(
     )
 
 
-def _judge_clip(clip: Clip, found: LabelledVideo) -> ClipResult:
+def _score_clip(clip: Clip, found: LabelledVideo) -> ClipResult:
     truth = clip.truth.until(found.last_frame)
-    return judge(str(clip.video), found, truth, video=clip.video)
+    return score_video(str(clip.video), found, truth, video=clip.video)
 
 
-def judge_files(
+def score_files(
     prediction: Path, truth: Path, *, until: int | None = None, rate: float | None = None
 ) -> RunResult:
     """Score a file of tracks against a file of truth.
@@ -124,8 +112,8 @@ def judge_files(
     Parameters
     ----------
     until
-        Number of the last frame to look at, from 1; without it, predictions beyond the last true
-        frame are false alarms (a warning tells so).
+        Number of the last frame to use, from 1. If it is None, predictions beyond the last true
+        frame are false alarms; a warning says so.
     rate
         As `compare` takes it.
 
@@ -139,11 +127,11 @@ def judge_files(
         found, true = found.until(until), true.until(until)
     elif len(found) and found.frames[-1] > true.last_frame:
         log.warning(
-            "%s: has boxes up to frame %d, the truth ends with frame %d; what is beyond counts as "
-            "false alarms unless --until %d",
+            "%s: has boxes up to frame %d, the truth ends with frame %d; boxes after it "
+            "count as false alarms unless you give --until %d",
             *(prediction, found.frames[-1], true.last_frame, true.last_frame),
         )
-    result = judge(str(prediction), found, true, rate=rate)
+    result = score_video(str(prediction), found, true, rate=rate)
     return RunResult((), (result,), result.scores)
 
 
@@ -153,5 +141,5 @@ def total(clips: Sequence[ClipResult]) -> Scores:
 
 
 def best(runs: Sequence[RunResult]) -> RunResult:
-    """Return the run with the highest F1; of equals the first."""
+    """Return the run with the highest F1, the first of equal ones."""
     return max(runs, key=lambda run: run.total.f1)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vdet.config.schema import Settings, SvmSettings
+from vdet.detect.detections import Detections
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import SvmDetector, horizon_of
@@ -15,20 +16,26 @@ from vdet.detect.svm.features import to_patch
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import lay_grids
 from vdet.detect.svm.windows import Windows
-from vdet.errors import DataError, ImageError, TruthError, VideoError
+from vdet.errors import DataError, FrameSizeError, ImageError, TruthError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.truth import read_truth
+from vdet.geometry import Int32Array
 from vdet.learn.dataset import PatchArchive, patch_archive
-from vdet.learn.mining.choosing import Choice, Kind, choose, scored_windows
-from vdet.learn.mining.placing import cut_sides
+from vdet.learn.mining.choosing import (
+    ChosenWindow,
+    PatchKind,
+    choose_windows,
+    compare_windows,
+    cut_sides,
+)
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
-from vdet.pipeline.loop import peek
+from vdet.pipeline.loop import Progress, no_progress, peek
 
 PATCH = 64
 """Side of the patches, pixels, as in the Udacity set."""
 
-_FOLDERS: dict[Kind, str] = {
+_FOLDERS: dict[PatchKind, str] = {
     "vehicle": "vehicles/mined_{}",
     "box": "boxes/mined_{}",
     "false alarm": "non-vehicles/mined_{}",
@@ -53,7 +60,7 @@ class MiningJob:
 
 
 @dataclass(frozen=True, slots=True)
-class Mined:
+class MiningResult:
     """Number of frames searched, and of patches of each kind."""
 
     frames: int
@@ -68,8 +75,8 @@ def mine(
     settings: Settings,
     model: Path | None = None,
     *,
-    progress: Callable[[int | None], Callable[[int], object]] = lambda _: lambda _: None,
-) -> Mined:
+    progress: Progress = no_progress,
+) -> MiningResult:
     """Search the labelled frames and write patches for the training.
 
     Patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
@@ -103,11 +110,11 @@ def mine(
             f"{job.truth}: covers the frames up to {truth.last_frame}; mine some of these"
         )
     searched, number = 0, 0
-    counts: Counter[Kind] = Counter()
+    counts: Counter[PatchKind] = Counter()
     with VideoReader(job.video, frames=last) as reader, patch_archive(job.output) as archive:
         advance = progress(last)
         images, frames = peek(reader)
-        windows_of = _search(job, detector, reader.info, images)
+        search = _window_search(job, detector, reader.info, images)
         for frame in frames:
             number = frame.index + 1
             labelled = truth.frame(number)
@@ -115,9 +122,9 @@ def mine(
             wanted = regular or _cuts_off_a_vehicle(labelled, reader.info.width)
             if wanted and number >= job.first:
                 searched += 1
-                choices = _choices(windows_of(frame.image), labelled, frame, settings)
-                _add(archive, frame, choices, job.video.stem)
-                counts.update(choice.kind for choice in choices)
+                chosen = _choose(search(frame.image), labelled, frame, settings)
+                _add(archive, frame, chosen, job.video.stem)
+                counts.update(window.kind for window in chosen)
             advance(1)
         if number < last:
             read_truth(job.truth, frame_count=number)  # raises an error with the line
@@ -125,37 +132,67 @@ def mine(
             raise DataError(
                 f"{job.video}: no window fits a vehicle or is a false alarm; try others"
             )
-    return Mined(searched, counts["vehicle"], counts["box"], counts["false alarm"], counts["part"])
+    kinds: tuple[PatchKind, ...] = ("vehicle", "box", "false alarm", "part")
+    return MiningResult(searched, *(counts[kind] for kind in kinds))
 
 
-def _search(
-    job: MiningJob,
-    model: DetectorModel,
-    info: VideoInfo,
-    images: Sequence[Image],
+def _window_search(
+    job: MiningJob, model: DetectorModel, info: VideoInfo, images: Sequence[Image]
 ) -> Callable[[Image], Windows]:
     """Return a function that returns the windows of a frame with their probabilities.
 
-    Those of the linear model are its own. For another detector they are laid as the linear model's
-    settings say, and a window has the score of the detection that it fits.
+    Those of the linear model are its own. For another detector they are laid as the default
+    settings of the linear model say, and a window has the score of the detection that it fits.
     """
     size = info.width, info.height
     try:
         detector = model.for_video(*size, images)
         if isinstance(detector, SvmDetector):
             return lambda image: detector.search(image, None).windows
-        svm = SvmSettings()
-        horizon = horizon_of(svm, images)
-        grids = lay_grids(svm, svm.features, *size, horizon=horizon)
+        boxes = _default_windows(*size, images)
     except ImageError as error:
         raise VideoError(f"{job.video}: {error}") from error
-    boxes = np.concatenate([grid.boxes for grid in grids])
 
     def search(image: Image) -> Windows:
-        detections = detector.detect(detector.search(image, None))
-        return scored_windows(boxes, detections, info.width)
+        still = model.for_video(*size, [image])
+        return score_windows(boxes, still.detect(still.search(image, None)), info.width)
 
     return search
+
+
+def _default_windows(width: int, height: int, images: Sequence[Image]) -> Int32Array:
+    """Return the windows that the linear model searches by default, int32 `(n, 4)`.
+
+    Raises
+    ------
+    FrameSizeError
+        No window fits into such a frame.
+    """
+    svm = SvmSettings()
+    grids = lay_grids(svm, svm.features, width, height, horizon=horizon_of(svm, images))
+    if not grids:
+        raise FrameSizeError(
+            f"no window fits into a frame of {width}×{height} pixels; give a larger one"
+        )
+    return np.concatenate([grid.boxes for grid in grids])
+
+
+def score_windows(boxes: Int32Array, detections: Detections, frame_width: int) -> Windows:
+    """Return windows with the highest score of the detections that each fits; 0 where none fits.
+
+    Parameters
+    ----------
+    boxes
+        int32 `(n, 4)`: x, y, width, height of square windows, frame pixels.
+    """
+    scores = np.zeros(len(boxes), np.float32)
+    squares = boxes.astype(np.float64)
+    corners = detections.boxes.astype(np.float64)
+    found = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+    for box, score in zip(found, detections.scores.tolist(), strict=True):
+        fits = compare_windows(squares, box, frame_width).fits
+        scores[fits] = np.maximum(scores[fits], score)
+    return Windows(boxes, scores, np.ones_like(scores), boxes.astype(np.float32))
 
 
 def _cuts_off_a_vehicle(truth: LabelledVideo, width: int) -> bool:
@@ -163,20 +200,20 @@ def _cuts_off_a_vehicle(truth: LabelledVideo, width: int) -> bool:
     return any(cut_sides(box, width).any() for box in truth.boxes[~truth.ignored])
 
 
-def _choices(
+def _choose(
     windows: Windows, truth: LabelledVideo, frame: Frame, settings: Settings
-) -> list[Choice]:
+) -> list[ChosenWindow]:
     """Choose at random, with a seed that depends on the frame alone."""
     rng = np.random.default_rng((settings.training.seed, frame.index))
-    return list(choose(windows, truth, frame.image.shape[1], settings.mining, rng))
+    return list(choose_windows(windows, truth, frame.image.shape[1], settings.mining, rng))
 
 
-def _add(archive: PatchArchive, frame: Frame, choices: Sequence[Choice], stem: str) -> None:
+def _add(archive: PatchArchive, frame: Frame, chosen: Sequence[ChosenWindow], stem: str) -> None:
     width = frame.image.shape[1]
-    beyond = max((max(-each.box.x, each.box.right - width) for each in choices), default=0)
+    beyond = max((max(-each.box.x, each.box.right - width) for each in chosen), default=0)
     pixels = FramePyramid(frame.image, margin=max(0, beyond))
-    for choice in choices:
-        box = choice.box
-        place = f"frame{frame.index + 1:06}_x{box.x:04}_y{box.y:04}_s{box.width:04}"
+    for window in chosen:
+        box = window.box
+        name = f"frame{frame.index + 1:06}_x{box.x:04}_y{box.y:04}_s{box.width:04}"
         patch = to_patch(pixels.crop(box.x, box.y, box.width, box.height), PATCH)
-        archive.add(f"{_FOLDERS[choice.kind].format(stem)}/{place}.png", patch, choice.sides)
+        archive.add(f"{_FOLDERS[window.kind].format(stem)}/{name}.png", patch, window.sides)

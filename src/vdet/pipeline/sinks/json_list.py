@@ -7,9 +7,7 @@ from typing import Any, Self
 
 from vdet.lanes.lane import lane_record
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
-
-STANDARD_OUTPUT = Path("-")
+from vdet.pipeline.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
 
 
 class JsonSink:
@@ -60,4 +58,4 @@ class JsonSink:
         self._items.append(item)
 
 
-JSON = SinkKind(JsonSink, what="lists of boxes")
+JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")

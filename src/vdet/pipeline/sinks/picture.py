@@ -40,4 +40,4 @@ class PictureSink:
         self._context.files.stage(self._path).write_bytes(data)
 
 
-PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures")
+PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures", takes="pictures")

@@ -1,18 +1,21 @@
 """What the rest of the program knows of an output, and how outputs are opened by name."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
-from vdet.errors import OutputError
+from vdet.errors import OutputError, VdetError
 from vdet.files import OutputFiles, check_output, make_folder
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
 from vdet.plugins import SINKS, load_plugin
+
+STANDARD_OUTPUT = Path("-")
 
 
 class Sink(Protocol):
@@ -81,12 +84,18 @@ class SinkKind:
     marker
         For an output that is a folder, which is made: a pattern of the files in it that tell that
         it was written before.
+    writes_standard_output
+        Whether the path `-` means standard output.
+    takes
+        "videos" or "pictures" if the sink can take results of these only.
     """
 
     open: Callable[[Path, SinkContext], Sink]
     suffixes: Sequence[str] = ()
     what: str = "outputs"
     marker: str = ""
+    writes_standard_output: bool = False
+    takes: Literal["videos", "pictures", "both"] = "both"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,28 +112,88 @@ def sink_kind(name: str) -> SinkKind:
     return kind
 
 
-def check_sink(
-    output: Output, *, overwrite: bool, inputs: Iterable[Path] = (), makes_folder: bool = False
+def check_sinks(
+    outputs: Sequence[Output],
+    *,
+    overwrite: bool,
+    inputs: Sequence[Path] = (),
+    makes_folder: bool = False,
 ) -> None:
-    """Refuse, before any work, an output that could not be written; arguments as `check_output`.
+    """Refuse, before any work, outputs that could not be written; arguments as `check_output`.
 
     Raises
     ------
     OutputError
-        The suffix is not one of the sink's, or the output cannot be written or is there already.
+        Two outputs have one path, a suffix is not one of the sink's, or an output cannot be written
+        or is there already.
     ConfigError
-        There is no sink of that name.
+        There is no sink of a name.
     """
-    kind, path = _kind_for(output), output.path
-    if kind.marker:
-        make_folder(path)
-        path = next(path.glob(kind.marker), path / kind.marker)
-    check_output(path, overwrite=overwrite, inputs=inputs, makes_folder=makes_folder)
+    seen: set[Path] = set()
+    for output in outputs:
+        kind, path = _kind_for(output), output.path
+        if kind.writes_standard_output and path == STANDARD_OUTPUT:
+            continue
+        if path.resolve() in seen:
+            raise OutputError(f"{path}: is given for two outputs; name another file for one")
+        seen.add(path.resolve())
+        if kind.marker:
+            make_folder(path)
+            path = next(path.glob(kind.marker), path / kind.marker)
+        check_output(path, overwrite=overwrite, inputs=inputs, makes_folder=makes_folder)
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:
-    """Open the sink of an output. Raises `ConfigError`, `OutputError`, `VideoError`."""
-    return _kind_for(output).open(output.path, context)
+    """Open the sink of an output; an `OSError` that it raises becomes one that names the output.
+
+    Raises
+    ------
+    OutputError
+        The sink does not take such results, the suffix is not one of the sink's, or the output
+        cannot be written.
+    ConfigError
+        There is no sink of that name.
+    """
+    kind = _kind_for(output)
+    source = "pictures" if context.video is None else "videos"
+    if kind.takes not in ("both", source):
+        raise OutputError(
+            f"{output.path}: the sink {output.sink} is for {kind.takes}; give another for {source}"
+        )
+    with _naming(output.path):
+        return _NamedSink(kind.open(output.path, context), output.path)
+
+
+class _NamedSink:
+    """A `Sink` whose `OSError` becomes an `OutputError` with the path of its output."""
+
+    def __init__(self, sink: Sink, path: Path) -> None:
+        self._sink = sink
+        self._path = path
+
+    def __enter__(self) -> Self:
+        with _naming(self._path):
+            self._sink.__enter__()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        with _naming(self._path):
+            self._sink.__exit__(*raised)
+
+    def write(self, result: FrameResult) -> None:
+        with _naming(self._path):
+            self._sink.write(result)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except VdetError:
+        raise
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputError(f"{path}: cannot be written: {reason}") from error
 
 
 def _kind_for(output: Output) -> SinkKind:

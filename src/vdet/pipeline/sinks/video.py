@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from vdet.draw.boxes import color_of, draw_box
-from vdet.errors import OutputError
 from vdet.lanes.drawing import draw_lane
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
-from vdet.media.writer import SUFFIXES
+from vdet.media.writer import VIDEO_SUFFIXES
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.threads import write_async
@@ -22,8 +21,7 @@ class VideoSink:
     """Draws into the frames, and encodes them in a thread."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        if context.video is None:
-            raise OutputError(f"{path}: the sink video is for videos; use the sink picture")
+        assert context.video is not None  # `takes` says so
         self._path = path
         self._context = context
         self._video = context.video
@@ -56,7 +54,7 @@ class VideoSink:
         self._encode(Frame(result.frame.index, result.frame.time, image))
 
 
-VIDEO = SinkKind(VideoSink, SUFFIXES, "videos")
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos")
 
 
 def annotated(result: FrameResult, *, scores: bool) -> Image:

@@ -13,7 +13,7 @@ For each vehicle a Kalman filter (`state`) estimates where it is in the next fra
 6.  a vehicle without a detection is shown by prediction for a short time; not behind another one
     that covers most of it. It is remembered for longer, and keeps its id;
 7.  a new vehicle near the expected place of a lost one is the same vehicle; of two tracks of one
-    vehicle the one with more evidence stays, or else the older one (`association`).
+    vehicle the one with the higher score stays, under the older id (`association`).
 
 All times are seconds, so that tracks do not depend on the frame rate.
 """

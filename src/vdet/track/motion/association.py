@@ -106,17 +106,44 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
 def without_duplicates(
     vehicles: Sequence[Vehicle], size: tuple[int, int], settings: MotionTrackerSettings
 ) -> list[Vehicle]:
-    """Drop tracks of a vehicle that has another one with more evidence, or else an older one."""
+    """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
+
+    It takes the lowest id of those dropped. A track that is not confirmed replaces no other one; it
+    stays beside it while its score is higher.
+    """
     kept: list[Vehicle] = []
-    for vehicle in sorted(vehicles, key=lambda v: (not v.confirmed, -v.evidence)):
-        seen = [v.state.box for v in kept if v.confirmed and not v.unseen]
-        if vehicle.unseen == 0 and seen:
-            box, *others = visible(np.stack([vehicle.state.box, *seen]), size)
-            inside = not vehicle.confirmed and is_part(box, np.stack(others), settings.part)
-            if inside or is_same(box, np.stack(others)):
-                continue
-        kept.append(vehicle)
+    for vehicle in sorted(vehicles, key=_rank):
+        same = _track_of_same(vehicle, kept, size, settings)
+        if same is None:
+            kept.append(vehicle)
+        elif vehicle.id is not None:
+            same.id = vehicle.id if same.id is None else min(same.id, vehicle.id)
     return [vehicle for vehicle in vehicles if vehicle in kept]
+
+
+def _rank(vehicle: Vehicle) -> tuple[bool, float]:
+    """Sort confirmed vehicles first, then by score; nearly equal scores keep their order."""
+    return not vehicle.confirmed, -round(vehicle.score, 2)
+
+
+def _track_of_same(
+    vehicle: Vehicle,
+    others: Sequence[Vehicle],
+    size: tuple[int, int],
+    settings: MotionTrackerSettings,
+) -> Vehicle | None:
+    """Return the track among `others`, higher in rank, that shows the same vehicle."""
+    if vehicle.unseen:
+        return None
+    for other in others:
+        if not other.confirmed or other.unseen:
+            continue
+        box, there = visible(np.stack([vehicle.state.box, other.state.box]), size)
+        weaker = vehicle.confirmed or vehicle.score <= other.score
+        part = not vehicle.confirmed and is_part(box, there[np.newaxis], settings.part)
+        if part or (weaker and is_same(box, there[np.newaxis])):
+            return other
+    return None
 
 
 def _distance(one: Vehicle, other: Vehicle) -> float:

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.evaluate.clips.evaluate import RunResult, best, judge, judge_files, total
+from vdet.evaluate.clips.evaluate import RunResult, best, score_files, score_video, total
 from vdet.evaluate.clips.text import plain, run_lines, sweep_rows
 from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
 
@@ -16,7 +16,7 @@ def video(frames: range, x: float = 0) -> LabelledVideo:
 
 def run(assignments: tuple[str, ...], *found: range) -> RunResult:
     """Return a run over as many clips; in each the vehicle is found in these of ten frames."""
-    clips = [judge(f"clip {i}", video(frames), video(TEN)) for i, frames in enumerate(found)]
+    clips = [score_video(f"clip {i}", video(frames), video(TEN)) for i, frames in enumerate(found)]
     return RunResult(assignments, tuple(clips), total(clips))
 
 
@@ -60,14 +60,14 @@ def test_predictions_beyond_the_truth_are_warned_of(
     found = write(tmp_path / "found.txt", range(1, 21), "1,-1,-1,-1")
     truth = write(tmp_path / "gt.txt", TEN, "1,3,1")
     with caplog.at_level(logging.WARNING, logger="vdet"):
-        assert judge_files(found, truth).total.false_positives == 10
+        assert score_files(found, truth).total.false_positives == 10
     assert "has boxes up to frame 20, the truth ends with frame 10" in caplog.text
     caplog.clear()
-    assert judge_files(found, truth, until=10).total.false_positives == 0
+    assert score_files(found, truth, until=10).total.false_positives == 0
     assert not caplog.text
 
 
 def test_until_cuts_the_truth_too(tmp_path: Path) -> None:
     found = write(tmp_path / "found.txt", range(1, 4), "1,-1,-1,-1")
     truth = write(tmp_path / "gt.txt", TEN, "1,3,1")
-    assert judge_files(found, truth, until=4).total.recall == 0.75
+    assert score_files(found, truth, until=4).total.recall == 0.75

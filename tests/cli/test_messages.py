@@ -1,4 +1,4 @@
-"""Progress bars, where a person may be looking."""
+"""Lines, log records and progress bars on standard error."""
 
 import functools
 import io
@@ -6,7 +6,7 @@ import io
 import pytest
 from tqdm import tqdm
 
-from vdet.cli.progress import files_bar
+from vdet.cli.messages import files_bar
 
 
 class Terminal(io.StringIO):
@@ -20,7 +20,7 @@ class Terminal(io.StringIO):
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     terminal = Terminal()
     bar = functools.partial(tqdm, file=terminal, mininterval=0)
-    monkeypatch.setattr("vdet.cli.progress.tqdm", bar)
+    monkeypatch.setattr("vdet.cli.messages.tqdm", bar)
     return terminal
 
 

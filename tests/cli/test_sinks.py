@@ -1,0 +1,364 @@
+"""`--sink NAME=FILE` on every command that has it, and the outputs of a run all together."""
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from conftest import Run
+from quick import QUICK_OPTIONS
+from red_cars import CAR, SETTINGS, red_finder, road
+from running import frames_of, names, write_drive
+from vdet.config.rendering import render
+from vdet.detect.svm.model import save_model
+from vdet.draw.boxes import color_of
+from vdet.media import VideoReader
+from vdet.media.images import read_image, write_image
+from vdet.pipeline.sinks.tracks import TrackSink
+from vdet.pipeline.sinks.video import VideoSink
+
+FRAMES = 15
+KNOWN = "known are video, tracks, stages, picture, json"
+
+
+@pytest.fixture(scope="module")
+def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
+    """Options with which red cars are found, by the names of files."""
+    folder = tmp_path_factory.mktemp("red")
+    save_model(red_finder(), folder / "red.npz")
+    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
+    return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    (tmp_path / "in").mkdir()
+    return write_drive(tmp_path / "in" / "a.mp4", FRAMES)
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    path = tmp_path / "red.png"
+    write_image(path, road(CAR))
+    return path
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """An empty folder."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    return folder
+
+
+def lines_of(path: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+class TestDetectVideo:
+    def test_a_sink_gets_the_same_results_as_the_options(
+        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
+    ) -> None:
+        options = ("--tracks", out / "a.jsonl", "--sink", f"tracks={out}/b.csv", *red)
+        result = run("detect-video", clip, out / "a.mp4", *options)
+        assert result.code == 0, result.err
+        assert names(out) == ["a.jsonl", "a.mp4", "b.csv"]
+        with (out / "b.csv").open() as file:
+            rows = [(int(row["frame"]), int(row["x"])) for row in csv.DictReader(file)]
+        records = lines_of(out / "a.jsonl")
+        assert rows == [(each["frame"], track["x"]) for each in records for track in each["tracks"]]
+        assert rows, "nothing was found: the test would say nothing"
+
+    def test_sinks_alone_are_enough(
+        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
+    ) -> None:
+        sinks = ("--sink", f"tracks={out}/a.txt", "--sink", f"video={out}/a.mkv")
+        result = run("detect-video", clip, "--no-video", *sinks, *red)
+        assert result.code == 0, result.err
+        assert names(out) == ["a.mkv", "a.txt"]
+        assert frames_of(out / "a.mkv") == FRAMES
+
+    @pytest.mark.parametrize("text", ["tracks", "tracks=", "=a.csv", "=", ""])
+    def test_another_text_than_name_and_file_is_wrong_usage(
+        self, run: Run, clip: Path, out: Path, text: str
+    ) -> None:
+        result = run("detect-video", clip, out / "a.mp4", "--sink", text)
+        assert result.code == 2
+        assert f"--sink {text}: expected NAME=FILE, as in tracks=out.csv" in result.err
+        assert names(out) == []
+
+    @pytest.mark.parametrize(
+        ("sink", "words"),
+        [
+            ("counts=a.csv", f"counts: is no sink; {KNOWN}"),
+            ("tracks=a.xml", "a.xml: tracks are written as .txt, .csv, .jsonl; name it so"),
+            ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
+            ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
+            ("picture=a.png", "a.png: the sink picture is for still pictures"),
+            ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one"),
+        ],
+    )
+    def test_an_output_that_cannot_be_is_refused_before_any_work(
+        self,
+        run: Run,
+        clip: Path,
+        out: Path,
+        sink: str,
+        words: str,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.chdir(out)
+        (out / "old.csv").write_text("precious")
+        result = run("detect-video", clip, "a.mp4", "--tracks", "t.txt", "--sink", sink)
+        assert (result.code, result.out) == (1, "")
+        assert result.err.startswith(f"vdet: {words}")
+        assert result.err.count("\n") == 1
+        assert names(out) == ["old.csv"]
+
+    def test_labels_have_scores_where_they_are_asked_for(
+        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
+    ) -> None:
+        for name, extra in (("plain.mp4", ()), ("scores.mp4", ("--set", "output.scores=true"))):
+            crisp = ("--set", "output.crf=5", "--set", "tracker.detections_needed=3")
+            result = run("detect-video", clip, out / name, *red, *crisp, *extra)
+            assert result.code == 0, result.err
+        widths = [tag_width(last_frame(out / name)) for name in ("plain.mp4", "scores.mp4")]
+        assert widths[0] > 0, "no label was drawn: the test would say nothing"
+        assert widths[1] > 1.5 * widths[0]
+
+
+def last_frame(path: Path) -> Any:
+    with VideoReader(path) as reader:
+        *_, last = (frame.image for frame in reader)
+    return last
+
+
+def tag_width(image: Any) -> int:
+    """Return how many columns have the colour of the first vehicle above its box."""
+    near = abs(image[: CAR.y - 6].astype(int) - color_of(1)).max(axis=2) < 40
+    return int(near.any(axis=0).sum())
+
+
+FULL = OSError(28, "No space left on device")
+
+
+def failing_exit(sink: type[TrackSink | VideoSink], error: Exception) -> Callable[..., None]:
+    """Return an end of a sink that does its work and then fails."""
+    leave = sink.__exit__
+
+    def fail(opened: Any, *raised: Any) -> None:
+        leave(opened, *raised)
+        raise error
+
+    return fail
+
+
+class TestTogether:
+    """All files of a run appear at its end, or none does."""
+
+    @pytest.mark.parametrize("failing", [TrackSink, VideoSink])
+    @pytest.mark.parametrize("error", [FULL, RuntimeError("a bug")])
+    def test_a_sink_that_fails_at_its_end_leaves_nothing_and_can_be_repeated(
+        self,
+        run: Run,
+        clip: Path,
+        out: Path,
+        red: tuple[str, ...],
+        monkeypatch: pytest.MonkeyPatch,
+        failing: type[TrackSink | VideoSink],
+        error: Exception,
+    ) -> None:
+        command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv",
+                   "--sink", f"tracks={out}/b.txt", "--stages", out / "stages", "--at", "0.2",
+                   *red)  # fmt: skip
+        with monkeypatch.context() as patch:
+            patch.setattr(failing, "__exit__", failing_exit(failing, error))
+            result = run(*command)
+        assert result.code == 1
+        assert result.err.count("\n") == 1, result.err
+        assert names(out) == []
+        again = run(*command)
+        assert again.code == 0, again.err
+        stages = [f"stages/{number}-{name}.png" for number, name in enumerate(
+            ("patches", "windows", "hits", "heat", "boxes"), start=1)]  # fmt: skip
+        assert names(out) == ["a.csv", "a.mp4", "b.txt", *stages]
+
+    def test_earlier_outputs_are_kept_where_a_sink_fails(
+        self, run: Run, clip: Path, out: Path, red: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv", *red)
+        for name in ("a.mp4", "a.csv"):
+            (out / name).write_text("precious")
+
+        monkeypatch.setattr(TrackSink, "__exit__", failing_exit(TrackSink, FULL))
+        assert run(*command, "--overwrite").code == 1
+        assert [(out / name).read_text() for name in names(out)] == ["precious"] * 2
+
+    def test_no_output_is_there_before_the_end(
+        self, run: Run, clip: Path, out: Path, red: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        seen: list[str] = []
+        write = TrackSink.write
+
+        def look(sink: TrackSink, result: Any) -> None:
+            write(sink, result)
+            seen.extend(name for name in names(out) if not name.startswith("."))
+
+        monkeypatch.setattr(TrackSink, "write", look)
+        command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv", *red)
+        assert run(*command).code == 0
+        assert seen == []
+        assert names(out) == ["a.csv", "a.mp4"]
+
+
+class TestDetectImage:
+    def test_a_sink_gets_the_results_of_all_pictures(
+        self, run: Run, picture: Path, out: Path, red: tuple[str, ...]
+    ) -> None:
+        empty = picture.with_name("empty.png")
+        write_image(empty, road())
+        options = ("--json", "-", "--sink", f"json={out}/b.json", *red)
+        result = run("detect-image", picture, empty, *options)
+        assert result.code == 0, result.err
+        assert (out / "b.json").read_text() == result.out
+        (found,) = json.loads(result.out)[0]["boxes"]
+        assert set(found) == {"x", "y", "width", "height", "score"}
+        assert 0 < found["score"] <= 1
+        assert json.loads(result.out)[1]["boxes"] == []
+
+    def test_a_sink_for_one_picture(
+        self, run: Run, picture: Path, out: Path, red: tuple[str, ...]
+    ) -> None:
+        sink = ("--sink", f"picture={out}/a.png", *red)
+        assert run("detect-image", picture, *sink).code == 0
+        assert (read_image(out / "a.png") != read_image(picture)).any()
+        before = (out / "a.png").read_bytes()
+        twin = picture.with_name("twin.png")
+        write_image(twin, road())
+        several = run("detect-image", twin, picture, *sink, "--overwrite")
+        assert several.code == 1
+        assert "a.png: takes one picture; for several give the name of a folder" in several.err
+        assert (out / "a.png").read_bytes() == before
+
+    @pytest.mark.parametrize(
+        ("sink", "code", "words"),
+        [
+            ("json", 2, "--sink json: expected NAME=FILE"),
+            ("counts=a.csv", 1, f"counts: is no sink; {KNOWN}"),
+            ("picture=a.txt", 1, "a.txt: pictures are written as "),
+            ("video=a.mp4", 1, "a.mp4: the sink video is for videos"),
+            ("json=red.png", 1, "red.png: is the input itself"),
+            ("json=old.json", 1, "old.json: is there already"),
+            ("tracks=-", 1, "-: tracks are written as .txt, .csv, .jsonl"),
+        ],
+    )
+    def test_an_output_that_cannot_be_is_refused_before_any_work(
+        self,
+        run: Run,
+        picture: Path,
+        sink: str,
+        code: int,
+        words: str,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.chdir(picture.parent)
+        (picture.parent / "old.json").write_text("precious")
+        result = run("detect-image", picture, "-o", "new", "--sink", sink)
+        assert (result.code, result.out) == (code, "")
+        assert words in result.err
+        assert names(picture.parent) == ["old.json", "red.png"]
+
+    def test_asks_for_an_output(self, run: Run, picture: Path) -> None:
+        result = run("detect-image", picture)
+        assert result.code == 2
+        assert "nothing would be written; give -o, --json, --stages or --sink" in result.err
+
+
+class TestEvalVideo:
+    def test_a_sink_gets_the_results_of_the_video(
+        self, run: Run, clip_path: Path, model_path: Path, truth_path: Path, out: Path
+    ) -> None:
+        common = ("--model", model_path, *QUICK_OPTIONS)
+        sinks = ("--sink", f"tracks={out}/a.csv", "--sink", f"video={out}/a.mp4")
+        done = run("eval", "video", clip_path, "--truth", truth_path, *sinks, *common)
+        assert done.code == 0, done.err
+        assert frames_of(out / "a.mp4") == 8
+        tracks = ("--no-video", "--tracks", out / "b.csv", "--frames", "8")
+        assert run("detect-video", clip_path, *tracks, *common).code == 0
+        assert (out / "a.csv").read_text() == (out / "b.csv").read_text()
+
+    @pytest.mark.parametrize(
+        ("arguments", "code", "words"),
+        [
+            (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
+            (("--sink", "counts=a.csv"), 1, f"counts: is no sink; {KNOWN}"),
+            (("--sink", "tracks=a.xml"), 1, "a.xml: tracks are written as"),
+            (
+                ("--sink", "tracks=a.csv", "--sweep", "output.crf=1,2"),
+                2,
+                "--sink is for one video under one setting",
+            ),
+        ],
+    )
+    def test_an_output_that_cannot_be_is_refused_before_any_work(
+        self,
+        run: Run,
+        clip_path: Path,
+        truth_path: Path,
+        out: Path,
+        arguments: tuple[str, ...],
+        code: int,
+        words: str,
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.chdir(out)
+        result = run("eval", "video", clip_path, "--truth", truth_path, *arguments)
+        assert (result.code, result.out) == (code, "")
+        assert words in result.err
+        assert names(out) == []
+
+
+class TestBatch:
+    def test_each_video_gets_the_output_of_the_sink(
+        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
+    ) -> None:
+        write_drive(clip.with_name("b.mp4"), 3)
+        sinks = ("--sink", "tracks=.CSV", "--sink", "video=.mkv", "--jobs", "2", *red)
+        result = run("detect-video", clip.parent, "-d", out, *sinks)
+        assert result.code == 0, result.err
+        assert names(out) == ["a.csv", "a.mkv", "b.csv", "b.mkv", "manifest.jsonl"]
+        outputs = {
+            record["input"]: record["outputs"] for record in lines_of(out / "manifest.jsonl")
+        }
+        assert outputs[str(clip)] == {"video": str(out / "a.mkv"), "tracks": str(out / "a.csv")}
+
+    @pytest.mark.parametrize(
+        ("arguments", "code", "words"),
+        [
+            (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
+            (("--sink", "tracks=a.csv"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
+            (("--sink", "tracks=.xml"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
+            (("--sink", "video=.avi"), 2, "with -d give --sink video a suffix: .mp4, .mov, .mkv"),
+            (("--sink", "json=boxes"), 2, "with -d give --sink json a suffix: as in .txt"),
+            (("--sink", "stages=.png"), 2, "stages: is for one video; leave out -d"),
+            (("--sink", "counts=.csv"), 1, f"counts: is no sink; {KNOWN}"),
+            (("--tracks", ".csv", "--sink", "tracks=.txt"), 2, "tracks is given two suffixes"),
+            (("--tracks", ".txt", "--sink", "json=.txt"), 1, "a.txt: two outputs of "),
+        ],
+    )
+    def test_what_cannot_be_is_refused_before_any_work(
+        self,
+        run: Run,
+        clip: Path,
+        out: Path,
+        arguments: tuple[str, ...],
+        code: int,
+        words: str,
+    ) -> None:
+        result = run("detect-video", clip.parent, "-d", out, *arguments)
+        assert (result.code, result.out) == (code, "")
+        assert words in result.err
+        assert names(out) == []
