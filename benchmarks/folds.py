@@ -28,7 +28,7 @@ from vdet.learn.augmentation import augment
 from vdet.learn.box_regression import extract_box_patches, fit_boxes
 from vdet.learn.dataset import PatchFile, find_boxed, find_patches
 from vdet.learn.extraction import extract
-from vdet.learn.fitting import fit
+from vdet.learn.fitting import fit_patches
 from vdet.learn.training_set import training_set
 from vdet.media import VideoReader
 from vdet.pipeline.loop import peek
@@ -114,12 +114,9 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
 
     def without(block: int) -> LinearModel:
         kept, kept_boxed = (each != block for each in blocks)
-        samples = training_set(data, kept)
-        model = fit(
-            samples.vectors, samples.vehicle, settings.svm.features, training, samples.origins
-        )
-        told = [samples, training_set(boxed_data, kept_boxed)]
-        return replace(model, box_regression=fit_boxes(told, assumed, settings))
+        model = fit_patches(data, kept, settings)
+        sets = [training_set(data, kept), training_set(boxed_data, kept_boxed)]
+        return replace(model, box_regression=fit_boxes(sets, assumed, settings))
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))

@@ -9,7 +9,7 @@ import numpy as np
 from vdet.config.schema import Settings, TrainingSettings
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
-from vdet.geometry import BoolArray, Float32Array
+from vdet.geometry import BoolArray, Float32Array, Float64Array
 from vdet.learn.augmentation import augment, zoom_in
 from vdet.learn.dataset import PatchFile, Sides
 from vdet.learn.extraction import LabelledVectors, SampleVectors, extract
@@ -21,7 +21,11 @@ _ASSUMED_SIDES: Sides = (-0.47, -0.40, 0.47, 0.42)
 """Typical sides of the vehicle in a patch of the Udacity set."""
 
 _LEAST_SPREAD = 0.05
-"""Added to each feature's spread, share of the mean spread: keeps weights of rare changes small."""
+"""Added to each feature's spread, share of the mean spread: limits the weights of features that
+hardly vary."""
+
+_BLOCK = 1024
+"""Rows that are scaled at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,11 +109,11 @@ def fit_split_boxes(
     if patches.assumed is not None:
         assumed_held = _hold_out(patches.assumed, name, settings.training)
         assumed = training_set(patches.assumed, ~assumed_held)
-    regression = fit_boxes([training_set(each, ~out) for each, out in parts], assumed, settings)
+    regression = fit_boxes([_with_sides(each, ~out) for each, out in parts], assumed, settings)
     if regression is None:
         return None, None
-    tested = [training_set(replace(each, augmented=None), out) for each, out in parts]
-    return regression, _error(regression, _BoxRows.of(tested, settings))
+    tested = [_with_sides(replace(each, augmented=None), out) for each, out in parts]
+    return regression, _error(regression, tested, settings)
 
 
 def fit_boxes(
@@ -119,94 +123,131 @@ def fit_boxes(
 
     Returns None if no side is known.
     """
-    training = settings.training
-    rows = _BoxRows.of(sets, settings)
-    count = len(rows.sides)
+    boxes = settings.training.boxes
+    length = Layout.of(settings.svm.features).hog_length
+    rows = [BoxRows(each.vectors[:, :length], each.sides) for each in sets]
+    count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in sets)
     if not count:
         return None
-    weights = np.ones(count, np.float32)
     if assumed is not None:
-        further = _BoxRows.of([assumed], settings)
-        weight = training.boxes.assumed * count / len(assumed.sides)
-        weights = np.append(weights, np.full(len(further.sides), weight, np.float32))
-        rows = _BoxRows(
-            np.concatenate([rows.hogs, further.hogs]), np.concatenate([rows.sides, further.sides])
-        )
-    return fit_sides(rows.hogs, rows.sides, training.boxes.penalty, weights)
+        weight = boxes.assumed * count / len(assumed.sides)
+        rows.append(BoxRows(assumed.vectors[:, :length], assumed.sides, weight))
+    return fit_sides(rows, boxes.penalty)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _BoxRows:
-    """Samples of which at least one side is known: HOG `(n, h)` and sides `(n, 4)`."""
-
-    hogs: Float32Array
-    sides: Float32Array
-
-    @staticmethod
-    def of(sets: Sequence[SampleVectors], settings: Settings) -> "_BoxRows":
-        length = Layout.of(settings.svm.features).hog_length
-        known = [np.isfinite(each.sides).any(axis=1) for each in sets]
-        return _BoxRows(
-            np.concatenate([s.vectors[rows, :length] for s, rows in zip(sets, known, strict=True)]),
-            np.concatenate([s.sides[rows] for s, rows in zip(sets, known, strict=True)]),
-        )
+def _with_sides(data: LabelledVectors, kept: BoolArray) -> SampleVectors:
+    """Return the training set of the kept patches of which at least one side is known."""
+    if data.sides is not None:
+        kept = kept & np.isfinite(data.sides).any(axis=1)
+    return training_set(data, kept)
 
 
 def _hold_out(data: LabelledVectors, name: SplitName, training: TrainingSettings) -> BoolArray:
     return hold_out(data.groups, name, training.test_fraction, training.seed)
 
 
-def _error(regression: BoxRegression, tested: _BoxRows) -> BoxError | None:
-    if not len(tested.sides):
-        return None
-    errors = abs(regression.sides(tested.hogs) - tested.sides)
-    return BoxError(len(tested.sides), round(float(np.nanmean(errors)), 4))
+def _error(
+    regression: BoxRegression, tested: Sequence[SampleVectors], settings: Settings
+) -> BoxError | None:
+    length = Layout.of(settings.svm.features).hog_length
+    errors = np.concatenate(
+        [abs(regression.sides(each.vectors[:, :length]) - each.sides) for each in tested]
+    )
+    return BoxError(len(errors), round(float(np.nanmean(errors)), 4)) if len(errors) else None
 
 
-def fit_sides(
-    hogs: Float32Array, sides: Float32Array, penalty: float, weights: Float32Array | None = None
-) -> BoxRegression:
-    """Fit the sides of vehicles' boxes to HOG vectors.
+@dataclass(frozen=True, slots=True, eq=False)
+class BoxRows:
+    """Rows to fit the sides of boxes to, all of the same weight.
 
-    Parameters
+    Attributes
     ----------
     hogs
         float32 `(n, h)`.
     sides
         float32 `(n, 4)`: left, top, right, bottom from the window's centre, in widths and heights
-        of the window; NaN for unknown ones. A side without any known value is always 0.
-    penalty
-        Ridge penalty of the weights of scaled features, for each patch.
-    weights
-        float32 `(n,)`: weight of each row; None for equal weights.
+        of the window; NaN for unknown ones.
+    weight
+        How much each row counts.
     """
-    if weights is None:
-        weights = np.ones(len(hogs), np.float32)
-    slopes = np.zeros((4, hogs.shape[1]), np.float32)
+
+    hogs: Float32Array
+    sides: Float32Array
+    weight: float = 1.0
+
+
+def fit_sides(parts: Sequence[BoxRows], penalty: float) -> BoxRegression:
+    """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
+
+    The rows are taken in blocks, so that they are not copied as a whole.
+
+    Parameters
+    ----------
+    penalty
+        Ridge penalty of the weights of scaled features, for each row of weight 1.
+    """
+    slopes = np.zeros((4, parts[0].hogs.shape[1]), np.float32)
     biases = np.zeros(4, np.float32)
-    for columns, rows in _patterns(~np.isnan(sides)):
-        targets = sides[rows][:, columns]
-        slopes[columns], biases[columns] = _ridge(hogs[rows], targets, penalty, weights[rows])
+    for columns, rows in _patterns([~np.isnan(part.sides) for part in parts]):
+        slopes[columns], biases[columns] = _Ridge(parts, columns, rows).solve(penalty)
     return BoxRegression(slopes, biases)
 
 
-def _patterns(known: BoolArray) -> Iterator[tuple[list[int], BoolArray]]:
-    """Yield the columns known in the same rows, and these rows: they are solved together."""
-    left = [column for column in range(known.shape[1]) if known[:, column].any()]
+_Pattern = tuple[list[int], list[BoolArray]]
+
+
+def _patterns(known: Sequence[BoolArray]) -> Iterator[_Pattern]:
+    """Yield the columns known in the same rows, and these rows of each part."""
+    together = np.concatenate(known)
+    left = [column for column in range(together.shape[1]) if together[:, column].any()]
     while left:
-        rows = known[:, left[0]]
-        columns = [column for column in left if (known[:, column] == rows).all()]
-        yield columns, rows
+        first = left[0]
+        columns = [column for column in left if (together[:, column] == together[:, first]).all()]
+        yield columns, [part[:, first] for part in known]
         left = [column for column in left if column not in columns]
 
 
-def _ridge(
-    hogs: Float32Array, targets: Float32Array, penalty: float, weights: Float32Array
-) -> tuple[Float32Array, Float32Array]:
-    from sklearn.linear_model import Ridge
+class _Ridge:
+    """Ridge regression by the normal equations of scaled features."""
 
-    spread = hogs.std(axis=0)
-    spread += _LEAST_SPREAD * spread.mean() + np.finfo(np.float32).tiny
-    alpha = penalty * float(weights.sum())
-    ridge = Ridge(alpha=alpha, solver="cholesky").fit(hogs / spread, targets, weights)
-    return ridge.coef_ / spread, ridge.intercept_
+    def __init__(
+        self, parts: Sequence[BoxRows], columns: Sequence[int], rows: Sequence[BoolArray]
+    ) -> None:
+        self._parts, self._columns, self._rows = parts, list(columns), rows
+        count, self._weight = 0, 0.0
+        width = parts[0].hogs.shape[1]
+        sums, squares, weighted = np.zeros((3, width))
+        targets = np.zeros(len(self._columns))
+        for hogs, sides, weight in self._blocks():
+            count += len(hogs)
+            self._weight += weight * len(hogs)
+            total = hogs.sum(axis=0, dtype=np.float64)
+            sums += total
+            weighted += weight * total
+            squares += np.square(hogs, dtype=np.float64).sum(axis=0)
+            targets += weight * sides.sum(axis=0, dtype=np.float64)
+        spread = np.sqrt(np.maximum(squares / count - np.square(sums / count), 0))
+        self._spread = spread + _LEAST_SPREAD * spread.mean() + np.finfo(np.float32).tiny
+        self._mean = weighted / self._weight
+        self._target = targets / self._weight
+
+    def _blocks(self) -> Iterator[tuple[Float32Array, Float32Array, float]]:
+        """Yield HOG and targets of the rows, block by block, with their weight."""
+        for part, known in zip(self._parts, self._rows, strict=True):
+            (rows,) = np.nonzero(known)
+            for start in range(0, len(rows), _BLOCK):
+                some = rows[start : start + _BLOCK]
+                yield part.hogs[some], part.sides[some][:, self._columns], part.weight
+
+    def solve(self, penalty: float) -> tuple[Float64Array, Float64Array]:
+        """Return weights `(columns, h)` and biases `(columns,)` for features as they are."""
+        from scipy.linalg import solve  # type: ignore[import-untyped]
+
+        gram = np.diag(np.full(len(self._mean), penalty * self._weight))
+        product = np.zeros((len(self._mean), len(self._columns)))
+        for hogs, sides, weight in self._blocks():
+            scaled = ((hogs - self._mean) / self._spread * weight**0.5).astype(np.float32)
+            gram += scaled.T @ scaled
+            product += scaled.T @ ((sides - self._target) * weight**0.5)
+        weights = solve(gram, product, assume_a="pos", overwrite_a=True).T / self._spread
+        return weights, self._target - weights @ self._mean

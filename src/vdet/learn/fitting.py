@@ -7,13 +7,27 @@ from typing import Any
 
 import numpy as np
 
-from vdet.config.schema import FeatureSettings, TrainingSettings
+from vdet.config.schema import FeatureSettings, Settings, TrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.geometry import BoolArray, Float32Array, Float64Array
-from vdet.learn.extraction import RowNumbers
+from vdet.learn.extraction import LabelledVectors, RowNumbers
+from vdet.learn.training_set import training_set
 
 log = logging.getLogger("vdet")
+
+
+def fit_patches(data: LabelledVectors, kept: BoolArray, settings: Settings) -> LinearModel:
+    """Fit on the kept patches, bool `(n,)`, and the samples made of these; errors as of `fit`."""
+    samples = training_set(data, kept)
+    return fit(
+        samples.vectors,
+        samples.vehicle,
+        settings.svm.features,
+        settings.training,
+        samples.origins,
+        copy=False,
+    )
 
 
 def fit(
@@ -22,6 +36,8 @@ def fit(
     features: FeatureSettings,
     settings: TrainingSettings,
     origins: RowNumbers | None = None,
+    *,
+    copy: bool = True,
 ) -> LinearModel:
     """Fit StandardScaler → LinearSvm → CalibratedClassifierCV on raw feature vectors.
 
@@ -35,6 +51,8 @@ def fit(
         intp `(n,)`: the row of the patch that each row was made of; a patch has its own row. The
         sigmoid is fitted on the patches alone, each scored by an SVM that was fitted without it and
         without the samples made of it. None: all rows are patches.
+    copy
+        False: `vectors` are overwritten, which saves memory.
 
     Raises
     ------
@@ -56,7 +74,7 @@ def fit(
             f"a class has {fewest} training patches, training.calibration.folds needs {folds}; "
             "give more patches"
         )
-    scaler = StandardScaler()
+    scaler = StandardScaler(copy=copy)
     scaled = scaler.fit_transform(vectors)
     calibrated = CalibratedClassifierCV(
         LinearSvm(C=settings.C, max_iter=settings.max_iterations),

@@ -19,9 +19,9 @@ from vdet.learn.augmentation import augment
 from vdet.learn.box_regression import BoxPatches, extract_box_patches, fit_split_boxes
 from vdet.learn.dataset import PatchFile, read_patches
 from vdet.learn.extraction import LabelledVectors, extract
-from vdet.learn.fitting import fit
+from vdet.learn.fitting import fit_patches
 from vdet.learn.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
-from vdet.learn.training_set import SplitName, hold_out, training_set
+from vdet.learn.training_set import SplitName, hold_out
 from vdet.workers import make_workers
 
 _TIMED_PATCHES = 200
@@ -110,19 +110,20 @@ def _fit_split(
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
-    samples = training_set(data, ~held)
-    model = fit(samples.vectors, samples.vehicle, settings.svm.features, training, samples.origins)
+    model = fit_patches(data, ~held, settings)
     regression, error = None, None
     if boxes is not None:
         regression, error = fit_split_boxes(data, held, boxes, name, settings)
     seconds = time.perf_counter() - began
     predicted = model.probabilities(data.vectors) >= 0.5
     right = predicted == data.vehicle
-    train_patches = int(np.count_nonzero(~held))
+    augmented = 0
+    if data.augmented is not None:
+        augmented = int(np.count_nonzero(~held[data.augmented.origins]))
     return replace(model, box_regression=regression), SplitReport(
         split=name,
-        train_patches=train_patches,
-        train_augmented=len(samples.vehicle) - train_patches,
+        train_patches=int(np.count_nonzero(~held)),
+        train_augmented=augmented,
         test_patches=int(np.count_nonzero(held)),
         train_accuracy=float(right[~held].mean()),
         test_accuracy=float(right[held].mean()),

@@ -12,8 +12,8 @@ from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.geometry import BoolArray, Float64Array, Int64Array
 from vdet.learn.extraction import LabelledVectors
-from vdet.learn.fitting import fit
-from vdet.learn.training_set import hold_out, training_set
+from vdet.learn.fitting import fit_patches
+from vdet.learn.training_set import hold_out
 
 log = logging.getLogger("vdet")
 
@@ -80,14 +80,7 @@ def run_trial(
     """Fit for each part on all other patches, and predict the part. Raises `DataError`."""
     rows, probabilities = [], []
     for held in parts:
-        samples = training_set(data, ~held)
-        model = fit(
-            samples.vectors,
-            samples.vehicle,
-            settings.svm.features,
-            settings.training,
-            samples.origins,
-        )
+        model = fit_patches(data, ~held, settings)
         rows.append(np.flatnonzero(held))
         probabilities.append(model.probabilities(data.vectors[held]).astype(np.float64))
         progress(1)
