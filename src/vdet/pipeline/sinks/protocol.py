@@ -82,8 +82,8 @@ class SinkKind:
     what
         What it writes, for messages: "tracks".
     marker
-        For an output that is a folder, which is made: a pattern of the files in it that tell that
-        it was written before.
+        For an output that is a folder, which is made: a pattern of a file in it that
+        shows that it was written before.
     writes_standard_output
         Whether the path `-` means standard output.
     takes

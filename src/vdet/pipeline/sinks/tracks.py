@@ -10,7 +10,7 @@
 In `.csv` and `.jsonl` frames count from 0 from the start of the file, `time` is in seconds, and
 `x, y` is the top-left pixel of the box, counted from 0. In `.txt`, which has no heading, frames and
 pixels count from 1, as MOTChallenge has it (Milan et al., "MOT16", 2016). `score` is 0 to 1, the
-share of such boxes that are vehicles. `predicted` tells that the detector did not see the vehicle
+share of such boxes that are vehicles. `predicted` means that the detector did not see the vehicle
 in this frame.
 
 Boxes are in pixels of the input frame, also where the frame is drawn undistorted, so they can be
