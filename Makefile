@@ -54,7 +54,7 @@ model: $(READY)  ## train the shipped models again: patches and video in DATA, t
 	cp build/model/default.npz build/model/seed.npz src/vdet/models/
 
 picture: $(READY)  ## draw the picture of the README
-	$(BIN)/python docs/make_picture.py
+	$(BIN)/python -m docs.picture
 
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt

@@ -1,4 +1,4 @@
-"""Clips drawn in code: every frame carries its number, so order and identity survive coding."""
+"""Clips drawn in code. Every frame shows its number, which can be read after it was coded."""
 
 import math
 from collections.abc import Sequence
@@ -70,11 +70,11 @@ ODD: dict[str, tuple[str, dict[str, Any]]] = {
     "mpeg-4 with b-frames": ("avi", {"codec": "mpeg4", "options": {"bf": "2", "q": "2"}}),
     "gif": ("gif", {"codec": "gif", "pix_fmt": "rgb8"}),
 }
-"""Suffix and arguments of `write_clip` for what is strange but legal."""
+"""Suffix and arguments of `write_clip` for clips that are odd but legal."""
 
 
 def draw_frame(number: int, width: int, height: int) -> Image:
-    """The number in black and white bars above, a red corner below on the left."""
+    """Draw the number as black and white bars at the top, and a red corner at the bottom left."""
     image = np.full((height, width, 3), 110, np.uint8)
     for bit in range(BITS):
         columns = slice(bit * width // BITS, (bit + 1) * width // BITS)

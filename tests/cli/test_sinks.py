@@ -97,7 +97,7 @@ class TestDetectVideo:
             ("tracks=a.xml", "a.xml: tracks are written as .txt, .csv, .jsonl; name it so"),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
             ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
-            ("picture=a.png", "a.png: the sink picture is for still pictures"),
+            ("picture=a.png", "a.png: the sink picture is for pictures; give another for videos"),
             ("tracks=t.txt", "t.txt: is given for two outputs; name another file for one"),
         ],
     )
@@ -342,11 +342,10 @@ class TestBatch:
             (("--sink", "tracks=a.csv"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
             (("--sink", "tracks=.xml"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
             (("--sink", "video=.avi"), 2, "with -d give --sink video a suffix: .mp4, .mov, .mkv"),
-            (("--sink", "json=boxes"), 2, "with -d give --sink json a suffix: as in .txt"),
+            (("--sink", "json=.json"), 2, "json: is for pictures; give another sink"),
             (("--sink", "stages=.png"), 2, "stages: is for one video; leave out -d"),
             (("--sink", "counts=.csv"), 1, f"counts: is no sink; {KNOWN}"),
             (("--tracks", ".csv", "--sink", "tracks=.txt"), 2, "tracks is given two suffixes"),
-            (("--tracks", ".txt", "--sink", "json=.txt"), 1, "a.txt: two outputs of "),
         ],
     )
     def test_what_cannot_be_is_refused_before_any_work(

@@ -12,8 +12,7 @@ from faults.conftest import Start
 from red_cars import red_work
 from running import names, write_drive
 from vdet.batch.task import process_file
-from vdet.media import Frame
-from vdet.media.encoder import Encoder
+from vdet.media import Frame, VideoWriter
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import Output
 from vdet.track.motion.tracker import MotionTracker
@@ -67,16 +66,16 @@ def job(tmp_path: Path) -> VideoJob:
 def test_a_writer_that_fails_at_the_100th_frame(
     job: VideoJob, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = Encoder.write
+    write = VideoWriter.write
     written: list[int] = []
 
-    def write_99(encoder: Encoder, frame: Frame) -> None:
+    def write_99(writer: VideoWriter, frame: Frame) -> None:
         if len(written) == 99:
             raise OSError(5, "Input/output error")
         written.append(frame.index)
-        write(encoder, frame)
+        write(writer, frame)
 
-    monkeypatch.setattr(Encoder, "write", write_99)
+    monkeypatch.setattr(VideoWriter, "write", write_99)
     record = process_file(job, work=red_work(tmp_path))
     assert record.error == f"{job.outputs[0].path}: cannot be written: Input/output error"
     assert written == list(range(99))

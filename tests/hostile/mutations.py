@@ -1,11 +1,11 @@
-"""Damage, seeded: what a good file becomes in a broken download, or in a wicked hand."""
+"""Seeded damage to a good file, as of a broken download or an attacker."""
 
 import random
 import re
 from collections.abc import Callable, Sequence
 
 HEADER = 512
-"""Bytes in which half of all damage falls: the fields there steer a reader the most."""
+"""Bytes at the start of a file that get half of all damage: fields there have the most effect."""
 WORST = 4
 """Most faults in one mutated file."""
 _FIELDS = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
@@ -21,9 +21,8 @@ def mutated(
     """Return `count` damaged versions of `data`, the same ones for the same `seed`.
 
     Each has one to `WORST` faults: bits flipped, fields set to extreme numbers, blocks zeroed, cut
-    out, doubled or exchanged, the end cut off. With `tokens`, which stand for the words and marks
-    of a text format, half of the faults put one of these in at a random place, or over what is
-    there.
+    out, doubled or moved, the end cut off. With `tokens`, the words and marks of a text format,
+    half of the faults insert one of these at a random place, or overwrite what is there.
     """
     rng = random.Random(seed)
     words = [token.encode() if isinstance(token, str) else token for token in tokens]
@@ -31,9 +30,9 @@ def mutated(
 
 
 def with_other_words(text: str, words: Sequence[str], *, seed: int, count: int) -> list[bytes]:
-    """Return `count` versions of `text` that keep its form: one or two words of it are others.
+    """Return `count` versions of `text` with the same structure, in which one or two words differ.
 
-    A word is a number of `text`, now and then a name; what comes in its place is one of `words`, or
+    The word is a number of `text`, sometimes a name. It is replaced by one of `words`, or by
     another word of `text`.
     """
     rng = random.Random(seed)
@@ -62,13 +61,13 @@ def _mutate(data: bytes, tokens: Sequence[bytes], rng: random.Random) -> bytes:
 
 
 def _place(data: bytearray, rng: random.Random) -> int:
-    """Choose a byte; every second time one of the first `HEADER`."""
+    """Choose a byte; with probability 0.5 one of the first `HEADER`."""
     end = len(data) if rng.random() < 0.5 else min(len(data), HEADER)
     return rng.randrange(max(1, end))
 
 
 def _block(data: bytearray, rng: random.Random) -> slice:
-    """Choose a stretch, short ones as often as long ones."""
+    """Choose a block; its length is log-uniform."""
     start = _place(data, rng)
     length = round(2 ** rng.uniform(0, max(1, len(data).bit_length() - 1)))
     return slice(start, min(len(data), start + max(1, length)))
@@ -110,8 +109,8 @@ def _double(data: bytearray, rng: random.Random) -> None:
     data[block.stop : block.stop] = data[block]
 
 
-def _exchange(data: bytearray, rng: random.Random) -> None:
-    """Take a block out and put it in elsewhere."""
+def _move(data: bytearray, rng: random.Random) -> None:
+    """Move a block to another place."""
     block = _block(data, rng)
     moved = data[block]
     del data[block]
@@ -128,5 +127,5 @@ _FAULTS: tuple[_Fault, ...] = (
     _cut_out,
     _cut_off,
     _double,
-    _exchange,
+    _move,
 )

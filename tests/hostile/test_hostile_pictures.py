@@ -1,4 +1,4 @@
-"""Damaged and wicked pictures through `vdet detect-image`."""
+"""Damaged and malicious pictures given to `vdet detect-image`."""
 
 import struct
 import zlib
@@ -43,14 +43,14 @@ def black(width: int, height: int) -> bytes:
 
 
 def png_of(width: int, height: int) -> bytes:
-    """Give a small PNG whose header, with the right checksum, claims another size."""
+    """Return a small PNG whose header, with the right checksum, claims another size."""
     png = encoded(".png", PICTURE)
     header = b"IHDR" + struct.pack(">II", width, height) + png[24:29]
     return png[:12] + header + struct.pack(">I", zlib.crc32(header)) + png[33:]
 
 
 def with_size(suffix: str, old: bytes, new: bytes) -> bytes:
-    """Give a small picture in which the bytes that tell its size are other ones."""
+    """Return a small picture whose header claims another size."""
     data = encoded(suffix, PICTURE)
     assert data.count(old) == 1
     return data.replace(old, new)
@@ -91,7 +91,7 @@ def test_300_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", BOMBS)
-def test_a_picture_of_too_many_pixels_is_refused_by_name(tmp_path: Path, name: str) -> None:
+def test_the_error_names_a_picture_of_too_many_pixels(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     path.write_bytes(BOMBS[name])
     with pytest.raises(ImageError, match="has more than 33,554,432 pixels, or a side of more than"):
@@ -104,13 +104,13 @@ def test_a_frame_of_8k_is_read(tmp_path: Path) -> None:
     assert read_image(path).shape == (4320, 7680, 3)
 
 
-def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
+def test_an_endless_file_is_read_up_to_the_limit() -> None:
     with pytest.raises(ImageError, match=r"/dev/zero: is larger than 256,000,000 bytes"):
         read_image(Path("/dev/zero"))
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".ppm", ".jp2", ".ras"])
-def test_formats_that_are_not_named_are_not_read(tmp_path: Path, suffix: str) -> None:
+def test_other_formats_are_not_read(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / "picture.png"
     path.write_bytes(encoded(suffix, PICTURE))
     with pytest.raises(ImageError, match=r"is not a picture, .* \(PNG, JPEG, BMP, TIFF, WebP\)"):
@@ -129,11 +129,11 @@ def test_a_panorama_with_a_million_windows_is_refused(tmp_path: Path) -> None:
     assert broken_promises(trials) == []
 
 
-def test_a_damaged_jpeg_that_can_be_read_is_warned_of(
+def test_a_damaged_jpeg_that_can_be_read_gives_a_warning(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "damaged.jpg"
     whole = encoded(".jpg", PICTURE)
     path.write_bytes(whole[:-400] + b"\xff\xd9")
     assert read_image(path).shape == PICTURE.shape
-    assert "damaged.jpg: is damaged, and read as far as can be (Corrupt JPEG data" in caplog.text
+    assert "damaged.jpg: is damaged, and read as far as possible (Corrupt JPEG data" in caplog.text

@@ -1,4 +1,4 @@
-"""Damaged and wicked video files: each run ends in time, well or with one line of error."""
+"""Damaged and malicious videos: each run ends in time, without an error or with one line of it."""
 
 import json
 import os
@@ -23,13 +23,13 @@ CLIPS: dict[str, dict[str, Any]] = {
     "gif": {"codec": "gif", "pix_fmt": "rgb8"},
 }
 EACH = 50
-SECONDS = 20.0  # for one file, on a machine with other work to do; one takes about 0.03 s
+SECONDS = 20.0  # for one file, on a busy machine; usually 0.03 s
 MEMORY = 1_000_000_000
 WORKER = Path(__file__).with_name("video_worker.py")
 
 
 class Runs:
-    """Runs the program on the files of a folder, in one other process, and looks at what it did."""
+    """Runs the program on the files of a folder, in one other process, and checks the outcomes."""
 
     def __init__(self, folder: Path) -> None:
         self.sources = folder / "in"
@@ -42,7 +42,7 @@ class Runs:
         (self.sources / name).write_bytes(data)
 
     def outcomes(self) -> dict[str, tuple[int, str]]:
-        """Exit code and what was said, for each file; what must hold for all is checked."""
+        """Return exit code and messages for each file, after the checks that hold for all."""
         before = {path.name: path.read_bytes() for path in self.sources.iterdir()}
         done = subprocess.run(
             [sys.executable, WORKER, self.sources, self.outputs, str(SECONDS), *FEW_OPTIONS],
@@ -80,7 +80,7 @@ def runs(tmp_path: Path) -> Runs:
 
 
 @pytest.mark.parametrize("kind", CLIPS)
-def test_every_damaged_file_ends_well_or_with_one_line(
+def test_each_run_on_a_damaged_file_ends_well_or_with_one_line_of_error(
     kind: str, runs: Runs, tmp_path: Path
 ) -> None:
     good = write_clip(tmp_path / f"good.{kind}", count=8, size=(96, 64), **CLIPS[kind])
@@ -91,9 +91,7 @@ def test_every_damaged_file_ends_well_or_with_one_line(
     assert 0 < sum(codes) < EACH, "all alike: the damage is too little or too much to say anything"
 
 
-def test_sizes_beyond_reason_are_refused_before_there_is_memory_for_them(
-    runs: Runs, tmp_path: Path
-) -> None:
+def test_enormous_frames_are_refused_before_memory_is_set_aside(runs: Runs, tmp_path: Path) -> None:
     data = bytearray(write_clip(tmp_path / "good.gif", codec="gif", pix_fmt="rgb8").read_bytes())
     for width, height in ((65_535, 65_535), (65_535, 500), (500, 65_535), (16_000, 8_000)):
         data[6:10] = struct.pack("<HH", width, height)
@@ -103,7 +101,7 @@ def test_sizes_beyond_reason_are_refused_before_there_is_memory_for_them(
         assert "37 million pixels" in said
 
 
-def test_a_playlist_opens_nothing_else(runs: Runs, tmp_path: Path) -> None:
+def test_a_playlist_opens_no_other_file(runs: Runs, tmp_path: Path) -> None:
     secret = write_clip(tmp_path / "secret.ts")
     head = "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n"
     runs.add("list.m3u8", f"{head}{secret}\n#EXT-X-ENDLIST\n".encode())

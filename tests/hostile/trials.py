@@ -1,7 +1,7 @@
-"""Many runs of the program on bad files, in one process that is watched.
+"""Many runs of the program on bad files, in one other process.
 
-`try_all` starts this file as a program. There, every run has a time limit, the memory of all of
-them together one, and what each wrote on standard error is kept, down to the C libraries' own.
+`try_all` starts this file as a program. In it, every run has a time limit, the process has a limit
+of memory, and the standard error of each run is kept, also what C libraries write to it.
 """
 
 import json
@@ -18,16 +18,16 @@ from types import FrameType
 from typing import IO, NoReturn
 
 MEMORY = 1_000_000_000
-"""Bytes that the whole process may ever have resident."""
-_ADDRESSES = 4_000_000_000  # a stop for what would bring the machine down
+"""Most bytes that the process may have resident."""
+_ADDRESSES = 4_000_000_000  # bytes; protects the machine
 _PATIENCE = 300  # seconds for all runs
 
 
 @dataclass(frozen=True)
 class Trial:
-    """How a run ended: its exit code (None: not at all, in time), its words, and how long it took.
+    """The outcome of a run: exit code (None: not ended in time), standard error, seconds.
 
-    `memory` is the most that the process has had resident up to its end, bytes.
+    `memory` is the peak resident memory of the process up to its end, bytes.
     """
 
     arguments: tuple[str, ...]
@@ -38,7 +38,7 @@ class Trial:
 
 
 def try_all(runs: Sequence[Sequence[str | Path]], *, seconds: float) -> list[Trial]:
-    """Run the program with each list of arguments, each for so many seconds at most."""
+    """Run the program with each list of arguments, each run for at most `seconds`."""
     orders = json.dumps([[str(word) for word in words] for words in runs])
     command = [sys.executable, __file__, str(seconds)]
     done = subprocess.run(
@@ -50,7 +50,7 @@ def try_all(runs: Sequence[Sequence[str | Path]], *, seconds: float) -> list[Tri
 
 
 def broken_promises(trials: Sequence[Trial], *, lines: int = 1) -> list[str]:
-    """Return what is wrong with each run that is; a failure may have so many lines of error."""
+    """Return what is wrong with each run; a failure may write up to `lines` lines of error."""
     return [
         f"{' '.join(trial.arguments)}: {complaint}"
         for trial in trials
@@ -74,7 +74,7 @@ def _complaint(trial: Trial, lines: int) -> str | None:
 
 
 def files_in(folder: Path) -> dict[Path, bytes]:
-    """Return all files below a folder with their content: what a run must leave as it is."""
+    """Return all files below a folder with their content."""
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 

@@ -1,8 +1,8 @@
-"""Runs `vdet detect-video` on every file of a folder, in one process: a line of JSON a run.
+"""Runs `vdet detect-video` on every file of a folder, in one process: one line of JSON per run.
 
-Called as `video_worker.py IN OUT SECONDS OPTION…`. A run that takes longer than that ends the
-process, with a traceback on standard error; so does a crash. The last line then tells which file it
-was: it is written before the run, too.
+Called as `video_worker.py IN OUT SECONDS OPTION…`. A run that takes longer than SECONDS, or that
+crashes, ends the process with a traceback on standard error. The last line names its file: a line
+is written before each run too.
 """
 
 import contextlib
@@ -32,7 +32,7 @@ def run_all(sources: Path, outputs: Path, seconds: float, options: list[str]) ->
 
 
 def report(source: Path, code: object, said: str) -> None:
-    """Write what came of a run; `code` is None before it, `peak` the peak memory so far, bytes."""
+    """Report a run; `code` is None before it, `peak` is the peak memory so far, bytes."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     print(json.dumps({"source": source.name, "code": code, "said": said, "peak": peak}), flush=True)
 

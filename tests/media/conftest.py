@@ -31,5 +31,5 @@ def plain_clip(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def warnings(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
-    """What the program has warned of."""
+    """Returns the warnings logged so far."""
     return lambda: [record.getMessage() for record in caplog.records if record.name == "vdet"]

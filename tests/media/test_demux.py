@@ -1,4 +1,4 @@
-"""Packets come out of a file in spite of read errors."""
+"""Packets are read from a file in spite of read errors."""
 
 from collections.abc import Iterator
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ from vdet.media.demux import packets
 
 
 class Failing:
-    """A container whose reads give what is in `script`: packets, or errors to raise."""
+    """A container whose reads follow `script`: packets to yield, or errors to raise."""
 
     def __init__(self, *script: Any) -> None:
         self.script = iter(script)
@@ -41,7 +41,7 @@ def test_reading_goes_on_after_an_error() -> None:
     assert read(A, error(), B) == ([A, B], 1)
 
 
-def test_errors_in_a_row_are_told_once() -> None:
+def test_errors_in_a_row_are_reported_once() -> None:
     assert read(A, error(), error(), error(), B, error()) == ([A, B], 2)
 
 
@@ -49,7 +49,7 @@ def test_a_file_of_nothing_but_errors_ends() -> None:
     assert read(*(error() for _ in range(1000)), A) == ([], 1)
 
 
-def test_a_stream_that_appears_late_ends_nothing_but_the_reading() -> None:
+def test_a_stream_that_appears_late_ends_only_the_reading() -> None:
     assert read(A, B, IndexError("list index out of range")) == ([A, B], 0)
 
 

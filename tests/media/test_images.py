@@ -1,4 +1,10 @@
+"""Pictures: read from any common format, written whole; comments of the decoders captured."""
+
+import os
 import struct
+import subprocess
+import sys
+import threading
 import zlib
 from pathlib import Path
 
@@ -9,13 +15,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import ImageError, OutputError
-from vdet.media.images import Image, decode_image, read_image, write_image
+from vdet.media.images import Image, capture_stderr, decode_image, read_image, write_image
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
 
 
 def smooth() -> Image:
-    """Give a picture that JPEG keeps well: blue grows to the right, red downwards."""
+    """Return a picture that JPEG keeps well: blue increases to the right, red downwards."""
     y, x = np.mgrid[0:48, 0:64]
     return np.stack([x * 4, np.full_like(x, 99), y * 5], axis=2).astype(np.uint8)
 
@@ -25,7 +31,7 @@ def encoded(suffix: str, image: np.ndarray) -> bytes:
 
 
 def turned_jpeg(image: Image, orientation: int) -> bytes:
-    """Encode as JPEG with an EXIF segment that holds nothing but the orientation."""
+    """Encode as JPEG, with only the orientation in its EXIF segment."""
     entry = struct.pack(">HHIHH", 0x0112, 3, 1, orientation, 0)
     exif = b"Exif\0\0MM\0*\0\0\0\x08" + struct.pack(">H", 1) + entry + bytes(4)
     jpeg = encoded(".jpg", image)
@@ -54,7 +60,7 @@ def test_a_path_need_not_be_ascii(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_image(path), PICTURE)
 
 
-def test_the_format_is_told_from_the_content_not_from_the_suffix(tmp_path: Path) -> None:
+def test_the_content_decides_on_the_format_not_the_suffix(tmp_path: Path) -> None:
     path = tmp_path / "picture.jpg"
     path.write_bytes(encoded(".png", PICTURE))
     np.testing.assert_array_equal(read_image(path), PICTURE)
@@ -133,7 +139,7 @@ def test_a_folder_is_no_picture(tmp_path: Path) -> None:
     ],
     ids=["empty", "text", "cut png", "cut jpeg", "png signature alone"],
 )
-def test_what_is_no_picture_is_named(tmp_path: Path, data: bytes) -> None:
+def test_the_error_names_a_file_that_is_no_picture(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "broken.png"
     path.write_bytes(data)
     with pytest.raises(ImageError, match=r"broken\.png: is not a picture, or is damaged"):
@@ -150,7 +156,7 @@ def test_any_bytes_are_a_picture_or_none(suffix: str, kept: int, junk: bytes) ->
     assert image is None or (image.dtype == np.uint8 and image.ndim == 3)
 
 
-def test_a_picture_of_a_trillion_pixels_is_refused_unread() -> None:
+def test_a_picture_that_claims_a_trillion_pixels_is_refused() -> None:
     header = struct.pack(">IIBBBBB", 1_000_000, 1_000_000, 8, 2, 0, 0, 0)
     png = encoded(".png", PICTURE)
     chunk = b"IHDR" + header
@@ -159,7 +165,7 @@ def test_a_picture_of_a_trillion_pixels_is_refused_unread() -> None:
 
 
 @pytest.mark.parametrize("name", ["picture.xyz", "picture", "picture.txt"])
-def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str) -> None:
+def test_the_error_for_an_unknown_suffix_lists_the_known_ones(tmp_path: Path, name: str) -> None:
     with pytest.raises(ImageError, match=r"written as .*\.jpg, .*\.png"):
         write_image(tmp_path / name, PICTURE)
     assert list(tmp_path.iterdir()) == []
@@ -168,3 +174,60 @@ def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str)
 def test_a_picture_is_not_written_into_a_missing_folder(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         write_image(tmp_path / "no" / "picture.png", PICTURE)
+
+
+@pytest.mark.parametrize("module", ["vdet", "vdet.media.images"])
+def test_an_import_leaves_the_environment_unchanged(module: str) -> None:
+    # OpenCV sets variables of its own.
+    before = "import os, cv2; before = dict(os.environ)"
+    code = f"{before}; import {module}; assert dict(os.environ) == before"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def write_stderr(text: str) -> None:
+    os.write(2, text.encode())
+
+
+def test_what_is_written_in_the_block_is_kept_and_not_shown(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    write_stderr("before\n")
+    with capture_stderr() as lines:
+        write_stderr("one\ntwo\n")
+    write_stderr("after\n")
+    assert lines == ["one", "two"]
+    assert capfd.readouterr().err == "before\nafter\n"
+
+
+def test_of_endless_lines_the_first_are_kept() -> None:
+    with capture_stderr() as lines:
+        for _ in range(1000):
+            write_stderr("x" * 99 + "\n")
+    assert 10 < len(lines) <= 100
+
+
+def test_standard_error_is_restored_after_an_error(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyError), capture_stderr():
+        raise KeyError
+    write_stderr("after\n")
+    assert capfd.readouterr().err == "after\n"
+
+
+def test_threads_capture_in_turn(capfd: pytest.CaptureFixture[str]) -> None:
+    caught: list[list[str]] = []
+
+    def capture(number: int) -> None:
+        for _ in range(20):
+            with capture_stderr() as lines:
+                write_stderr(f"{number}\n" * 3)
+            caught.append(lines)
+
+    threads = [threading.Thread(target=capture, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(len(lines) == 3 and len(set(lines)) == 1 for lines in caught)
+    assert len(caught) == 80
+    write_stderr("after\n")
+    assert capfd.readouterr().err == "after\n"

@@ -55,32 +55,32 @@ def test_a_whole_stream_has_lost_nothing() -> None:
     assert (losses.damaged, losses.total, losses.evident) == (0, 20, False)
 
 
-def test_a_packet_that_gave_no_picture_is_lost_where_there_was_an_error() -> None:
+def test_a_packet_without_a_picture_is_lost_if_there_was_an_error() -> None:
     losses = counted(ALL, at(*range(7), *range(9, 20)), errors=1)
     assert (losses.damaged, losses.lost, losses.total) == (2, 2, 20)
 
 
-def test_without_an_error_the_file_may_mean_it_so() -> None:
+def test_a_packet_without_a_picture_is_not_lost_if_there_was_no_error() -> None:
     losses = counted(ALL, at(*range(7), *range(9, 20)))
     assert (losses.damaged, losses.total, losses.skipped) == (0, 18, 2)
 
 
-def test_pictures_without_a_packet_are_missed_by_the_times() -> None:
+def test_a_gap_in_the_times_counts_the_pictures_without_a_packet() -> None:
     some = at(*range(7), *range(12, 20))
     assert counted(some, some, errors=1).damaged == 5
 
 
-def test_a_picture_after_the_last_that_came_is_lost_too() -> None:
+def test_a_missing_last_picture_is_lost() -> None:
     assert counted(ALL, ALL[:-1], errors=1).damaged == 1
 
 
-def test_a_picture_that_comes_late_was_not_lost_if_nothing_is_damaged() -> None:
+def test_without_damage_a_late_picture_counts() -> None:
     swapped = at(*range(7), 8, 7, *range(9, 20))
     losses = counted(swapped, swapped)
     assert (losses.skipped, losses.damaged, losses.total) == (0, 0, 20)
 
 
-def test_where_there_is_damage_it_is_not_usable() -> None:
+def test_in_damage_a_late_picture_is_not_usable() -> None:
     losses = Losses(Fraction(PERIOD), paired=True)
     losses.fail_to_decode()
     assert [losses.receive(picture) for picture in at(3, 5, 4, 5, 6)] == [
@@ -88,7 +88,7 @@ def test_where_there_is_damage_it_is_not_usable() -> None:
     ]  # fmt: skip
 
 
-def test_irregular_times_say_nothing() -> None:
+def test_gaps_in_irregular_times_are_not_counted() -> None:
     uneven = at(0, 1, 5, 6, 9, 14, 15, 20, 26, 27)
     losses = counted(uneven, uneven, errors=1)
     assert (losses.skipped, losses.damaged) == (0, 1)
@@ -100,7 +100,7 @@ def test_pictures_shown_with_errors_are_damaged() -> None:
     assert (losses.damaged, losses.lost, losses.total) == (1, 0, 20)
 
 
-def test_damaged_packets_count_once_with_the_pictures_they_cost() -> None:
+def test_a_damaged_packet_and_its_lost_picture_count_once() -> None:
     packets = [*ALL[:5], thing(50, corrupt=True), thing(60, corrupt=True), *ALL[7:]]
     assert counted(packets, [*ALL[:5], *ALL[6:]]).damaged == 2
 
@@ -109,7 +109,7 @@ def test_damaged_packets_count_once_with_the_pictures_they_cost() -> None:
     ("received", "paired"),
     [(at(*range(0, 20, 2)), False), ([thing(n * 20, interlaced=True) for n in range(10)], True)],
 )
-def test_packets_are_not_counted_against_pictures_where_that_means_nothing(
+def test_packets_and_pictures_are_not_compared_where_they_do_not_pair(
     received: list[Any], paired: bool
 ) -> None:
     losses = Losses(Fraction(20), paired=paired)
@@ -148,7 +148,7 @@ def test_pictures_after_a_clock_was_set_back_are_usable_in_spite_of_damage() -> 
 
 
 class TestBytes:
-    def test_packets_side_by_side_are_no_evidence(self) -> None:
+    def test_packets_side_by_side_are_no_evidence_of_damage(self) -> None:
         losses = Losses(Fraction(PERIOD), paired=True)
         for position in range(1000, 100_000, 500):
             losses.pass_bytes(position, 490)
@@ -156,7 +156,7 @@ class TestBytes:
         assert not losses.end(7, 100_000)
         assert losses.damaged == 0
 
-    def test_a_hole_between_them_is(self) -> None:
+    def test_a_hole_between_packets_is_evidence_of_damage(self) -> None:
         losses = Losses(Fraction(PERIOD), paired=True)
         losses.pass_bytes(1000, 500)
         losses.pass_bytes(5000, 500)
@@ -168,7 +168,7 @@ class TestBytes:
         assert losses.end(7, 3000)
         assert (losses.damaged, losses.total) == (7, 27)
 
-    def test_other_containers_say_nothing_about_bytes(self) -> None:
+    def test_bytes_at_the_end_do_not_matter_in_other_containers(self) -> None:
         assert not counted(ALL, ALL).end(7, 3000)
 
 
@@ -177,7 +177,7 @@ class TestBytes:
     st.lists(st.none() | st.integers(-1000, 1000), max_size=30),
     st.integers(0, 3),
 )
-def test_there_are_never_more_damaged_than_there_are(
+def test_no_more_pictures_are_damaged_than_there_are(
     sent: list[int | None], received: list[int | None], errors: int
 ) -> None:
     losses = counted([thing(t) for t in sent], [thing(t) for t in received], errors=errors)

@@ -1,4 +1,4 @@
-"""Which pictures a pattern stands for."""
+"""Which pictures a pattern names."""
 
 import contextlib
 import tempfile
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import VideoError
-from vdet.media.numbered import Sequence, find_sequence
+from vdet.media.numbered import PictureSequence, find_sequence
 
 
 def make(folder: Path, *names: str) -> None:
@@ -17,40 +17,40 @@ def make(folder: Path, *names: str) -> None:
         (folder / name).touch()
 
 
-def test_they_begin_at_the_first_number_that_is_there(tmp_path: Path) -> None:
+def test_pictures_begin_at_the_first_number_that_exists(tmp_path: Path) -> None:
     make(tmp_path, "a_0099.png", "a_0100.png", "a_0101.png", "a_0.png", "b_0001.png", "a_0050.jpg")
     pattern = str(tmp_path / "a_%04d.png")
-    assert find_sequence(tmp_path / "a_%04d.png") == Sequence(pattern, 99)
+    assert find_sequence(tmp_path / "a_%04d.png") == PictureSequence(pattern, 99)
 
 
-def test_numbers_may_outgrow_their_digits(tmp_path: Path) -> None:
+def test_numbers_may_have_more_digits_than_the_pattern(tmp_path: Path) -> None:
     make(tmp_path, "98.png", "99.png", "100.png", "0101.png")
     found = find_sequence(tmp_path / "%02d.png")
-    assert found == Sequence(str(tmp_path / "%02d.png"), 98)
+    assert found == PictureSequence(str(tmp_path / "%02d.png"), 98)
 
 
-def test_without_digits_a_number_has_no_zeros_before_it(tmp_path: Path) -> None:
+def test_without_a_width_numbers_have_no_leading_zeros(tmp_path: Path) -> None:
     make(tmp_path, "0.png", "1.png", "02.png", "007.png")
     found = find_sequence(tmp_path / "%d.png")
-    assert found == Sequence(str(tmp_path / "%d.png"), 0)
+    assert found == PictureSequence(str(tmp_path / "%d.png"), 0)
 
 
-def test_a_doubled_per_cent_sign_is_one(tmp_path: Path) -> None:
+def test_a_doubled_per_cent_sign_means_one(tmp_path: Path) -> None:
     folder = tmp_path / "50%d"
     folder.mkdir()
     make(folder, "100%_1.png", "100%%_7.png")
     found = find_sequence(folder / "100%%_%d.png")
-    assert found == Sequence(f"{tmp_path}/50%%d/100%%_%d.png", 1)
+    assert found == PictureSequence(f"{tmp_path}/50%%d/100%%_%d.png", 1)
 
 
 @pytest.mark.parametrize(
     "name", ["in.mp4", "100%.mp4", "%s.png", "%4d.png", "%d-%d.png", "%%d.png"]
 )
-def test_what_is_no_pattern_is_a_file(name: str, tmp_path: Path) -> None:
+def test_a_name_that_is_no_pattern_is_a_file(name: str, tmp_path: Path) -> None:
     assert find_sequence(tmp_path / name) is None
 
 
-def test_a_file_of_that_very_name_goes_first(tmp_path: Path) -> None:
+def test_an_existing_file_with_the_name_of_a_pattern_is_a_file(tmp_path: Path) -> None:
     make(tmp_path, "a%d.mp4", "a1.mp4")
     assert find_sequence(tmp_path / "a%d.mp4") is None
 
@@ -63,7 +63,9 @@ def test_a_file_of_that_very_name_goes_first(tmp_path: Path) -> None:
         (("img_01.png", "img_03.png"), "picture 2 is missing, between 1 and 3"),
     ],
 )
-def test_none_and_a_gap_are_refused(names: tuple[str, ...], words: str, tmp_path: Path) -> None:
+def test_no_pictures_and_a_gap_are_refused(
+    names: tuple[str, ...], words: str, tmp_path: Path
+) -> None:
     make(tmp_path, *names)
     with pytest.raises(VideoError, match=words):
         find_sequence(tmp_path / "img_%02d.png")
@@ -75,7 +77,7 @@ def test_a_folder_that_is_missing_is_refused(tmp_path: Path) -> None:
 
 
 @given(st.text(st.sampled_from("%0123d4s.png\n*[("), min_size=1, max_size=12))
-def test_no_name_breaks_it(name: str) -> None:
+def test_any_name_is_a_pattern_or_none(name: str) -> None:
     with contextlib.suppress(VideoError):
         assert find_sequence(Path("no-such-folder") / name) is None
 
@@ -86,10 +88,10 @@ def test_no_name_breaks_it(name: str) -> None:
     first=st.integers(0, 2000),
     count=st.integers(1, 4),
 )
-def test_names_are_those_that_printf_makes(
+def test_a_pattern_matches_the_names_that_printf_makes(
     before: str, digits: int | None, first: int, count: int
 ) -> None:
     name = f"{before}_%{'' if digits is None else f'0{digits}'}d.png"
     with tempfile.TemporaryDirectory() as folder:
         make(Path(folder), *(name % number for number in range(first, first + count)))
-        assert find_sequence(Path(folder) / name) == Sequence(f"{folder}/{name}", first)
+        assert find_sequence(Path(folder) / name) == PictureSequence(f"{folder}/{name}", first)

@@ -1,4 +1,4 @@
-"""The contract: every odd but legal clip gives its frames, in order, upright, at their times."""
+"""The contract of the reader: odd but legal clips give all frames, upright, at their times."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -56,7 +56,7 @@ def test_frames_come_complete_in_order_and_at_their_times(
     assert frames[0].time == reader.info.start
 
 
-def test_images_are_upright_bgr_of_the_size_that_is_told(clip: tuple[Path, dict[str, Any]]) -> None:
+def test_images_are_upright_bgr_of_the_declared_size(clip: tuple[Path, dict[str, Any]]) -> None:
     path, spec = clip
     width, height = spec.get("size", (160, 96))
     with VideoReader(path) as reader:
@@ -74,7 +74,7 @@ def test_images_are_upright_bgr_of_the_size_that_is_told(clip: tuple[Path, dict[
                 assert np.abs(corner.mean(axis=(0, 1)) - RED).max() < tolerance
 
 
-def test_the_number_of_frames_is_foretold_where_the_file_allows_it(
+def test_the_expected_number_of_frames_is_known_where_the_file_declares_it(
     clip: tuple[Path, dict[str, Any]],
 ) -> None:
     path, spec = clip
@@ -87,7 +87,7 @@ def test_the_number_of_frames_is_foretold_where_the_file_allows_it(
 
 @pytest.mark.usefixtures("silent")
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
-def test_what_is_written_again_has_the_same_frames_at_the_same_times(
+def test_a_copy_has_the_same_frames_at_the_same_times(
     clip: tuple[Path, dict[str, Any]],
     suffix: str,
     tmp_path: Path,

@@ -1,4 +1,4 @@
-"""Images to coded pictures and back."""
+"""Images are converted to pictures for the encoder, and back."""
 
 import av
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.media.pixels import fitted, to_bgr, to_i420
+from vdet.media.pixels import resized, to_bgr, to_i420
 
 
 @given(st.integers(1, 70), st.integers(1, 70))
@@ -28,18 +28,18 @@ def test_an_odd_side_grows_by_its_last_row_or_column() -> None:
 @pytest.mark.parametrize(
     "color", [(255, 255, 255), (0, 0, 0), (40, 30, 210), (200, 60, 20), (128, 128, 128)]
 )
-def test_colours_survive_the_way_there_and_back(color: tuple[int, int, int]) -> None:
+def test_colours_are_the_same_after_encoding_and_decoding(color: tuple[int, int, int]) -> None:
     image = np.full((32, 48, 3), color, np.uint8)
     assert np.abs(to_bgr(to_i420(image), 0).astype(int) - color).max() <= 3
 
 
-def test_a_bgr_picture_is_copied_out_of_the_memory_of_the_decoder() -> None:
+def test_the_image_of_a_bgr_picture_is_a_copy() -> None:
     picture = av.VideoFrame.from_ndarray(np.zeros((32, 64, 3), np.uint8), format="bgr24")
     to_bgr(picture, 0)[:] = 255
     assert not picture.to_ndarray().any()
 
 
-def test_an_image_of_the_right_size_is_left_as_it_is() -> None:
+def test_an_image_of_the_right_size_is_unchanged() -> None:
     image = np.zeros((10, 20, 3), np.uint8)
-    assert fitted(image, 20, 10) is image
-    assert fitted(image, 30, 40).shape == (40, 30, 3)
+    assert resized(image, 20, 10) is image
+    assert resized(image, 30, 40).shape == (40, 30, 3)

@@ -1,4 +1,4 @@
-"""The video reader: parts of a file, files with faults, files that are no videos."""
+"""The video reader: parts of a file, damaged files, files that are no videos, and frame times."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -38,7 +38,7 @@ TOLERANT = InputSettings(max_damaged=1)
 
 
 def overwrite(path: Path, places: int, size: int = 40) -> None:
-    """Put noise over some places of the last two thirds of a file."""
+    """Write noise to some places in the last two thirds of a file."""
     data = bytearray(path.read_bytes())
     rng = np.random.default_rng(0)
     for place in np.linspace(0.7, 0.4, places) * len(data):
@@ -47,7 +47,7 @@ def overwrite(path: Path, places: int, size: int = 40) -> None:
 
 
 def read_damaged(path: Path, threads: int) -> tuple[list[Frame], int]:
-    """The frames, and how many were damaged or lost."""
+    """Return the frames, and how many were damaged or lost."""
     with VideoReader(path, threads=threads, settings=TOLERANT) as reader:
         return list(reader), reader.damaged
 
@@ -94,13 +94,15 @@ class TestRange:
             reader.info.start + Fraction(index, 25) for index in expected
         ]
 
-    def test_leaving_early_lets_go_of_the_file(self, plain_clip: Path, warnings: Warnings) -> None:
+    def test_leaving_the_block_early_closes_the_file(
+        self, plain_clip: Path, warnings: Warnings
+    ) -> None:
         with VideoReader(plain_clip) as reader:
             assert next(iter(reader)).index == 0
         assert list(reader) == []
         assert warnings() == []
 
-    def test_two_readers_do_not_know_of_one_another(self, plain_clip: Path) -> None:
+    def test_two_readers_of_one_file_are_independent(self, plain_clip: Path) -> None:
         with VideoReader(plain_clip) as one, VideoReader(plain_clip, threads=1) as other:
             pairs = list(zip(one, other, strict=True))
         assert len(pairs) == 12
@@ -108,7 +110,7 @@ class TestRange:
 
 
 @pytest.mark.parametrize("rotation", [90, 180, 270])
-def test_a_turned_clip_looks_as_another_program_shows_it(
+def test_a_turned_clip_looks_as_opencv_shows_it(
     rotation: int, tmp_path: Path, write_clip: Writer
 ) -> None:
     path = write_clip(tmp_path / "turned.mp4", rotation=rotation)
@@ -121,7 +123,7 @@ def test_a_turned_clip_looks_as_another_program_shows_it(
     assert np.abs(ours.astype(int) - other).mean() < 3
 
 
-def test_info_tells_what_the_file_says(tmp_path: Path, write_clip: Writer) -> None:
+def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> None:
     rate = Fraction(30_000, 1001)
     path = write_clip(tmp_path / "a.mp4", rate=rate, matrix=1, sounds=["aac"])
     with VideoReader(path) as reader:
@@ -194,7 +196,7 @@ class TestFaults:
             numbers = [read_number(frame.image) for frame in reader]
         assert numbers[:20] == list(range(20))
         assert numbers == sorted(set(numbers))  # B-frames just before the cut may be missing
-        if suffix == "mkv" or options.get("movflags") == "+faststart":  # the length is told ahead
+        if suffix == "mkv" or options.get("movflags") == "+faststart":  # these declare their length
             (warning,) = warnings()
             assert warning.startswith(f"{path}: ")
             assert f"ends early: {len(numbers)} of 60 frames could be read" in warning
@@ -207,7 +209,7 @@ class TestFaults:
             VideoReader(path)
 
     @pytest.mark.parametrize("kind", DAMAGED)
-    def test_damage_is_skipped_counted_and_told_alike_whatever_the_number_of_threads(
+    def test_damage_has_the_same_effect_with_any_number_of_threads(
         self, kind: str, *, tmp_path: Path, write_clip: Writer, warnings: Warnings
     ) -> None:
         path = write_clip(tmp_path / f"damaged.{kind}", **(GOPS | DAMAGED[kind]))
@@ -223,7 +225,7 @@ class TestFaults:
         (warning,) = set(warnings())
         assert f"{path}: {damaged} of " in warning
 
-    def test_damage_in_the_middle_leaves_both_ends(
+    def test_damage_in_the_middle_spares_both_ends(
         self, tmp_path: Path, write_clip: Writer, read_number: Number
     ) -> None:
         path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
@@ -248,7 +250,7 @@ class TestFaults:
         assert reader.damaged > 3
         assert warnings() == []
 
-    def test_damage_is_not_told_of_a_part_that_was_not_read(
+    def test_damage_after_the_last_frame_read_is_not_reported(
         self, tmp_path: Path, write_clip: Writer, warnings: Warnings
     ) -> None:
         path = cut_off(write_clip(tmp_path / "cut.mkv", **GOPS), 0.6)

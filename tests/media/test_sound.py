@@ -1,4 +1,4 @@
-"""Sound goes over into the written video, packet by packet, in step with the picture."""
+"""Sound is copied into the written video, packet by packet, in step with the picture."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -21,7 +21,7 @@ FAST = OutputSettings(preset="ultrafast")
 def copy(
     source: Path, target: Path, *, first: int = 0, last: int | None = None, whole: bool = True
 ) -> Path:
-    """Write the frames `first` … `last - 1` of `source`."""
+    """Write the frames `first` to `last - 1` of `source`."""
     with (
         VideoReader(source, start=Fraction(first, 25)) as reader,
         VideoWriter(target, reader.info, FAST, whole_sound=whole) as writer,
@@ -33,7 +33,7 @@ def copy(
 
 
 def sound(path: Path, track: int = 0) -> Sound:
-    """The packets with their times after the first picture."""
+    """Return the packets, with their times after the first picture in seconds."""
     with av.open(str(path)) as container:
         stream, picture = container.streams.audio[track], container.streams.video[0]
         begin = (picture.start_time or 0) * (picture.time_base or 0)
@@ -52,7 +52,7 @@ def assert_same(sound: Sound, original: Sound) -> None:
 
 @pytest.mark.parametrize("suffix", ["mp4", "mov", "mkv"])
 @pytest.mark.parametrize("codec", ["aac", "ac3", "libmp3lame"])
-def test_all_of_it_is_kept_to_the_bit(
+def test_sound_is_copied_bit_for_bit(
     codec: str, suffix: str, tmp_path: Path, write_clip: Writer, warnings: Warnings
 ) -> None:
     source = write_clip(tmp_path / "in.mp4", sounds=[codec], sound_seconds=1)
@@ -63,7 +63,7 @@ def test_all_of_it_is_kept_to_the_bit(
     assert warnings() == []
 
 
-def test_every_sound_is_kept_with_its_language(tmp_path: Path, write_clip: Writer) -> None:
+def test_every_sound_stream_is_copied_with_its_language(tmp_path: Path, write_clip: Writer) -> None:
     source = write_clip(tmp_path / "in.mkv", sounds=["aac", "libmp3lame"])
     with av.open(str(source)) as original, av.open(str(tmp_path / "tagged.mkv"), "w") as tagged:
         streams = {s.index: tagged.add_stream_from_template(s) for s in original.streams}
@@ -112,7 +112,7 @@ def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
         assert container.streams.video[0].frames == 12
 
 
-def test_a_clip_with_nothing_but_such_sound_is_written_silent(
+def test_a_clip_with_only_such_sound_is_written_silent(
     tmp_path: Path, write_clip: Writer, warnings: Warnings
 ) -> None:
     target = copy(write_clip(tmp_path / "in.mov", sounds=["pcm_mulaw"]), tmp_path / "out.mp4")
@@ -144,7 +144,7 @@ def test_a_source_cut_off_gives_the_sound_before_the_cut(
     assert_same(kept, sound(source)[-len(kept) :])
 
 
-def test_damaged_sound_does_not_cost_the_picture(
+def test_damaged_sound_does_not_affect_the_picture(
     tmp_path: Path, write_clip: Writer, warnings: Warnings
 ) -> None:
     source = write_clip(tmp_path / "in.ts", sounds=["aac"], count=50)

@@ -1,4 +1,4 @@
-"""The video writer: what it writes, and that it writes all of it or nothing."""
+"""The video writer: what it writes, and that a staged file appears complete or not at all."""
 
 import resource
 from collections.abc import Callable, Iterable, Iterator
@@ -9,21 +9,13 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media import (
-    ColorTags,
-    Frame,
-    FrameWriter,
-    NullWriter,
-    VideoInfo,
-    VideoReader,
-    VideoWriter,
-)
+from vdet.files import replacing
+from vdet.media import ColorTags, Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.media.images import Image
 
-Image = NDArray[np.uint8]
 Draw = Callable[[int, int, int], Image]
 Writer = Callable[..., Path]
 FAST = OutputSettings(preset="ultrafast")
@@ -32,7 +24,7 @@ INFO = VideoInfo(Path("unused"), 160, 96, Fraction(25), Fraction(1, 12_800))
 
 @pytest.fixture
 def frames(draw_frame: Draw) -> list[Frame]:
-    """Twelve frames whose times begin at 7 s."""
+    """Twelve frames, the first at 7 s."""
     return [
         Frame(index, 7 + Fraction(index, 25), draw_frame(index, 160, 96)) for index in range(12)
     ]
@@ -44,7 +36,7 @@ def failing(frames: list[Frame], error: type[BaseException]) -> Iterator[Frame]:
 
 
 def write(path: Path, frames: Iterable[Frame], info: VideoInfo = INFO) -> Path:
-    with VideoWriter(path, info, FAST) as writer:
+    with replacing(path) as temporary, VideoWriter(temporary, info, FAST, name=path) as writer:
         for frame in frames:
             writer.write(frame)
     return path
@@ -61,7 +53,7 @@ def listing(folder: Path) -> list[str]:
 
 class TestFile:
     @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".MP4"])
-    def test_it_holds_the_frames_from_second_0(
+    def test_the_first_frame_is_at_second_0(
         self,
         suffix: str,
         frames: list[Frame],
@@ -72,7 +64,7 @@ class TestFile:
         assert [read_number(frame.image) for frame in written] == list(range(12))
         assert [frame.time for frame in written] == [Fraction(index, 25) for index in range(12)]
 
-    def test_times_are_exact_however_uneven(self, frames: list[Frame], tmp_path: Path) -> None:
+    def test_uneven_times_are_exact(self, frames: list[Frame], tmp_path: Path) -> None:
         ticks = [5, 6, 700, 701, 90_000, 90_013, 90_014, 10**7, 10**7 + 1, 10**7 + 2, 10**8, 10**9]
         base = Fraction(1, 30_000)
         moved = [
@@ -89,7 +81,9 @@ class TestFile:
         with av.open(str(write(tmp_path / f"out{suffix}", frames[:count]))) as container:
             assert container.duration == count * av.time_base // 25
 
-    def test_a_browser_plays_it_while_it_loads(self, frames: list[Frame], tmp_path: Path) -> None:
+    def test_a_browser_can_play_the_file_while_it_loads(
+        self, frames: list[Frame], tmp_path: Path
+    ) -> None:
         data = write(tmp_path / "out.mp4", frames).read_bytes()
         assert data.index(b"moov") < data.index(b"mdat")
         with av.open(str(tmp_path / "out.mp4")) as container:
@@ -103,7 +97,7 @@ class TestFile:
         assert frame.image.shape == (98, 154, 3)
         assert np.abs(frame.image[:97, :153].astype(int) - image).mean() < 3
 
-    def test_settings_are_those_of_the_encoder(self, frames: list[Frame], tmp_path: Path) -> None:
+    def test_the_settings_reach_the_encoder(self, frames: list[Frame], tmp_path: Path) -> None:
         sizes = []
         for crf in (10, 40):
             path = tmp_path / f"{crf}.mp4"
@@ -127,7 +121,7 @@ class TestFile:
             (ColorTags(9, 16, 9), ColorTags(9, 16, 6)),
         ],
     )
-    def test_colours_are_tagged_if_those_of_the_source_were(
+    def test_colours_are_tagged_if_the_source_is(
         self, source: ColorTags, written: ColorTags, frames: list[Frame], tmp_path: Path
     ) -> None:
         path = write(tmp_path / "out.mp4", frames, replace(INFO, color=source))
@@ -136,23 +130,35 @@ class TestFile:
             corner = next(iter(reader)).image[60:90, 10:70]
         assert np.abs(corner.mean(axis=(0, 1)) - (40, 30, 210)).max() < 5
 
+    def test_a_file_may_be_written_without_staging(
+        self, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        path = tmp_path / "out.mp4"
+        with VideoWriter(path, INFO, FAST) as writer:
+            for frame in frames:
+                writer.write(frame)
+            assert path.exists()
+        assert len(read(path)) == 12
+
     @pytest.mark.parametrize("name", ["ж视频 é.mp4", "a:b.mp4", "100% %03d.mp4", "-o.mp4"])
-    def test_any_name_will_do(self, name: str, frames: list[Frame], tmp_path: Path) -> None:
+    def test_any_file_name_works(self, name: str, frames: list[Frame], tmp_path: Path) -> None:
         assert len(read(write(tmp_path / name, frames))) == 12
         assert listing(tmp_path) == [name]
 
 
 class TestAllOrNothing:
-    def test_nothing_has_the_name_before_the_end(self, frames: list[Frame], tmp_path: Path) -> None:
+    def test_the_file_does_not_exist_before_the_end(
+        self, frames: list[Frame], tmp_path: Path
+    ) -> None:
         path = tmp_path / "out.mp4"
-        with VideoWriter(path, INFO, FAST) as writer:
+        with replacing(path) as temporary, VideoWriter(temporary, INFO, FAST) as writer:
             writer.write(frames[0])
             assert not path.exists()
         assert listing(tmp_path) == ["out.mp4"]
 
     @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
     @pytest.mark.parametrize("count", [0, 3])
-    def test_an_exception_leaves_what_was_there(
+    def test_an_exception_leaves_the_older_file(
         self, error: type[BaseException], count: int, frames: list[Frame], tmp_path: Path
     ) -> None:
         path = tmp_path / "out.mp4"
@@ -188,22 +194,15 @@ class TestAllOrNothing:
 
 
 class TestRefusals:
-    def test_a_folder_that_is_missing(self, tmp_path: Path) -> None:
-        with pytest.raises(OutputError, match=r"out\.mp4: cannot be written"):
-            write(tmp_path / "none" / "out.mp4", [])
+    def test_a_folder_that_is_missing(self, frames: list[Frame], tmp_path: Path) -> None:
+        writer = VideoWriter(tmp_path / "none" / "out.mp4", INFO, FAST, name=Path("name.mp4"))
+        with (
+            pytest.raises(OutputError, match=r"^name\.mp4: cannot be written: No such file"),
+            writer,
+        ):
+            writer.write(frames[0])
 
     @pytest.mark.parametrize("name", ["out.avi", "out", "out.mp4.txt"])
-    def test_a_kind_of_file_that_is_not_written(self, name: str, tmp_path: Path) -> None:
+    def test_a_suffix_of_no_known_container(self, name: str, tmp_path: Path) -> None:
         with pytest.raises(OutputError, match=r"\.mp4, \.mov, \.mkv"):
             VideoWriter(tmp_path / name, INFO, FAST)
-
-
-def test_the_null_writer_takes_frames_and_leaves_nothing(
-    frames: list[Frame], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    writer: FrameWriter
-    with NullWriter() as writer:
-        for frame in frames:
-            writer.write(frame)
-    assert listing(tmp_path) == []

@@ -45,7 +45,7 @@ from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import RulesTracker
 
 QUEUED = 24
-"""More frames than these held at a time would not be a stream."""
+"""Largest number of frames that a run may hold at a time."""
 
 
 class TestFollowFrames:
@@ -193,12 +193,16 @@ class TestMemory:
         assert 0 < most <= QUEUED
 
     def test_a_whole_run_holds_few_frames_at_a_time(self, red_clip: Path, tmp_path: Path) -> None:
+        def frames_alive() -> int:
+            return sum(isinstance(item, Frame) for item in gc.get_objects())
+
+        others = frames_alive()  # of tests before this one
         calls = count()
         held: list[int] = []
 
         def advance(_: int) -> None:
             if next(calls) % 6 == 5:  # looking takes a while
-                held.append(sum(isinstance(item, Frame) for item in gc.get_objects()))
+                held.append(frames_alive() - others)
 
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
         run_red(VideoJob(red_clip, wanted), threads=2, progress=lambda _: advance)

@@ -1,4 +1,4 @@
-"""Strange clips through the whole command, with settings that cost little."""
+"""Run the whole command on odd clips, with settings that make it quick."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,7 +16,10 @@ from quick import FEW_OPTIONS
 
 @dataclass(frozen=True)
 class Shown:
-    """What an output holds: pictures with their times, packets of each sound, and warnings."""
+    """The content of an output, and the warnings of the run.
+
+    `sounds` is the number of packets of each sound stream.
+    """
 
     images: list[Image]
     times: list[Fraction]
@@ -28,14 +31,14 @@ Process = Callable[..., Shown]
 
 
 def assert_whole(shown: Shown, numbers: list[int], rate: Fraction = Fraction(25)) -> None:
-    """These frames, one period of the rate after another."""
+    """Assert that these frames, and no others, are shown at a constant rate."""
     assert [read_number(image) for image in shown.images] == numbers
     for index, time in enumerate(shown.times):
         assert abs(time - index / rate) <= MILLISECOND
 
 
-def _look(path: Path, err: str) -> Shown:
-    """Read an output without any code of the program."""
+def _read(path: Path, err: str) -> Shown:
+    """Read an output, without any code of vdet."""
     with av.open(str(path)) as container:
         (stream,) = container.streams.video
         assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
@@ -56,7 +59,7 @@ def _look(path: Path, err: str) -> Shown:
 
 @pytest.fixture
 def process(run: Run, tmp_path: Path) -> Process:
-    """Run `vdet detect-video`, which must succeed and leave nothing but its output."""
+    """Run `vdet detect-video`, which must succeed and write only its output."""
 
     def process_it(source: Path, *options: str, suffix: str = "mp4") -> Shown:
         folder = tmp_path / "out"
@@ -65,6 +68,6 @@ def process(run: Run, tmp_path: Path) -> Process:
         result = run("detect-video", source, out, *FEW_OPTIONS, *options)
         assert result.code == 0, result.err
         assert [path.name for path in folder.iterdir()] == [out.name]
-        return _look(out, result.err)
+        return _read(out, result.err)
 
     return process_it

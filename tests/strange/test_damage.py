@@ -1,4 +1,4 @@
-"""Damage in a file: what is left is processed, the loss is told, and too much of it is an error."""
+"""Damage in a file: the rest is processed, the loss is reported, and too much of it is an error."""
 
 from fractions import Fraction
 from itertools import pairwise
@@ -14,7 +14,7 @@ from conftest import Run
 from strange.conftest import Process
 
 COUNT = 40
-# Every frame is coded by itself, so that damage does not spread.
+# Every frame is a key frame, so that damage does not spread.
 KINDS: dict[str, dict[str, Any]] = {
     "mp4": {"movflags": "+faststart", "options": {"g": "1"}},
     "ts": {"options": {"g": "1"}, "size": (640, 384)},
@@ -23,21 +23,21 @@ KINDS: dict[str, dict[str, Any]] = {
     "webm": {"codec": "libvpx-vp9", "options": {"g": "1", "deadline": "realtime"}},
 }
 NOISE = {"mp4": (40, 0), "ts": (192, 376), "mkv": (40, 0), "avi": (40, 0), "webm": (6, 0)}
-"""How noise lies in a frame's packet: first byte, and end if not that of the frame.
+"""Range of bytes in the packet of a frame that become noise; 0 for the end of the packet.
 
-A transport stream is cut into pieces of 188 bytes, each with a header: it is the second one.
+A transport stream consists of cells of 188 bytes, each with a header: it is the second cell.
 """
 
 
 def packets_of(path: Path) -> list[tuple[int, int]]:
-    """Where each packet lies, and its size, bytes."""
+    """Return position and size of each packet, bytes."""
     with av.open(str(path)) as container:
         packets = [packet for packet in container.demux(video=0) if packet.size]
     return [(packet.pos or 0, packet.size) for packet in packets]
 
 
 def damaged(folder: Path, suffix: str, frames: list[int]) -> Path:
-    """Write a clip, and noise over these of its frames."""
+    """Write a clip in which these frames are damaged."""
     path = write_clip(folder / f"damaged.{suffix}", count=COUNT, **KINDS[suffix])
     data = bytearray(path.read_bytes())
     rng = np.random.default_rng(0)
@@ -52,7 +52,7 @@ def damaged(folder: Path, suffix: str, frames: list[int]) -> Path:
 
 
 @pytest.mark.parametrize("suffix", KINDS)
-def test_a_little_is_told_of_and_the_rest_is_processed(
+def test_a_little_damage_is_a_warning_and_the_rest_is_processed(
     suffix: str, tmp_path: Path, process: Process
 ) -> None:
     source = damaged(tmp_path, suffix, [22, 33])
@@ -67,7 +67,9 @@ def test_a_little_is_told_of_and_the_rest_is_processed(
 
 
 @pytest.mark.parametrize("suffix", KINDS)
-def test_too_much_is_an_error_and_nothing_is_written(suffix: str, run: Run, tmp_path: Path) -> None:
+def test_too_much_damage_is_an_error_and_nothing_is_written(
+    suffix: str, run: Run, tmp_path: Path
+) -> None:
     source = damaged(tmp_path, suffix, [11, 22, 33, 34])
     (tmp_path / "out").mkdir()
     out = tmp_path / "out" / "out.mp4"
@@ -81,20 +83,20 @@ def test_too_much_is_an_error_and_nothing_is_written(suffix: str, run: Run, tmp_
     assert not list(out.parent.iterdir())
 
 
-def test_what_is_too_much_is_a_setting(tmp_path: Path, process: Process) -> None:
+def test_the_limit_of_damage_is_a_setting(tmp_path: Path, process: Process) -> None:
     source = damaged(tmp_path, "mp4", [11, 22, 33, 34])
     shown = process(source, "--set", "input.max_damaged=0.1")
     assert "4 of 40 frames damaged or lost" in shown.warnings[0]
 
 
-def test_only_what_is_gone_through_counts(tmp_path: Path, process: Process) -> None:
+def test_damage_after_the_last_frame_read_does_not_count(tmp_path: Path, process: Process) -> None:
     source = damaged(tmp_path, "mp4", [31, 32, 33, 34])
     shown = process(source, "--frames", "25")
     assert [read_number(image) for image in shown.images] == list(range(25))
     assert shown.warnings == []
 
 
-def test_frames_that_matroska_skips_unseen_are_counted_by_the_times(
+def test_frames_in_a_hole_of_a_matroska_file_are_counted_by_the_times(
     run: Run, tmp_path: Path
 ) -> None:
     clusters = {"cluster_time_limit": "400"}  # ten frames each
@@ -110,9 +112,7 @@ def test_frames_that_matroska_skips_unseen_are_counted_by_the_times(
     assert f"hole.mkv: {unseen} of 40 frames damaged or lost" in result.err
 
 
-def test_frames_that_were_never_recorded_are_told_of_and_tolerated(
-    tmp_path: Path, process: Process
-) -> None:
+def test_frames_that_were_never_recorded_are_a_warning(tmp_path: Path, process: Process) -> None:
     times = [Fraction(index, 25) for index in range(COUNT) if index not in {11, 22, 33, 34}]
     source = write_clip(tmp_path / "gaps.mp4", times=times)
     shown = process(source)

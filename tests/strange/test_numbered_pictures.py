@@ -21,14 +21,14 @@ def write_pictures(pattern: Path, numbers: range) -> Path:
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg", "bmp", "tiff", "webp"])
-def test_they_are_a_video(suffix: str, tmp_path: Path, process: Process) -> None:
+def test_numbered_pictures_are_a_video(suffix: str, tmp_path: Path, process: Process) -> None:
     pattern = tmp_path / "pictures 100%" / f"img_%02d.{suffix}"
-    shown = process(write_pictures(pattern, range(9, 12)))  # not from 0, and with ever more digits
+    shown = process(write_pictures(pattern, range(9, 12)))  # not from 0, and with more digits
     assert_whole(shown, [9, 10, 11])
     assert shown.warnings == []
 
 
-def test_their_rate_is_a_setting(tmp_path: Path, process: Process) -> None:
+def test_the_rate_of_numbered_pictures_is_a_setting(tmp_path: Path, process: Process) -> None:
     pattern = write_pictures(tmp_path / "%d.png", range(5))
     shown = process(pattern, "--set", "input.frame_rate=29.97")
     assert_whole(shown, list(range(5)), Fraction(2997, 100))
@@ -41,7 +41,7 @@ def test_sixteen_bits_of_grey_are_converted(tmp_path: Path, process: Process) ->
     assert_whole(process(tmp_path / "%04d.png"), [0, 1, 2])
 
 
-def test_a_damaged_one_is_counted_as_lost(tmp_path: Path, process: Process) -> None:
+def test_a_damaged_picture_is_counted_as_lost(tmp_path: Path, process: Process) -> None:
     pattern = write_pictures(tmp_path / "%d.png", range(30))
     (tmp_path / "20.png").write_text("no picture")
     shown = process(pattern)
@@ -51,7 +51,7 @@ def test_a_damaged_one_is_counted_as_lost(tmp_path: Path, process: Process) -> N
     assert "%d.png: 1 of 30 frames damaged or lost" in warning
 
 
-def test_one_that_is_missing_is_named(run: Run, tmp_path: Path) -> None:
+def test_the_error_names_a_missing_picture(run: Run, tmp_path: Path) -> None:
     pattern = write_pictures(tmp_path / "img_%03d.png", range(5))
     (tmp_path / "img_002.png").unlink()
     result = run("detect-video", pattern, tmp_path / "out.mp4")

@@ -1,4 +1,4 @@
-"""Every strange but legal clip comes out whole: each frame, its time, upright, with its sound."""
+"""Every odd but legal clip is processed whole: each frame, upright, at its time, and the sound."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""What a file may hold besides one picture of one size: it neither hinders nor gets lost."""
+"""Files with covers, subtitles, several sizes, or frames too small or too wide to be searched."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -37,7 +37,7 @@ def test_a_cover_picture_is_not_the_video(tmp_path: Path, process: Process) -> N
     assert shown.warnings == []
 
 
-def test_subtitles_do_not_hinder(tmp_path: Path, process: Process) -> None:
+def test_subtitles_are_ignored(tmp_path: Path, process: Process) -> None:
     texts = tmp_path / "texts.srt"
     texts.write_text("1\n00:00:00,000 --> 00:00:00,300\nhello\n")
     source, path = write_clip(tmp_path / "plain.mkv"), tmp_path / "subtitled.mkv"
@@ -82,7 +82,7 @@ def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
     assert "both.h264: frames of 320×192 pixels scaled to 160×96" in warning
 
 
-def test_frames_that_begin_to_lie_on_their_side_are_scaled_too(
+def test_frames_that_change_from_landscape_to_portrait_are_scaled(
     tmp_path: Path, process: Process
 ) -> None:
     wide = write_clip(tmp_path / "wide.h264", count=3)
@@ -97,7 +97,7 @@ def _tiny(path: Path, size: tuple[int, int]) -> Path:
 
 
 def assert_complete(shown: Shown, size: tuple[int, int]) -> None:
-    """The numbers cannot be read in frames so small: only the times tell them apart."""
+    """Assert shape and times; frames so small do not show their numbers."""
     width, height = size
     shape = (height + height % 2, width + width % 2, 3)
     assert [image.shape for image in shown.images] == [shape] * 5
@@ -125,9 +125,7 @@ def test_frames_smaller_than_a_patch_are_searched_in_windows_as_small(
     assert shown.warnings == []
 
 
-def test_frames_so_wide_that_no_search_of_them_would_end_are_refused_by_name(
-    run: Run, tmp_path: Path
-) -> None:
+def test_frames_with_too_many_windows_are_refused(run: Run, tmp_path: Path) -> None:
     source = write_clip(
         tmp_path / "wide.mkv", size=(16_000, 100), count=1, codec="ffv1", pix_fmt="bgr0"
     )

@@ -1,15 +1,7 @@
-"""Read and write video: frames with exact times, sound carried over, output complete or absent."""
+"""Video and pictures: frames with exact times, sound carried over, sizes limited."""
 
 from vdet.media.frame import ColorTags, Frame, VideoInfo
 from vdet.media.reader import VideoReader
-from vdet.media.writer import FrameWriter, NullWriter, VideoWriter
+from vdet.media.writer import VideoWriter
 
-__all__ = [
-    "ColorTags",
-    "Frame",
-    "FrameWriter",
-    "NullWriter",
-    "VideoInfo",
-    "VideoReader",
-    "VideoWriter",
-]
+__all__ = ["ColorTags", "Frame", "VideoInfo", "VideoReader", "VideoWriter"]

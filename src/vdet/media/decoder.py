@@ -15,9 +15,9 @@ from vdet.media.demux import MAX_PIXELS, open_input, packets
 from vdet.media.losses import Losses
 from vdet.media.probe import check_size, period_of, picture_stream
 
-_HIDING = ("vp8", "libvpx")  # decoders of codecs with packets that hold no picture to be shown
+_WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
 _MAX_RECENT = 500  # packets; key frames further apart than that are rare
-_QUIET = ("vp8", "vp9")  # decoders that hide some errors when several pictures are decoded at once
+_WITHOUT_FRAME_THREADS = ("vp8", "vp9")  # they would hide some errors
 
 
 class Decoder:
@@ -53,7 +53,7 @@ class Decoder:
         for other in self.container.streams:
             if other is not self.stream and not self._all_streams:
                 other.discard = Discard.all
-        paired = self._context.name not in _HIDING
+        paired = self._context.name not in _WITH_HIDDEN_PACKETS
         self.losses = Losses(period_of(self.stream), paired=paired)
 
     def pictures(self) -> Iterator[av.VideoFrame]:
@@ -154,6 +154,6 @@ def _open(path: Path, frame_rate: float, threads: int) -> tuple[InputContainer, 
         container.close()
         raise
     context.options = {"max_pixels": str(MAX_PIXELS)}
-    context.thread_type = "SLICE" if context.name in _QUIET else "AUTO"
+    context.thread_type = "SLICE" if context.name in _WITHOUT_FRAME_THREADS else "AUTO"
     context.thread_count = threads
     return container, stream

@@ -1,4 +1,4 @@
-"""Open a video file, and take its packets out in spite of damage."""
+"""Open a video file, and read its packets in spite of damage."""
 
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -10,19 +10,19 @@ from av.packet import Packet
 from av.stream import Stream
 
 from vdet.errors import VideoError
-from vdet.media.claims import check_claims
+from vdet.media.mp4_index import check_mp4_index
 from vdet.media.numbered import find_sequence
 
 MAX_PIXELS = 8192 * 4608
-"""Of a frame; 8K video in both its widths has less. A damaged header may claim a thousandfold."""
+"""Of a frame. 8K video, in both its widths, has fewer; a damaged header may claim far more."""
 
 MAX_SIDE = 16_384
 """Pixels; H.264 cannot be written larger."""
 
-_MAX_FAILURES = 100  # in a row; a file that gives nothing but errors must end, too
+_MAX_FAILURES = 100  # in a row; a file with nothing but errors must end too
 
-# Formats that hold pictures themselves. Left out are those that name other files or addresses to be
-# opened (playlists and such), and text that would be drawn as a picture.
+# Formats that contain their pictures. Not among them are formats that name other files or addresses
+# to be opened (such as playlists), and text that would be drawn as a picture.
 _FORMATS = (
     "apng", "asf", "av1", "avi", "cavsvideo", "dhav", "dirac", "dv", "flv", "gif", "gxf", "h261",
     "h263", "h264", "hevc", "ivf", "kux", "live_flv", "m4v", "matroska", "mjpeg", "mjpeg_2000",
@@ -46,7 +46,7 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
     """
     if path.is_dir():
         raise VideoError(f"{path}: is a folder; give the name of a video file")
-    # An absolute name cannot be taken for a protocol ("a:b.mp4").
+    # "a:b.mp4" would be taken for a protocol; an absolute name is not.
     name, kind, options = str(path.absolute()), None, {"format_whitelist": ",".join(_FORMATS)}
     if sequence := find_sequence(path):
         name, kind = sequence.pattern, "image2"
@@ -57,9 +57,9 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
             "start_number_range": "1",
         }
     else:
-        check_claims(path)
+        check_mp4_index(path)
     try:
-        options["max_pixels"] = str(MAX_PIXELS)  # already where the decoder looks into the file
+        options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
     except av.FileNotFoundError as error:
         raise VideoError(f"{path}: there is no such file; check the name") from error
@@ -84,10 +84,10 @@ def packets(
         try:
             for packet in container.demux(list(streams)):
                 failures = 0
-                if packet.size:  # an empty one would tell the decoder that all is over
+                if packet.size:  # an empty one would end the decoder
                     yield packet
             return
-        except IndexError:  # PyAV's, at the end, over a stream that appeared while it was reading
+        except IndexError:  # PyAV's, at the end, if a stream appeared during the reading
             return
         except av.FFmpegError:
             failures += 1

@@ -1,4 +1,4 @@
-"""Numbered pictures as one video: `frames/img_%04d.png`, a pattern as `printf` has it."""
+"""Numbered pictures as one video: `frames/img_%04d.png`, a pattern like those of `printf`."""
 
 import re
 from dataclasses import dataclass
@@ -11,10 +11,10 @@ _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]))?d((?:[^%]|%%)*)")
 
 
 @dataclass(frozen=True, slots=True)
-class Sequence:
+class PictureSequence:
     """Pictures without a gap, from number `first` on.
 
-    `pattern` is their absolute name with ``%d`` or ``%04d`` for the number; every other per cent
+    `pattern` is their absolute name, with ``%d`` or ``%04d`` for the number. Every other per cent
     sign in it is doubled.
     """
 
@@ -22,15 +22,15 @@ class Sequence:
     first: int
 
 
-def find_sequence(path: Path) -> Sequence | None:
-    """Look for the pictures that `path` stands for; None where it is no pattern, or a file.
+def find_sequence(path: Path) -> PictureSequence | None:
+    """Return the pictures that the pattern `path` names; None where it is no pattern, or a file.
 
-    They may begin at any number. In the name of a folder a per cent sign stands for itself.
+    They may begin at any number. In the name of a folder, a per cent sign means itself.
 
     Raises
     ------
     VideoError
-        The folder cannot be read, it holds no such picture, or one is missing among them.
+        The folder cannot be read, there is no such picture in it, or one is missing.
     """
     pattern = _PATTERN.fullmatch(path.name)
     if pattern is None or path.exists():
@@ -45,7 +45,7 @@ def find_sequence(path: Path) -> Sequence | None:
                 "add it, or number the pictures without a gap"
             )
     folder = str(path.parent.absolute()).replace("%", "%%")
-    return Sequence(f"{folder}/{path.name}", numbers[0])
+    return PictureSequence(f"{folder}/{path.name}", numbers[0])
 
 
 def _numbers(path: Path, pattern: re.Match[str]) -> list[int]:

@@ -14,24 +14,24 @@ _TURNS = {
 
 
 def quarter_turns(picture: av.VideoFrame) -> int:
-    """Return how far the display matrix turns `picture`: 0, 90, 180 or 270° counter-clockwise."""
+    """Return the rotation of the display matrix: 0, 90, 180 or 270° counter-clockwise."""
     return round(picture.rotation / 90) * 90 % 360
 
 
 def to_bgr(picture: av.VideoFrame, rotation: int) -> Image:
     """Return `picture` turned by `rotation` degrees counter-clockwise, BGR uint8, (H, W, 3).
 
-    Colour matrix and range are the picture's own; BT.601 and limited where it names none.
+    Colour matrix and range are those that the picture names; else BT.601 and limited.
     """
     image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), dtype=np.uint8)
     if rotation:
         return cv2.rotate(image, _TURNS[rotation]).astype(np.uint8, copy=False)
     if picture.format.name == "bgr24":
-        return image.copy()  # else it would be the decoder's own memory
+        return image.copy()  # it shares the memory of the decoder
     return np.ascontiguousarray(image)
 
 
-def fitted(image: Image, width: int, height: int) -> Image:
+def resized(image: Image, width: int, height: int) -> Image:
     """Return `image` scaled to `width` × `height` pixels; unchanged where it has that size."""
     if image.shape[:2] == (height, width):
         return image
@@ -42,7 +42,7 @@ def fitted(image: Image, width: int, height: int) -> Image:
 def to_i420(image: Image) -> av.VideoFrame:
     """Return a BGR image (H, W, 3) as a yuv420p picture, BT.601, limited range.
 
-    4:2:0 needs even sides: an odd one gets its last row or column twice.
+    4:2:0 needs even sides: the last row or column of an odd one is repeated.
     """
     height, width = image.shape[:2]
     if height % 2 or width % 2:

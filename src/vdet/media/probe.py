@@ -1,4 +1,4 @@
-"""What a video file says of itself."""
+"""What a video file declares: its size, rate, length, colours."""
 
 from fractions import Fraction
 from pathlib import Path
@@ -13,12 +13,12 @@ from vdet.media.demux import MAX_PIXELS, MAX_SIDE
 from vdet.media.frame import ColorTags, VideoInfo
 from vdet.media.pixels import quarter_turns
 
-_USUAL_RATE = Fraction(25)
-_LARGEST_TERM = 1_000_000  # of a rate; the encoder's own are 32-bit integers
+_DEFAULT_RATE = Fraction(25)
+_MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
 def picture_stream(container: InputContainer, path: Path) -> VideoStream:
-    """Return the first stream of moving pictures: a cover or a thumbnail is none.
+    """Return the first stream of moving pictures, which is not a cover or a thumbnail.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def picture_stream(container: InputContainer, path: Path) -> VideoStream:
 
 
 def check_size(path: Path, width: int, height: int) -> None:
-    """Refuse frames that are too large, before there is memory for any. Raises `VideoError`."""
+    """Refuse frames that are too large, before memory is set aside. Raises `VideoError`."""
     if max(width, height) > MAX_SIDE or width * height > MAX_PIXELS:
         raise VideoError(
             f"{path}: frames of {width}×{height} pixels are too large ({MAX_PIXELS // 10**6} "
@@ -46,7 +46,7 @@ def check_size(path: Path, width: int, height: int) -> None:
 def describe(
     path: Path, container: InputContainer, stream: VideoStream, first: av.VideoFrame
 ) -> VideoInfo:
-    """Gather what is known once the `first` picture of `stream` has been decoded."""
+    """Describe a video, of which the `first` picture has been decoded."""
     time_base = _time_base(stream)
     rate = _first_sensible(stream.average_rate, stream.guessed_rate)
     start = (first.pts or 0) * time_base
@@ -72,9 +72,9 @@ def describe(
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
-    """Return the seconds of picture that the file declares; None where it declares none.
+    """Return the duration of the picture stream that the file declares, seconds, or None.
 
-    Matroska declares, in a tag, when the stream ends; `start` is the time of its first frame.
+    Matroska declares, in a tag, the end of the stream; `start` is the time of its first frame.
     """
     if stream.duration and stream.time_base:
         return stream.duration * stream.time_base
@@ -87,14 +87,14 @@ def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
 
 
 def _longest(container: InputContainer) -> Fraction | None:
-    """Return the seconds of the longest stream: the picture's own may be shorter."""
+    """Return the duration of the longest stream, seconds; that of the picture may be shorter."""
     return Fraction(container.duration, av.time_base) if container.duration else None
 
 
 def period_of(stream: VideoStream) -> Fraction:
     """Return the usual time from one picture to the next, in units of the time base.
 
-    It is not the average where pictures were left out.
+    The average is longer where pictures are missing.
     """
     rate = _first_sensible(stream.guessed_rate, stream.average_rate)
     return 1 / (rate * _time_base(stream))
@@ -106,6 +106,6 @@ def _time_base(stream: VideoStream) -> Fraction:
 
 def _first_sensible(*rates: Fraction | None) -> Fraction:
     for rate in rates:
-        if rate and (near := rate.limit_denominator(_LARGEST_TERM)) > 0:
+        if rate and (near := rate.limit_denominator(_MAX_TERM)) > 0:
             return near
-    return _USUAL_RATE
+    return _DEFAULT_RATE

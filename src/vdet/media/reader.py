@@ -16,11 +16,11 @@ from vdet.media.decoder import Decoder
 from vdet.media.demux import MAX_PIXELS
 from vdet.media.frame import Frame, VideoInfo
 from vdet.media.images import Image
-from vdet.media.pixels import fitted, to_bgr
+from vdet.media.pixels import resized, to_bgr
 from vdet.media.probe import check_size, describe, stated_duration
 
 _log = logging.getLogger("vdet")
-_USUAL = InputSettings()
+_DEFAULTS = InputSettings()
 _TOLERANCE = Fraction(1, 100)  # share of its duration, or frames, that a whole file may lack
 
 
@@ -66,7 +66,7 @@ class VideoReader:
         end: Fraction | None = None,
         frames: int | None = None,
         threads: int | None = None,
-        settings: InputSettings = _USUAL,
+        settings: InputSettings = _DEFAULTS,
     ) -> None:
         self._start = start or Fraction(0)
         self._end = end
@@ -149,7 +149,7 @@ class VideoReader:
         height, width = image.shape[:2]
         if (width, height) != (info.width, info.height):
             self._scaled.add((width, height))
-        return fitted(image, info.width, info.height)
+        return resized(image, info.width, info.height)
 
     def _timed(self, first: av.VideoFrame) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
         period = 1 / self.info.rate

@@ -1,52 +1,37 @@
-"""Write a video that appears under its name only when complete."""
+"""Write frames as H.264 into one container, next to the sound of their source."""
 
 import contextlib
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Self
 
 import av
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media.encoder import Encoder
-from vdet.media.frame import Frame, VideoInfo
+from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
+from vdet.media.pixels import to_i420
+from vdet.media.sound import SoundCopy
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
-
-class FrameWriter(Protocol):
-    """Takes the frames of one video; a context manager."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *raised: object) -> None: ...
-
-    def write(self, frame: Frame) -> None:
-        """Take the next frame; times must increase from one to the next."""
-
-
-class NullWriter:
-    """A `FrameWriter` that writes nothing."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        pass
-
-    def write(self, frame: Frame) -> None:
-        """Forget `frame`."""
+_FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
+_BT601 = 6  # matrix code of ITU-T H.273
+_LIMITED = 1  # av.video.reformatter.ColorRange.MPEG
 
 
 class VideoWriter:
-    """A `FrameWriter` that writes H.264, yuv420p, with the sound of the source.
+    """Writes frames as H.264, yuv420p, with the sound of their source; a context manager.
 
-    Nothing appears at `path` before the end of the ``with`` block, and nothing at all if that is
-    left by an exception. The first frame is shown at second 0, every other exactly as long after
-    it as in the source (mkv: to the millisecond). Sides of odd length grow by one pixel, the last
-    row or column repeated: 4:2:0 needs even ones. Colours are coded by BT.601, limited range, and
-    tagged so where the source was tagged at all. Sound packets are copied, not encoded again.
+    The file is complete only when the ``with`` block has ended without an exception. For an output
+    that appears complete or not at all, write to a file from `vdet.files.OutputFiles`.
+
+    The first frame is shown at second 0, every other exactly as long after it as in the source
+    (mkv: to the millisecond), the last for one period of the average rate. Sides of odd length grow
+    by one pixel, the last row or column repeated: 4:2:0 needs even ones. Colours are coded by
+    BT.601, limited range, and tagged so if the source was tagged at all. Sound packets are copied,
+    not encoded again.
 
     Parameters
     ----------
@@ -56,6 +41,8 @@ class VideoWriter:
         Of the source; frames must have its width and height.
     settings
         Codec, preset and quality.
+    name
+        The name of the file in messages, where that is not `path`.
     whole_sound
         True: the sound goes on to its own end. False: it ends with the last frame written, which
         is right where the frames are only a part of the source.
@@ -80,51 +67,116 @@ class VideoWriter:
         whole_sound: bool = True,
         threads: int | None = None,
     ) -> None:
+        self._name = name or path
         if path.suffix.lower() not in VIDEO_SUFFIXES:
-            names = ", ".join(VIDEO_SUFFIXES)
-            raise OutputError(f"{path}: videos are written as {names}; name it so")
-        self._file = path
-        self._path = name or path
+            suffixes = ", ".join(VIDEO_SUFFIXES)
+            raise OutputError(f"{self._name}: videos are written as {suffixes}; name it so")
+        self._path = path
         self._info = info
         self._settings = settings
         self._whole_sound = whole_sound
         self._threads = threads
-        self._encoder: Encoder | None = None
-
-    def __enter__(self) -> Self:
-        with contextlib.ExitStack() as stack:
-            stack.push(self._refuse_none)
-            stack.enter_context(self._naming_the_file())
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(self, *raised: Any) -> None:
-        self._stack.__exit__(*raised)
+        self._encoder: _Encoder | None = None
 
     def write(self, frame: Frame) -> None:
         """Encode the next frame; times must increase from one to the next."""
         with self._naming_the_file():
             if self._encoder is None:
-                self._encoder = self._stack.enter_context(self._open(frame))
+                self._encoder = _Encoder(
+                    self._path, self._info, self._settings, frame.time, self._threads
+                )
             self._encoder.write(frame)
 
-    def _open(self, first: Frame) -> Encoder:
-        return Encoder(
-            self._file,
-            self._info,
-            self._settings,
-            origin=first.time,
-            whole_sound=self._whole_sound,
-            threads=self._threads,
-        )
+    def __enter__(self) -> Self:
+        return self
 
-    def _refuse_none(self, *raised: Any) -> None:
-        if self._encoder is None and raised[0] is None:
-            raise VideoError(f"{self._path}: there was no frame to write; check the times given")
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self._encoder is None:
+            if kind is None:
+                raise VideoError(
+                    f"{self._name}: there was no frame to write; check the times given"
+                )
+            return
+        with contextlib.closing(self._encoder), self._naming_the_file():
+            if kind is None:
+                self._encoder.finish(whole_sound=self._whole_sound)
 
     @contextlib.contextmanager
     def _naming_the_file(self) -> Iterator[None]:
         try:
             yield
         except av.FFmpegError as error:
-            raise OutputError(f"{self._path}: cannot be written: {error.strerror}") from error
+            raise OutputError(f"{self._name}: cannot be written: {error.strerror}") from error
+
+
+class _Encoder:
+    """An open output file, whose second 0 is second `origin` of the source.
+
+    Every method may raise `av.FFmpegError`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        info: VideoInfo,
+        settings: OutputSettings,
+        origin: Fraction,
+        threads: int | None,
+    ) -> None:
+        self._origin = origin
+        self._period = 1 / info.rate
+        self._time_base = info.time_base
+        if info.time_base.denominator > _FINEST:
+            self._time_base = Fraction(1, _FINEST)
+        self._last = -1
+        self._container = av.open(
+            str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
+        )
+        self._stream = self._add_picture(info, settings, threads)
+        self._sound = SoundCopy(info.path, self._container, origin) if info.has_sound else None
+
+    def write(self, frame: Frame) -> None:
+        """Encode a frame, and copy the sound up to it."""
+        picture = to_i420(frame.image)
+        since = frame.time - self._origin
+        self._last = max(self._last + 1, round(since / self._time_base))
+        picture.pts = self._last
+        picture.time_base = self._time_base
+        picture.duration = round(self._period / self._time_base)
+        self._container.mux(self._stream.encode(picture))
+        if self._sound:
+            self._sound.copy(since)
+
+    def finish(self, *, whole_sound: bool) -> None:
+        """Write what is left: frames that the encoder holds back, sound, the file's index."""
+        self._container.mux(self._stream.encode(None))
+        if self._sound:
+            end = self._last * self._time_base + self._period
+            self._sound.copy(None if whole_sound else end)
+        self._container.close()
+
+    def close(self) -> None:
+        """Close the file, complete or not."""
+        with contextlib.suppress(av.FFmpegError):
+            self._container.close()
+        if self._sound:
+            self._sound.close()
+
+    def _add_picture(
+        self, info: VideoInfo, settings: OutputSettings, threads: int | None
+    ) -> av.VideoStream:
+        options = {"preset": settings.preset, "crf": str(settings.crf)}
+        stream = self._container.add_stream(settings.codec, rate=info.rate, options=options)
+        context = stream.codec_context
+        context.width = info.width + info.width % 2
+        context.height = info.height + info.height % 2
+        context.thread_count = threads or 0
+        context.pix_fmt = "yuv420p"
+        context.time_base = self._time_base
+        context.sample_aspect_ratio = info.pixel_aspect
+        context.color_primaries = info.color.primaries
+        context.color_trc = info.color.transfer
+        if info.color.matrix != UNSPECIFIED:
+            context.colorspace = _BT601
+            context.color_range = _LIMITED
+        return stream

@@ -37,7 +37,10 @@ def write_clip(path: Path, scene: Scene) -> None:
         time_base=1 / scene.rate,
         frames=scene.frames,
     )
-    with VideoWriter(path, info, OutputSettings()) as writer:
+    with (
+        replacing(path) as temporary,
+        VideoWriter(temporary, info, OutputSettings(), name=path) as writer,
+    ):
         for frame in frames(scene):
             writer.write(frame)
 

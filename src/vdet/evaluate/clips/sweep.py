@@ -1,4 +1,4 @@
-"""Combinations of settings to compare: `heat.threshold=1,2,4` gives one assignment per value."""
+"""Combinations of settings to compare: `tracker.needed=0.1,0.2` gives an assignment per value."""
 
 import itertools
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ def _axis(text: str) -> list[str]:
     key, equals, values = (part.strip() for part in text.partition("="))
     found = [value.strip() for value in _split(values)]
     if not (key and equals and all(found)):
-        raise ConfigError(f"--sweep {text}: expected KEY=VALUE,VALUE, as in heat.threshold=1,2,4")
+        raise ConfigError(f"--sweep {text}: expected KEY=VALUE,VALUE, as in tracker.needed=0.1,0.2")
     return [f"{key}={value}" for value in dict.fromkeys(found)]
 
 

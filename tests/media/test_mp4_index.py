@@ -1,4 +1,4 @@
-"""An index that claims more than there can be is refused before it costs memory."""
+"""An index that claims more samples than a file can have is refused before it costs memory."""
 
 import struct
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vdet.errors import VideoError
 from vdet.media import VideoReader
-from vdet.media.claims import check_claims
+from vdet.media.mp4_index import check_mp4_index
 
 Writer = Callable[..., Path]
 MANY = 90_000_000
@@ -21,7 +21,7 @@ def box(kind: bytes, content: bytes) -> bytes:
 
 
 def with_claim(path: Path, count: int, size: int = 1) -> Path:
-    """Let the sample table say: `count` samples of `size` bytes."""
+    """Make the sample table claim `count` samples of `size` bytes."""
     data = bytearray(path.read_bytes())
     at = data.index(b"stsz")
     data[at + 8 : at + 16] = struct.pack(">II", size, count)
@@ -36,36 +36,38 @@ def test_more_samples_than_bytes_are_refused(tmp_path: Path, write_clip: Writer)
 
 
 @pytest.mark.parametrize("parts", [1, 30])
-def test_so_are_fragments_however_many_share_the_claim(parts: int, tmp_path: Path) -> None:
+def test_fragments_that_claim_too_many_samples_together_are_refused(
+    parts: int, tmp_path: Path
+) -> None:
     run = box(b"trun", struct.pack(">III", 1, MANY // parts, 0))
     data = box(b"ftyp", b"isom") + box(b"moof", box(b"traf", run)) * parts
     (tmp_path / "bomb.mp4").write_bytes(data)
     with pytest.raises(VideoError, match="claims 90,000,000 samples"):
-        check_claims(tmp_path / "bomb.mp4")
+        check_mp4_index(tmp_path / "bomb.mp4")
 
 
-def test_behind_a_box_of_64_bits_too(tmp_path: Path) -> None:
+def test_an_index_after_a_box_with_a_64_bit_size_is_checked(tmp_path: Path) -> None:
     large = struct.pack(">I4sQ", 1, b"mdat", 16 + 5000) + bytes(5000)
     table = box(b"moov", box(b"trak", box(b"stsz", struct.pack(">III", 0, 1, MANY))))
     (tmp_path / "bomb.mov").write_bytes(large + table)
     with pytest.raises(VideoError, match="claims 90,000,000"):
-        check_claims(tmp_path / "bomb.mov")
+        check_mp4_index(tmp_path / "bomb.mov")
 
 
-def test_sizes_listed_one_by_one_are_bounded_by_the_file(tmp_path: Path) -> None:
+def test_samples_listed_one_by_one_pass(tmp_path: Path) -> None:
     table = box(b"moov", box(b"stsz", struct.pack(">III", 0, 0, MANY)))
     (tmp_path / "listed.mp4").write_bytes(box(b"ftyp", b"isom") + table)
-    check_claims(tmp_path / "listed.mp4")
+    check_mp4_index(tmp_path / "listed.mp4")
 
 
-def test_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
+def test_whole_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
     for suffix, options in (
         ("mp4", {"sounds": ["aac"]}),
         ("mov", {"sounds": ["pcm_s16le"], "sound_seconds": 100, "count": 2}),
         ("mp4", {"movflags": "+frag_keyframe+empty_moov"}),
         ("mkv", {}),
     ):
-        check_claims(write_clip(tmp_path / f"clip.{suffix}", **options))
+        check_mp4_index(write_clip(tmp_path / f"clip.{suffix}", **options))
 
 
 @pytest.fixture(scope="module")
@@ -84,10 +86,10 @@ BOXES = st.lists(
 
 
 @given(BOXES | st.binary(max_size=60))
-def test_whatever_it_reads_it_ends(scratch: Path, data: bytes) -> None:
+def test_any_bytes_pass_or_are_refused(scratch: Path, data: bytes) -> None:
     scratch.write_bytes(box(b"ftyp", b"isom") + data)
     try:
-        check_claims(scratch)
+        check_mp4_index(scratch)
     except VideoError as error:
         refused = str(error)
         assert "claims" in refused

@@ -1,7 +1,7 @@
-"""How many samples the index of an MP4 or MOV file claims, counted before memory is set aside.
+"""The number of samples that the index of an MP4 or MOV file claims, checked before it is read.
 
-An index may say "so many samples of one size" in a few bytes, and the demultiplexer makes an entry
-for each: 5 kB of file can ask for gigabytes.
+An index can claim any number of samples of one size in a few bytes, and the demultiplexer makes an
+entry for each: a file of 5 kB can ask for gigabytes of memory.
 """
 
 import struct
@@ -12,31 +12,34 @@ from typing import BinaryIO
 
 from vdet.errors import VideoError
 
-_MOST = 4_000_000  # samples, for which memory is set aside at ease: 44 hours of video
-_MOST_BOXES = 200_000  # to be looked at; ten hours of one-second fragments have as many
+_MAX_SAMPLES = 4_000_000  # always accepted: 44 hours of video
+_MAX_BOXES = 200_000  # that are read; ten hours of one-second fragments have as many
 
 _PARENTS = {b"moov", b"trak", b"mdia", b"minf", b"stbl", b"moof", b"traf"}
-_FIRST = {b"ftyp", b"styp", b"moov", b"moof", b"mdat", b"free", b"skip", b"wide", b"sidx", b"uuid"}
+_FIRST_BOXES = {
+    *(b"ftyp", b"styp", b"moov", b"moof", b"mdat"),
+    *(b"free", b"skip", b"wide", b"sidx", b"uuid"),
+}
 _OWN_FIELDS = 0xF00  # flags of a track run: each sample has fields of its own in the file
 
 
-def check_claims(path: Path) -> None:
+def check_mp4_index(path: Path) -> None:
     """Refuse an MP4 or MOV file that claims far more samples than it has bytes.
 
     Raises
     ------
     VideoError
-        It does. A file that cannot be read is somebody else's to refuse.
+        It does. A file that cannot be read passes: `open_input` refuses it.
     """
-    if not path.is_file():  # to open a pipe would take its content away
+    if not path.is_file():  # reading from a pipe would consume its content
         return
     try:
         with path.open("rb") as file:
             size = file.seek(0, 2)
-            claimed = sum(islice(_claims(file, size), _MOST_BOXES))
+            claimed = sum(islice(_claims(file, size), _MAX_BOXES))
     except OSError:
         return
-    if claimed > max(_MOST, size):
+    if claimed > max(_MAX_SAMPLES, size):
         raise VideoError(
             f"{path}: claims {claimed:,} samples in {size:,} bytes, so it is damaged; "
             "give a file that plays"
@@ -44,13 +47,13 @@ def check_claims(path: Path) -> None:
 
 
 def _claims(file: BinaryIO, size: int) -> Iterator[int]:
-    """Yield for each box the samples of one size that it claims."""
+    """Yield the number of samples of one size that each box claims."""
     position = 0
     while position + 8 <= size:
         file.seek(position)
         head = file.read(24)
         length, kind = struct.unpack(">I4s", head[:8])
-        if position == 0 and kind not in _FIRST:
+        if position == 0 and kind not in _FIRST_BOXES:
             return
         inside = 8
         if length == 1 and len(head) >= 16:
