@@ -106,6 +106,8 @@ def output_options(
 def _suffix(output: Output) -> str:
     """Return the suffix of an output in a batch; the rest of its name is that of the video."""
     kind, suffix = sink_kind(output.sink), str(output.path).lower()
+    if kind.takes == "pictures":
+        raise click.UsageError(f"{output.sink}: is for pictures; give another sink")
     if kind.marker:
         raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
     if not re.fullmatch(r"\.[a-z0-9]+", suffix) or suffix not in (kind.suffixes or [suffix]):

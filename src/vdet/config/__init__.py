@@ -1,1 +1,1 @@
-"""Every tunable: typed settings, read from YAML with errors that name their place."""
+"""The settings: typed, read from YAML, with errors that name their place."""

@@ -102,7 +102,7 @@ def read_document(path: Path) -> Document:
 
 
 def parse_document(text: str, name: str) -> Document:
-    """Read YAML text; `name` stands for it in messages. Raises `ConfigError`."""
+    """Read YAML text; `name` is its name in messages. Raises `ConfigError`."""
     reader = _Reader(name)
     values = reader.value(_compose(text, name), ())
     if values is None:

@@ -1,4 +1,4 @@
-"""All settings: every tunable, typed, with its default, its range and its explanation.
+"""All settings, typed, each with its default, its range and its explanation.
 
 The defaults are those of `configs/default.yaml`, which is their printed form.
 """
@@ -61,7 +61,7 @@ __all__ = [
 
 
 class Settings(Section):
-    """Everything, a field a section."""
+    """All settings, one field for each section."""
 
     detector: SerializeAsAny[DetectorSettings] = SvmSettings()
     tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
