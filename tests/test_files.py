@@ -1,9 +1,24 @@
+"""Files: outputs that are whole or absent, temporary files that are stale, limits, names."""
+
+import os
+import subprocess
+import sys
+import tracemalloc
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from vdet.errors import OutputError, VideoError
-from vdet.files import check_output, replacing
+from vdet.errors import ConfigError, OutputError, VideoError
+from vdet.files import (
+    OutputFiles,
+    check_output,
+    printable,
+    read_whole,
+    remove_stale,
+    replacing,
+)
 
 
 def names(folder: Path) -> list[str]:
@@ -90,6 +105,209 @@ def test_a_folder_of_that_name_is_not_replaced(tmp_path: Path) -> None:
     assert names(tmp_path) == ["out"]
 
 
+LEAVE_ONE = """
+import os, sys
+from pathlib import Path
+from vdet.files import replacing
+
+with replacing(Path(sys.argv[1])):
+    os._exit(1)
+"""
+
+
+def leave_one(path: Path) -> Path:
+    """Let a process end in the middle of writing `path`."""
+    subprocess.run([sys.executable, "-c", LEAVE_ONE, str(path)], check=False)
+    (left,) = path.parent.glob(f".{path.stem}.vdet-*{path.suffix}")
+    return left
+
+
+class TestOutputFiles:
+    """The files of one run appear together, or none does."""
+
+    @staticmethod
+    def write(folder: Path, files: OutputFiles, *numbers: int) -> None:
+        for number in numbers:
+            files.stage(folder / f"{number}.txt").write_text("new")
+
+    def test_all_appear_when_the_block_ends(self, tmp_path: Path) -> None:
+        with OutputFiles() as files:
+            self.write(tmp_path, files, *range(20))
+            assert not any(name[0] != "." for name in names(tmp_path))
+        assert names(tmp_path) == sorted(f"{number}.txt" for number in range(20))
+
+    def test_they_may_lie_in_several_folders(self, tmp_path: Path) -> None:
+        (tmp_path / "a").mkdir()
+        with OutputFiles() as files:
+            files.stage(tmp_path / "a" / "x.csv")
+            files.stage(tmp_path / "y.mp4")
+        assert names(tmp_path) == ["a", "y.mp4"]
+        assert names(tmp_path / "a") == ["x.csv"]
+
+    def test_they_are_synced_before_one_appears_and_appear_in_order(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        steps: list[str] = []
+        fsync, replace = os.fsync, Path.replace
+
+        def note_sync(descriptor: int) -> None:
+            fsync(descriptor)
+            steps.append("sync")
+
+        def note_rename(path: Path, target: Path) -> None:
+            replace(path, target)
+            steps.append(target.name)
+
+        monkeypatch.setattr("os.fsync", note_sync)
+        monkeypatch.setattr(Path, "replace", note_rename)
+        with OutputFiles() as files:
+            self.write(tmp_path, files, 3, 1, 2)
+        assert steps == ["sync", "sync", "sync", "3.txt", "1.txt", "2.txt"]
+
+    @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
+    def test_none_appears_after_an_error(self, error: type[BaseException], tmp_path: Path) -> None:
+        (tmp_path / "1.txt").write_text("old")
+
+        def run() -> None:
+            with OutputFiles() as files:
+                self.write(tmp_path, files, 1, 2, 3)
+                raise error
+
+        with pytest.raises(error):
+            run()
+        assert names(tmp_path) == ["1.txt"]
+        assert (tmp_path / "1.txt").read_text() == "old"
+
+    def test_none_appears_where_one_cannot_be_staged(self, tmp_path: Path) -> None:
+        def run() -> None:
+            with OutputFiles() as files:
+                self.write(tmp_path, files, 1, 2)
+                files.stage(tmp_path / "none" / "x.txt")
+
+        with pytest.raises(OutputError, match=r"x\.txt: cannot be written: No such file"):
+            run()
+        assert names(tmp_path) == []
+
+    def test_none_appears_where_one_cannot_be_synced(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        calls: list[int] = []
+
+        def fail_at_the_second(descriptor: int) -> None:
+            calls.append(descriptor)
+            if len(calls) == 2:
+                raise OSError(5, "Input/output error")
+
+        monkeypatch.setattr("os.fsync", fail_at_the_second)
+        with (
+            pytest.raises(OutputError, match=r"2\.txt: cannot be written: Input/output error"),
+            OutputFiles() as files,
+        ):
+            self.write(tmp_path, files, 1, 2, 3)
+        assert names(tmp_path) == []
+
+    def test_what_appeared_before_a_rename_that_fails_is_removed(self, tmp_path: Path) -> None:
+        (tmp_path / "2.txt").write_text("old")
+        (tmp_path / "3.txt").mkdir()
+        with (
+            pytest.raises(OutputError, match=r"3\.txt: cannot be written: Is a directory"),
+            OutputFiles() as files,
+        ):
+            self.write(tmp_path, files, 1, 2, 3, 4)
+        assert names(tmp_path) == ["2.txt", "3.txt"]
+        assert (tmp_path / "2.txt").read_text() == "new"  # what it replaced cannot come back
+
+    def test_staging_removes_what_a_killed_run_left(self, tmp_path: Path) -> None:
+        leave_one(tmp_path / "a.csv")
+        with OutputFiles() as files:
+            files.stage(tmp_path / "b.mp4")
+            assert len(names(tmp_path)) == 1
+        assert names(tmp_path) == ["b.mp4"]
+
+    def test_without_a_file_nothing_happens(self, tmp_path: Path) -> None:
+        with OutputFiles():
+            pass
+        assert names(tmp_path) == []
+
+
+def test_what_an_ended_process_left_is_removed(tmp_path: Path) -> None:
+    left = leave_one(tmp_path / "out.mp4")
+    remove_stale(tmp_path)
+    assert not left.exists()
+
+
+def test_what_is_in_use_is_kept(tmp_path: Path) -> None:
+    with replacing(tmp_path / "out.mp4") as temporary:
+        remove_stale(tmp_path)
+        assert temporary.exists()
+        with replacing(tmp_path / "out.mp4"), replacing(tmp_path / "other.txt"):
+            assert temporary.exists()
+
+
+def test_writing_anything_in_a_folder_cleans_it(tmp_path: Path) -> None:
+    leave_one(tmp_path / "a.csv")
+    with replacing(tmp_path / "b.mp4"):
+        pass
+    assert [path.name for path in tmp_path.iterdir()] == ["b.mp4"]
+
+
+@pytest.mark.parametrize(
+    "name", [".out.1a2b3c4d.mp4", "out.vdet-1a2b3c4d.mp4", ".vdet-1a2b3c4d", ".a.vdet-1a2b3c4x.mp4"]
+)
+def test_files_of_others_are_never_removed(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    remove_stale(tmp_path)
+    assert (tmp_path / name).exists()
+
+
+def test_a_link_of_such_a_name_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "precious").touch()
+    (tmp_path / ".a.vdet-1a2b3c4d.mp4").symlink_to("precious")
+    remove_stale(tmp_path)
+    assert (tmp_path / "precious").exists()
+
+
+def test_a_folder_that_is_not_there_needs_no_cleaning(tmp_path: Path) -> None:
+    remove_stale(tmp_path / "none")
+
+
+@pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
+def test_a_name_of_any_length_has_room_for_the_mark(tmp_path: Path, stem: str) -> None:
+    path = tmp_path / f"{stem}.mp4"
+    with replacing(path) as temporary:
+        temporary.write_text("whole")
+    assert path.read_text() == "whole"
+
+
+def test_without_locks_nothing_is_stale(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(38, "Function not implemented")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with replacing(tmp_path / "a.mp4") as temporary:
+        remove_stale(tmp_path)
+        assert temporary.exists()
+    assert names(tmp_path) == ["a.mp4"]
+
+
+def test_a_file_removed_before_it_is_locked_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[Path] = []
+    fstat = os.fstat
+
+    def remove_the_first(descriptor: int) -> os.stat_result:
+        if not made:
+            made.extend(tmp_path.iterdir())
+            made[0].unlink()
+        return fstat(descriptor)
+
+    monkeypatch.setattr("os.fstat", remove_the_first)
+    with replacing(tmp_path / "a.mp4") as temporary:
+        assert temporary.exists()
+        assert [temporary] != made
+
+
 def test_an_output_that_is_there_is_refused_without_overwrite(tmp_path: Path) -> None:
     path = tmp_path / "out.txt"
     path.touch()
@@ -126,3 +344,53 @@ def test_an_output_below_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="file is no folder"):
         check_output(tmp_path / "file" / "out.txt", overwrite=True)
+
+
+def read(path: Path, most: int) -> bytes:
+    return read_whole(path, most=most, what="letter", error=ConfigError)
+
+
+@pytest.mark.parametrize("size", [0, 9, 10])
+def test_a_file_within_its_limit_is_read_whole(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"x" * size)
+    assert read(path, 10) == b"x" * size
+
+
+def test_a_larger_file_is_refused_in_the_callers_own_kind_of_error(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"x" * 1001)
+    with pytest.raises(ConfigError, match=r"file: is larger than 1,000 bytes; that is no letter"):
+        read(path, 1000)
+
+
+def test_a_file_without_an_end_takes_no_more_memory_than_its_limit() -> None:
+    tracemalloc.start()
+    with pytest.raises(ConfigError, match="/dev/zero: is larger than 3,000,000 bytes"):
+        read(Path("/dev/zero"), 3_000_000)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 7_500_000
+
+
+def test_no_memory_is_set_aside_for_a_limit_that_is_not_reached(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"x")
+    tracemalloc.start()
+    read(path, 10**9)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 2_000_000
+
+
+def test_a_missing_file_is_named() -> None:
+    with pytest.raises(ConfigError, match="none: cannot be read: No such file"):
+        read(Path("none"), 10)
+
+
+@given(st.text(max_size=200))
+def test_a_name_is_shown_on_one_line_that_a_terminal_only_shows(name: str) -> None:
+    shown = printable(name)
+    assert shown.isprintable()
+    assert len(shown) <= 81
+    assert shown == name or not name.isprintable() or name.startswith(shown[:-1])

@@ -16,7 +16,7 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 400
 
 ROOMS = (
-    "__main__", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "pipeline", "lanes",
+    "__main__", "cli", "testing", "api", "batch", "learn", "evaluate", "pipeline", "lanes",
     "track", "detect", "synthetic", "draw", "media", "config", "plugins", "workers", "archives",
     "files", "geometry", "errors", "__init__",
 )  # fmt: skip

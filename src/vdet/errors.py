@@ -1,4 +1,4 @@
-"""What can go wrong, by kind; each kind carries the exit code of the program.
+"""Kinds of errors; each has the exit code of the program.
 
 Exit codes: 0 success, 1 an error below, 2 wrong usage (click's own), 3 some files of a batch
 failed, 130 interrupted.
@@ -11,13 +11,13 @@ INTERRUPTED = 130
 
 
 class VdetError(Exception):
-    """Anything that the user can understand and act upon."""
+    """An error that the user can understand and act upon."""
 
     exit_code = 1
 
 
 class ConfigError(VdetError, ValueError):
-    """The YAML or a `--set` is wrong; one line a mistake."""
+    """Settings are wrong; one line for each mistake."""
 
 
 class DataError(VdetError, ValueError):
@@ -25,7 +25,7 @@ class DataError(VdetError, ValueError):
 
 
 class ModelError(VdetError, ValueError):
-    """A model file is damaged, foreign, or does not fit its use."""
+    """A model file is damaged, is no model, or does not fit its use."""
 
 
 class ImageError(VdetError, ValueError):
@@ -49,7 +49,7 @@ class TruthError(VdetError, ValueError):
 
 
 class BatchError(VdetError, ValueError):
-    """A batch cannot be begun as it was asked for."""
+    """A batch cannot be run as it was asked for."""
 
 
 class ClusterError(VdetError, OSError):
@@ -57,7 +57,7 @@ class ClusterError(VdetError, OSError):
 
 
 def in_one_line(error: Exception) -> str:
-    """Say of any error what it is; of one that is no `VdetError` or `OSError` that it is a bug."""
+    """Describe any error in one line; one that is no `VdetError` or `OSError` is called a bug."""
     if isinstance(error, VdetError):
         return str(error)
     if isinstance(error, OSError):

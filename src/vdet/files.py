@@ -1,9 +1,9 @@
-"""Files: outputs that appear under their names only when complete, inputs read up to a limit.
+"""Files: outputs that appear only when they are complete, and inputs read up to a limit.
 
-A temporary file lies beside its output. Its name has one form, `.name.vdet-1a2b3c4d.suffix`, and
-its writer holds a lock on it. The system releases the lock when the process ends, however it ends.
-So what a killed run left can be told from what another run is writing at this moment, also on other
-machines of a shared file system.
+A temporary file lies beside its output and is named `.name.vdet-1a2b3c4d.suffix`. Its writer holds
+a lock on it, which the system releases when the process ends, in whatever way. So the files that a
+killed run left can be told from those that another run is writing at the moment, also from other
+machines on a shared file system.
 """
 
 import contextlib
@@ -14,20 +14,21 @@ import secrets
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from types import TracebackType
 from typing import IO, Any, Self
 
 from vdet.errors import OutputError, VdetError
 
 try:
     import fcntl
-except ImportError:  # Windows: no lock is taken, and nothing is held for forsaken
+except ImportError:  # Windows: files are not locked, and none is taken for stale
     fcntl = None  # type: ignore[assignment]
 
-_NAME = re.compile(r"\..*\.vdet-[0-9a-f]{8}(\.[^.]*)?", re.DOTALL)
-_LONGEST_STEM = 200  # bytes; a whole name may have 255
+_TEMPORARY = re.compile(r"\..*\.vdet-[0-9a-f]{8}(\.[^.]*)?", re.DOTALL)
+_MAX_STEM = 200  # bytes; a whole name may have 255
 _FLAGS = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-_LONGEST_NAME = 80  # of a name in a message, characters
 _CHUNK = 1_000_000  # bytes
+_MAX_SHOWN = 80  # characters of a name
 
 
 def check_output(
@@ -38,15 +39,15 @@ def check_output(
     Parameters
     ----------
     inputs
-        Files that the work reads; they are never written over.
+        Files that the work reads; they are never overwritten.
     makes_folder
         The work makes the folder of the output if it is missing.
 
     Raises
     ------
     OutputError
-        `path` is an input, is a folder, is there already (and not `overwrite`), or its folder
-        cannot be written.
+        `path` is an input, is a folder, is there already (without `overwrite`), or its folder
+        cannot be written to.
     """
     if path.resolve() in {source.resolve() for source in inputs}:
         raise OutputError(f"{path}: is the input itself; give another output")
@@ -73,77 +74,86 @@ def make_folder(folder: Path) -> None:
 
 
 class OutputFiles:
-    """The output files of one run, which appear under their names together; a context manager.
+    """The output files of one run, which appear together; a context manager.
 
-    `stage` gives temporary files. When the block ends well, they are brought to the disk and then
-    renamed, in the order in which they were staged; when it ends with an error they are removed.
-    If one cannot be renamed, those that have appeared and that replaced nothing are removed again.
+    When the block ends without an error, all staged files are synced to the disk and then renamed,
+    in the order in which they were staged. When it ends with an error, none appears.
 
     Raises
     ------
     OutputError
-        A file cannot be made, brought to the disk or renamed, or an `OSError` that is not a
-        `VdetError` already came out of the block.
+        A file cannot be made, synced or renamed. The files of this run that have been renamed
+        before are removed, except where they replaced older files.
     """
 
     def __init__(self) -> None:
-        self._staged: list[tuple[Path, Path]] = []
-        self._stack = contextlib.ExitStack()
+        self._staged: list[tuple[Path, Path]] = []  # temporary and final path
+        self._cleanup = contextlib.ExitStack()
+
+    def stage(self, path: Path) -> Path:
+        """Return a new, empty file beside `path` that will become `path`.
+
+        It has the suffix of `path`, for writers that choose a format by it. Temporary files that
+        killed runs left in the folder are removed.
+        """
+        with output_errors(path):
+            remove_stale(path.parent)
+            temporary, descriptor = _create(path)
+        if descriptor is not None:
+            self._cleanup.callback(os.close, descriptor)
+        self._cleanup.callback(_try_to_remove, temporary)
+        self._staged.append((temporary, path))
+        return temporary
 
     def __enter__(self) -> Self:
         return self
 
-    def stage(self, path: Path) -> Path:
-        """Return a new, empty temporary file beside `path`, of the same suffix."""
-        remove_stale(path.parent)
-        with _named(path):
-            temporary = self._stack.enter_context(temporary_beside(path))
-        self._staged.append((temporary, path))
-        return temporary
-
-    def __exit__(self, kind: type[BaseException] | None, error: Any, _: object) -> None:
-        with self._stack:
+    def __exit__(
+        self, kind: type[BaseException] | None, _: BaseException | None, __: TracebackType | None
+    ) -> None:
+        with self._cleanup:
             if kind is None:
                 self._publish()
-        if isinstance(error, OSError) and not isinstance(error, VdetError) and self._staged:
-            path = self._staged[0][1]
-            raise _unwritable(path, error) from error
 
     def _publish(self) -> None:
-        appeared: list[Path] = []
-        try:
+        for temporary, path in self._staged:
+            with output_errors(path):
+                _sync(temporary)
+        with contextlib.ExitStack() as undo:
             for temporary, path in self._staged:
-                with _named(path):
-                    bring_to_disk(temporary)
-            for temporary, path in self._staged:
-                is_new = not path.exists()
-                with _named(path):
+                is_new = not os.path.lexists(path)
+                with output_errors(path):
                     temporary.replace(path)
                 if is_new:
-                    appeared.append(path)
-        except BaseException:
-            for path in appeared:
-                path.unlink(missing_ok=True)
-            raise
-
-
-@contextlib.contextmanager
-def _named(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise _unwritable(path, error) from error
-
-
-def _unwritable(path: Path, error: OSError) -> OutputError:
-    return OutputError(f"{path}: cannot be written: {error.strerror or error}")
+                    undo.callback(_try_to_remove, path)
+            undo.pop_all()
 
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary file beside `path`, renamed to `path` at the end: `OutputFiles` for one."""
+    """Give a temporary file that becomes `path` when the block ends without an error.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be made or renamed, or the block raises an `OSError` that is not a
+        `VdetError`.
+    """
     with OutputFiles() as files:
-        yield files.stage(path)
+        temporary = files.stage(path)
+        with output_errors(path):
+            yield temporary
+
+
+@contextlib.contextmanager
+def output_errors(path: Path) -> Iterator[None]:
+    """Turn an `OSError` of the block into an `OutputError` that names `path`."""
+    try:
+        yield
+    except VdetError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def write_json(values: Any, target: str) -> None:
@@ -156,55 +166,13 @@ def write_json(values: Any, target: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-@contextlib.contextmanager
-def temporary_beside(path: Path) -> Iterator[Path]:
-    """Give a new, empty file in the folder of `path`, of its suffix; what is left of it goes.
-
-    Raises
-    ------
-    OSError
-        The file cannot be made.
-    """
-    temporary, descriptor = _make(path)
-    try:
-        yield temporary
-    finally:
-        temporary.unlink(missing_ok=True)
-        if descriptor is not None:
-            os.close(descriptor)
-
-
-def bring_to_disk(path: Path) -> None:
-    """Wait until what was written to a file, by whatever means, has arrived. Raises `OSError`."""
-    descriptor = os.open(path, _FLAGS)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def remove_stale(folder: Path) -> None:
     """Remove the temporary files in `folder` whose writers have ended."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if _NAME.fullmatch(entry.name):
+            if _TEMPORARY.fullmatch(entry.name):
                 with contextlib.suppress(OSError):
                     _remove_if_stale(entry.path)
-
-
-def _make(path: Path) -> tuple[Path, int | None]:
-    """Return a new file, and the descriptor that holds its lock, where there are locks."""
-    stem = os.fsencode(path.stem)[:_LONGEST_STEM].decode(errors="ignore")
-    while True:
-        candidate = path.with_name(f".{stem}.vdet-{secrets.token_hex(4)}{path.suffix}")
-        descriptor = os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
-        if fcntl is None:
-            os.close(descriptor)
-            return candidate, None
-        # Somebody who was removing forsaken files may have come between the two calls.
-        if _lock(descriptor) and os.fstat(descriptor).st_nlink:
-            return candidate, descriptor
-        os.close(descriptor)
 
 
 def _remove_if_stale(path: str) -> None:
@@ -218,8 +186,23 @@ def _remove_if_stale(path: str) -> None:
         os.close(descriptor)
 
 
+def _create(path: Path) -> tuple[Path, int | None]:
+    """Return a new temporary file, and the descriptor that holds its lock, if there are locks."""
+    stem = os.fsencode(path.stem)[:_MAX_STEM].decode(errors="ignore")
+    while True:
+        candidate = path.with_name(f".{stem}.vdet-{secrets.token_hex(4)}{path.suffix}")
+        descriptor = os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
+        if fcntl is None:
+            os.close(descriptor)
+            return candidate, None
+        # Another run may have taken it for stale and removed it before it was locked.
+        if _lock(descriptor) and os.fstat(descriptor).st_nlink:
+            return candidate, descriptor
+        os.close(descriptor)
+
+
 def _lock(descriptor: int) -> bool:
-    """Return False if another has the lock. Where files have no locks, none is forsaken either."""
+    """Return False if another has the lock; True on a file system without locks."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -229,13 +212,27 @@ def _lock(descriptor: int) -> bool:
     return True
 
 
+def _sync(path: Path) -> None:
+    """Wait until the content of a file, however it was written, is on the disk."""
+    descriptor = os.open(path, _FLAGS)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _try_to_remove(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
 def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> bytes:
     """Return the content of a file.
 
     Parameters
     ----------
     most
-        Bytes; a larger file is refused after so many, whatever size it claims to have.
+        Bytes. A larger file is refused once so many have been read, whatever size it claims.
     what
         What the file should be, for the message.
     error
@@ -252,18 +249,18 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
 
 
 def _chunks(file: IO[bytes], most: int) -> Iterator[bytes]:
-    """Give at most so many bytes; asked for all at once, memory is set aside for `most`."""
+    """Yield at most `most` bytes. A single read would set memory aside for all of them."""
     while chunk := file.read(min(most, _CHUNK)):
         yield chunk
         most -= len(chunk)
 
 
 def escaped(name: str) -> str:
-    """Return a name from outside on one line, without what a terminal would obey."""
+    """Return a name from outside on one line, without characters that control a terminal."""
     return name if name.isprintable() else ascii(name)
 
 
 def printable(name: str) -> str:
     """Return a name from outside as messages show it: escaped, and cut where it is very long."""
     shown = escaped(name)
-    return shown if len(shown) <= _LONGEST_NAME else f"{shown[:_LONGEST_NAME]}…"
+    return shown if len(shown) <= _MAX_SHOWN else f"{shown[:_MAX_SHOWN]}…"

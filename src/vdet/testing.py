@@ -18,6 +18,7 @@ from vdet.files import OutputFiles
 from vdet.geometry import Box
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import Image
+from vdet.pipeline.loop import NullDetector
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.track.protocol import VideoTracker
@@ -198,15 +199,8 @@ def _content(path: Path) -> list[Path]:
     return [path] if path.exists() else []
 
 
-class _Blind:
-    """A detector without stage pictures."""
-
-    def search(self, image: Image, index: int | None) -> None:
-        """Do nothing."""
-
-    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
-        """Return no detections."""
-        return NO_DETECTIONS
+class _ShowsFrame(NullDetector):
+    """A detector whose only stage picture is the frame."""
 
     def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
         """Return a picture of the frame."""
@@ -219,4 +213,4 @@ def _result(index: int) -> FrameResult:
         Track(number, box, 0.9, predicted=number == 2)
         for number, box in enumerate(_boxes(index), start=1)
     )
-    return FrameResult(Path("check.mp4"), frame, _detections(index), tracks, None, _Blind())
+    return FrameResult(Path("check.mp4"), frame, _detections(index), tracks, None, _ShowsFrame())

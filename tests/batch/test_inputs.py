@@ -1,4 +1,4 @@
-"""Which videos a batch is made of."""
+"""The videos of a batch, from files, folders and patterns."""
 
 import os
 from pathlib import Path
@@ -11,7 +11,7 @@ from vdet.errors import BatchError
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder as a camera leaves it, which the program is started in."""
+    """A folder as a camera leaves it; it is the current folder."""
     for name in (
         "clips/b.mp4",
         "clips/a.MOV",
@@ -78,7 +78,7 @@ class TestFound:
     def test_a_file_whose_name_looks_like_a_pattern_is_itself(self) -> None:
         assert found("odd [1].mp4") == [("odd [1].mp4", "odd [1].mp4")]
 
-    def test_what_is_named_twice_is_taken_once(self, folder: Path) -> None:
+    def test_a_video_that_is_named_twice_is_taken_once(self, folder: Path) -> None:
         (folder / "link").symlink_to(folder / "clips")
         assert found("clips", "clips/b.mp4", "link/b.mp4", "clips/../clips") == found("clips")
 
@@ -93,7 +93,7 @@ class TestFound:
         ("*.mkv", r"\*.mkv: no file matches this pattern"),
     ],
 )
-def test_what_stands_for_no_video_is_named(clip: str, words: str) -> None:
+def test_a_clip_that_gives_no_video_is_named(clip: str, words: str) -> None:
     with pytest.raises(BatchError, match=f"^{words}"):
         find_sources([Path("clips"), Path(clip)])
 

@@ -1,11 +1,11 @@
-"""The manifest: whole lines, whatever was there before."""
+"""The manifest: whole lines, whatever is there already."""
 
 import json
 from pathlib import Path
 
 import pytest
 
-from vdet.batch.manifest import Origin, Record, appending
+from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.errors import OutputError
 
 ORIGIN = Origin("vdet 1.2", "m.npz", "ab" * 32)
@@ -19,7 +19,7 @@ def lines(path: Path) -> list[str]:
 
 def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
     path = tmp_path / "m.jsonl"
-    with appending(path, ORIGIN) as add:
+    with open_manifest(path, ORIGIN) as add:
         add(RECORD)
         (line,) = lines(path)
         add(RECORD)
@@ -44,7 +44,7 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
 def test_what_is_there_is_kept(tmp_path: Path) -> None:
     path = tmp_path / "m.jsonl"
     path.write_text("earlier\n")
-    with appending(path, ORIGIN) as add:
+    with open_manifest(path, ORIGIN) as add:
         add(RECORD)
     assert lines(path)[0] == "earlier"
     assert len(lines(path)) == 2
@@ -53,17 +53,17 @@ def test_what_is_there_is_kept(tmp_path: Path) -> None:
 def test_a_line_that_was_cut_off_does_not_spoil_the_next(tmp_path: Path) -> None:
     path = tmp_path / "m.jsonl"
     path.write_text('{"input": "/in')
-    with appending(path, ORIGIN) as add:
+    with open_manifest(path, ORIGIN) as add:
         add(RECORD)
     cut, whole = lines(path)
     assert cut == '{"input": "/in'
     assert json.loads(whole)["frames"] == 2
 
 
-def test_names_of_any_kind_can_be_told(tmp_path: Path) -> None:
+def test_names_of_any_kind_can_be_recorded(tmp_path: Path) -> None:
     path = tmp_path / "m.jsonl"
     odd = Record("/in/\udcff \n\U0001f697.mp4", {}, "now", 0.0, error="\udcff: bad")
-    with appending(path, ORIGIN) as add:
+    with open_manifest(path, ORIGIN) as add:
         add(odd)
     (line,) = lines(path)
     assert json.loads(line)["input"] == odd.input
@@ -71,7 +71,7 @@ def test_names_of_any_kind_can_be_told(tmp_path: Path) -> None:
 
 def test_a_manifest_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     def open_it() -> None:
-        with appending(tmp_path / "none" / "m.jsonl", ORIGIN):
+        with open_manifest(tmp_path / "none" / "m.jsonl", ORIGIN):
             pass
 
     with pytest.raises(OutputError, match=r"m\.jsonl: cannot be written: No such file"):
@@ -80,18 +80,18 @@ def test_a_manifest_that_cannot_be_written_is_named(tmp_path: Path) -> None:
 
 def test_a_full_disk_is_named() -> None:
     def fill() -> None:
-        with appending(Path("/dev/full"), ORIGIN) as add:
+        with open_manifest(Path("/dev/full"), ORIGIN) as add:
             add(RECORD)
 
     with pytest.raises(OutputError, match="/dev/full: cannot be written: No space left on device"):
         fill()
 
 
-def test_an_error_of_the_work_is_none_of_the_manifest(tmp_path: Path) -> None:
-    def work() -> None:
-        with appending(tmp_path / "m.jsonl", ORIGIN):
+def test_an_error_in_the_block_is_not_one_of_the_manifest(tmp_path: Path) -> None:
+    def fail() -> None:
+        with open_manifest(tmp_path / "m.jsonl", ORIGIN):
             raise OSError(24, "Too many open files")
 
     with pytest.raises(OSError, match="Too many open files") as caught:
-        work()
+        fail()
     assert not isinstance(caught.value, OutputError)

@@ -1,4 +1,4 @@
-"""What a batch will do, and what it refuses before any work."""
+"""The plan of a batch, and what is refused before any work."""
 
 import os
 from collections.abc import Mapping
@@ -60,7 +60,7 @@ class TestJobs:
         assert made.manifest == Path("out/manifest.jsonl")
         assert not Path("out").exists()
 
-    def test_all_have_what_is_common(self) -> None:
+    def test_all_jobs_have_what_is_common(self) -> None:
         (job,) = plan("clips/a.mp4").jobs
         video = Output("video", Path("out/a.mp4"))
         assert job == replace(COMMON, source=Path("clips/a.mp4"), outputs=(video,))
@@ -74,7 +74,7 @@ class TestJobs:
         made = plan_outputs("clips/a.mp4", "clips/c.avi", suffixes={"video": ".mkv"})
         assert outputs(made.jobs) == [["out/a.mkv"], ["out/c.mkv"]]
 
-    def test_what_is_done_is_skipped_and_what_is_half_done_is_not(self) -> None:
+    def test_jobs_with_all_their_outputs_are_skipped(self) -> None:
         Path("out").mkdir()
         for name in ("a.mp4", "a.csv", "b.MKV"):
             Path("out", name).touch()
@@ -84,14 +84,14 @@ class TestJobs:
             *("clips/b.MKV", "clips/c.avi", "clips/day/a.mp4"),
         ]
 
-    def test_an_output_that_is_there_is_kept_or_replaced_as_one_likes(self) -> None:
+    def test_an_output_that_is_there_is_refused_or_replaced(self) -> None:
         Path("out").mkdir()
         Path("out/a.mp4").touch()
         with pytest.raises(OutputError, match=r"^out/a\.mp4: is there already"):
             plan("clips")
         assert len(plan("clips", overwrite=True).jobs) == 4
 
-    def test_a_manifest_that_is_there_is_gone_on_with(self) -> None:
+    def test_a_manifest_that_is_there_is_continued(self) -> None:
         Path("out").mkdir()
         Path("out/manifest.jsonl").touch()
         assert len(plan("clips").jobs) == 4
@@ -99,7 +99,7 @@ class TestJobs:
 
 @pytest.mark.usefixtures("clips")
 class TestRefused:
-    def test_two_inputs_of_one_name_both_told(self) -> None:
+    def test_two_inputs_of_one_name(self) -> None:
         words = r"^clips/a\.mp4 and clips/day/a\.mp4: both would become out/a\.mp4"
         with pytest.raises(BatchError, match=words):
             plan("clips/a.mp4", "clips/day/a.mp4")

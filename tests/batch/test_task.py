@@ -30,7 +30,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     return Work(SETTINGS, path, threads=1)
 
 
-def test_tells_what_was_done_and_makes_the_folders_for_it(
+def test_the_record_says_what_was_done_and_folders_are_made(
     job: VideoJob, work: Work, tmp_path: Path
 ) -> None:
     before = datetime.now(UTC).replace(microsecond=0)
@@ -48,7 +48,7 @@ def test_tells_what_was_done_and_makes_the_folders_for_it(
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
 
 
-def test_warnings_of_this_file_are_recorded_and_no_others(
+def test_only_warnings_about_this_file_are_recorded(
     job: VideoJob, work: Work, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def warn_and_process(*arguments: object, **options: object) -> object:
@@ -93,7 +93,7 @@ def test_with_vdet_debug_a_bug_shows_its_traceback(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_a_killed_process_is_told_for_it(job: VideoJob) -> None:
+def test_a_file_whose_process_was_killed_has_a_record(job: VideoJob) -> None:
     record = record_of_killed(job)
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: its process was killed")

@@ -77,7 +77,7 @@ def test_when_none_works_the_code_is_1(run: Run, tmp_path: Path) -> None:
     assert names(tmp_path / "out") == ["manifest.jsonl"]
 
 
-def test_times_and_tracks_alone_and_nothing_said(run: Run, clips: Path, tmp_path: Path) -> None:
+def test_a_part_of_each_video_tracks_alone_and_quiet(run: Run, clips: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     options = ("--no-video", "--tracks", ".jsonl", "--start", "0.08", "--frames", "3")
     result = run("-q", "detect-video", clips, "-d", out, "--jobs", "2", *options)
@@ -87,7 +87,7 @@ def test_times_and_tracks_alone_and_nothing_said(run: Run, clips: Path, tmp_path
     assert numbers == [2, 3, 4]
 
 
-def test_one_job_works_in_a_process_of_its_own_too(run: Run, clips: Path, tmp_path: Path) -> None:
+def test_one_job_also_has_its_own_process(run: Run, clips: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     result = run("detect-video", clips / "a.mp4", "-d", out, "--jobs", "1", "--frames", "2")
     assert result.code == 0, result.err

@@ -35,7 +35,7 @@ def test_makes_a_camera_of_a_folder_and_names_what_it_skipped(
     assert "6 of 7 photographs used" in result.out
 
 
-def test_previews_show_each_photograph_used_beside_its_undistorted_self(
+def test_previews_show_each_photograph_beside_its_undistorted_form(
     run: Run, boards: Path, tmp_path: Path
 ) -> None:
     preview = tmp_path / "preview"
@@ -62,7 +62,7 @@ def test_another_pattern_than_the_board_has_is_not_found(
 
 
 @pytest.mark.parametrize("pattern", ["9", "9x", "9x6x3", "2x6", "ninexsix", "-9x6"])
-def test_a_pattern_that_is_none_is_wrong_usage(run: Run, tmp_path: Path, pattern: str) -> None:
+def test_a_wrong_pattern_is_wrong_usage(run: Run, tmp_path: Path, pattern: str) -> None:
     result = run("calibrate", tmp_path, "-o", tmp_path / "c.yaml", f"--pattern={pattern}")
     assert result.code == 2
     assert "as in 9x6" in result.err

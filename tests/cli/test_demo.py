@@ -1,14 +1,17 @@
+"""`vdet demo`, and the steps that it makes."""
+
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
-from quick import QUICK
-from vdet import demo
+from conftest import Run
+from quick import QUICK, only_windows
+from vdet.cli.demo import DemoFiles, DemoResult, check_demo, run_demo
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.demo import DemoFiles, DemoResult, check_demo, run_demo
 from vdet.detect.svm.model import load_model
 from vdet.errors import OutputError
 from vdet.evaluate.predictions import read_predictions
@@ -19,6 +22,7 @@ from vdet.synthetic.scene import Scene
 
 PATCHES = 400
 FRAMES = 30
+FEW_WINDOWS = only_windows("size: 128, overlap: 0.7, top: 370, bottom: 600")
 
 
 def short_clip(seed: int) -> Scene:
@@ -29,7 +33,7 @@ def short_clip(seed: int) -> Scene:
 class Demo:
     files: DemoFiles
     result: DemoResult
-    said: list[str]
+    steps: list[str]
     totals: list[int | None]
 
 
@@ -37,7 +41,7 @@ class Demo:
 def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
     """A demo with few patches and a short clip."""
     files = DemoFiles(tmp_path_factory.mktemp("demo") / "new" / "demo")
-    said: list[str] = []
+    steps: list[str] = []
     totals: list[int | None] = []
 
     def progress(total: int | None) -> Callable[[int], object]:
@@ -45,11 +49,11 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
         return lambda _: None
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(demo, "PATCHES", PATCHES)
-        patch.setattr(demo, "demo_scene", short_clip)
+        patch.setattr("vdet.cli.demo.PATCHES", PATCHES)
+        patch.setattr("vdet.cli.demo.demo_scene", short_clip)
         settings = load_settings(None, QUICK)
-        result = run_demo(files, settings, say=said.append, progress=progress)
-    return Demo(files, result, said, totals)
+        result = run_demo(files, settings, report_step=steps.append, progress=progress)
+    return Demo(files, result, steps, totals)
 
 
 def test_every_file_it_names_is_there(done: Demo) -> None:
@@ -84,7 +88,7 @@ def test_vehicles_are_found(done: Demo) -> None:
     assert scores.precision > 0.35
 
 
-def test_the_model_has_learnt_the_patches(done: Demo) -> None:
+def test_the_model_classifies_the_patches(done: Demo) -> None:
     assert {split.split for split in done.result.training.splits} == {"random", "tail"}
     for split in done.result.training.splits:
         assert 0.85 < split.test_accuracy <= 1
@@ -96,9 +100,9 @@ def test_tracks_and_truth_can_be_scored_again(done: Demo) -> None:
     assert read_truth(done.files.truth)
 
 
-def test_each_step_is_told(done: Demo) -> None:
-    assert [line[:3] for line in done.said] == ["1/4", "2/4", "3/4", "4/4"]
-    assert f"{2 * PATCHES} patches" in done.said[0]
+def test_each_step_is_reported(done: Demo) -> None:
+    assert [line[:3] for line in done.steps] == ["1/4", "2/4", "3/4", "4/4"]
+    assert f"{2 * PATCHES} patches" in done.steps[0]
     assert done.totals == [2 * PATCHES, FRAMES]
 
 
@@ -120,7 +124,7 @@ def test_earlier_stage_pictures_are_not_written_over_either(tmp_path: Path) -> N
     check_demo(DemoFiles(tmp_path), overwrite=True)
 
 
-def test_a_new_or_an_empty_folder_will_do(tmp_path: Path) -> None:
+def test_the_folder_may_be_new_or_empty(tmp_path: Path) -> None:
     check_demo(DemoFiles(tmp_path), overwrite=False)
     check_demo(DemoFiles(tmp_path / "new" / "demo"), overwrite=False)
     assert (tmp_path / "new" / "demo").is_dir()
@@ -130,3 +134,55 @@ def test_a_file_is_no_folder_for_a_demo(tmp_path: Path) -> None:
     (tmp_path / "demo").touch()
     with pytest.raises(OutputError, match="cannot be made a folder"):
         check_demo(DemoFiles(tmp_path / "demo"), overwrite=False)
+
+
+@pytest.fixture
+def small(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vdet.cli.demo.PATCHES", 60)
+    monkeypatch.setattr(
+        "vdet.cli.demo.demo_scene", lambda seed: replace(short_clip(seed), frames=FRAMES // 2)
+    )
+
+
+@pytest.mark.usefixtures("small")
+def test_says_what_it_measured_and_where_to_look(run: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "demo"
+    result = run("demo", folder, *FEW_WINDOWS)
+    assert result.code == 0, result.err
+    for split in ("random", "tail"):
+        assert re.search(rf"patches, {split} split: test accuracy [01]\.\d{{3}}", result.out)
+    assert f"video: {FRAMES // 2} frames in " in result.out
+    for words in ("precision", "recall", "F1", "IoU 0.5", "IDF1", "id switches"):
+        assert words in result.out
+    for name in ("found.mp4", "stages", "found.jsonl", "truth.txt", "model.json"):
+        assert str(folder / name) in result.out
+        assert (folder / name).exists()
+    for step in ("1/4", "2/4", "3/4", "4/4"):
+        assert step in result.err
+
+    again = run("demo", folder, *FEW_WINDOWS)
+    assert again.code == 1
+    assert "is there already; give --overwrite" in again.err
+    assert again.err.count("\n") == 1
+
+
+def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "demo").write_text("precious")
+    result = run("demo", tmp_path / "demo")
+    assert result.code == 1
+    assert result.err.count("\n") == 1
+    assert "internal error" not in result.err
+    assert (tmp_path / "demo").read_text() == "precious"
+
+
+def test_a_wrong_setting_is_refused_before_anything_is_drawn(run: Run, tmp_path: Path) -> None:
+    result = run("demo", tmp_path / "demo", "--set", "detector.heat.treshold=2")
+    assert result.code == 1
+    assert "detector.heat.treshold" in result.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_seed_is_a_whole_number(run: Run, tmp_path: Path) -> None:
+    result = run("demo", tmp_path / "demo", "--seed", "-1")
+    assert result.code == 2
+    assert "is not in the range" in result.err

@@ -161,7 +161,9 @@ def test_tracks_of_no_frames_are_an_error_too(run: Run, clip_path: Path, tmp_pat
     assert tracks.read_text() == "precious"
 
 
-def test_a_moment_that_never_comes_is_warned_of(run: Run, clip_path: Path, tmp_path: Path) -> None:
+def test_stages_of_a_time_after_the_end_give_a_warning(
+    run: Run, clip_path: Path, tmp_path: Path
+) -> None:
     options = ("--no-video", "--stages", tmp_path / "stages", "--at", "50", "--frames", "2")
     result = run("detect-video", clip_path, *options)
     assert result.code == 0

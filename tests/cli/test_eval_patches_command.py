@@ -8,7 +8,7 @@ from conftest import Run
 QUICK = ("--set", "training.C=0.001", "--jobs", "1")
 
 
-def test_trains_afresh_for_a_split(run: Run, patches_path: Path, tmp_path: Path) -> None:
+def test_trains_a_model_for_a_split(run: Run, patches_path: Path, tmp_path: Path) -> None:
     target, folder = tmp_path / "p.json", tmp_path / "report"
     options = ("--split", "tail", "--json", target, "--report", folder)
     result = run("eval", "patches", patches_path, *options, *QUICK)
@@ -40,7 +40,7 @@ def test_a_model_and_a_split_exclude_each_other(
 ) -> None:
     result = run("eval", "patches", patches_path, "--model", model_path, "--split", "tail")
     assert result.code == 2
-    assert "--split trains afresh" in result.err
+    assert "--split trains new models" in result.err
 
 
 def test_earlier_numbers_are_kept(run: Run, patches_path: Path, tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
     assert values["losses"][0]["last"] == 2
 
 
-def test_boxes_beyond_the_truth_are_warned_of(run: Run, found: Path, truth: Path) -> None:
+def test_boxes_after_the_last_true_frame_give_a_warning(run: Run, found: Path, truth: Path) -> None:
     result = run("eval", "tracks", found, truth)
     assert result.code == 0
     assert result.err.count("\n") == 1

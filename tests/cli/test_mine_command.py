@@ -104,7 +104,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
     assert seen == {1, 5, 9}
 
 
-def test_the_same_video_gives_the_same_bytes_whichever_other_frames_are_looked_at(
+def test_a_frame_gives_the_same_patches_whatever_other_frames_are_used(
     run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     for name, chosen in (
@@ -122,7 +122,7 @@ def test_the_same_video_gives_the_same_bytes_whichever_other_frames_are_looked_a
     assert any("frame000006" in name for name in both)
 
 
-def test_frames_that_cut_a_vehicle_off_are_looked_at_besides(
+def test_frames_that_cut_a_vehicle_off_are_used_too(
     run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     truth, target = tmp_path / "cut.txt", tmp_path / "mined.zip"
@@ -145,7 +145,7 @@ def _patches(path: Path) -> dict[str, bytes]:
     [
         (("--until", "3", "--from", "4"), 2, "--until must not be before --from"),
         (("--every", "0"), 2, "--every"),
-        (("--from", "10"), 1, "gt.txt: knows of the frames up to 9; mine some of these"),
+        (("--from", "10"), 1, "gt.txt: covers the frames up to 9; mine some of these"),
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--set", "mining.parts=-1"), 1, "mining.parts"),

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -53,7 +54,7 @@ def test_an_interrupt_ends_with_130(run: Run, monkeypatch: pytest.MonkeyPatch) -
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("vdet.cli.config.render", interrupt)
+    monkeypatch.setattr(import_module("vdet.cli.main"), "render", interrupt)
     result = run("config")
     assert result.code == 130
     assert "interrupted" in result.err
@@ -63,7 +64,7 @@ def test_a_bug_is_one_line_too(run: Run, monkeypatch: pytest.MonkeyPatch) -> Non
     def fail(*_: object) -> None:
         raise RuntimeError("two\nlines")
 
-    monkeypatch.setattr("vdet.cli.config.render", fail)
+    monkeypatch.setattr(import_module("vdet.cli.main"), "render", fail)
     result = run("config")
     assert result.code == 1
     assert result.err.count("\n") == 1

@@ -21,7 +21,7 @@ def test_makes_a_model_and_a_report(run: Run, patches_path: Path, tmp_path: Path
     random = report["splits"][0]
     assert random["test_patches"] == sum(random["confusion"].values()) == 120
     assert random["test_accuracy"] > 0.9
-    assert random["train_views"] > random["train_patches"], "mirror images, and some others"
+    assert random["train_augmented"] > random["train_patches"], "mirror images, and some others"
     assert model.provenance["report"] == report
     for words in ("300 vehicles", "leak-free", "said vehicle", "vehicles/near", "one prediction"):
         assert words in result.out

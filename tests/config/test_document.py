@@ -203,7 +203,7 @@ def test_very_deep_nesting_is_refused(text: str) -> None:
     assert refusal(text) == "my.yaml: is nested too deeply"
 
 
-def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     path = tmp_path / "my.yaml"
     path.write_bytes(b"\xef\xbb\xbfa: 1\r\n")
     assert read_document(path).values == {"a": 1}
@@ -227,7 +227,7 @@ def test_a_file_that_is_not_utf_8_is_refused(tmp_path: Path, data: bytes) -> Non
         read_document(path)
 
 
-def test_a_huge_file_is_refused_unparsed(tmp_path: Path) -> None:
+def test_a_huge_file_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
     path = tmp_path / "my.yaml"
     path.write_bytes(b"#" * (MAX_BYTES + 1))
     with pytest.raises(ConfigError, match=r"my\.yaml: is larger than 100,000 bytes"):

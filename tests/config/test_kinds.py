@@ -30,7 +30,7 @@ def load(path: Path, text: str, *assignments: str) -> Settings:
 
 
 def refusal(path: Path, text: str, *assignments: str) -> list[str]:
-    """Return the lines of the error, the file's folder left out."""
+    """Return the lines of the error, without the file's folder."""
     with pytest.raises(ConfigError) as error:
         load(path, text, *assignments)
     return str(error.value).replace(f"{path.parent}/", "").split("\n")
@@ -101,7 +101,7 @@ class TestRefused:
         words = "belongs to tracker.method: motion, and has no effect with rules"
         assert line == f"my.yaml:1:26: tracker.needed: {words}"
 
-    def test_so_is_one_in_an_assignment_over_the_file_of_another_kind(self, path: Path) -> None:
+    def test_a_key_of_another_kind_in_an_assignment_is_refused(self, path: Path) -> None:
         assert refusal(path, "tracker: {method: motion}", "tracker.history=3") == [RULES]
         assert refusal(path, "tracker: {method: rules}", "tracker.method=motion",
                        "tracker.history=3") == [RULES]  # fmt: skip
@@ -130,7 +130,7 @@ class TestRefused:
         (line,) = refusal(path, text)
         assert line.startswith(message)
 
-    def test_an_unknown_kind_is_told_the_known_ones(self) -> None:
+    def test_an_unknown_kind_is_answered_with_the_known_ones(self) -> None:
         with pytest.raises(ConfigError, match=r"is no tracker; known are motion, rules$"):
             load_settings(None, ["tracker.method=best"])
         with pytest.raises(ConfigError, match=r"is no detector; known are svm"):

@@ -38,7 +38,7 @@ def load(path: Path, text: str, *assignments: str) -> Settings:
 
 
 def refusal(path: Path, text: str, *assignments: str) -> list[str]:
-    """Give the lines of the error, the file's folder left out."""
+    """Return the lines of the error, without the file's folder."""
     with pytest.raises(ConfigError) as error:
         load(path, text, *assignments)
     return str(error.value).replace(f"{path.parent}/", "").split("\n")
@@ -270,14 +270,14 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, me
         ("0.0=3", "windows[0][0]: is no setting; known here: size, "),
     ],
 )
-def test_so_is_one_in_an_assignment_to_an_item_of_the_file(
+def test_a_mistake_in_an_assignment_to_an_item_of_the_file_is_explained(
     path: Path, assignment: str, message: str
 ) -> None:
     (line,) = refusal(path, WINDOWS, f"detector.search.windows.{assignment}")
     assert line.startswith(f"--set: detector.search.{message}")
 
 
-def test_a_value_that_an_assignment_mends_is_no_error(path: Path) -> None:
+def test_a_wrong_value_that_an_assignment_replaces_is_no_error(path: Path) -> None:
     assert (
         load(path, "detector: {heat: {frames: 0}}", "detector.heat.frames=3").svm.heat.frames == 3
     )

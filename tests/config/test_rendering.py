@@ -141,7 +141,7 @@ def test_every_setting_that_is_given_is_printed(settings: Settings) -> None:
     assert printed == settings.model_dump(mode="json", exclude_none=True)
 
 
-def test_the_keys_of_list_items_are_looked_at_too() -> None:
+def test_the_keys_of_list_items_are_among_them() -> None:
     keys = {
         *("detector.search.windows.overlap", "detector.search.windows.step"),
         *("detector.features.hog.cell", "tracker.leak", "tracker.history", "output.crf"),
@@ -150,14 +150,14 @@ def test_the_keys_of_list_items_are_looked_at_too() -> None:
 
 
 @pytest.mark.parametrize(("name", "key"), EVERY_KEY)
-def test_every_key_has_words_of_its_own(name: str, key: str) -> None:
+def test_every_key_is_explained(name: str, key: str) -> None:
     field = dict(fields_of(KINDS[name]))[key]
     words = field.annotation.__doc__ if is_section(field) else field.description
     assert words
 
 
 @pytest.mark.parametrize(("name", "key"), EVERY_KEY)
-def test_the_words_of_every_key_are_printed_as_a_comment(name: str, key: str) -> None:
+def test_the_explanation_of_every_key_is_printed_as_a_comment(name: str, key: str) -> None:
     text = render(KINDS[name])
     comments = [line.strip()[2:] for line in text.splitlines() if "# " in line]
     words = dict(fields_of(KINDS[name]))[key].description or ""

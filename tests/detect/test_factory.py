@@ -69,7 +69,7 @@ class TestLinearModel:
 
 def test_an_unknown_kind_is_refused_and_the_known_ones_are_named() -> None:
     for load in (load_detector, model_file):
-        with pytest.raises(ConfigError, match=r"^sonar: is not known; known are svm"):
+        with pytest.raises(ConfigError, match=r"^sonar: is no detector; known are svm"):
             load(DetectorSettings(kind="sonar"))
 
 

@@ -136,4 +136,4 @@ def test_a_damaged_jpeg_that_can_be_read_is_warned_of(
     whole = encoded(".jpg", PICTURE)
     path.write_bytes(whole[:-400] + b"\xff\xd9")
     assert read_image(path).shape == PICTURE.shape
-    assert "damaged.jpg: is damaged, and read as far as can be (Corrupt JPEG data" in caplog.text
+    assert "damaged.jpg: is damaged, and read as far as possible (Corrupt JPEG data" in caplog.text

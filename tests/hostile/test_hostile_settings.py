@@ -1,4 +1,4 @@
-"""Damaged and wicked YAML, as settings through the whole of `vdet detect-image`, and as cameras."""
+"""Damaged and hostile YAML: settings and cameras, through the whole of `vdet detect-image`."""
 
 import codecs
 from itertools import pairwise
@@ -17,7 +17,7 @@ from vdet.errors import ConfigError
 from vdet.lanes.camera_file import load_camera
 
 SETTINGS = """\
-# looked at: one picture
+# for one picture
 detector:
   kind: svm
   reference_height: 720
@@ -136,7 +136,7 @@ def test_500_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Pat
 ALIAS_BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"{new}: &{new} [{', '.join([f'*{old}'] * 9)}]\n" for old, new in pairwise("abcdefghi")
 )
-WICKED = {
+HOSTILE = {
     "alias bomb": (ALIAS_BOMB, r"2:8: is not YAML: aliases \(\*name\) are not accepted"),
     "alias to itself": ("detector: &a [*a]", "aliases"),
     "merge key": ("lanes: &a {frames: 2}\ndetector: {<<: *a}", "aliases"),
@@ -182,9 +182,9 @@ WICKED = {
 }
 
 
-@pytest.mark.parametrize("name", WICKED)
-def test_wicked_yaml_is_refused_by_name(tmp_path: Path, name: str) -> None:
-    text, words = WICKED[name]
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_yaml_is_refused_with_a_reason(tmp_path: Path, name: str) -> None:
+    text, words = HOSTILE[name]
     path = tmp_path / "my.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError, match=words) as error:
@@ -194,10 +194,10 @@ def test_wicked_yaml_is_refused_by_name(tmp_path: Path, name: str) -> None:
     assert all(line.isprintable() and len(line) < 1000 for line in lines)
 
 
-@pytest.mark.parametrize("name", WICKED)
-def test_nor_is_it_a_camera(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_yaml_is_no_camera_either(tmp_path: Path, name: str) -> None:
     path = tmp_path / "camera.yaml"
-    path.write_text(WICKED[name][0][:20_000], encoding="utf-8")
+    path.write_text(HOSTILE[name][0][:20_000], encoding="utf-8")
     with pytest.raises(ConfigError) as error:
         load_camera(path)
     lines = str(error.value).splitlines()

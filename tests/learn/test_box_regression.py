@@ -12,7 +12,7 @@ TRUE = BoxRegression(
 
 
 def scene(count: int = 400) -> tuple[Float32Array, Float32Array]:
-    """Give features of different spread, and the sides that `TRUE` makes of them."""
+    """Return features of different spread, and the sides that `TRUE` computes from them."""
     rng = np.random.default_rng(0)
     hogs = (rng.random((count, 12)) * np.linspace(0.05, 1, 12)).astype(np.float32)
     return hogs, TRUE.sides(hogs)

@@ -96,7 +96,7 @@ def test_the_order_is_the_same_in_a_zip_file(tmp_path: Path) -> None:
     assert listed(make_zip(tmp_path / "set.zip", names)) == listed(folder)
 
 
-def test_any_picture_format_counts_whatever_the_case_of_its_suffix(tmp_path: Path) -> None:
+def test_any_picture_format_counts_with_upper_or_lower_case_suffix(tmp_path: Path) -> None:
     names = [f"vehicles/far/{name}" for name in ("1.jpg", "2.JPEG", "3.PNG", "4.bmp")]
     make_folder(tmp_path, [*names, "non-vehicles/road/1.png"])
     assert [name for name, _ in listed(tmp_path)][1:] == names

@@ -1,4 +1,5 @@
 import logging
+import tracemalloc
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from vdet.config.schema import (
 from vdet.errors import DataError
 from vdet.geometry import Float32Array
 from vdet.learn.fitting import fit
+from vdet.learn.linear_svm import LinearSvm
 
 COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
 
@@ -149,3 +151,30 @@ def test_augmented_samples_do_not_replace_missing_patches() -> None:
     origins = np.where(vehicle, 0, np.arange(40))
     with pytest.raises(DataError, match="a class has 1 training patches"):
         fit(vectors, vehicle, COLOUR, training(), origins)
+
+
+@pytest.mark.parametrize("penalty", [1e-4, 1.0])
+def test_the_svm_has_the_loss_of_scikit_learn_or_less(penalty: float) -> None:
+    vectors, vehicle = clouds()
+    scaled = StandardScaler().fit_transform(vectors)
+    reference = LinearSVC(C=penalty, random_state=0).fit(scaled, vehicle)
+    found = LinearSvm(C=penalty).fit(scaled, vehicle)
+
+    def loss(svm: LinearSVC | LinearSvm) -> float:
+        distances = scaled.astype(np.float64) @ svm.coef_[0] + svm.intercept_[0]
+        errors = np.maximum(0, 1 - np.where(vehicle, 1, -1) * distances)
+        penalties = np.square(svm.coef_).sum() + np.square(svm.intercept_).sum()
+        return float(penalties / 2 + penalty * np.square(errors).sum())
+
+    assert loss(found) <= loss(reference) * (1 + 1e-5)
+    assert (found.predict(scaled) == reference.predict(scaled)).mean() > 0.99
+
+
+def test_the_svm_copies_no_data() -> None:
+    vectors = np.random.default_rng(0).normal(size=(2000, 500)).astype(np.float32)
+    vehicle = vectors[:, 0] > 0
+    tracemalloc.start()
+    LinearSvm(C=0.01).fit(vectors, vehicle)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < vectors.nbytes / 2

@@ -23,7 +23,7 @@ def write(path: Path) -> Path:
     return path
 
 
-def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     path = write(tmp_path / "a.zip")
     files = [*find_patches([path]), *find_boxed([path])]
     assert {file.name: file.sides for file in files} == {
@@ -45,7 +45,7 @@ def test_the_files_in_it_can_be_read_when_unpacked(tmp_path: Path) -> None:
         assert {info.external_attr >> 16 for info in archive.infolist()} == {0o644}
 
 
-def test_an_error_leaves_an_earlier_archive_as_it_was(tmp_path: Path) -> None:
+def test_after_an_error_an_earlier_archive_is_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "a.zip"
     path.write_bytes(b"precious")
     with pytest.raises(UnicodeEncodeError), patch_archive(path) as archive:

@@ -56,7 +56,7 @@ SETTINGS = Settings(
 
 
 def texture(rng: np.random.Generator, vehicle: bool) -> Image:
-    """Draw noise with dark bars across for a vehicle, upright ones for anything else."""
+    """Draw noise with horizontal dark bars for a vehicle, vertical ones for anything else."""
     image = rng.integers(120, 200, (SIZE, SIZE, 3), dtype=np.uint8)
     at = int(rng.integers(2, 6))
     bars = image if vehicle else image.swapaxes(0, 1)
@@ -410,7 +410,7 @@ def test_too_few_patches_for_the_folds_are_an_error(files: list[PatchFile]) -> N
         train(few, SETTINGS, jobs=1)
 
 
-def test_groups_of_one_patch_each_leave_nothing_to_test_the_tail_on(
+def test_groups_of_one_patch_each_have_no_tail_to_test(
     files: list[PatchFile],
 ) -> None:
     lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]

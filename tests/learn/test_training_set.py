@@ -12,7 +12,7 @@ def column(*values: float) -> np.ndarray:
 
 
 def data(augmented: SampleVectors | None) -> LabelledVectors:
-    """Give five patches whose one feature is their number, in tens."""
+    """Return five patches whose single feature is ten times their number."""
     vehicle = np.array([True, False, True, False, True])
     sides = np.full((5, 4), np.nan, np.float32)
     sides[0] = 0.5

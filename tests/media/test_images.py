@@ -1,4 +1,10 @@
+"""Pictures: read from any common format, written whole; the libraries' comments on them."""
+
+import os
 import struct
+import subprocess
+import sys
+import threading
 import zlib
 from pathlib import Path
 
@@ -9,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import ImageError, OutputError
-from vdet.media.images import Image, decode_image, read_image, write_image
+from vdet.media.images import Image, capture_stderr, decode_image, read_image, write_image
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
 
@@ -168,3 +174,60 @@ def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str)
 def test_a_picture_is_not_written_into_a_missing_folder(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         write_image(tmp_path / "no" / "picture.png", PICTURE)
+
+
+@pytest.mark.parametrize("module", ["vdet", "vdet.media.images"])
+def test_an_import_leaves_the_environment_unchanged(module: str) -> None:
+    # OpenCV sets variables of its own.
+    before = "import os, cv2; before = dict(os.environ)"
+    code = f"{before}; import {module}; assert dict(os.environ) == before"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def write_stderr(text: str) -> None:
+    os.write(2, text.encode())
+
+
+def test_what_is_written_in_the_block_is_kept_and_not_shown(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    write_stderr("before\n")
+    with capture_stderr() as lines:
+        write_stderr("one\ntwo\n")
+    write_stderr("after\n")
+    assert lines == ["one", "two"]
+    assert capfd.readouterr().err == "before\nafter\n"
+
+
+def test_of_endless_lines_the_first_are_kept() -> None:
+    with capture_stderr() as lines:
+        for _ in range(1000):
+            write_stderr("x" * 99 + "\n")
+    assert 10 < len(lines) <= 100
+
+
+def test_standard_error_is_restored_after_an_error(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyError), capture_stderr():
+        raise KeyError
+    write_stderr("after\n")
+    assert capfd.readouterr().err == "after\n"
+
+
+def test_threads_capture_in_turn(capfd: pytest.CaptureFixture[str]) -> None:
+    caught: list[list[str]] = []
+
+    def capture(number: int) -> None:
+        for _ in range(20):
+            with capture_stderr() as lines:
+                write_stderr(f"{number}\n" * 3)
+            caught.append(lines)
+
+    threads = [threading.Thread(target=capture, args=(number,)) for number in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(len(lines) == 3 and len(set(lines)) == 1 for lines in caught)
+    assert len(caught) == 80
+    write_stderr("after\n")
+    assert capfd.readouterr().err == "after\n"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
+from vdet.files import OutputFiles
 from vdet.media import (
     ColorTags,
     Frame,
@@ -44,7 +45,7 @@ def failing(frames: list[Frame], error: type[BaseException]) -> Iterator[Frame]:
 
 
 def write(path: Path, frames: Iterable[Frame], info: VideoInfo = INFO) -> Path:
-    with VideoWriter(path, info, FAST) as writer:
+    with OutputFiles() as files, VideoWriter(files.stage(path), info, FAST, name=path) as writer:
         for frame in frames:
             writer.write(frame)
     return path
@@ -145,7 +146,7 @@ class TestFile:
 class TestAllOrNothing:
     def test_nothing_has_the_name_before_the_end(self, frames: list[Frame], tmp_path: Path) -> None:
         path = tmp_path / "out.mp4"
-        with VideoWriter(path, INFO, FAST) as writer:
+        with OutputFiles() as files, VideoWriter(files.stage(path), INFO, FAST) as writer:
             writer.write(frames[0])
             assert not path.exists()
         assert listing(tmp_path) == ["out.mp4"]

@@ -1,13 +1,18 @@
 """What several tests of the pipeline need."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from pipeline.red_runs import COUNT, video_info
 from red_cars import drive
+from vdet import plugins
 from vdet.config.schema import OutputSettings
 from vdet.media import VideoWriter
+from vdet.pipeline.sinks.protocol import SinkKind
+
+Register = Callable[[str, SinkKind], None]
 
 
 @pytest.fixture(scope="session")
@@ -18,3 +23,15 @@ def red_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for frame in drive(COUNT):
             writer.write(frame)
     return path
+
+
+@pytest.fixture
+def register(monkeypatch: pytest.MonkeyPatch) -> Register:
+    """Make a kind of sink known under a name, for one test."""
+    kinds: dict[str, SinkKind] = {}
+    load = plugins.load_plugin
+    monkeypatch.setattr(
+        "vdet.pipeline.sinks.protocol.load_plugin",
+        lambda group, name: kinds.get(name) or load(group, name),
+    )
+    return kinds.__setitem__

@@ -14,7 +14,7 @@ from vdet.geometry import Box
 from vdet.lanes.road import Road
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
-from vdet.pipeline.loop import BlindDetector, Summary, VideoJob, follow_frames, peek, run_video
+from vdet.pipeline.loop import NullDetector, Summary, VideoJob, follow_frames, peek, run_video
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, SinkContext, open_sink
 from vdet.track.track import Track
@@ -85,7 +85,7 @@ def result_of(
         Track(number, each, 0.9, predicted=False) if isinstance(each, Box) else each
         for number, each in enumerate(vehicles, start=1)
     )
-    return FrameResult(source, frame, NO_DETECTIONS, tracks, found, BlindDetector())
+    return FrameResult(source, frame, NO_DETECTIONS, tracks, found, NullDetector())
 
 
 def write(

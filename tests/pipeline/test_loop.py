@@ -45,7 +45,7 @@ from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import RulesTracker
 
 QUEUED = 24
-"""More frames than these held at a time would not be a stream."""
+"""Largest number of frames that a run may hold at a time."""
 
 
 class TestFollowFrames:

@@ -1,11 +1,15 @@
 """Still pictures: which are taken, where their results go, and what is found in them."""
 
+import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pytest
 
+from pipeline.conftest import Register
 from pipeline.red_runs import model_for
 from red_cars import CAR, PERSPECTIVE, SETTINGS, road
 from vdet.config.schema import Settings
@@ -16,9 +20,10 @@ from vdet.pipeline.pictures import (
     find_images,
     plan_pictures,
     run_picture,
+    run_pictures,
 )
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output
+from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind
 
 
 def touch(*paths: Path) -> None:
@@ -82,7 +87,7 @@ class TestPlan:
 
     def test_stages_of_two_inputs_of_one_stem_are_refused(self, tmp_path: Path) -> None:
         sources = [tmp_path / "a.png", tmp_path / "a.jpg"]
-        with pytest.raises(OutputError, match="wanted by two inputs"):
+        with pytest.raises(OutputError, match="is wanted by two inputs"):
             plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
 
     def test_earlier_stages_are_kept(self, tmp_path: Path) -> None:
@@ -186,3 +191,68 @@ class TestRun:
         with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
             run_red(source, picture=tmp_path / "out.png")
         assert not (tmp_path / "out.png").exists()
+
+
+class Fails:
+    """A sink that stages a file, and fails when its block ends without an error."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self.file = context.files.stage(path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            raise OSError(28, "No space left on device")
+
+    def write(self, result: FrameResult) -> None:
+        self.file.write_text(result.source.name)
+
+
+class TestSeveral:
+    @pytest.fixture
+    def jobs(self, tmp_path: Path) -> list[PictureJob]:
+        """Two pictures of a car, and between them a file that is no picture."""
+        jobs = []
+        for name in ("a.png", "b.png", "c.png"):
+            source = tmp_path / name
+            write_image(source, road(CAR))
+            jobs.append(PictureJob(source, (Output("picture", tmp_path / f"out-{name}"),)))
+        (tmp_path / "b.png").write_text("no picture")
+        return jobs
+
+    def names(self, folder: Path) -> list[str]:
+        return sorted(path.name for path in folder.iterdir() if len(path.stem) > 1)
+
+    def test_a_picture_that_cannot_be_read_does_not_stop_the_others(
+        self, jobs: list[PictureJob], tmp_path: Path
+    ) -> None:
+        shared = [Output("json", tmp_path / "boxes.json")]
+        (failure,) = run_pictures(jobs, shared, model_for(SETTINGS), SETTINGS)
+        assert "b.png: is not a picture" in str(failure)
+        assert self.names(tmp_path) == ["boxes.json", "out-a.png", "out-c.png"]
+        items = json.loads((tmp_path / "boxes.json").read_text())
+        assert [Path(item["image"]).name for item in items] == ["a.png", "c.png"]
+        assert [len(item["boxes"]) for item in items] == [1, 1]
+
+    def test_a_shared_output_that_fails_at_the_end_leaves_those_of_the_pictures(
+        self, jobs: list[PictureJob], tmp_path: Path, register: Register
+    ) -> None:
+        register("fails", SinkKind(Fails))
+        shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
+        with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
+            run_pictures(jobs, shared, model_for(SETTINGS), SETTINGS)
+        assert self.names(tmp_path) == ["out-a.png", "out-c.png"]
+
+    def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
+        self, jobs: list[PictureJob], tmp_path: Path, register: Register
+    ) -> None:
+        register("fails", SinkKind(Fails))
+        (first, *_) = jobs
+        fails = Output("fails", tmp_path / "fails.txt")
+        for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
+            job = replace(first, outputs=outputs)
+            with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
+                run_pictures([job], (), model_for(SETTINGS), SETTINGS)
+            assert self.names(tmp_path) == []

@@ -1,1 +1,1 @@
-"""Many videos in one go: inputs → plan → run → manifest. One bad file never stops the rest."""
+"""Many videos in one run: inputs → plan → run → manifest. A bad file does not stop the others."""

@@ -1,4 +1,4 @@
-"""Which videos a batch is made of: files, folders and patterns, and where each lies among them."""
+"""The videos of a batch, from files, folders and patterns."""
 
 import glob
 import os
@@ -13,40 +13,44 @@ VIDEO_INPUT_SUFFIXES = frozenset((
     ".hevc", ".insv", ".m2t", ".m2ts", ".m2v", ".m4v", ".mjpeg", ".mjpg", ".mkv", ".mov", ".mp4",
     ".mpeg", ".mpg", ".mts", ".mxf", ".ogv", ".ts", ".vob", ".webm", ".wmv", ".y4m",
 ))  # fmt: skip
-"""What is taken for a video in a folder. A file that is named is taken whatever its suffix."""
+"""Suffixes of videos in a folder. A file that is named may have any suffix."""
 
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A video, and its `place` below the folder or the pattern that it was found by."""
+    """A video, and its `place`: its path below the folder or the pattern that it was found by."""
 
     path: Path
     place: Path
 
 
 def find_sources(clips: Sequence[Path]) -> list[Source]:
-    """Return the videos that `clips` stand for, each once, in the order of their names.
+    """Return the videos of `clips`, each once.
 
-    A file stands for itself; a folder for the videos in it and below it, hidden ones left out; what
-    is neither and has one of ``*?[`` in it for the files and folders that it matches, ``**`` for
-    any folders between. What a pattern matches lies below its last folder without such characters.
+    Each clip is one of these, and its videos are in the order of their names:
+
+    * a file;
+    * a folder: the videos in it and below it, without hidden files and folders;
+    * a pattern with ``*``, ``?`` or ``[``, where ``**`` means any folders: the files that match,
+      and the videos in the folders that match. Their places are below the last folder of the
+      pattern that has no such character.
 
     Raises
     ------
     BatchError
-        One of `clips` stands for no video at all, or a folder cannot be read.
+        One of `clips` gives no video, or a folder cannot be read.
     """
     found: dict[tuple[Path, Path], Source] = {}
     for clip in clips:
-        sources = sorted(_stand_for(clip), key=lambda source: source.place)
+        sources = sorted(_videos_of(clip), key=lambda source: source.place)
         if not sources:
-            raise BatchError(f"{clip}: {_nothing(clip)}")
+            raise BatchError(f"{clip}: {_reason(clip)}")
         for source in sources:
             found.setdefault((source.path.resolve(), source.place), source)
     return list(found.values())
 
 
-def _stand_for(clip: Path) -> Iterable[Source]:
+def _videos_of(clip: Path) -> Iterable[Source]:
     if clip.is_dir():
         return _below(clip, clip)
     if clip.exists() or not glob.has_magic(str(clip)):
@@ -77,7 +81,8 @@ def _refuse_unreadable(error: OSError) -> None:
     raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; leave it out") from error
 
 
-def _nothing(clip: Path) -> str:
+def _reason(clip: Path) -> str:
+    """Say why a clip gives no video."""
     if clip.is_dir():
         return "there is no video in this folder or below it; name the files"
     if glob.has_magic(str(clip)):

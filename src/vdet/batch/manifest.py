@@ -1,4 +1,4 @@
-"""The manifest: a line of JSON for every file of a batch, added the moment that it has ended."""
+"""The manifest: a line of JSON for every file of a batch, added as soon as the file is done."""
 
 import errno
 import json
@@ -13,7 +13,7 @@ from vdet.errors import OutputError
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What made the results: the program with its version, the model's file and its SHA-256.
+    """How the results were made: the program with its version, the model file and its SHA-256.
 
     The last two are None for a detector without a model file.
     """
@@ -25,12 +25,22 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What became of a file.
+    """The result of one file.
 
-    `input` is an absolute name, `outputs` has that of each output by the name of its sink. `width`
-    and `height` are of the upright picture in pixels, `frames` were read, `tracks` vehicles
-    followed, in `seconds` of wall time from `started`, in UTC. `error` is None where all went well;
-    else there is no output, and of the numbers only the seconds are known.
+    Attributes
+    ----------
+    input, outputs
+        Absolute paths; that of each output is under the name of its sink.
+    started
+        In UTC, as ISO 8601 writes it.
+    seconds
+        Wall time.
+    width, height
+        Size of the upright picture, pixels.
+    frames, tracks
+        How many frames were read, and how many vehicles were followed.
+    error
+        None if all went well; else there are no outputs, and of the numbers only the seconds.
     """
 
     input: str
@@ -46,32 +56,32 @@ class Record:
 
 
 @contextmanager
-def appending(path: Path, origin: Origin) -> Iterator[Callable[[Record], None]]:
-    """Give a function that adds a record to the manifest, and to the disk before it returns.
+def open_manifest(path: Path, origin: Origin) -> Iterator[Callable[[Record], None]]:
+    """Give a function that adds a record to the manifest; it returns when the disk has it.
 
     Raises
     ------
     OutputError
         The file cannot be written (from the function, too).
     """
-    with _naming(path):
+    with _named_errors(path):
         file = path.open("ab", buffering=0)
     with file:
 
         def add(record: Record) -> None:
             line = json.dumps(asdict(record) | asdict(origin), allow_nan=False) + "\n"
-            with _naming(path):
+            with _named_errors(path):
                 if file.write(line.encode()) != len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
                 os.fsync(file.fileno())
 
-        with _naming(path):
+        with _named_errors(path):
             _end_last_line(path, file.write)
         yield add
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _named_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -79,7 +89,7 @@ def _naming(path: Path) -> Iterator[None]:
 
 
 def _end_last_line(path: Path, write: Callable[[bytes], object]) -> None:
-    """Begin on a line of our own, after what a full disk may have cut off."""
+    """End a last line that was cut off by a full disk."""
     with path.open("rb") as file:
         if file.seek(0, os.SEEK_END):
             file.seek(-1, os.SEEK_END)

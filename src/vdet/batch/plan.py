@@ -1,6 +1,6 @@
-"""What a batch will do: a job a video, refused as a whole before any work if it cannot be right."""
+"""The plan of a batch: a job for each video. A wrong plan is refused before any work."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,12 +15,17 @@ MANIFEST = "manifest.jsonl"
 
 @dataclass(frozen=True, slots=True)
 class OutputOptions:
-    """Which outputs every video gets, and what is done about outputs that are there already.
+    """Which outputs every video gets, and what happens to outputs that are there already.
 
-    `suffixes` has the suffix of the output's file for each sink, by the sink's name. None: the
-    video's own suffix where the sink can write it, else the first that it can write. With
-    `skip_existing` a job is left out if all its outputs are there, and makes all of them again if
-    only some are.
+    Attributes
+    ----------
+    suffixes
+        The suffix of the output for each sink, by the sink's name. None: the video's own suffix if
+        the sink can write it, else the first that the sink can write.
+    overwrite
+        Outputs that are there already are replaced.
+    skip_existing
+        A job is left out if all its outputs are there. If only some are, all are made again.
     """
 
     suffixes: Mapping[str, str | None]
@@ -30,7 +35,7 @@ class OutputOptions:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The jobs to do, and those that were done before, with `folder` for all of their outputs."""
+    """The jobs to do and those that are left out; all their outputs lie in `folder`."""
 
     folder: Path
     jobs: tuple[VideoJob, ...]
@@ -38,24 +43,25 @@ class Plan:
 
     @property
     def manifest(self) -> Path:
-        """Where the records of the jobs go."""
+        """The file for the records of the jobs."""
         return self.folder / MANIFEST
 
 
 def make_plan(
     clips: Sequence[Path], folder: Path, common: VideoJob, options: OutputOptions
 ) -> Plan:
-    """Plan a job for every video that `clips` stand for; outputs lie in `folder` as these do.
+    """Plan a job for every video of `clips`; outputs lie in `folder` by the places of the videos.
 
     Parameters
     ----------
     common
-        What all jobs have in common: times, number of frames, lanes.
+        A job with the times, the number of frames and the lanes of all jobs.
 
     Raises
     ------
     BatchError
-        There is no video; `folder` and an input lie in one another; two outputs have one name.
+        There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
+        name.
     OutputError
         An output cannot be written, or is there already.
     ConfigError
@@ -66,8 +72,11 @@ def make_plan(
     jobs = [_job(source, folder, common, options) for source in sources]
     _refuse_inside(sources, folder)
     _refuse_shared(jobs, folder)
-    done = [options.skip_existing and _is_done(job) for job in jobs]
-    plan = Plan(folder, tuple(_where(jobs, done, False)), tuple(_where(jobs, done, True)))
+    to_do: list[VideoJob] = []
+    skipped: list[VideoJob] = []
+    for job in jobs:
+        (skipped if options.skip_existing and _is_done(job) else to_do).append(job)
+    plan = Plan(folder, tuple(to_do), tuple(skipped))
     check_output(plan.manifest, overwrite=True, makes_folder=True)
     replaces = options.overwrite or options.skip_existing
     for job in plan.jobs:
@@ -92,10 +101,6 @@ def _path(place: Path, sink: str, suffix: str | None) -> Path:
     return place.with_suffix(writable[0])
 
 
-def _where(jobs: Sequence[VideoJob], done: Sequence[bool], wanted: bool) -> Iterator[VideoJob]:
-    return (job for job, is_done in zip(jobs, done, strict=True) if is_done is wanted)
-
-
 def _is_done(job: VideoJob) -> bool:
     return all(output.path.is_file() for output in job.outputs)
 
@@ -110,16 +115,16 @@ def _refuse_nested(clips: Iterable[Path], folder: Path) -> None:
 
 
 def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
-    inside = folder.resolve()
+    resolved = folder.resolve()
     for source in sources:
-        if source.path.resolve().is_relative_to(inside):
+        if source.path.resolve().is_relative_to(resolved):
             raise BatchError(
                 f"{source.path}: this input lies in the output folder {folder}; give another"
             )
 
 
 def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
-    """Refuse an output that is another output too, or the manifest, or an input."""
+    """Refuse an output with the name of another output, of the manifest or of an input."""
     inputs = {job.source.resolve() for job in jobs}
     owners: dict[Path, Path] = {}
     for job in jobs:

@@ -5,7 +5,7 @@ from contextlib import closing
 from functools import partial
 from typing import TypeVar
 
-from vdet.batch.manifest import Origin, Record, appending
+from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import Plan
 from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import make_folder, remove_stale
@@ -34,7 +34,7 @@ def run_batch(
     function = partial(process_file, work=work)
     try:
         with (
-            appending(plan.manifest, origin) as add,
+            open_manifest(plan.manifest, origin) as add,
             closing(each_once(function, plan.jobs, workers)) as results,
         ):
             for job, result in results:

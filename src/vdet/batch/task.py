@@ -1,4 +1,4 @@
-"""One file of a batch: process it, and say what became of it, whatever happens."""
+"""One file of a batch: process it, and return its record."""
 
 import logging
 import os
@@ -20,10 +20,14 @@ from vdet.pipeline.loop import Summary, VideoJob, run_video
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What every video of a batch is processed with; a worker loads the model by itself.
+    """What every video of a batch is processed with; workers load the model themselves.
 
-    `model` is a model file, None for a detector without one. `threads` are those of the search, of
-    the decoder and of the encoder of each video.
+    Attributes
+    ----------
+    model
+        A model file; None for the shipped one, or for a detector without one.
+    threads
+        Of the search, of the decoder and of the encoder of each video.
     """
 
     settings: Settings
@@ -32,11 +36,14 @@ class Work:
 
 
 def process_file(job: VideoJob, *, work: Work) -> Record:
-    """Run a job, make the folders that it needs, and return its record; no error gets out."""
+    """Make the folders of a job's outputs, run it, and return its record.
+
+    Errors are recorded, and not raised.
+    """
     began, started = time.perf_counter(), _now()
     summary, error = None, None
     threads = work.threads
-    with _warnings_of(job) as warnings:
+    with _collected_warnings(job) as warnings:
         try:
             for output in job.outputs:
                 make_folder(output.path.parent)
@@ -51,7 +58,7 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
 
 
 def record_of_killed(job: VideoJob) -> Record:
-    """Return the record of a job whose process was killed, also when nothing else ran beside it."""
+    """Return the record of a job whose process was killed each time."""
     error = f"{job.source}: its process was killed, or crashed; there may be too little memory"
     return _record(job, _now(), 0.0, error=error)
 
@@ -88,24 +95,24 @@ def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-class _Collector(logging.Handler):
-    """Keeps the warnings that name one of `paths`: threads of this process may do other files."""
+class _WarningCollector(logging.Handler):
+    """Keeps the warnings about `paths`; other threads of the process may log about other files."""
 
     def __init__(self, paths: Sequence[Path], messages: list[str]) -> None:
         super().__init__(logging.WARNING)
-        self._beginnings = tuple(f"{path}: " for path in paths)
+        self._prefixes = tuple(f"{path}: " for path in paths)
         self._messages = messages
 
     def emit(self, record: logging.LogRecord) -> None:
         message = record.getMessage()
-        if message.startswith(self._beginnings):
+        if message.startswith(self._prefixes):
             self._messages.append(message)
 
 
 @contextmanager
-def _warnings_of(job: VideoJob) -> Iterator[list[str]]:
+def _collected_warnings(job: VideoJob) -> Iterator[list[str]]:
     messages: list[str] = []
-    collector = _Collector([job.source, *(each.path for each in job.outputs)], messages)
+    collector = _WarningCollector([job.source, *(each.path for each in job.outputs)], messages)
     log = logging.getLogger("vdet")
     log.addHandler(collector)
     try:

@@ -1,4 +1,4 @@
-"""The command line: parses, calls the library, prints. One small file a command."""
+"""The command line, one file for each command: it parses, calls the library and prints."""
 
 from vdet.cli.main import main
 

@@ -1,4 +1,4 @@
-"""`vdet detect-video CLIP... -d DIR`: many videos in one go."""
+"""`vdet detect-video -d DIR CLIP...`: many videos in one run."""
 
 import hashlib
 import logging
@@ -16,8 +16,8 @@ from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
-from vdet.cli.options import PathOf, scheduler_option
-from vdet.cli.progress import files_bar, tell
+from vdet.cli.messages import files_bar, print_message
+from vdet.cli.options import PATH, POSITIVE, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
 from vdet.errors import SOME_FAILED, VdetError
@@ -32,7 +32,7 @@ log = logging.getLogger("vdet")
 
 @dataclass(frozen=True, slots=True)
 class BatchOptions:
-    """What `batch_options` gave; without a `folder` it is no batch."""
+    """The values of `batch_options`; without a `folder` there is no batch."""
 
     folder: Path | None
     jobs: int | None
@@ -41,8 +41,8 @@ class BatchOptions:
     scheduler: str | None
 
     @property
-    def any_but_folder(self) -> bool:
-        """Whether one was given that says nothing without a folder."""
+    def need_folder(self) -> bool:
+        """Whether an option is given that has no effect without a folder."""
         return bool(self.jobs or self.skip_existing or self.dry_run or self.scheduler)
 
 
@@ -50,20 +50,28 @@ def batch_options(command: F) -> F:
     """Add the options of a batch; they make a `BatchOptions`."""
     for option in (
         scheduler_option,
-        click.option("--dry-run", is_flag=True, help="With -d: list what would be done."),
-        click.option("--skip-existing", is_flag=True, help="With -d: leave out what is done."),
+        click.option(
+            "--dry-run", is_flag=True, help="With -d: list what would be written, and end."
+        ),
+        click.option(
+            "--skip-existing",
+            is_flag=True,
+            help="With -d: leave out videos whose outputs are all there.",
+        ),
         click.option(
             "--jobs",
-            type=click.IntRange(min=1),
-            help="With -d: videos at once, each in a process; else one a core.",
+            type=POSITIVE,
+            metavar="N",
+            show_default="one for each core",
+            help="With -d: process N videos at once, each in its own process.",
         ),
         click.option(
             "-d",
             "--directory",
             "folder",
-            type=PathOf(),
+            type=PATH,
             metavar="DIR",
-            help="Process every CLIP (files, folders, quoted patterns) into this folder.",
+            help="Process every CLIP, and write the outputs into DIR.",
         ),
     ):
         command = option(command)
@@ -78,14 +86,16 @@ def output_options(
     sinks: Sequence[Output],
     overwrite: bool,
 ) -> OutputOptions:
-    """Read which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
+    """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
     suffixes: dict[str, str | None] = {} if no_video else {"video": None}
     for output in (*([Output("tracks", tracks)] if tracks else []), *sinks):
         if suffixes.get(output.sink) is not None:
             raise click.UsageError(f"{output.sink} is given two suffixes; keep one")
         suffixes[output.sink] = _suffix(output)
     if not suffixes:
-        raise click.UsageError("nothing would be written; leave out --no-video, or give --tracks")
+        raise click.UsageError(
+            "nothing would be written; leave out --no-video, or give --tracks or --sink"
+        )
     if overwrite and options.skip_existing:
         raise click.UsageError("--overwrite and --skip-existing do not go together")
     if options.jobs and options.scheduler:
@@ -94,7 +104,7 @@ def output_options(
 
 
 def _suffix(output: Output) -> str:
-    """Return the suffix that an output has in a batch; its name is that of the video."""
+    """Return the suffix of an output in a batch; the rest of its name is that of the video."""
     kind, suffix = sink_kind(output.sink), str(output.path).lower()
     if kind.marker:
         raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
@@ -105,7 +115,7 @@ def _suffix(output: Output) -> str:
     return suffix
 
 
-def do_batch(
+def process_batch(
     clips: Sequence[Path],
     common: VideoJob,
     outputs: OutputOptions,
@@ -116,54 +126,54 @@ def do_batch(
     threads: int | None,
     quiet: bool,
 ) -> int:
-    """Do a batch, or list it, and return the exit code."""
+    """Process a batch, or list what would be written, and return the exit code."""
     folder = options.folder or Path()
-    if options.scheduler:  # the workers stand in other folders
+    if options.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
         model = model.absolute() if model else None
     plan = make_plan(clips, folder, common, outputs)
     if options.dry_run:
-        click.echo("\n".join(_listing(plan)))
+        click.echo("\n".join(_plan_lines(plan)))
         return 0
     if not plan.jobs:
         click.echo(f"all of {len(plan.skipped)} files are there already", err=True)
         return 0
-    workers, share = _workers(options, len(plan.jobs))
-    work = Work(settings, model, threads or share)
+    workers, search_threads = _workers(options, len(plan.jobs))
+    work = Work(settings, model, threads or search_threads)
     failed = _run(plan, work, workers, quiet=quiet)
     if not failed:
         return 0
     return SOME_FAILED if plan.skipped or len(failed) < len(plan.jobs) else VdetError.exit_code
 
 
-def _listing(plan: Plan) -> list[str]:
-    """Say a line a file what would be done."""
+def _plan_lines(plan: Plan) -> list[str]:
+    """Return a line for each file: what would be written."""
     return [
-        *(f"{job.source}: {_names(job)} there already" for job in plan.skipped),
-        *(f"{job.source} → {_names(job)}" for job in plan.jobs),
+        *(f"{job.source}: {_output_names(job)} there already" for job in plan.skipped),
+        *(f"{job.source} → {_output_names(job)}" for job in plan.jobs),
     ]
 
 
-def _names(job: VideoJob) -> str:
+def _output_names(job: VideoJob) -> str:
     return ", ".join(str(output.path) for output in job.outputs)
 
 
 def _run(plan: Plan, work: Work, workers: Workers, *, quiet: bool) -> list[Record]:
-    """Run the batch, tell of it on standard error, and return what failed."""
+    """Run the batch, print the result of each file, and return the records of those that failed."""
     results = run_batch(plan, work, _origin(work), workers=workers)
     failed = []
     with files_bar(len(plan.jobs), quiet=quiet) as advance, closing(results):
         for job, record in results:
-            _tell(job, record, quiet=quiet)
+            _print_result(job, record, quiet=quiet)
             advance(record.frames or 0)
             if record.error:
                 failed.append(record)
     if not quiet:
-        there = f"{len(plan.skipped)} there already, " if plan.skipped else ""
+        skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
         done = len(plan.jobs) - len(failed)
-        tell(f"{plan.manifest}: {done} files done, {there}{len(failed)} failed")
+        print_message(f"{plan.manifest}: {done} files done, {skipped}{len(failed)} failed")
     for record in failed:
-        tell(f"failed: {record.error}")
+        print_message(f"failed: {record.error}")
     return failed
 
 
@@ -176,7 +186,7 @@ def _origin(work: Work) -> Origin:
 
 
 def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
-    """Return where to work, and how many threads the search of each file has there."""
+    """Return the workers of a batch, and how many threads search each file there."""
     if options.scheduler:
         return DaskCluster(options.scheduler), 1
     from joblib import cpu_count
@@ -186,11 +196,11 @@ def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
     return LocalProcesses(jobs), max(1, cores // jobs)
 
 
-def _tell(job: VideoJob, record: Record, *, quiet: bool) -> None:
+def _print_result(job: VideoJob, record: Record, *, quiet: bool) -> None:
     for warning in record.warnings:
         log.warning("%s", warning)
     if record.error:
         log.error("%s", record.error)
     elif not quiet:
         found = f"{record.frames} frames, {record.tracks} vehicles"
-        tell(f"{job.source}: {found}, {record.seconds:.1f} s")
+        print_message(f"{job.source}: {found}, {record.seconds:.1f} s")

@@ -1,4 +1,4 @@
-"""`vdet calibrate`: chessboard photographs to a camera."""
+"""`vdet calibrate`: from photographs of a chessboard to a camera file."""
 
 import logging
 import re
@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from vdet.cli.options import PathOf, overwrite_option
+from vdet.cli.options import PATH, overwrite_option
 from vdet.errors import OutputError
 from vdet.files import check_output
 from vdet.lanes.calibration import Pattern, check_previews, write_previews
@@ -18,7 +18,7 @@ from vdet.pipeline.pictures import find_images
 log = logging.getLogger("vdet")
 
 
-class PatternOf(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
+class PatternType(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
     """The inner corners of a chessboard, along and across: 9x6."""
 
     name = "pattern"
@@ -41,20 +41,22 @@ class PatternOf(click.ParamType):  # type: ignore[type-arg]  # generic from clic
 
 
 @click.command()
-@click.argument("photos", nargs=-1, required=True, type=PathOf(), metavar="PHOTO...")
-@click.option("-o", "--output", required=True, type=PathOf(), help="The camera to write, .yaml.")
+@click.argument("photos", nargs=-1, required=True, type=PATH, metavar="PHOTO...")
+@click.option(
+    "-o", "--output", required=True, type=PATH, metavar="FILE", help="Camera file to write, .yaml."
+)
 @click.option(
     "--pattern",
     default="9x6",
     show_default=True,
-    type=PatternOf(),
+    type=PatternType(),
     help="Inner corners of the board, along and across.",
 )
 @click.option(
     "--preview",
-    type=PathOf(),
+    type=PATH,
     metavar="DIR",
-    help="Every photograph with its corners, undistorted.",
+    help="Write every photograph into DIR, with its corners, and undistorted.",
 )
 @overwrite_option
 def calibrate(
@@ -65,9 +67,10 @@ def calibrate(
     preview: Path | None,
     overwrite: bool,
 ) -> None:
-    """Find a camera's focal length and lens distortion from each PHOTO of a flat chessboard.
+    """Measure a camera with photographs of a chessboard.
 
-    PHOTO: files, or folders of them; ten or more, of the whole board from different sides.
+    Its focal length and lens distortion are computed. Each PHOTO is a file, or a folder of files.
+    Take ten or more, of the whole flat board, from different sides.
     """
     if output.suffix.lower() not in (".yaml", ".yml"):
         raise OutputError(f"{output}: cameras are written as .yaml; name it so")

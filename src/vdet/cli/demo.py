@@ -1,17 +1,41 @@
-"""`vdet demo`: the whole system on a made-up road."""
+"""`vdet demo`: the whole system on a drawn road: patches, training, detection, evaluation."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.options import PathOf, overwrite_option, read_settings, settings_options
-from vdet.cli.progress import progress_bar
+from vdet.cli.messages import print_message, progress_bar
+from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
+from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
+from vdet.detect.svm.model import save_model
+from vdet.files import check_output, make_folder
+from vdet.pipeline.loop import Progress, VideoJob, check_job, no_progress, run_video
+from vdet.pipeline.sinks.protocol import Output
+from vdet.synthetic import demo_scene, write_clip, write_patches, write_truth
+
+if TYPE_CHECKING:
+    from vdet.evaluate.scores import Scores
+    from vdet.learn.report import TrainingReport
+
+PATCHES = 1200
+"""Of each class."""
 
 
 @click.command()
-@click.argument("folder", default=Path("demo"), type=PathOf(), metavar="[DIR]")
-@click.option("--seed", default=1, show_default=True, type=click.IntRange(min=0))
-@settings_options
+@click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
+@click.option(
+    "--seed",
+    default=1,
+    show_default=True,
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Seed of everything that is drawn.",
+)
+@settings_options("training.C=1e-4")
 @overwrite_option
 @click.pass_obj
 def demo(
@@ -23,15 +47,21 @@ def demo(
     assignments: tuple[str, ...],
     overwrite: bool,
 ) -> None:
-    """Draw a road with vehicles, train, detect, and compare with the truth, all in DIR."""
-    from vdet.demo import DemoFiles, check_demo, run_demo
+    """Try the whole program on a drawn road.
 
+    Patches and a road with vehicles are drawn, a model is trained, the vehicles are found and
+    compared with the truth. All files are written into DIR, or into demo where it is not given.
+    """
     settings = read_settings(config_name, assignments)
     files = DemoFiles(folder)
     check_demo(files, overwrite=overwrite)
     with progress_bar("", quiet=quiet) as progress:
         result = run_demo(
-            files, settings, seed=seed, say=(lambda _: None) if quiet else _say, progress=progress
+            files,
+            settings,
+            seed=seed,
+            report_step=(lambda _: None) if quiet else print_message,
+            progress=progress,
         )
     for split in result.training.splits:
         click.echo(f"patches, {split.split} split: test accuracy {split.test_accuracy:.3f}")
@@ -45,11 +75,122 @@ def demo(
         f"Look at\n"
         f"  {files.result}  the road with the vehicles found\n"
         f"  {files.stages}/  every stage of one frame as a picture\n"
-        f"  {files.tracks}  the boxes, a record a frame; {files.truth} has the true ones\n"
+        f"  {files.tracks}  the boxes, a record for each frame; {files.truth} has the true ones\n"
         f"  {files.report}  what training measured\n"
         f"Then try your own:  vdet detect-video in.mp4 out.mp4"
     )
 
 
-def _say(line: str) -> None:
-    click.echo(line, err=True)
+@dataclass(frozen=True, slots=True)
+class DemoFiles:
+    """The files of the demo in its folder."""
+
+    folder: Path
+
+    @property
+    def patches(self) -> Path:
+        """Folder of the labelled patches."""
+        return self.folder / "patches"
+
+    @property
+    def clip(self) -> Path:
+        """The road."""
+        return self.folder / "road.mp4"
+
+    @property
+    def truth(self) -> Path:
+        """The true boxes of the road, MOTChallenge columns."""
+        return self.folder / "truth.txt"
+
+    @property
+    def model(self) -> Path:
+        """The model that is trained on the patches."""
+        return self.folder / "model.npz"
+
+    @property
+    def report(self) -> Path:
+        """The report of the training."""
+        return self.folder / "model.json"
+
+    @property
+    def result(self) -> Path:
+        """The road with the found vehicles drawn in."""
+        return self.folder / "found.mp4"
+
+    @property
+    def tracks(self) -> Path:
+        """The found vehicles, a record for each frame."""
+        return self.folder / "found.jsonl"
+
+    @property
+    def stages(self) -> Path:
+        """Folder of pictures of every stage at one moment."""
+        return self.folder / "stages"
+
+    @property
+    def job(self) -> VideoJob:
+        """The detection in the road."""
+        outputs = {"video": self.result, "tracks": self.tracks, "stages": self.stages}
+        return VideoJob(self.clip, tuple(Output(sink, path) for sink, path in outputs.items()))
+
+
+@dataclass(frozen=True, slots=True)
+class DemoResult:
+    """What the demo measured."""
+
+    training: "TrainingReport"
+    scores: "Scores"
+    frames: int
+    seconds: float
+
+
+def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
+    """Make the folder, and refuse to replace an earlier demo. Raises `OutputError`."""
+    make_folder(files.folder)
+    for path in (files.clip, files.truth, files.model, files.report):
+        check_output(path, overwrite=overwrite)
+    check_job(files.job, overwrite=overwrite)
+
+
+def run_demo(
+    files: DemoFiles,
+    settings: Settings,
+    *,
+    seed: int = 1,
+    report_step: Callable[[str], object] = lambda _: None,
+    progress: Progress = no_progress,
+) -> DemoResult:
+    """Draw the data, train on them, detect in the clip, and compare with the truth.
+
+    Parameters
+    ----------
+    seed
+        Of everything that is drawn; the same seed gives the same data.
+    report_step
+        Called with a line before each step.
+    progress
+        As `run_video` takes it, for the longer steps.
+    """
+    from vdet.evaluate.predictions import read_predictions
+    from vdet.evaluate.scores import score
+    from vdet.evaluate.truth import read_truth
+    from vdet.learn.dataset import find_patches
+    from vdet.learn.training import train
+
+    report_step(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
+    write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
+    scene = demo_scene(seed)
+    write_clip(files.clip, scene)
+    write_truth(files.truth, scene)
+    report_step("2/4 training …")
+    patches = find_patches([files.patches])
+    model, report = train(patches, settings, progress=progress(len(patches)))
+    save_model(model, files.model)
+    report.write(files.report)
+    report_step("3/4 finding the vehicles …")
+    job = replace(files.job, at=scene.frames / scene.rate / 2)
+    detector = load_detector(settings.detector, files.model)
+    summary = run_video(job, detector, settings, progress=progress)
+    report_step("4/4 comparing with the truth …")
+    scores = score(read_predictions(files.tracks), read_truth(files.truth), rate=float(scene.rate))
+    return DemoResult(report, scores, summary.frames, summary.seconds)

@@ -1,4 +1,4 @@
-"""`vdet detect-image`: vehicles in pictures."""
+"""`vdet detect-image`: find vehicles in pictures."""
 
 import logging
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.options import (
-    PathOf,
+    PATH,
     lane_options,
     model_option,
     overwrite_option,
@@ -24,18 +24,26 @@ log = logging.getLogger("vdet")
 
 
 @click.command()
-@click.argument("images", nargs=-1, required=True, type=PathOf(), metavar="IMAGE...")
+@click.argument("images", nargs=-1, required=True, type=PATH, metavar="IMAGE...")
 @click.option(
-    "-o", "--output", type=PathOf(), help="Annotated picture, or a folder for several of them."
+    "-o",
+    "--output",
+    type=PATH,
+    metavar="PATH",
+    help="Write the picture with its boxes. For several pictures, give a folder.",
 )
 @click.option(
-    "--json", "json_target", type=PathOf(), metavar="FILE", help="The boxes; - for standard output."
+    "--json",
+    "json_target",
+    type=PATH,
+    metavar="FILE",
+    help="Write the boxes to FILE, or with - to standard output.",
 )
-@click.option("--stages", type=PathOf(), metavar="DIR", help="A picture of every stage.")
+@click.option("--stages", type=PATH, metavar="DIR", help="Write a picture of every stage into DIR.")
 @sink_option
 @lane_options
 @model_option
-@settings_options
+@settings_options("detector.stills.strength=0.2")
 @overwrite_option
 def detect_image(
     *,
@@ -51,7 +59,10 @@ def detect_image(
     assignments: tuple[str, ...],
     overwrite: bool,
 ) -> None:
-    """Find vehicles in each IMAGE: files, or folders of them."""
+    """Find vehicles in pictures.
+
+    Each IMAGE is a file, or a folder of files.
+    """
     shared = read_sinks(sinks)
     if json_target is not None:
         shared = (Output("json", json_target), *shared)

@@ -1,14 +1,16 @@
-"""`vdet detect-video`: vehicles followed through a video, or through many."""
+"""`vdet detect-video`: find and follow vehicles in one video, or in many."""
 
 from fractions import Fraction
 from pathlib import Path
 
 import click
 
-from vdet.cli.batch import BatchOptions, batch_options, do_batch, output_options
+from vdet.cli.batch import BatchOptions, batch_options, output_options, process_batch
+from vdet.cli.messages import print_message, progress_bar
 from vdet.cli.options import (
-    PathOf,
-    Time,
+    PATH,
+    POSITIVE,
+    TimeType,
     lane_options,
     model_option,
     overwrite_option,
@@ -18,7 +20,6 @@ from vdet.cli.options import (
     settings_options,
     sink_option,
 )
-from vdet.cli.progress import progress_bar
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.pipeline.loop import VideoJob, check_job, run_video
@@ -26,34 +27,37 @@ from vdet.pipeline.sinks.protocol import Output
 
 
 @click.command()
-@click.argument("clips", nargs=-1, required=True, type=PathOf(), metavar="IN [OUT] | CLIP...")
-@click.option("--no-video", is_flag=True, help="Write no video, only --tracks or --stages.")
+@click.argument("clips", nargs=-1, required=True, type=PATH, metavar="IN [OUT] | CLIP...")
+@click.option("--no-video", is_flag=True, help="Write no video, only other outputs.")
 @click.option(
     "--tracks",
-    type=PathOf(),
+    type=PATH,
     metavar="FILE",
-    help="Every shown box: .txt (MOTChallenge), .csv or .jsonl. With -d give only the suffix.",
+    help="Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -d, give only "
+    "the suffix.",
 )
-@click.option("--start", type=Time(), help="From this time on: seconds or HH:MM:SS.")
-@click.option("--end", type=Time(), help="Up to this time.")
-@click.option("--frames", type=click.IntRange(min=1), help="At most so many frames.")
+@click.option("--start", type=TimeType(), help="Begin at this time: seconds, MM:SS or HH:MM:SS.")
+@click.option("--end", type=TimeType(), help="Stop before this time.")
+@click.option("--frames", type=POSITIVE, metavar="N", help="Process at most N frames.")
 @click.option(
     "--threads",
-    type=click.IntRange(min=1),
-    help="Threads that search one video. Default: one a core, shared by --jobs.",
+    type=POSITIVE,
+    metavar="N",
+    show_default="one for each core, shared by --jobs",
+    help="Search one video in N threads.",
 )
 @click.option(
     "--stages",
-    type=PathOf(),
+    type=PATH,
     metavar="DIR",
-    help="A picture of every stage of one frame; see --at.",
+    help="Write a picture of every stage of one frame into DIR. Goes with --at.",
 )
-@click.option("--at", type=Time(), help="Time of the frame that --stages shows.")
+@click.option("--at", type=TimeType(), help="Show the frame at this time with --stages.")
 @sink_option
 @batch_options
 @lane_options
 @model_option
-@settings_options
+@settings_options("output.crf=18")
 @overwrite_option
 @click.pass_obj
 def detect_video(
@@ -81,10 +85,13 @@ def detect_video(
     dry_run: bool,
     scheduler: str | None,
 ) -> int:
-    """Find and follow vehicles in the video IN, and write it with their boxes to OUT.
+    """Find and follow vehicles in one video, or in many.
 
-    With -d DIR: in every CLIP, a file, a folder with all below it, or a quoted pattern like
-    'day*/*.mp4'. DIR then holds a video for each of them, and manifest.jsonl with a record of each.
+    IN is a video. OUT is written: the same video with a box around each vehicle.
+
+    With -d DIR, every CLIP is processed. A CLIP is a video, a folder with videos in it or below it,
+    or a quoted pattern such as 'day*/*.mp4'. The outputs of each video are written into DIR, and a
+    record of each into manifest.jsonl there.
     """
     batch = BatchOptions(folder, jobs, skip_existing, dry_run, scheduler)
     if start is not None and end is not None and end <= start:
@@ -94,36 +101,35 @@ def detect_video(
         source, output = _in_and_out(clips, batch)
         outputs = _outputs(output, tracks, stages, others)
         _check_usage(output, outputs, no_video=no_video, with_stages=stages is not None, at=at)
-        wanted = None
+        batch_outputs = None
     else:
         if stages is not None or at is not None:
             raise click.UsageError("--stages and --at are for one video; leave out -d")
         source, outputs = Path(), ()  # each video has its own
-        wanted = output_options(
+        batch_outputs = output_options(
             batch, no_video=no_video, tracks=tracks, sinks=others, overwrite=overwrite
         )
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments)
-    moment = at or Fraction(0)
-    job = VideoJob(source, outputs, start, end, frames, moment, request)
-    if wanted is not None:
-        load_detector(settings.detector, model_path)  # refused before any work
-        return do_batch(
+    job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request)
+    if batch_outputs is not None:
+        load_detector(settings.detector, model_path)  # an error is raised before any work
+        return process_batch(
             clips,
             job,
-            wanted,
+            batch_outputs,
             batch,
             settings=settings,
             model=model_path,
             threads=threads,
             quiet=quiet,
         )
-    _do_one(job, settings, model_path, threads, overwrite=overwrite, quiet=quiet)
+    _process_one(job, settings, model_path, threads, overwrite=overwrite, quiet=quiet)
     return 0
 
 
 def _in_and_out(clips: tuple[Path, ...], batch: BatchOptions) -> tuple[Path, Path | None]:
-    if batch.any_but_folder:
+    if batch.need_folder:
         raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler go with -d DIR")
     if len(clips) > 2:
         raise click.UsageError("give IN and OUT, or -d DIR for several videos")
@@ -154,7 +160,7 @@ def _check_usage(
         raise click.UsageError("--stages and --at go together")
 
 
-def _do_one(
+def _process_one(
     job: VideoJob,
     settings: Settings,
     model_path: Path | None,
@@ -169,8 +175,7 @@ def _do_one(
         summary = run_video(job, model, settings, threads=threads, progress=progress)
     if not quiet:
         rate = summary.frames / summary.seconds
-        click.echo(
+        print_message(
             f"{job.source}: {summary.frames} frames, {summary.tracks} vehicles, "
-            f"{summary.seconds:.1f} s, {rate:.1f} frames/s",
-            err=True,
+            f"{summary.seconds:.1f} s, {rate:.1f} frames/s"
         )

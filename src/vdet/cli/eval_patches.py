@@ -1,12 +1,18 @@
-"""`vdet eval patches`: how well the classifier works."""
+"""`vdet eval patches`: measure the classifier."""
 
 from pathlib import Path
 
 import click
 
-from vdet.cli.eval_options import give_results, results_options
-from vdet.cli.options import PathOf, read_settings, settings_options
-from vdet.cli.progress import progress_bar
+from vdet.cli.messages import progress_bar
+from vdet.cli.options import (
+    PATH,
+    POSITIVE,
+    print_results,
+    read_settings,
+    results_options,
+    settings_options,
+)
 from vdet.detect.svm.kind import requested_features
 from vdet.detect.svm.model import load_model
 from vdet.evaluate.output import check_outputs
@@ -14,23 +20,32 @@ from vdet.learn.dataset import find_patches
 
 
 @click.command()
-@click.argument("data", nargs=-1, required=True, type=PathOf(), metavar="DATA...")
+@click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
 @click.option(
     "--model",
     "model_path",
-    type=PathOf(),
+    type=PATH,
     metavar="FILE",
-    help="Test this model on all of DATA; without it, models are trained afresh for each split.",
+    show_default="models that are trained for each split",
+    help="Test this model on all of DATA.",
 )
 @click.option(
     "--split",
     "splits",
     multiple=True,
     type=click.Choice(("random", "tail", "groups")),
-    help="Only this split; may be given often. groups: leave one group out.",
+    show_default="all three",
+    help="Train without the patches of this split, and test on them: random patches, the tail of "
+    "each group, or each of the groups in turn. Can be repeated.",
 )
-@settings_options
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; else one a core.")
+@settings_options("training.C=1e-4")
+@click.option(
+    "--jobs",
+    type=POSITIVE,
+    metavar="N",
+    show_default="one for each core",
+    help="Work in N processes.",
+)
 @results_options
 @click.pass_obj
 def patches(
@@ -46,13 +61,16 @@ def patches(
     report: Path | None,
     overwrite: bool,
 ) -> None:
-    """Measure the classifier on DATA: folders or zip files of labelled patches."""
+    """Measure the classifier on labelled patches.
+
+    Each DATA is a folder or a zip file, as vdet train takes it.
+    """
     from vdet.learn.patch_eval import SPLITS, evaluate_model, evaluate_splits
     from vdet.learn.patch_eval.page import patch_page
     from vdet.learn.patch_eval.text import lines, plain
 
     if model_path is not None and splits:
-        raise click.UsageError("--split trains afresh; leave it out, or --model")
+        raise click.UsageError("--split trains new models; leave it out, or --model")
     settings = read_settings(config_name, assignments)
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     inputs = [*data, *([model_path] if model_path else [])]
@@ -64,7 +82,7 @@ def patches(
             result = evaluate_splits(files, settings, chosen, jobs=jobs, progress=progress)
         else:
             result = evaluate_model(files, model, settings, jobs=jobs, progress=progress)
-    give_results(
+    print_results(
         lines(result),
         plain(result),
         lambda: patch_page(result),

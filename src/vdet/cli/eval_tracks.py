@@ -1,24 +1,29 @@
-"""`vdet eval tracks`: how good tracks are that were found before."""
+"""`vdet eval tracks`: compare a file of tracks with the truth."""
 
 from pathlib import Path
 
 import click
 
-from vdet.cli.eval_options import give_results, results_options
-from vdet.cli.options import PathOf
+from vdet.cli.options import PATH, POSITIVE, print_results, results_options
 from vdet.evaluate.output import check_outputs
 
 
 @click.command()
-@click.argument("prediction", type=PathOf(), metavar="PRED")
-@click.argument("truth", type=PathOf(), metavar="TRUTH")
+@click.argument("prediction", type=PATH, metavar="PRED")
+@click.argument("truth", type=PATH, metavar="TRUTH")
 @click.option(
-    "--until", type=click.IntRange(min=1), metavar="FRAME", help="Last frame to look at, from 1."
+    "--until",
+    type=POSITIVE,
+    metavar="FRAME",
+    show_default="the last one of both files",
+    help="End with this frame, counted from 1.",
 )
 @click.option(
     "--rate",
     type=click.FloatRange(min=0, min_open=True),
-    help="Frames a second, for false tracks a minute; without it, as PRED has it.",
+    metavar="FPS",
+    show_default="from the times in PRED",
+    help="Frames per second, for the number of false tracks per minute.",
 )
 @results_options
 def tracks(
@@ -31,9 +36,10 @@ def tracks(
     report: Path | None,
     overwrite: bool,
 ) -> None:
-    """Compare PRED, as vdet detect-video --tracks writes it, with TRUTH.
+    """Compare a file of tracks with the truth.
 
-    TRUTH is a MOTChallenge gt.txt, KITTI tracking labels or CVAT for video 1.1.
+    PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
+    labels or CVAT for video 1.1.
     """
     from vdet.evaluate.clips.evaluate import score_files
     from vdet.evaluate.clips.text import plain_clip, run_lines
@@ -41,7 +47,7 @@ def tracks(
 
     check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
     run = score_files(prediction, truth, until=until, rate=rate)
-    give_results(
+    print_results(
         run_lines([run]),
         plain_clip(run.clips[0]),
         lambda: video_page([run]),

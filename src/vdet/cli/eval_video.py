@@ -1,51 +1,56 @@
-"""`vdet eval video`: how well vehicles are found and followed in labelled video."""
+"""`vdet eval video`: measure detection and tracking in labelled video."""
 
 from pathlib import Path
 
 import click
 
-from vdet.cli.eval_options import give_results, results_options
+from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
-    PathOf,
+    PATH,
+    POSITIVE,
     model_option,
+    print_results,
     read_settings,
     read_sinks,
+    results_options,
     settings_options,
     sink_option,
 )
-from vdet.cli.progress import progress_bar
 from vdet.detect.factory import load_detector, model_file
 from vdet.evaluate.output import check_outputs
 from vdet.pipeline.sinks.protocol import check_sinks
 
 
 @click.command()
-@click.argument("videos", nargs=-1, required=True, type=PathOf(), metavar="IN...")
+@click.argument("videos", nargs=-1, required=True, type=PATH, metavar="IN...")
 @click.option(
     "--truth",
     "truths",
     multiple=True,
     required=True,
-    type=PathOf(),
+    type=PATH,
     metavar="FILE",
-    help="True boxes: MOTChallenge, KITTI or CVAT; one for each IN, in the same order.",
+    help="True boxes of a video: MOTChallenge, KITTI or CVAT. Repeat it for each IN, in the same "
+    "order.",
 )
 @click.option(
     "--until",
-    type=click.IntRange(min=1),
+    type=POSITIVE,
     metavar="FRAME",
-    help="Last frame to look at, from 1; without it, the last that the truth knows of.",
+    show_default="the last one in the truth",
+    help="End with this frame, counted from 1.",
 )
 @click.option(
     "--sweep",
     "sweeps",
     multiple=True,
     metavar="KEY=VALUE,VALUE",
-    help="Compare values of a setting, as in detector.heat.threshold=1,2; several make a grid.",
+    help="Compare values of one setting, for example tracker.needed=0.1,0.3. Repeated, all "
+    "combinations are compared.",
 )
 @sink_option
 @model_option
-@settings_options
+@settings_options("tracker.needed=0.3")
 @results_options
 @click.pass_obj
 def video(
@@ -63,9 +68,12 @@ def video(
     report: Path | None,
     overwrite: bool,
 ) -> None:
-    """Find and follow vehicles in each IN, and compare them with the truth."""
-    from vdet.evaluate.clips.clip import open_clip
-    from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
+    """Measure detection and tracking in labelled video.
+
+    Vehicles are found and followed in each video IN, and compared with its truth.
+    """
+    from vdet.evaluate.clips.clip import Variant, open_clip
+    from vdet.evaluate.clips.evaluate import evaluate_clips
     from vdet.evaluate.clips.sweep import grid
     from vdet.evaluate.clips.text import plain, run_lines
     from vdet.evaluate.report.video_page import video_page
@@ -76,18 +84,19 @@ def video(
     outputs = read_sinks(sinks)
     if outputs and (len(swept) > 1 or len(videos) > 1):
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
-    settings = [read_settings(config_name, (*assignments, *extra)) for extra in swept]
-    for each in settings:
-        load_detector(each.detector, model_path)  # all fit the model, or it says so
-    files = [path for each in settings if (path := model_file(each.detector, model_path))]
+    variants = []
+    for extra in swept:
+        settings = read_settings(config_name, (*assignments, *extra))
+        variants.append(Variant(settings, load_detector(settings.detector, model_path), extra))
+    detectors = [variant.settings.detector for variant in variants]
+    files = [path for each in detectors if (path := model_file(each, model_path))]
     inputs = [*videos, *truths, *files]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
     check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
-    variants = [Variant(extra, each) for extra, each in zip(swept, settings, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:
-        runs = evaluate_clips(clips, model_path, variants, progress, outputs=outputs)
-    give_results(
+        runs = evaluate_clips(clips, variants, progress, outputs=outputs)
+    print_results(
         run_lines(runs),
         plain(runs),
         lambda: video_page(runs),

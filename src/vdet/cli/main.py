@@ -10,21 +10,24 @@ import click
 
 import vdet
 from vdet.cli.calibrate import calibrate
-from vdet.cli.config import config
 from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
-from vdet.cli.eval import evaluate
-from vdet.cli.logs import set_up_logs
+from vdet.cli.eval_patches import patches
+from vdet.cli.eval_tracks import tracks
+from vdet.cli.eval_video import video
+from vdet.cli.messages import set_up_logs
 from vdet.cli.mine import mine
+from vdet.cli.options import read_settings, settings_options
 from vdet.cli.train import train
+from vdet.config.rendering import render
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(vdet.__version__, prog_name="vdet")
-@click.option("-v", "--verbose", is_flag=True, help="Say more of what is done.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress bars, no warnings, only errors.")
+@click.option("-v", "--verbose", is_flag=True, help="Print more about what is done.")
+@click.option("-q", "--quiet", is_flag=True, help="Print no progress and no warnings, only errors.")
 @click.pass_context
 def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     """Find and follow vehicles in road video on an ordinary CPU."""
@@ -32,17 +35,33 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     context.obj = quiet
 
 
-for _command in (train, mine, detect_image, detect_video, calibrate, evaluate, config, demo):
+@cli.group("eval")
+def evaluate() -> None:
+    """Measure detection, tracking or the classifier."""
+
+
+@cli.command()
+@settings_options("tracker.method=rules")
+def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
+    """Print the effective settings as commented YAML.
+
+    Save them, change what you like, and give the file to a command with -c.
+    """
+    click.echo(render(read_settings(config_name, assignments)), nl=False)
+
+
+for _command in (calibrate, demo, detect_image, detect_video, mine, train):
     cli.add_command(_command)
+for _command in (patches, tracks, video):
+    evaluate.add_command(_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
-    """Run the program and exit: 0 success, 1 an error, 2 wrong usage, 3 a batch that is not whole.
+    """Run the program and exit.
 
-    Interrupted, it exits with 130.
-
-    An error is one line on standard error; with `VDET_DEBUG=1` in the environment a traceback
-    follows.
+    Exit codes: 0 success, 1 an error, 2 wrong usage, 3 some files of a batch failed, 130
+    interrupted. An error is one line on standard error; with `VDET_DEBUG=1` in the environment a
+    traceback follows.
     """
     try:
         code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
@@ -50,17 +69,17 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         error.show()
         sys.exit(error.exit_code)
     except (KeyboardInterrupt, click.Abort):
-        sys.exit(_complain("interrupted", INTERRUPTED))
-    except BrokenPipeError:  # the reader of our output has gone
+        sys.exit(_print_error("interrupted", INTERRUPTED))
+    except BrokenPipeError:  # whoever read our output has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except Exception as error:
         code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
-        sys.exit(_complain(in_one_line(error), code))
+        sys.exit(_print_error(in_one_line(error), code))
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _complain(message: str, code: int) -> int:
+def _print_error(message: str, code: int) -> int:
     for line in message.splitlines():
         click.echo(f"vdet: {line}", err=True)
     if os.environ.get("VDET_DEBUG") == "1":

@@ -1,51 +1,59 @@
-"""`vdet mine`: labelled video to patches."""
+"""`vdet mine`: from labelled video to patches."""
 
 from pathlib import Path
 
 import click
 
+from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
-    PathOf,
+    PATH,
+    POSITIVE,
     model_option,
     overwrite_option,
     read_settings,
     settings_options,
 )
-from vdet.cli.progress import progress_bar
 from vdet.detect.factory import model_file
 from vdet.errors import OutputError
 from vdet.files import check_output
 
 
 @click.command()
-@click.argument("video", type=PathOf())
+@click.argument("video", type=PATH, metavar="VIDEO")
 @click.option(
     "--truth",
     required=True,
-    type=PathOf(),
+    type=PATH,
     metavar="FILE",
     help="True boxes: MOTChallenge, KITTI or CVAT.",
 )
-@click.option("-o", "--output", required=True, type=PathOf(), help="The patches to write, .zip.")
+@click.option("-o", "--output", required=True, type=PATH, metavar="FILE", help="Zip file to write.")
 @click.option(
-    "--every", type=click.IntRange(min=1), default=4, show_default=True, help="Every n-th frame …"
+    "--every",
+    type=POSITIVE,
+    default=4,
+    show_default=True,
+    metavar="N",
+    help="Use every Nth frame.",
 )
 @click.option(
     "--from",
     "first",
-    type=click.IntRange(min=1),
+    type=POSITIVE,
     default=1,
+    show_default=True,
     metavar="FRAME",
-    help="… from this one on, counted from 1 …",
+    help="Begin at this frame, counted from 1.",
 )
 @click.option(
     "--until",
-    type=click.IntRange(min=1),
+    type=POSITIVE,
     metavar="FRAME",
-    help="… to this one; without it, to the last that the truth knows of.",
+    show_default="the last one in the truth",
+    help="End with this frame, counted from 1.",
 )
 @model_option
-@settings_options
+@settings_options("mining.parts=0")
 @overwrite_option
 @click.pass_obj
 def mine(
@@ -62,10 +70,11 @@ def mine(
     assignments: tuple[str, ...],
     overwrite: bool,
 ) -> None:
-    """Cut patches for vdet train out of VIDEO: vehicles where the truth has them, false alarms.
+    """Cut patches for vdet train out of labelled video.
 
-    Vehicles come with their boxes. A false alarm is a window that the model takes for a vehicle
-    where there is none, or only a part of one; nothing is taken from ignore regions.
+    Vehicles are cut out where the truth has them, and come with their boxes. False alarms are cut
+    out too: windows that the model takes for vehicles where there is none, or only a part of one.
+    Nothing is cut out of ignore regions.
     """
     from vdet.learn.mining import MiningJob
     from vdet.learn.mining import mine as mine_patches

@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,25 +11,24 @@ import click
 
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
+from vdet.evaluate.output import write_page
+from vdet.files import write_json
 from vdet.lanes.camera_file import load_camera
 from vdet.lanes.road import LaneRequest
 from vdet.pipeline.sinks.protocol import Output
 
-_TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
+PATH = click.Path(path_type=Path)
+"""A path; whether something is there is checked later."""
+POSITIVE = click.IntRange(min=1)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 log = logging.getLogger("vdet")
 
-
-class PathOf(click.Path):
-    """A path, given to the command as `pathlib.Path`; whether it exists is the library's to say."""
-
-    def __init__(self) -> None:
-        super().__init__(path_type=Path)
+_TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
 
 
-class Time(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
+class TimeType(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
     """A time in the video: seconds, MM:SS or HH:MM:SS, each with decimals."""
 
     name = "time"
@@ -50,53 +49,56 @@ class Time(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4
         return seconds
 
 
-def settings_options(command: F) -> F:
-    """Add `-c FILE` and `--set KEY=VALUE`; read them with `read_settings`."""
-    command = click.option(
-        "--set",
-        "assignments",
-        multiple=True,
-        metavar="KEY=VALUE",
-        help="Change one setting, as in output.crf=18; may be given often.",
-    )(command)
-    return click.option(
-        "-c",
-        "--config",
-        "config_name",
-        metavar="FILE",
-        help="YAML settings over the built-in ones: a file, or a shipped one (default, seed).",
-    )(command)
+def settings_options(example: str) -> Callable[[F], F]:
+    """Add `-c FILE` and `--set KEY=VALUE`; read them with `read_settings`.
+
+    `example` is an assignment for the help text; it changes what the command does.
+    """
+
+    def add(command: F) -> F:
+        command = click.option(
+            "--set",
+            "assignments",
+            multiple=True,
+            metavar="KEY=VALUE",
+            help=f"Change one setting, for example {example}. Can be repeated.",
+        )(command)
+        return click.option(
+            "-c",
+            "--config",
+            "config_name",
+            metavar="FILE",
+            help="Read settings from a YAML file, or from a shipped one: default or seed.",
+        )(command)
+
+    return add
 
 
 def read_settings(config_name: str | None, assignments: tuple[str, ...]) -> Settings:
-    """Read what `settings_options` gave."""
+    """Read the settings that `settings_options` ask for."""
     return load_settings(find_config(config_name) if config_name else None, assignments)
 
 
-def model_option(command: F) -> F:
-    """Add `--model FILE`; load it with `load_detector`."""
-    return click.option(
-        "--model",
-        "model_path",
-        type=PathOf(),
-        metavar="FILE",
-        help="Model file of the detector; else the shipped one that fits the settings.",
-    )(command)
+model_option = click.option(
+    "--model",
+    "model_path",
+    type=PATH,
+    metavar="FILE",
+    show_default="the shipped one that fits the settings",
+    help="Model file of the detector.",
+)
 
-
-def sink_option(command: F) -> F:
-    """Add `--sink NAME=FILE`; read it with `read_sinks`."""
-    return click.option(
-        "--sink",
-        "sinks",
-        multiple=True,
-        metavar="NAME=FILE",
-        help="Another output, by the name of its sink; may be given often.",
-    )(command)
+sink_option = click.option(
+    "--sink",
+    "sinks",
+    multiple=True,
+    metavar="NAME=FILE",
+    help="Write another output: the name of a sink, and a file. Can be repeated.",
+)
 
 
 def read_sinks(sinks: tuple[str, ...]) -> tuple[Output, ...]:
-    """Read what `sink_option` gave."""
+    """Read the outputs that `sink_option` asks for."""
     outputs = []
     for text in sinks:
         name, equals, path = text.partition("=")
@@ -111,17 +113,17 @@ def lane_options(command: F) -> F:
     command = click.option(
         "--camera",
         "camera_path",
-        type=PathOf(),
+        type=PATH,
         metavar="FILE",
-        help="Undistort with this camera, from vdet calibrate; goes with --lanes.",
+        help="Undistort for --lanes with this file, which vdet calibrate wrote.",
     )(command)
     return click.option(
-        "--lanes", is_flag=True, help="Find and draw the lane too, on undistorted pictures."
+        "--lanes", is_flag=True, help="Find the lane too, and draw it into undistorted frames."
     )(command)
 
 
 def read_lanes(lanes: bool, camera_path: Path | None) -> LaneRequest | None:
-    """Read what `lane_options` gave."""
+    """Read the request that `lane_options` make; None for no lanes."""
     if camera_path is not None and not lanes:
         raise click.UsageError("--camera goes with --lanes")
     if not lanes:
@@ -139,6 +141,38 @@ overwrite_option = click.option(
 scheduler_option = click.option(
     "--scheduler",
     metavar="ADDRESS",
-    help="Work on the Dask cluster of this scheduler, as tcp://host:8786; files lie where all its "
-    "workers find them.",
+    help="Work on the Dask cluster of this scheduler, for example tcp://host:8786. All its workers "
+    "must find the files under the same names.",
 )
+
+
+def results_options(command: F) -> F:
+    """Add `--json FILE`, `--report DIR` and `--overwrite`; read them with `print_results`."""
+    command = overwrite_option(command)
+    command = click.option(
+        "--report", type=PATH, metavar="DIR", help="Write report.html, with figures, into DIR."
+    )(command)
+    return click.option(
+        "--json",
+        "json_target",
+        metavar="FILE",
+        help="Write all numbers to FILE. With -, they go to standard output, and the table to "
+        "standard error.",
+    )(command)
+
+
+def print_results(
+    lines: Iterable[str],
+    values: Mapping[str, Any],
+    make_page: Callable[[], str],
+    *,
+    json_target: str | None,
+    report: Path | None,
+) -> None:
+    """Print the table, and write the files that `results_options` ask for."""
+    to_stderr = json_target == "-"
+    click.echo("\n".join(lines), err=to_stderr)
+    if json_target is not None:
+        write_json(values, json_target)
+    if report is not None:
+        click.echo(f"\n{write_page(make_page(), report)}: the report", err=to_stderr)

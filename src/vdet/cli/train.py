@@ -1,17 +1,18 @@
-"""`vdet train`: patches to a model."""
+"""`vdet train`: from labelled patches to a model."""
 
 from pathlib import Path
 
 import click
 
+from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
-    PathOf,
+    PATH,
+    POSITIVE,
     overwrite_option,
     read_settings,
     scheduler_option,
     settings_options,
 )
-from vdet.cli.progress import progress_bar
 from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.files import check_output
@@ -19,10 +20,18 @@ from vdet.learn.dataset import find_boxed, find_patches
 
 
 @click.command()
-@click.argument("data", nargs=-1, required=True, type=PathOf(), metavar="DATA...")
-@click.option("-o", "--output", required=True, type=PathOf(), help="The model to write, .npz.")
-@settings_options
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; else one a core.")
+@click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
+@click.option(
+    "-o", "--output", required=True, type=PATH, metavar="FILE", help="Model file to write, .npz."
+)
+@settings_options("training.C=1e-4")
+@click.option(
+    "--jobs",
+    type=POSITIVE,
+    metavar="N",
+    show_default="one for each core",
+    help="Work in N processes.",
+)
 @scheduler_option
 @overwrite_option
 @click.pass_obj
@@ -37,11 +46,12 @@ def train(
     scheduler: str | None,
     overwrite: bool,
 ) -> None:
-    """Train a model on DATA: folders or zip files of labelled patches.
+    """Train a model on labelled patches.
 
-    Patches lie in vehicles/<group>/ and non-vehicles/<group>/. Where a boxes.csv beside these
-    folders tells where in a patch the vehicle is, as in those of vdet mine, the model learns to
-    find its sides. The report is printed, and written beside the model as JSON.
+    Each DATA is a folder or a zip file. Patches lie in vehicles/<group>/ and non-vehicles/<group>/.
+    A file boxes.csv beside these folders says where in a patch the vehicle is; vdet mine writes
+    it. With it the model learns where the sides of vehicles are. A report is printed, and written
+    beside the model as JSON.
     """
     from vdet.learn.training import train as fit_model
 
@@ -53,7 +63,7 @@ def train(
     report_path = output.with_suffix(".json")
     for path in (output, report_path):
         check_output(path, overwrite=overwrite, inputs=data)
-    if scheduler:  # the workers stand in other folders
+    if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
     files, boxed = find_patches(data), find_boxed(data)
     with progress_bar(" patches", quiet=quiet) as start:

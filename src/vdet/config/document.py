@@ -1,4 +1,4 @@
-"""YAML text → plain values, each with the place where it stands, so that errors can name it."""
+"""YAML text → plain values, each with its place in the text, so that errors can name it."""
 
 import re
 import reprlib
@@ -62,8 +62,8 @@ def config_error(lines: Iterable[str], count: int) -> ConfigError:
 class _Loader(yaml.SafeLoader):
     """Safe YAML in which `1e-3` is a number, and aliases and tags are refused.
 
-    YAML 1.1 asks for a dot and a sign in `1.0e-3`; nobody expects that. An alias can stand for a
-    billion values (a "bomb"), a tag can ask for any kind of value; settings need neither.
+    In YAML 1.1 a number with an exponent needs a dot and a sign: `1.0e-3`. A few aliases can expand
+    to billions of values, a tag can ask for any kind of value; settings need neither.
     """
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
@@ -103,16 +103,16 @@ def read_document(path: Path) -> Document:
 
 def parse_document(text: str, name: str) -> Document:
     """Read YAML text; `name` stands for it in messages. Raises `ConfigError`."""
-    walk = _Walk(name)
-    values = walk.value(_compose(text, name), ())
+    reader = _Reader(name)
+    values = reader.value(_compose(text, name), ())
     if values is None:
         values = {}
     elif not isinstance(values, dict):
         got = reprlib.repr(values)
-        walk.errors.append(f"{name}:1:1: expected settings (key: value), got {got}")
-    if walk.errors:
-        raise config_error(walk.errors, len(walk.errors))
-    return Document(name, values, walk.places)
+        reader.errors.append(f"{name}:1:1: expected settings (key: value), got {got}")
+    if reader.errors:
+        raise config_error(reader.errors, len(reader.errors))
+    return Document(name, values, reader.places)
 
 
 def parse_assignment(text: str) -> Document:
@@ -128,14 +128,14 @@ def parse_assignment(text: str) -> Document:
     if not equals or not all(parts):
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
     name = "--set"
-    walk = _Walk(name)
+    reader = _Reader(name)
     path: Key = tuple(int(part) if _is_number(part) else part for part in parts)
-    nested = walk.value(_compose(value, name), path)
-    if walk.errors:
-        raise config_error(walk.errors, len(walk.errors))
+    nested = reader.value(_compose(value, name), path)
+    if reader.errors:
+        raise config_error(reader.errors, len(reader.errors))
     for part in reversed(path):
         nested = {part: nested}
-    places = dict.fromkeys(walk.places, name) | {path: name}
+    places = dict.fromkeys(reader.places, name) | {path: name}
     return Document(name, nested, places)
 
 
@@ -150,14 +150,18 @@ def _compose(text: str, name: str) -> yaml.Node | None:
         mark = error.problem_mark or error.context_mark
         place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
         raise ConfigError(f"{place}: is not YAML: {error.problem or error.context}") from error
-    except (yaml.YAMLError, ValueError, OverflowError) as error:  # no character, or a forbidden one
+    except (
+        yaml.YAMLError,
+        ValueError,
+        OverflowError,
+    ) as error:  # a character that YAML does not allow
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error
 
 
-class _Walk:
-    """Turns nodes into values, noting places, and duplicate keys as errors."""
+class _Reader:
+    """Turns nodes into values, and collects their places and the mistakes."""
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -70,7 +70,7 @@ class TrainingSettings(Section):
         0,
         ge=0,
         le=2**32 - 1,
-        description="seed of the split, the folds, the solver and the augmentation",
+        description="seed of the split, the folds and the augmentation",
     )
     max_broken: Fraction = Field(0.01, description="tolerated share of unreadable patches")
     calibration: CalibrationSettings = CalibrationSettings()

@@ -23,7 +23,7 @@ def fit(
     settings: TrainingSettings,
     origins: RowNumbers | None = None,
 ) -> LinearModel:
-    """Fit StandardScaler → LinearSVC → CalibratedClassifierCV on raw feature vectors.
+    """Fit StandardScaler → LinearSvm → CalibratedClassifierCV on raw feature vectors.
 
     Parameters
     ----------
@@ -45,6 +45,8 @@ def fit(
     from sklearn.exceptions import ConvergenceWarning
     from sklearn.preprocessing import StandardScaler
 
+    from vdet.learn.linear_svm import LinearSvm
+
     origins = np.arange(len(vehicle)) if origins is None else origins
     folds = settings.calibration.folds
     (patches,) = np.nonzero(origins == np.arange(len(origins)))
@@ -57,7 +59,7 @@ def fit(
     scaler = StandardScaler()
     scaled = scaler.fit_transform(vectors)
     calibrated = CalibratedClassifierCV(
-        _unweighted_svm(settings),
+        LinearSvm(C=settings.C, max_iter=settings.max_iterations),
         method="sigmoid",
         cv=list(_folds(vehicle[patches], patches, origins, settings)),
         ensemble=settings.calibration.ensemble,
@@ -69,18 +71,6 @@ def fit(
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
     return _to_model(calibrated.calibrated_classifiers_, scaler, features)
-
-
-def _unweighted_svm(settings: TrainingSettings) -> Any:
-    """Return an SVM that takes no sample weights, so that they apply to the calibration alone."""
-    from sklearn.svm import LinearSVC
-
-    class Svm(LinearSVC):  # type: ignore[misc]  # scikit-learn has no types
-        def fit(self, x: Float32Array, y: BoolArray) -> "Svm":
-            super().fit(x, y)
-            return self
-
-    return Svm(C=settings.C, max_iter=settings.max_iterations, random_state=settings.seed)
 
 
 def _weights(patches: RowNumbers, count: int) -> Float64Array:

@@ -1,7 +1,13 @@
-"""Pictures: read to BGR uint8 from any common form, written whole or not at all."""
+"""Pictures: read to BGR uint8 from any common format, written whole or not at all."""
 
+import contextlib
 import logging
+import math
+import os
 import re
+import tempfile
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import cv2
@@ -10,20 +16,25 @@ import numpy.typing as npt
 
 from vdet.errors import ImageError
 from vdet.files import read_whole, replacing
-from vdet.media.captured import capture_stderr
+from vdet.media.picture_size import picture_size
 
 Image = npt.NDArray[np.uint8]
 
-log = logging.getLogger("vdet")
-
 MAX_PICTURE_PIXELS = 2**25
-"""A picture of more pixels is not read: an 8K frame has fewer."""
+"""A picture of more pixels is not read: an 8K frame has fewer, a decompression bomb far more."""
 MAX_PICTURE_SIDE = 2**15
-
 MAX_BYTES = 256_000_000
-"""Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits, not compressed at all."""
-
+"""Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits without compression."""
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
+
+_NO_PICTURE = "is not a picture, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
+_HARMLESS = ("[ WARN", "Warning", "libpng warning")
+_PLACE = re.compile(r"^\[ERROR:\S+ global \S+ \w+ ")  # in OpenCV's source
+_MAX_COMMENTS = 10_000  # bytes
+_STDERR = 2
+_stderr_lock = threading.Lock()  # the file descriptor belongs to the whole process
+
+log = logging.getLogger("vdet")
 
 
 def read_image(path: Path) -> Image:
@@ -37,8 +48,9 @@ def read_image(path: Path) -> Image:
     Raises
     ------
     ImageError
-        The file cannot be read, is no picture that OpenCV knows, or is larger than `MAX_BYTES`;
-        the picture has more than `MAX_PICTURE_PIXELS`, or a side longer than `MAX_PICTURE_SIDE`.
+        The file cannot be read, is not a PNG, JPEG, BMP, TIFF or WebP picture, or is larger than
+        `MAX_BYTES`; the picture has more than `MAX_PICTURE_PIXELS`, or a side longer than
+        `MAX_PICTURE_SIDE`.
     """
     data = read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
     try:
@@ -46,63 +58,16 @@ def read_image(path: Path) -> Image:
     except ImageError as error:
         raise ImageError(f"{path}: {error}") from error
     if complaint:
-        log.warning("%s: is damaged, and read as far as can be (%s)", path, complaint)
+        log.warning("%s: is damaged, and read as far as possible (%s)", path, complaint)
     return image
 
 
 def decode_image(data: bytes) -> Image | None:
-    """Decode an encoded picture as `read_image` does; None where that cannot be done."""
+    """Decode an encoded picture as `read_image` does; None where that is impossible."""
     try:
         return _decode(data)[0]
     except ImageError:
         return None
-
-
-def _decode(data: bytes) -> tuple[Image, str]:
-    """Return a picture, and what the decoder complained of; nothing, where all was well."""
-    if not _is_known(data):
-        raise ImageError(_NO_PICTURE)
-    flags = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_ANYDEPTH
-    try:
-        with capture_stderr() as comments:
-            image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error as error:
-        if _SIZE_LIMIT in str(error):
-            raise ImageError(
-                f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than "
-                f"{MAX_PICTURE_SIDE:,}; make it smaller"
-            ) from error
-        image = None
-    if image is None:
-        raise ImageError(_NO_PICTURE)
-    complaints = [_PLACE.sub("", line) for line in comments if not line.startswith(_HARMLESS)]
-    return _to_uint8(image), complaints[0] if complaints else ""
-
-
-def _is_known(data: bytes) -> bool:
-    """Tell the formats that are read. For some others OpenCV writes files of its own."""
-    if data.startswith(b"RIFF"):
-        return data[8:12] == b"WEBP"
-    return data.startswith(_SIGNATURES)
-
-
-_SIGNATURES = (b"\x89PNG", b"\xff\xd8\xff", b"BM", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_NO_PICTURE = "is not a picture, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
-_HARMLESS = ("[ WARN", "Warning", "libpng warning")
-_PLACE = re.compile(r"^\[ERROR:\S+ global \S+ \w+ ")  # in OpenCV's source
-_SIZE_LIMIT = "CV_IO_MAX_IMAGE"  # OpenCV names the limit that a picture exceeds
-
-
-def _to_uint8(image: cv2.typing.MatLike) -> Image:
-    if image.dtype == np.uint8:
-        return image.astype(np.uint8, copy=False)
-    if image.dtype == np.uint16:
-        return np.asarray(cv2.convertScaleAbs(image, alpha=1 / 257), np.uint8)
-    scaled = np.empty(image.shape, np.uint8)
-    for number, values in enumerate(image):  # row by row: all at once would take gigabytes
-        shares = np.nan_to_num(values.astype(np.float32)).clip(0, 1)  # such pictures hold 0 to 1
-        scaled[number] = shares * 255 + 0.5
-    return scaled
 
 
 def encode_image(image: Image, path: Path) -> bytes:
@@ -121,3 +86,58 @@ def write_image(path: Path, image: Image) -> None:
     data = encode_image(image, path)
     with replacing(path) as temporary:
         temporary.write_bytes(data)
+
+
+def _decode(data: bytes) -> tuple[Image, str]:
+    """Return a picture, and the decoder's first complaint; an empty one where there is none."""
+    size = picture_size(data)  # also keeps out formats for which OpenCV writes files of its own
+    if size is None:
+        raise ImageError(_NO_PICTURE)
+    _check_size(*size)
+    flags = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_ANYDEPTH
+    image = None
+    with contextlib.suppress(cv2.error), capture_stderr() as comments:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    if image is None:
+        raise ImageError(_NO_PICTURE)
+    _check_size(*image.shape[:2])  # should a decoder find another size than its header claims
+    complaints = [_PLACE.sub("", line) for line in comments if not line.startswith(_HARMLESS)]
+    return _to_uint8(image), complaints[0] if complaints else ""
+
+
+def _check_size(*sides: int) -> None:
+    if max(sides) > MAX_PICTURE_SIDE or math.prod(sides) > MAX_PICTURE_PIXELS:
+        raise ImageError(
+            f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than "
+            f"{MAX_PICTURE_SIDE:,}; make it smaller"
+        )
+
+
+@contextlib.contextmanager
+def capture_stderr() -> Iterator[list[str]]:
+    """Keep standard error silent in the block; the list then holds the lines written to it.
+
+    The C libraries that decode pictures comment there on damaged files.
+    """
+    lines: list[str] = []
+    with _stderr_lock, tempfile.TemporaryFile() as file, contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError):  # a process may have no standard error
+            outside = os.dup(_STDERR)
+            stack.callback(os.close, outside)
+            stack.callback(os.dup2, outside, _STDERR)
+            os.dup2(file.fileno(), _STDERR)
+        yield lines
+        file.seek(0)
+        lines += file.read(_MAX_COMMENTS).decode("utf-8", "replace").splitlines()
+
+
+def _to_uint8(image: cv2.typing.MatLike) -> Image:
+    if image.dtype == np.uint8:
+        return image.astype(np.uint8, copy=False)
+    if image.dtype == np.uint16:
+        return np.asarray(cv2.convertScaleAbs(image, alpha=1 / 257), np.uint8)
+    scaled = np.empty(image.shape, np.uint8)
+    for number, values in enumerate(image):  # row by row: all at once would take gigabytes
+        shares = np.nan_to_num(values.astype(np.float32)).clip(0, 1)  # such pictures hold 0 to 1
+        scaled[number] = shares * 255 + 0.5
+    return scaled

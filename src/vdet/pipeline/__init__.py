@@ -1,1 +1,1 @@
-"""The loop frame → detector → tracker → sinks."""
+"""From frames to outputs: the loop over the frames of a video, and still pictures."""

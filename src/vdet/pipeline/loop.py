@@ -33,7 +33,7 @@ from vdet.track.factory import make_tracker
 log = logging.getLogger("vdet")
 
 FIRST_FRAMES = 5
-"""Frames that a detector is made with."""
+"""Number of frames that `DetectorModel.for_video` gets."""
 
 IO_TIMEOUT = 120.0  # seconds
 
@@ -42,17 +42,24 @@ Progress = Callable[[int | None], Advance]
 
 
 def no_progress(_: int | None) -> Advance:
-    """Take progress and show none."""
+    """Show no progress."""
     return lambda _: None
 
 
 @dataclass(frozen=True, slots=True)
 class VideoJob:
-    """A video to be searched, which part of it, and the outputs that are asked for.
+    """A video, the part of it that is searched, and the outputs.
 
-    `start` and `end` are seconds from the first frame; frames with start ≤ time < end are taken,
-    at most `frames` of them. `at` is the moment, in seconds from the first frame, of which stage
-    pictures are made. With `lanes` the lane is found too, and all is drawn on undistorted frames.
+    Attributes
+    ----------
+    start, end
+        Seconds from the first frame; frames with start ≤ time < end are searched.
+    frames
+        Largest number of frames to search.
+    at
+        Time of the stage pictures, seconds from the first frame.
+    lanes
+        If it is given, the lane is found too, and everything is drawn on undistorted frames.
     """
 
     source: Path
@@ -65,13 +72,23 @@ class VideoJob:
 
     @property
     def is_part(self) -> bool:
-        """Whether only a part of the video is asked for."""
+        """Whether only a part of the video is searched."""
         return (self.start, self.end, self.frames) != (None, None, None)
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a run did: upright frames of which size, shown tracks (ids), seconds of wall time."""
+    """What a run did.
+
+    Attributes
+    ----------
+    width, height
+        Size of the upright frames, pixels.
+    frames, tracks
+        Number of frames searched, and of vehicles shown (ids).
+    seconds
+        Wall time.
+    """
 
     width: int
     height: int
@@ -81,7 +98,7 @@ class Summary:
 
 
 def check_job(job: VideoJob, *, overwrite: bool) -> None:
-    """Refuse, before any work, a job whose outputs could not be written. Raises `OutputError`."""
+    """Refuse a job whose outputs cannot be written, before any work. Raises `OutputError`."""
     check_sinks(job.outputs, overwrite=overwrite, inputs=[job.source])
 
 
@@ -95,29 +112,33 @@ def run_video(
     timeout: float = IO_TIMEOUT,
     progress: Progress = no_progress,
 ) -> Summary:
-    """Run a job; its outputs appear under their names together, when all is done.
+    """Run a job. Its outputs appear under their names together, at the end of the run.
 
-    Reading, searching and encoding overlap in threads; tracking and drawing lie between them.
+    Reading, searching and encoding run in threads; tracking and drawing in the calling one.
 
     Parameters
     ----------
     threads
-        Threads of the search; None for one a core.
+        Number of threads that search; None for one per core.
     codec_threads
-        Threads of the decoder, and of the encoder; None lets them choose.
+        Number of threads of the decoder, and of the encoder; None lets them choose.
     timeout
-        Seconds in which the next frame must be read or written, else the job is given up: a disk
-        or a network that hangs must not stop a batch. What lies before `job.start` has as long
-        again as it lasts.
+        Seconds in which the next frame must be read or written; after that the job fails, so that
+        a disk or a network that hangs does not stop a batch. The duration of the part before
+        `job.start` is added to it.
     progress
-        Called once with the expected number of frames (None: unknown); what it returns is called
+        Called once with the expected number of frames (None: unknown). What it returns is called
         with the number of frames done since the last call.
 
     Raises
     ------
-    VideoError, OutputError
+    VideoError
         The video cannot be read, too much of it is damaged, or the camera of `job.lanes` took
-        frames of another shape; an output cannot be written. No output is left then.
+        frames of another aspect ratio.
+    OutputError
+        An output cannot be written.
+
+    No output is left after an error.
     """
     began = time.perf_counter()
     ids: set[int] = set()
@@ -125,7 +146,7 @@ def run_video(
     timeout += float(job.start or 0)
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles())
-        stack.enter_context(_stalls_named(job, timeout))
+        stack.enter_context(_name_stalls(job, timeout))
         stack.enter_context(single_threaded_libraries())
         reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)
         info = reader.info
@@ -134,7 +155,7 @@ def run_video(
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         advance = progress(reader.expected)
         threads = threads or os.cpu_count() or 1
-        results = _results(read, job, model, settings, video=info, threads=threads)
+        results = _follow_job(read, job, model, settings, video=info, threads=threads)
         for result in stack.enter_context(closing(results)):
             for sink in sinks:
                 sink.write(result)
@@ -155,10 +176,9 @@ def follow_frames(
     threads: int = 1,
     roads: RoadFinder | None = None,
 ) -> Generator[FrameResult]:
-    """Find and follow the vehicles, and with `roads` the lane, through the frames of a video.
+    """Find and follow the vehicles through the frames of a video, and with `roads` the lane.
 
-    Several frames may be searched in `threads` at once; what follows the search, frame by frame,
-    gives the same result whatever their number.
+    `threads` frames are searched at once. The results do not depend on their number.
     """
     tracker = make_tracker(settings, video.width, video.height)
 
@@ -175,14 +195,14 @@ def follow_frames(
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
-    """Return the first images, which a detector is made with, and all of the frames."""
+    """Return the images that `DetectorModel.for_video` gets, and an iterable of all frames."""
     rest = iter(frames)
     first = list(itertools.islice(rest, FIRST_FRAMES))
     return [frame.image for frame in first], itertools.chain(first, rest)
 
 
-class BlindDetector:
-    """A `VideoDetector` for frames that are too small to be searched: it finds nothing."""
+class NullDetector:
+    """A `VideoDetector` that finds nothing, for frames that are too small to be searched."""
 
     def search(self, image: Image, index: int | None) -> None:
         """Do nothing."""
@@ -196,7 +216,7 @@ class BlindDetector:
         return {}
 
 
-def _results(
+def _follow_job(
     read: Iterable[Frame],
     job: VideoJob,
     model: DetectorModel,
@@ -205,7 +225,7 @@ def _results(
     video: VideoInfo,
     threads: int,
 ) -> Generator[FrameResult]:
-    """Follow the vehicles; put the video's name before an error."""
+    """Follow the vehicles of a job; an error gets the name of the video."""
     size = video.width, video.height
     images, frames = peek(read)
     try:
@@ -223,7 +243,7 @@ def _detector(
         return model.for_video(*size, images)
     except FrameSizeError as error:
         log.warning("%s: gets no boxes: %s", source, error)
-        return BlindDetector()
+        return NullDetector()
 
 
 def _open(job: VideoJob, settings: Settings, threads: int | None) -> VideoReader:
@@ -238,17 +258,17 @@ def _open(job: VideoJob, settings: Settings, threads: int | None) -> VideoReader
 
 
 def _frames(reader: VideoReader) -> Generator[Frame]:
-    """Give all frames, and close the reader in the thread that took them."""
+    """Return all frames; the thread that reads them closes the reader."""
     with reader:
         yield from reader
 
 
 @contextmanager
-def _stalls_named(job: VideoJob, timeout: float) -> Iterator[None]:
+def _name_stalls(job: VideoJob, timeout: float) -> Iterator[None]:
     try:
         yield
     except StalledError as error:
         raise VideoError(
-            f"{job.source}: nothing could be read or written for {timeout:g} s; given up; look at "
-            "the disk or network"
+            f"{job.source}: nothing could be read or written for {timeout:g} s; check the disk or "
+            "the network"
         ) from error

@@ -1,4 +1,4 @@
-"""Vehicles, and the lane, in still pictures: read, detected, handed to sinks."""
+"""Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -25,14 +25,16 @@ from vdet.track.track import Track
 
 @dataclass(frozen=True, slots=True)
 class PictureJob:
-    """A picture to be searched, and the outputs that are its own."""
+    """A picture, and the outputs that are written for it alone."""
 
     source: Path
     outputs: tuple[Output, ...]
 
 
 def find_images(paths: Sequence[Path]) -> list[Path]:
-    """Return the pictures among `paths`, those in folders included (not in folders of these).
+    """Return the pictures that `paths` name: files, and the pictures in folders.
+
+    Folders inside these folders are not searched.
 
     Raises
     ------
@@ -63,15 +65,20 @@ def _is_picture(path: Path) -> bool:
 def plan_pictures(
     sources: Sequence[Path], out: Path | None, stages: Path | None, *, overwrite: bool
 ) -> list[PictureJob]:
-    """Decide where each picture's results go, and refuse what cannot be, before any work.
+    """Choose the outputs of each picture, and check them before any work.
 
-    `out` is a file for a single picture where it has a picture's suffix, else a folder, which is
-    made; pictures keep their names in it. Stage pictures of several sources go to one folder each.
+    Parameters
+    ----------
+    out
+        A file, if there is a single source and `out` has the suffix of a picture; else a folder,
+        which is made, and in which the pictures keep their names. None: no pictures.
+    stages
+        Folder of the stage pictures; several sources get a folder in it each. None: no such.
 
     Raises
     ------
     OutputError
-        An output is there already (and not `overwrite`), equals a source, or is wanted twice.
+        An output exists already (and not `overwrite`), is a source, or is that of two sources.
     """
     is_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
     jobs = []
@@ -85,7 +92,7 @@ def plan_pictures(
     for output, count in Counter(outputs).items():
         if count > 1:
             raise OutputError(
-                f"{output.path}: wanted by two inputs of one name; run them separately"
+                f"{output.path}: is wanted by two inputs of one name; run them separately"
             )
     if out is not None and not is_file:
         make_folder(out)
@@ -102,8 +109,13 @@ def run_pictures(
 ) -> list[ImageError]:
     """Search pictures; return the errors of those that cannot be read or searched.
 
-    The outputs of one picture appear together, the `shared` ones when all pictures are done.
-    Raises `OutputError`.
+    The outputs of one picture appear together. The `shared` outputs, which get the results of all
+    pictures, appear at the end.
+
+    Raises
+    ------
+    OutputError
+        An output cannot be written.
     """
     failures: list[ImageError] = []
     with ExitStack() as stack:
@@ -125,7 +137,7 @@ def run_picture(
     *,
     shared: Sequence[Sink] = (),
 ) -> FrameResult:
-    """Search a picture, write its outputs together, and hand the result to the shared sinks.
+    """Search a picture, write its outputs together, and give the result to the shared sinks.
 
     Raises
     ------
@@ -152,7 +164,12 @@ def detect_picture(
 ) -> FrameResult:
     """Search a picture, BGR uint8 `(H, W, 3)`; `source` is its name in messages.
 
-    Each detection becomes a track of its own, numbered from 1. Raises `ImageError`.
+    Each detection becomes a track, with ids from 1.
+
+    Raises
+    ------
+    ImageError
+        The picture cannot be searched.
     """
     height, width = image.shape[:2]
     try:

@@ -1,4 +1,4 @@
-"""What a run knows of a frame."""
+"""The result of one frame."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,11 +13,20 @@ from vdet.track.track import Track
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """A frame, what was found in it, and the vehicles that are shown.
+    """A frame, what was detected in it, and the vehicles that are shown.
 
-    `detections` and `tracks` are in pixels of the frame as it was read; `road` holds the frame
-    undistorted, and is None where lanes are not looked for. `source` is the video or the picture.
-    Nobody changes the frame's image: all sinks get the same one.
+    Attributes
+    ----------
+    source
+        The video, or the still picture.
+    frame
+        The frame as it was read. All sinks get the same image, so none may change it.
+    detections, tracks
+        In pixels of that frame.
+    road
+        The lane, and the undistorted frame; None if lanes are not searched for.
+    detector
+        The detector that found `detections`.
     """
 
     source: Path
@@ -28,5 +37,5 @@ class FrameResult:
     detector: VideoDetector = field(repr=False)
 
     def stage_pictures(self) -> dict[str, Image]:
-        """Return a picture of each stage of the detection, by name, the first one first."""
+        """Return a picture of each stage of the detection, by name, in order."""
         return self.detector.stage_pictures(self.frame.image, self.detections)

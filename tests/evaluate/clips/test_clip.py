@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pytest
@@ -13,8 +14,8 @@ from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
-from vdet.evaluate.clips.clip import find_tracks, follow_variants, open_clip
-from vdet.evaluate.clips.evaluate import Variant, evaluate_clips
+from vdet.evaluate.clips.clip import Variant, find_tracks, follow_variants, open_clip
+from vdet.evaluate.clips.evaluate import evaluate_clips
 from vdet.evaluate.predictions import read_predictions
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
@@ -31,6 +32,21 @@ def settings(*assignments: str) -> Settings:
     return load_settings(None, (*QUICK, *assignments))
 
 
+class OfModel(Protocol):
+    """Makes a variant of the quick settings, with the shared model."""
+
+    def __call__(self, *assignments: str) -> Variant: ...
+
+
+@pytest.fixture
+def variant(model_path: Path) -> OfModel:
+    def make(*assignments: str) -> Variant:
+        chosen = settings(*assignments)
+        return Variant(chosen, load_detector(chosen.detector, model_path), assignments)
+
+    return make
+
+
 @pytest.fixture
 def truth_path(scene: Scene, tmp_path: Path) -> Path:
     path = tmp_path / "gt.txt"
@@ -39,25 +55,26 @@ def truth_path(scene: Scene, tmp_path: Path) -> Path:
 
 
 def test_settings_side_by_side_give_what_each_gives_alone(
-    clip_path: Path, model_path: Path
+    clip_path: Path, variant: OfModel
 ) -> None:
+    motion = settings().model_copy(update={"tracker": MotionTrackerSettings()})
     variants = [
-        settings("detector.heat.threshold=0.1"),
-        settings("detector.heat.threshold=0.3", "detector.heat.frames=3"),
-        settings("detector.search.probability=0.8"),
-        settings("tracker.history=2"),
-        settings("detector.search.perspective.sizes=[0.25]", "detector.search.alternate=2"),
-        settings("detector.search.perspective={sizes: [0.25], horizon: 0.5}"),
-        settings("detector.heat.regions=votes", "detector.heat.votes.least=0.02"),
-        settings().model_copy(update={"tracker": MotionTrackerSettings()}),
+        variant("detector.heat.threshold=0.1"),
+        variant("detector.heat.threshold=0.3", "detector.heat.frames=3"),
+        variant("detector.search.probability=0.8"),
+        variant("tracker.history=2"),
+        variant("detector.search.perspective.sizes=[0.25]", "detector.search.alternate=2"),
+        variant("detector.search.perspective={sizes: [0.25], horizon: 0.5}"),
+        variant("detector.heat.regions=votes", "detector.heat.votes.least=0.02"),
+        replace(variant(), settings=motion),
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
         frames, info = list(reader), reader.info
-    together = list(follow_variants(frames, variants, model_path, info))
+    together = list(follow_variants(frames, variants, info))
     for results, frame in zip(together, frames, strict=True):
         assert all(result.frame is frame for result in results)
         assert all(result.source == info.path for result in results)
-    alone = [follow_alone(frames, each, model_path, info) for each in variants]
+    alone = [follow_alone(frames, each, info) for each in variants]
     for each, others in zip(zip(*together, strict=True), alone, strict=True):
         assert [result.tracks for result in each] == [result.tracks for result in others]
         for one, other in zip(each, others, strict=True):
@@ -67,14 +84,11 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     assert len(found) > 1, "the settings should differ in what they find"
 
 
-def follow_alone(
-    frames: Sequence[Frame], settings: Settings, model_path: Path, info: VideoInfo
-) -> list[FrameResult]:
+def follow_alone(frames: Sequence[Frame], variant: Variant, info: VideoInfo) -> list[FrameResult]:
     """Follow the vehicles under one of the settings, as a run of the pipeline does."""
     images, frames_again = peek(frames)
-    model = load_detector(settings.detector, model_path)
-    detector = model.for_video(info.width, info.height, images)
-    return list(follow_frames(frames_again, detector, settings, info))
+    detector = variant.model.for_video(info.width, info.height, images)
+    return list(follow_frames(frames_again, detector, variant.settings, info))
 
 
 @pytest.fixture
@@ -92,52 +106,52 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[int | None]:
 
 
 def test_settings_that_search_alike_share_the_search(
-    clip_path: Path, model_path: Path, searched: list[int | None]
+    clip_path: Path, variant: OfModel, searched: list[int | None]
 ) -> None:
     variants = [
-        settings(),
-        settings("detector.heat.threshold=1"),
-        settings("tracker.history=2"),
-        settings("detector.search.probability=0.9"),
+        variant(),
+        variant("detector.heat.threshold=1"),
+        variant("tracker.history=2"),
+        variant("detector.search.probability=0.9"),
     ]
     with VideoReader(clip_path, frames=3) as reader:
-        results = list(follow_variants(reader, variants, model_path, reader.info))
+        results = list(follow_variants(reader, variants, reader.info))
     assert [len(each) for each in results] == [4, 4, 4]
     assert searched == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(
-    clip_path: Path, truth_path: Path, model_path: Path
+    clip_path: Path, truth_path: Path, variant: OfModel
 ) -> None:
     steps: list[int] = []
     clip = open_clip(clip_path, truth_path)
-    (found,) = find_tracks(clip, [settings()], model_path, lambda _: steps.append)
+    (found,) = find_tracks(clip, [variant()], lambda _: steps.append)
     assert found.frame_count == len(steps) == FRAMES
     assert found.rate == 25
 
 
-def test_until_ends_sooner(clip_path: Path, truth_path: Path, model_path: Path) -> None:
+def test_until_ends_sooner(clip_path: Path, truth_path: Path, variant: OfModel) -> None:
     clip = open_clip(clip_path, truth_path, until=4)
-    (run,) = evaluate_clips([clip], model_path, [Variant((), settings())])
+    (run,) = evaluate_clips([clip], [variant()])
     assert max(frame.number for frame in run.clips[0].comparison.frames) == 4
 
 
 def test_truth_beyond_the_video_is_refused_with_its_line(
-    clip_path: Path, tmp_path: Path, model_path: Path
+    clip_path: Path, tmp_path: Path, variant: OfModel
 ) -> None:
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
-        find_tracks(open_clip(clip_path, truth), [settings()], model_path, no_progress)
+        find_tracks(open_clip(clip_path, truth), [variant()], no_progress)
 
 
 def test_clips_are_pooled_under_each_setting(
-    clip_path: Path, truth_path: Path, model_path: Path
+    clip_path: Path, truth_path: Path, variant: OfModel
 ) -> None:
     clips = [open_clip(clip_path, truth_path, until=3), open_clip(clip_path, truth_path, until=2)]
     swept = [f"detector.heat.threshold={threshold}" for threshold in (1, 2)]
-    variants = [Variant((assignment,), settings(assignment)) for assignment in swept]
-    runs = evaluate_clips(clips, model_path, variants)
+    variants = [variant(assignment) for assignment in swept]
+    runs = evaluate_clips(clips, variants)
     assert [run.assignments for run in runs] == [(assignment,) for assignment in swept]
     for run in runs:
         boxes = [clip.scores.vehicle_boxes for clip in run.clips]
@@ -145,25 +159,24 @@ def test_clips_are_pooled_under_each_setting(
 
 
 def test_no_output_appears_where_the_truth_covers_frames_beyond_the_video(
-    clip_path: Path, tmp_path: Path, model_path: Path
+    clip_path: Path, tmp_path: Path, variant: OfModel
 ) -> None:
     truth, tracks = tmp_path / "gt.txt", tmp_path / "found.csv"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     clip = open_clip(clip_path, truth)
     with pytest.raises(TruthError):
-        find_tracks(clip, [settings()], model_path, no_progress, [Output("tracks", tracks)])
+        find_tracks(clip, [variant()], no_progress, [Output("tracks", tracks)])
     assert [path.name for path in tmp_path.iterdir()] == ["gt.txt"]
 
 
 def test_outputs_get_the_results_under_the_first_of_the_settings(
-    clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
+    clip_path: Path, truth_path: Path, variant: OfModel, tmp_path: Path
 ) -> None:
     tracks = tmp_path / "found.csv"
-    variants = [settings(), settings("detector.heat.threshold=5000")]
+    variants = [variant(), variant("detector.heat.threshold=5000")]
     first, second = find_tracks(
         open_clip(clip_path, truth_path),
         variants,
-        model_path,
         no_progress,
         [Output("tracks", tracks)],
     )

@@ -100,7 +100,7 @@ def test_a_window_between_two_vehicles_belongs_to_the_nearer_one() -> None:
     assert kinds(chosen(windows(between), truth(CAR, beside))) == {between: "vehicle"}
 
 
-def test_a_part_in_an_ignore_region_is_not_taken() -> None:
+def test_no_part_is_taken_from_an_ignore_region() -> None:
     part = about(465, 36)
     assert kinds(chosen(windows(part), truth(CAR))) == {part: "part"}
     assert chosen(windows(part), truth(CAR, ignored=(Box(455, 280, 90, 90),))) == []
@@ -110,7 +110,7 @@ def many() -> Windows:
     return windows(*(about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120)))
 
 
-def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:
+def test_the_settings_limit_the_patches_of_each_vehicle_and_frame() -> None:
     settings = MiningSettings(probability=0, per_vehicle=4, false_alarms=7, parts=3)
     choices = chosen(many(), truth(CAR, OTHER), settings)
     counted = [choice.kind for choice in choices]
@@ -120,7 +120,7 @@ def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> No
     assert sum(box.x < 600 for box in fitting) == 4
 
 
-def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
+def test_the_same_seed_takes_the_same_windows_and_another_seed_takes_others() -> None:
     settings = MiningSettings(per_vehicle=4, false_alarms=7)
     one, same, other = (chosen(many(), truth(CAR), settings, seed) for seed in (0, 0, 1))
     assert one == same
@@ -131,7 +131,7 @@ def test_a_window_that_two_sets_share_is_one_patch() -> None:
     assert len(chosen(windows(about(450), about(450)), truth(CAR))) == 1
 
 
-def test_a_frame_without_vehicles_has_false_alarms_only() -> None:
+def test_a_frame_without_vehicles_gives_false_alarms_only() -> None:
     assert {choice.kind for choice in chosen(many(), truth())} == {"false alarm"}
     assert len(chosen(many(), truth())) == len(many())
 

@@ -23,7 +23,7 @@ def trial(name: str, groups: tuple[str, ...]) -> TrialReport:
 REPORT = PatchReport(2, 1, 0, (trial("tail", ("vehicles/a",)), trial("groups", ("vehicles/b",))))
 
 
-def test_the_tests_stand_side_by_side() -> None:
+def test_the_tests_are_side_by_side() -> None:
     text = "\n".join(lines(REPORT))
     (accuracy,) = (line for line in text.splitlines() if line.startswith("accuracy  "))
     assert accuracy.count("0.6667 [") == 2

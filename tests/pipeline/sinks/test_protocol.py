@@ -10,9 +10,9 @@ from typing import Self
 import numpy as np
 import pytest
 
+from pipeline.conftest import Register
 from pipeline.red_runs import COUNT, outputs, read, run_red, video_info
 from red_cars import HEIGHT, SETTINGS
-from vdet import plugins
 from vdet.config.schema import OutputSettings
 from vdet.errors import ConfigError, OutputError
 from vdet.files import OutputFiles
@@ -28,20 +28,7 @@ from vdet.pipeline.sinks.protocol import (
     open_sink,
 )
 
-Register = Callable[[str, SinkKind], None]
 MOMENTS = ("open", "enter", "first", "middle", "end")
-
-
-@pytest.fixture
-def register(monkeypatch: pytest.MonkeyPatch) -> Register:
-    """Make a kind of sink known under a name, for one test."""
-    kinds: dict[str, SinkKind] = {}
-    load = plugins.load_plugin
-    monkeypatch.setattr(
-        "vdet.pipeline.sinks.protocol.load_plugin",
-        lambda group, name: kinds.get(name) or load(group, name),
-    )
-    return kinds.__setitem__
 
 
 @dataclass
@@ -247,7 +234,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
         ("json", "a.json", True, "is for pictures; give another for videos"),
     ],
 )
-def test_a_sink_is_refused_what_it_cannot_take(
+def test_a_sink_refuses_results_that_it_cannot_take(
     tmp_path: Path, sink: str, name: str, is_video: bool, words: str
 ) -> None:
     output = Output(sink, tmp_path / name)

@@ -16,7 +16,7 @@ from vdet.geometry import Box
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import Road
 from vdet.media.images import Image, read_image
-from vdet.pipeline.loop import BlindDetector
+from vdet.pipeline.loop import NullDetector
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output
 from vdet.track.track import Track
@@ -94,7 +94,7 @@ def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path:
 
 
 def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> None:
-    class Pictures(BlindDetector):
+    class Pictures(NullDetector):
         def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
             assert len(detections) == 0
             return {"z-first": image // 2, "a-second": 255 - image}

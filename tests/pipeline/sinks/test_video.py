@@ -14,7 +14,7 @@ from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media.images import Image
-from vdet.pipeline.sinks.video import annotated
+from vdet.pipeline.sinks.video import annotate
 from vdet.track.track import Track
 
 LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
@@ -37,22 +37,22 @@ def road_seen(camera: CalibratedCamera | None) -> Road:
 def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "#1")
-    np.testing.assert_array_equal(annotated(result_of(CAR), scores=False), expected)
+    np.testing.assert_array_equal(annotate(result_of(CAR), scores=False), expected)
 
 
 def test_scores_stand_beside_the_ids_where_they_are_asked_for() -> None:
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "#1 0.90")
-    np.testing.assert_array_equal(annotated(result_of(CAR), scores=True), expected)
+    np.testing.assert_array_equal(annotate(result_of(CAR), scores=True), expected)
 
 
 def test_predicted_vehicles_are_drawn_dashed() -> None:
     seen, predicted = (Track(1, CAR, 0.9, predicted=flag) for flag in (False, True))
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "#1", dashed=True)
-    dashed = annotated(result_of(predicted), scores=False)
+    dashed = annotate(result_of(predicted), scores=False)
     np.testing.assert_array_equal(dashed, expected)
-    solid = annotated(result_of(seen), scores=False)
+    solid = annotate(result_of(seen), scores=False)
     lower = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
     drawn, gaps = (solid[lower] == color_of(1)).all(1), (dashed[lower] != solid[lower]).any(1)
     assert drawn.all()
@@ -64,14 +64,14 @@ def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     assert undistorted.place(CAR) != CAR
     expected = undistorted.image.copy()
     draw_box(expected, undistorted.place(CAR), color_of(1), "#1")
-    drawn = annotated(result_of(CAR, found=undistorted), scores=False)
+    drawn = annotate(result_of(CAR, found=undistorted), scores=False)
     np.testing.assert_array_equal(drawn, expected)
 
 
 def test_a_vehicle_that_undistortion_moves_out_of_the_picture_is_not_drawn() -> None:
     undistorted = road_seen(LENS)
     assert undistorted.place(CORNER).area == 0
-    drawn = annotated(result_of(CORNER, found=undistorted), scores=False)
+    drawn = annotate(result_of(CORNER, found=undistorted), scores=False)
     np.testing.assert_array_equal(drawn, undistorted.image)
 
 
@@ -85,7 +85,7 @@ def test_the_frames_of_the_result_are_not_drawn_on() -> None:
     undistorted = with_lane.image.copy()
     for found in (None, with_lane):
         result = result_of(CAR, found=found)
-        annotated(result, scores=True)
+        annotate(result, scores=True)
         np.testing.assert_array_equal(result.frame.image, road(CAR))
     np.testing.assert_array_equal(with_lane.image, undistorted)
 
@@ -93,7 +93,7 @@ def test_the_frames_of_the_result_are_not_drawn_on() -> None:
 def test_the_lane_lies_under_the_boxes() -> None:
     box = Box(100, 150, 120, 60)
     with_lane = replace(road_seen(None), lane=LANE)
-    drawn = annotated(result_of(box, found=with_lane), scores=False)
+    drawn = annotate(result_of(box, found=with_lane), scores=False)
     assert (drawn[box.bottom - 1, box.x : box.right] == color_of(1)).all()
     blue, green, red = drawn[180, 160].astype(int) - road(CAR)[180, 160]
     assert green > max(blue, red)
@@ -105,7 +105,7 @@ def white(width: int, height: int) -> Image:
 
 def test_only_boxes_and_their_labels_are_drawn_on() -> None:
     boxes = [Box(200, 400, 120, 90), Box(800, 420, 240, 150)]
-    image = annotated(result_of(*boxes, image=white(1280, 720)), scores=False)
+    image = annotate(result_of(*boxes, image=white(1280, 720)), scores=False)
     allowed = np.zeros(image.shape[:2], bool)
     for box in boxes:
         allowed[box.y - 32 : box.bottom, box.x : box.right] = True
@@ -118,11 +118,11 @@ def test_only_boxes_and_their_labels_are_drawn_on() -> None:
 def test_each_id_has_its_own_color() -> None:
     result = result_of(Box(20, 100, 50, 50), Box(200, 100, 50, 50), image=white(320, 240))
     three, four = (replace(track, id=track.id + 2) for track in result.tracks)
-    image = annotated(replace(result, tracks=(three, four)), scores=False)
+    image = annotate(replace(result, tracks=(three, four)), scores=False)
     assert tuple(image[149, 45]) == color_of(3)
     assert tuple(image[149, 225]) == color_of(4)
 
 
 @pytest.mark.parametrize("scores", [False, True])
 def test_no_tracks_leave_the_picture_as_it_was(scores: bool) -> None:
-    assert annotated(result_of(image=white(320, 240)), scores=scores).min() == 255
+    assert annotate(result_of(image=white(320, 240)), scores=scores).min() == 255

@@ -102,14 +102,14 @@ def test_needing_fewer_detections_never_makes_it_more() -> None:
 
 def test_a_car_vouched_for_counts_as_detected_that_often() -> None:
     car = seen()
-    car.vouch(10)
+    car.count_at_least(10)
     assert car.is_shown
     assert (car.in_a_row, car.count) == (10, 10)
 
 
 def test_vouching_takes_no_detections_away() -> None:
     car = seen(12)
-    car.vouch(10)
+    car.count_at_least(10)
     assert (car.in_a_row, car.count) == (12, 12)
 
 

@@ -42,4 +42,6 @@ def detection_scores(strengths: npt.ArrayLike, middle: float, slope: float) -> F
     float32 `(n,)`.
     """
     relative = np.asarray(strengths, np.float64) / middle
-    return np.asarray(1 - 1 / (1 + relative**slope), np.float32)
+    with np.errstate(over="ignore"):  # infinite odds are a score of 1
+        odds = relative**slope
+    return np.asarray(1 - 1 / (1 + odds), np.float32)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
-from vdet.detect.factory import load_detector
+from vdet.detect.protocol import DetectorModel
 from vdet.errors import ImageError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo, Row
 from vdet.evaluate.truth import read_truth
@@ -34,6 +34,18 @@ class Clip:
     until: int | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Variant:
+    """Settings to compare with others, and the detector that was loaded with them.
+
+    `assignments` are those in which the settings differ from the others, as `--set` takes them.
+    """
+
+    settings: Settings
+    model: DetectorModel
+    assignments: tuple[str, ...] = ()
+
+
 def open_clip(video: Path, truth_path: Path, until: int | None = None) -> Clip:
     """Read the truth of a video.
 
@@ -55,8 +67,7 @@ def open_clip(video: Path, truth_path: Path, until: int | None = None) -> Clip:
 
 def find_tracks(
     clip: Clip,
-    variants: Sequence[Settings],
-    model: Path | None,
+    variants: Sequence[Variant],
     progress: Progress,
     outputs: Sequence[Output] = (),
 ) -> list[LabelledVideo]:
@@ -64,8 +75,6 @@ def find_tracks(
 
     Parameters
     ----------
-    model
-        Model file of the detector; None for the shipped one.
     progress
         Called with the expected number of frames (None: unknown); what it returns is called with
         the number of frames done since the last call.
@@ -86,13 +95,13 @@ def find_tracks(
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles())
         reader = stack.enter_context(
-            VideoReader(clip.video, frames=clip.until, settings=variants[0].input)
+            VideoReader(clip.video, frames=clip.until, settings=variants[0].settings.input)
         )
-        context = SinkContext(files, variants[0], reader.info)
+        context = SinkContext(files, variants[0].settings, reader.info)
         sinks = [stack.enter_context(open_sink(output, context)) for output in outputs]
         advance = progress(reader.expected)
         try:
-            for results in follow_variants(reader, variants, model, reader.info):
+            for results in follow_variants(reader, variants, reader.info):
                 for sink in sinks:
                     sink.write(results[0])
                 for row, result in zip(rows, results, strict=True):
@@ -108,17 +117,12 @@ def find_tracks(
 
 
 def follow_variants(
-    frames: Iterable[Frame], variants: Sequence[Settings], model: Path | None, video: VideoInfo
+    frames: Iterable[Frame], variants: Sequence[Variant], video: VideoInfo
 ) -> Iterator[list[FrameResult]]:
     """Return for each frame a result for each of the settings, in their order.
 
     The results under one of the settings do not depend on the others, and are those of
     `vdet.pipeline.loop.follow_frames`.
-
-    Parameters
-    ----------
-    model
-        Model file of the detector; None for the shipped one.
 
     Raises
     ------
@@ -127,11 +131,9 @@ def follow_variants(
     """
     images, frames = peek(frames)
     size = video.width, video.height
-    detectors = [
-        load_detector(settings.detector, model).for_video(*size, images) for settings in variants
-    ]
-    trackers = [make_tracker(settings, *size) for settings in variants]
-    keys = [settings.detector.search_key for settings in variants]
+    detectors = [each.model.for_video(*size, images) for each in variants]
+    trackers = [make_tracker(each.settings, *size) for each in variants]
+    keys = [each.settings.detector.search_key for each in variants]
     searchers = dict(zip(keys, detectors, strict=True))
     with single_threaded_libraries():
         for frame in frames:

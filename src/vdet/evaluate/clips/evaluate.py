@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.config.schema import Settings
-from vdet.evaluate.clips.clip import Clip, find_tracks
+from vdet.evaluate.clips.clip import Clip, Variant, find_tracks
 from vdet.evaluate.clips.losses import Loss, losses
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.labelled_video import LabelledVideo
@@ -48,17 +47,8 @@ class RunResult:
     total: Scores
 
 
-@dataclass(frozen=True, slots=True)
-class Variant:
-    """Settings, and the assignments in which they differ from the others."""
-
-    assignments: tuple[str, ...]
-    settings: Settings
-
-
 def evaluate_clips(
     clips: Sequence[Clip],
-    model: Path | None,
     variants: Sequence[Variant],
     progress: Progress = no_progress,
     *,
@@ -68,8 +58,6 @@ def evaluate_clips(
 
     Parameters
     ----------
-    model
-        Model file of the detector; None for the shipped one.
     progress
         As `find_tracks` takes it, called for each clip.
     outputs
@@ -80,8 +68,7 @@ def evaluate_clips(
     VideoError, TruthError, OutputError
         As `find_tracks`.
     """
-    settings = [variant.settings for variant in variants]
-    found = [find_tracks(clip, settings, model, progress, outputs) for clip in clips]
+    found = [find_tracks(clip, variants, progress, outputs) for clip in clips]
     results = []
     for number, variant in enumerate(variants):
         of_clips = [

@@ -1,1 +1,1 @@
-"""The outputs of a run, one file an output."""
+"""The outputs of a run, one module per output."""

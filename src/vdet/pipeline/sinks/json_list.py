@@ -11,11 +11,11 @@ from vdet.pipeline.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
 
 
 class JsonSink:
-    """Gathers an item a picture, and writes the list at the end; nothing where there is no item.
+    """Collects an item per picture, and writes the list at the end, if there is an item.
 
     Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
-    `height` (pixels of the input picture) and `score`; where lanes are looked for also `lane`, as
-    in `.jsonl` tracks.
+    `height` (pixels of the input picture) and `score`. If lanes are searched for, it also has
+    `lane`, as in `.jsonl` tracks.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:

@@ -1,4 +1,4 @@
-"""The sink `picture`: a still picture with its vehicles, and its lane, drawn in."""
+"""The sink `picture`: a still picture with the vehicles and the lane drawn into it."""
 
 from pathlib import Path
 from typing import Self
@@ -7,15 +7,13 @@ from vdet.errors import OutputError
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
-from vdet.pipeline.sinks.video import annotated
+from vdet.pipeline.sinks.video import annotate
 
 
 class PictureSink:
     """Writes one picture."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        if context.video is not None:
-            raise OutputError(f"{path}: the sink picture is for still pictures; use the sink video")
         self._path = path
         self._context = context
         self._is_done = False
@@ -36,7 +34,7 @@ class PictureSink:
                 f"{self._path}: takes one picture; for several give the name of a folder"
             )
         self._is_done = True
-        data = encode_image(annotated(result, scores=True), self._path)
+        data = encode_image(annotate(result, scores=True), self._path)
         self._context.files.stage(self._path).write_bytes(data)
 
 

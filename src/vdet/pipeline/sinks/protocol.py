@@ -1,7 +1,6 @@
-"""What the rest of the program knows of an output, and how outputs are opened by name."""
+"""The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -9,8 +8,8 @@ from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
-from vdet.errors import OutputError, VdetError
-from vdet.files import OutputFiles, check_output, make_folder
+from vdet.errors import OutputError
+from vdet.files import OutputFiles, check_output, make_folder, output_errors
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
 from vdet.plugins import SINKS, load_plugin
@@ -21,9 +20,9 @@ STANDARD_OUTPUT = Path("-")
 class Sink(Protocol):
     """Takes the results of a run, frame by frame; a context manager.
 
-    It writes into files that it gets from `SinkContext.files`: these appear under their names when
-    the whole run ends well, and not at all otherwise. It leaves its files complete when it is left
-    without an error.
+    It writes into files that it gets from `SinkContext.files`. They appear under their names when
+    the whole run ends without an error, and not at all otherwise. When the `with` block of the sink
+    ends without an error, its files must be complete.
     """
 
     def __enter__(self) -> Self: ...
@@ -42,22 +41,22 @@ class Sink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SinkContext:
-    """What a sink is opened with.
+    """What a sink gets when it is opened.
 
     Attributes
     ----------
     files
         Gives temporary files: `files.stage(path)`.
     video
-        The video that is read; None where pictures are.
+        The video that is read; None if the results are of still pictures.
     is_part
         Whether only a part of the video is read.
     at
-        Time of the moment that is asked for (`--at`), seconds from the first frame.
+        The option `--at`: seconds from the first frame.
     codec_threads
-        Threads of an encoder; None lets it choose.
+        Number of threads of an encoder; None lets it choose.
     timeout
-        Seconds after which a write that does not end is given up.
+        Seconds after which a write that does not end is an error.
     """
 
     files: OutputFiles
@@ -71,19 +70,19 @@ class SinkContext:
 
 @dataclass(frozen=True, slots=True)
 class SinkKind:
-    """A kind of sink, as it is registered under its name.
+    """A kind of sink, which is registered under a name.
 
     Attributes
     ----------
     open
-        Takes the path of the output and a `SinkContext`.
+        Function that takes the path of the output and a `SinkContext`, and returns the sink.
     suffixes
-        Those that the output may have, lower case; empty for any.
+        Suffixes that the output may have, lower case; empty for any.
     what
-        What it writes, for messages: "tracks".
+        Noun for what it writes, for messages: "tracks".
     marker
-        For an output that is a folder, which is made: a pattern of the files in it that tell that
-        it was written before.
+        Only if the output is a folder, which is made: pattern of a file in it. If there is such a
+        file, the folder is the output of an earlier run.
     writes_standard_output
         Whether the path `-` means standard output.
     takes
@@ -100,14 +99,14 @@ class SinkKind:
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """An output that is asked for: the name of a sink, and where it writes."""
+    """An output of a run: the name of its sink, and its path."""
 
     sink: str
     path: Path
 
 
 def sink_kind(name: str) -> SinkKind:
-    """Return the kind of sink of a name. Raises `ConfigError` where there is none."""
+    """Return the kind of sink with this name. Raises `ConfigError` if there is none."""
     kind: SinkKind = load_plugin(SINKS, name)
     return kind
 
@@ -119,15 +118,15 @@ def check_sinks(
     inputs: Sequence[Path] = (),
     makes_folder: bool = False,
 ) -> None:
-    """Refuse, before any work, outputs that could not be written; arguments as `check_output`.
+    """Refuse outputs that cannot be written, before any work; arguments as in `check_output`.
 
     Raises
     ------
     OutputError
         Two outputs have one path, a suffix is not one of the sink's, or an output cannot be written
-        or is there already.
+        or exists already.
     ConfigError
-        There is no sink of a name.
+        There is no sink with such a name.
     """
     seen: set[Path] = set()
     for output in outputs:
@@ -144,7 +143,7 @@ def check_sinks(
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:
-    """Open the sink of an output; an `OSError` that it raises becomes one that names the output.
+    """Open the sink of an output. An `OSError` of the sink becomes an `OutputError` with its path.
 
     Raises
     ------
@@ -152,7 +151,7 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
         The sink does not take such results, the suffix is not one of the sink's, or the output
         cannot be written.
     ConfigError
-        There is no sink of that name.
+        There is no sink with that name.
     """
     kind = _kind_for(output)
     source = "pictures" if context.video is None else "videos"
@@ -160,7 +159,7 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
         raise OutputError(
             f"{output.path}: the sink {output.sink} is for {kind.takes}; give another for {source}"
         )
-    with _naming(output.path):
+    with output_errors(output.path):
         return _NamedSink(kind.open(output.path, context), output.path)
 
 
@@ -172,28 +171,17 @@ class _NamedSink:
         self._path = path
 
     def __enter__(self) -> Self:
-        with _naming(self._path):
+        with output_errors(self._path):
             self._sink.__enter__()
         return self
 
     def __exit__(self, *raised: Any) -> None:
-        with _naming(self._path):
+        with output_errors(self._path):
             self._sink.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
-        with _naming(self._path):
+        with output_errors(self._path):
             self._sink.write(result)
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except VdetError:
-        raise
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise OutputError(f"{path}: cannot be written: {reason}") from error
 
 
 def _kind_for(output: Output) -> SinkKind:

@@ -1,15 +1,15 @@
-"""The sink `stages`: a folder with a picture of every stage, for one moment."""
+"""The sink `stages`: a folder with a picture of every stage of one frame."""
 
 import logging
 from pathlib import Path
 from typing import Any, Self
 
-from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
+from vdet.draw.boxes import WHITE, draw_box, draw_label
 from vdet.files import make_folder
 from vdet.media.images import Image, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
-from vdet.pipeline.sinks.video import track_label
+from vdet.pipeline.sinks.video import draw_tracks
 
 log = logging.getLogger("vdet")
 
@@ -17,7 +17,7 @@ _BOXES = "boxes"
 
 
 class StagesSink:
-    """Writes the pictures of the first frame at or after the moment that is asked for."""
+    """Writes the pictures of the first frame at or after the time `SinkContext.at`."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self._folder = path
@@ -34,7 +34,7 @@ class StagesSink:
             log.warning("%s: no frame at or after --at; no stage pictures", self._folder)
 
     def write(self, result: FrameResult) -> None:
-        """Write the pictures if this is the frame."""
+        """Write the pictures if it is the frame."""
         if self._is_done or result.frame.time < self._time:
             return
         self._is_done = True
@@ -48,16 +48,13 @@ class StagesSink:
 
 
 def _with_boxes(result: FrameResult) -> Image:
-    """Draw the detections in white with their scores, and over them the shown vehicles."""
+    """Draw the detections in white with their scores, and the shown vehicles over them."""
     picture = result.frame.image.copy()
     detections = result.detections
     for box, score in zip(detections.rounded, detections.scores.tolist(), strict=True):
         draw_box(picture, box, WHITE)
         draw_label(picture, f"{score:.2f}", (box.x, box.bottom), WHITE)
-    for track in result.tracks:
-        label = track_label(track, scores=True)
-        draw_box(picture, track.box, color_of(track.id), label, dashed=track.predicted)
-    return picture
+    return draw_tracks(picture, result.tracks, scores=True)
 
 
 STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png")

@@ -1,23 +1,23 @@
-"""The sink `tracks`: shown boxes, frame by frame, as text; the file's suffix names the format.
+"""The sink `tracks`: the shown boxes of each frame as text; the suffix chooses the format.
 
 | suffix   | a line is          | columns                                                          |
 |----------|--------------------|------------------------------------------------------------------|
 | `.txt`   | a box              | `frame, id, left, top, width, height, score, -1, -1, -1`         |
-| `.csv`   | a box              | `frame,time,id,x,y,width,height,score,predicted`, with heading   |
-| `.jsonl` | a frame, even if   | `frame`, `time`, `tracks`: a list of objects with `id`, `x`, `y`,|
-|          | nothing is in it   | `width`, `height`, `score`, `predicted`; with lanes also `lane`  |
+| `.csv`   | a box              | `frame,time,id,x,y,width,height,score,predicted`, with a heading |
+| `.jsonl` | a frame, even one  | `frame`, `time`, `tracks`: a list of objects with `id`, `x`, `y`,|
+|          | without a box      | `width`, `height`, `score`, `predicted`; with lanes also `lane`  |
 
-In `.csv` and `.jsonl` frames count from 0 from the start of the file, `time` is in seconds, and
-`x, y` is the top-left pixel of the box, counted from 0. In `.txt`, which has no heading, frames and
-pixels count from 1, as MOTChallenge has it (Milan et al., "MOT16", 2016). `score` is 0 to 1, the
-share of such boxes that are vehicles. `predicted` tells that the detector did not see the vehicle
-in this frame.
+In `.csv` and `.jsonl` frames count from 0 at the start of the video, `time` is in seconds, and
+`x, y` is the top-left pixel of the box, counted from 0. `.txt` has no heading; its frames and
+pixels count from 1, as in MOTChallenge (Milan et al., "MOT16", 2016). `score` is 0 to 1: the share
+of boxes with such a score that are vehicles. `predicted` means that the detector did not see the
+vehicle in this frame.
 
-Boxes are in pixels of the input frame, also where the frame is drawn undistorted, so they can be
-compared with labels of the input. `lane` is null where none is shown, else an object with `radius`
-(metres, null on a straight road), `offset` (of the camera from the lane's middle, metres, positive
-to the right), `width` (metres), `left` and `right`: each line as `[[x, y], …]`, pixels of the
-undistorted frame counted from 0, the nearest point first.
+Boxes are in pixels of the input frame, even if the frame is drawn undistorted, so they can be
+compared with labels of the input. `lane` is null if no lane is shown, else an object with `radius`
+(metres, null on a straight road), `offset` (of the camera from the middle of the lane, metres,
+positive to the right), `width` (metres), `left` and `right`: each line as `[[x, y], …]`, pixels of
+the undistorted frame counted from 0, the nearest point first.
 """
 
 import csv
@@ -109,7 +109,7 @@ class TrackSink:
         self._file.close()
 
     def write(self, result: FrameResult) -> None:
-        """Add the tracks of a frame, and its lane where the format has a place for it."""
+        """Add the tracks of a frame, and its lane if the format has it."""
         self._write(result)
 
 

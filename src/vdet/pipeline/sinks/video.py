@@ -1,4 +1,4 @@
-"""The sink `video`: the video with its vehicles, and its lane, drawn in."""
+"""The sink `video`: the video with the vehicles and the lane drawn into it."""
 
 from collections.abc import Iterable
 from contextlib import ExitStack
@@ -18,7 +18,7 @@ from vdet.track.track import Track
 
 
 class VideoSink:
-    """Draws into the frames, and encodes them in a thread."""
+    """Draws into copies of the frames, and encodes them in a thread."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         assert context.video is not None  # `takes` says so
@@ -49,39 +49,38 @@ class VideoSink:
         self._stack.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
-        """Draw the vehicles that are shown, and hand the frame to the encoder."""
-        image = annotated(result, scores=self._scores)
+        """Draw the shown vehicles, and give the frame to the encoder."""
+        image = annotate(result, scores=self._scores)
         self._encode(Frame(result.frame.index, result.frame.time, image))
 
 
 VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos")
 
 
-def annotated(result: FrameResult, *, scores: bool) -> Image:
-    """Return the frame with its vehicles; itself where nothing is drawn.
+def annotate(result: FrameResult, *, scores: bool) -> Image:
+    """Return a copy of the frame with its vehicles; the frame's own image if there are none.
 
-    Where lanes are looked for, it is the undistorted frame with the lane, and the vehicles' boxes
-    are carried through the same undistortion.
+    If lanes are searched for, it is a copy of the undistorted frame with the lane, and the boxes
+    of the vehicles are undistorted too.
     """
     road, tracks = result.road, result.tracks
     if road is None:
         image = result.frame.image
-        return _with_tracks(image.copy(), tracks, scores=scores) if tracks else image
+        return draw_tracks(image.copy(), tracks, scores=scores) if tracks else image
     image = road.image.copy()
     if road.lane:
         draw_lane(image, road.lane)
     placed = (replace(track, box=road.place(track.box)) for track in tracks)
-    return _with_tracks(image, (track for track in placed if track.box.area), scores=scores)
+    return draw_tracks(image, (track for track in placed if track.box.area), scores=scores)
 
 
-def _with_tracks(image: Image, tracks: Iterable[Track], *, scores: bool) -> Image:
-    """Draw vehicles into an image, each id in its own colour, predicted ones dashed."""
+def draw_tracks(image: Image, tracks: Iterable[Track], *, scores: bool) -> Image:
+    """Draw vehicles into an image, and return it.
+
+    Each id has its own colour and is the label, with `scores` the score too. Predicted boxes are
+    dashed.
+    """
     for track in tracks:
-        label = track_label(track, scores=scores)
+        label = f"#{track.id} {track.score:.2f}" if scores else f"#{track.id}"
         draw_box(image, track.box, color_of(track.id), label, dashed=track.predicted)
     return image
-
-
-def track_label(track: Track, *, scores: bool) -> str:
-    """Name a vehicle on a picture."""
-    return f"#{track.id} {track.score:.2f}" if scores else f"#{track.id}"

@@ -189,7 +189,7 @@ class Association:
     def _create_vouched(self, region: Region, id_kept: int | None) -> None:
         car = self._new_car(region)
         car.id = id_kept
-        car.vouch(self._settings.detections_needed)
+        car.count_at_least(self._settings.detections_needed)
 
     def _new_car(self, region: Region) -> Car:
         car = Car(self._settings.detections_needed, self._settings.history)

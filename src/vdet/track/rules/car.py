@@ -146,8 +146,8 @@ class Car:
         """Show the car after this number of detections in a row, if that is sooner."""
         self.needed = min(self.needed, detections)
 
-    def vouch(self, detections: int) -> None:
-        """Count the car as detected at least so often already, and in a row."""
+    def count_at_least(self, detections: int) -> None:
+        """Raise both counts of detections to this number where they are lower."""
         self.in_a_row = max(self.in_a_row, detections)
         self.count = max(self.count, detections)
 

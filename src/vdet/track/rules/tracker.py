@@ -64,10 +64,10 @@ class RulesTracker:
         there = [other for other in others if other.box.contains(car.centroid)]
         if car.id is None or not there:
             return False
-        heir = min(there, key=lambda other: math.dist(other.centroid, car.centroid))
-        heir.vouch(self._settings.detections_needed)
-        if heir.id is None:
-            heir.id = car.id
+        successor = min(there, key=lambda other: math.dist(other.centroid, car.centroid))
+        successor.count_at_least(self._settings.detections_needed)
+        if successor.id is None:
+            successor.id = car.id
         self._cars.remove(car)
         return True
 

@@ -1,4 +1,4 @@
-"""Progress bars, where a person may be looking."""
+"""Lines, log records and progress bars on standard error."""
 
 import functools
 import io
@@ -6,11 +6,11 @@ import io
 import pytest
 from tqdm import tqdm
 
-from vdet.cli.progress import files_bar
+from vdet.cli.messages import files_bar
 
 
 class Terminal(io.StringIO):
-    """What a bar takes for a terminal."""
+    """A stream that says it is a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -20,7 +20,7 @@ class Terminal(io.StringIO):
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     terminal = Terminal()
     bar = functools.partial(tqdm, file=terminal, mininterval=0)
-    monkeypatch.setattr("vdet.cli.progress.tqdm", bar)
+    monkeypatch.setattr("vdet.cli.messages.tqdm", bar)
     return terminal
 
 
@@ -39,7 +39,7 @@ def test_a_batch_has_a_bar_over_files_with_the_rate_of_all_frames_and_the_time_l
     assert "<" in last  # tqdm's mark before the time that is left
 
 
-def test_nothing_is_shown_if_it_shall_be_quiet(terminal: Terminal) -> None:
+def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
     with files_bar(4, quiet=True) as advance:
         advance(200)
     assert terminal.getvalue() == ""

@@ -1,4 +1,4 @@
-"""Files from outside: limits, zip files, names."""
+"""Zip files from outside: listed and read, up to their limits."""
 
 import contextlib
 import io
@@ -12,50 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
-from vdet.errors import ConfigError
-from vdet.files import printable, read_whole
-
-
-def read(path: Path, most: int) -> bytes:
-    return read_whole(path, most=most, what="letter", error=ConfigError)
-
-
-@pytest.mark.parametrize("size", [0, 9, 10])
-def test_a_file_within_its_limit_is_read_whole(tmp_path: Path, size: int) -> None:
-    path = tmp_path / "file"
-    path.write_bytes(b"x" * size)
-    assert read(path, 10) == b"x" * size
-
-
-def test_a_larger_file_is_refused_in_the_callers_own_kind_of_error(tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    path.write_bytes(b"x" * 1001)
-    with pytest.raises(ConfigError, match=r"file: is larger than 1,000 bytes; that is no letter"):
-        read(path, 1000)
-
-
-def test_a_file_without_an_end_takes_no_more_memory_than_its_limit() -> None:
-    tracemalloc.start()
-    with pytest.raises(ConfigError, match="/dev/zero: is larger than 3,000,000 bytes"):
-        read(Path("/dev/zero"), 3_000_000)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 7_500_000
-
-
-def test_no_memory_is_set_aside_for_a_limit_that_is_not_reached(tmp_path: Path) -> None:
-    path = tmp_path / "file"
-    path.write_bytes(b"x")
-    tracemalloc.start()
-    read(path, 10**9)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 2_000_000
-
-
-def test_a_missing_file_is_named() -> None:
-    with pytest.raises(ConfigError, match="none: cannot be read: No such file"):
-        read(Path("none"), 10)
 
 
 def zipped(name: str, data: bytes, compression: int = zipfile.ZIP_DEFLATED) -> bytes:
@@ -93,7 +49,7 @@ def test_a_member_is_read_whole_or_not_at_all(content: bytes, drawn: st.DataObje
         (b"no zip file", "is neither a folder nor a readable zip file"),
     ],
 )
-def test_what_is_not_read_is_said_to_be(data: bytes, words: str) -> None:
+def test_the_error_says_why_a_member_is_not_read(data: bytes, words: str) -> None:
     with pytest.raises(ArchiveError, match=words):
         member(data, most=100)
 
@@ -115,11 +71,3 @@ def test_ordinary_names_are_listed(tmp_path: Path, name: str) -> None:
     path = tmp_path / "a.zip"
     path.write_bytes(zipped(name, b""))
     assert list_members(path) == [name]
-
-
-@given(st.text(max_size=200))
-def test_a_name_is_shown_on_one_line_that_a_terminal_only_shows(name: str) -> None:
-    shown = printable(name)
-    assert shown.isprintable()
-    assert len(shown) <= 81
-    assert shown == name or not name.isprintable() or name.startswith(shown[:-1])

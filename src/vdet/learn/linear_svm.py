@@ -1,0 +1,75 @@
+"""A linear SVM that is fitted in the memory of its data.
+
+The classifier is that of scikit-learn's `LinearSVC`: squared hinge loss, L2 penalty on weights and
+bias. liblinear, which `LinearSVC` calls, copies float32 data to six times their size; L-BFGS needs
+only products of the data with a vector.
+Source of the solver: Liu and Nocedal, "On the Limited Memory BFGS Method for Large Scale
+Optimization", 1989.
+"""
+
+import warnings
+
+import numpy as np
+from scipy.optimize import minimize  # type: ignore[import-untyped]
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.exceptions import ConvergenceWarning
+
+from vdet.geometry import BoolArray, Float32Array, Float64Array
+
+_CORRECTIONS = 20  # of L-BFGS
+_TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
+
+
+class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
+    """A two-class linear SVM as a scikit-learn estimator.
+
+    `C` is the penalty of the errors, `max_iter` the most iterations of the solver. `fit` warns with
+    `ConvergenceWarning` if they are not enough. It takes no sample weights.
+    """
+
+    def __init__(self, C: float = 1.0, max_iter: int = 1000) -> None:
+        self.C = C
+        self.max_iter = max_iter
+
+    def fit(self, x: Float32Array, y: BoolArray) -> "LinearSvm":
+        """Fit to `x`, float32 `(n, features)`, with labels `y`, bool `(n,)`."""
+        signs = np.where(y, 1, -1).astype(np.float32)
+        scale = 1 / (self.C * len(y))  # the loss of zero weights becomes 1
+
+        def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
+            weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
+            errors = np.maximum(0, 1 - signs * (x @ weights + bias))
+            slopes = -2 * self.C * (errors * signs)
+            gradient = parameters + np.append(slopes @ x, slopes.sum())
+            squares = float(np.square(errors, dtype=np.float64).sum())
+            value = 0.5 * float(parameters @ parameters) + self.C * squares
+            return scale * value, scale * gradient
+
+        found = minimize(
+            loss,
+            np.zeros(x.shape[1] + 1),
+            jac=True,
+            method="L-BFGS-B",
+            options={
+                "maxiter": self.max_iter,
+                "maxfun": 10 * self.max_iter,
+                "maxcor": _CORRECTIONS,
+                "ftol": _TOLERANCE,
+                "gtol": 0,
+            },
+        )
+        if found.status == 1:  # the iterations are used up
+            warnings.warn("the solver has not converged", ConvergenceWarning, stacklevel=2)
+        self.classes_ = np.array([False, True])
+        self.coef_ = found.x[np.newaxis, :-1]
+        self.intercept_ = found.x[-1:]
+        return self
+
+    def decision_function(self, x: Float32Array) -> Float32Array:
+        """Return the signed distances, float32 `(n,)`: positive for the second class."""
+        distances: Float32Array = x @ self.coef_[0].astype(np.float32)
+        return distances + np.float32(self.intercept_[0])
+
+    def predict(self, x: Float32Array) -> BoolArray:
+        """Return the classes, bool `(n,)`."""
+        return self.decision_function(x) > 0

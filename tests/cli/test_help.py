@@ -1,0 +1,85 @@
+"""The help of every command reads for itself."""
+
+import re
+from collections.abc import Iterator
+
+import click
+import pytest
+
+from conftest import Run
+from vdet.cli.main import cli
+from vdet.config.loading import load_settings
+from vdet.config.schema import Settings
+from vdet.evaluate.clips.sweep import grid
+
+
+def commands(group: click.Group, *names: str) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    """Give every command with the words by which it is called, groups included."""
+    yield names, group
+    for name, command in group.commands.items():
+        if isinstance(command, click.Group):
+            yield from commands(command, *names, name)
+        else:
+            yield (*names, name), command
+
+
+COMMANDS = dict(commands(cli))
+OPTIONS = [
+    (names, option.opts[-1], option.help or "")
+    for names, command in COMMANDS.items()
+    for option in command.params
+    if isinstance(option, click.Option)
+]
+EXAMPLES = [(names, text) for names, _, text in OPTIONS if "for example" in text]
+
+
+@pytest.mark.parametrize("names", COMMANDS, ids=" ".join)
+def test_every_command_has_help_and_a_line_in_the_list_that_is_not_cut(
+    run: Run, names: tuple[str, ...]
+) -> None:
+    result = run(*names, "--help")
+    assert result.code == 0
+    assert COMMANDS[names].help
+    assert "..." not in re.sub(r"[A-Z]\]?\.\.\.", "", result.out), "a line is cut"
+
+
+@pytest.mark.parametrize(("names", "option", "text"), OPTIONS)
+def test_the_help_of_every_option_is_of_whole_sentences(
+    names: tuple[str, ...], option: str, text: str
+) -> None:
+    assert text, f"vdet {' '.join(names)} {option} has no help"
+    assert text[0].isupper()
+    assert text.endswith(".")
+    assert "…" not in text
+    assert ";" not in text, "two sentences in one"
+
+
+@pytest.mark.parametrize("names", COMMANDS, ids=" ".join)
+def test_every_option_and_argument_has_a_name_for_its_value(names: tuple[str, ...]) -> None:
+    speaking = ("time", "pattern", "choice")
+    for parameter in COMMANDS[names].params:
+        is_flag = isinstance(parameter, click.Option) and parameter.is_flag
+        assert is_flag or parameter.metavar or parameter.type.name in speaking, parameter.name
+
+
+@pytest.mark.parametrize(("names", "text"), EXAMPLES)
+def test_examples_of_settings_have_an_effect(names: tuple[str, ...], text: str) -> None:
+    example = re.search(r"for example (\S+=\S+?)\.", text)
+    if example is None:  # an address, not a setting
+        assert "://" in text
+        return
+    if names == ("eval", "video") and "," in example[1]:
+        values = [load_settings(None, assignments) for assignments in grid([example[1]])]
+        assert len(values) > 1
+        assert values[0] != values[1]
+    else:
+        assert load_settings(None, [example[1]]) != Settings()
+
+
+def test_one_option_means_the_same_in_every_command() -> None:
+    """Options of one name have one help, but for examples and for what is the command's own."""
+    own = {"--output", "--until", "--model", "--stages", "--json", "--jobs", "--truth"}
+    texts: dict[str, set[str]] = {}
+    for _, option, text in OPTIONS:
+        texts.setdefault(option, set()).add(re.sub(r"for example \S+", "", text))
+    assert {option for option, helps in texts.items() if len(helps) > 1} <= own
