@@ -20,7 +20,7 @@ from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
 from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
 
-SOON = 120.0  # seconds; a limit for what takes a moment, on a very busy machine
+SOON = 300.0  # seconds; a limit for what takes a moment, on a very busy machine
 
 HOLDS_VIDEOS = """
 import os, time
