@@ -26,7 +26,7 @@ types: $(READY)  ## check types
 	$(BIN)/mypy
 
 tests: $(READY)  ## run all tests
-	$(BIN)/pytest -n 2
+	$(BIN)/pytest -n 2 --dist worksteal
 
 bench: $(READY)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks

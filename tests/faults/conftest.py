@@ -1,5 +1,6 @@
 """Clips that take a while, and the program as a process that is ended after the test."""
 
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -8,6 +9,18 @@ import pytest
 from running import Gate, Running, start, write_drive
 
 Start = Callable[..., Running]
+
+
+@pytest.fixture(autouse=True)
+def default_signals() -> Iterator[None]:
+    """Programs inherit which signals are ignored; under nohup it is SIGHUP."""
+    numbers = (signal.SIGINT, signal.SIGHUP)
+    ignored = [number for number in numbers if signal.getsignal(number) == signal.SIG_IGN]
+    for number in ignored:
+        signal.signal(number, signal.SIG_DFL)
+    yield
+    for number in ignored:
+        signal.signal(number, signal.SIG_IGN)
 
 
 @pytest.fixture
