@@ -177,6 +177,7 @@ def follow(
         images, all_frames = peek(read)
         try:
             started = detector.for_video(reader.info.width, reader.info.height, images)
+            del images  # else they stay in memory for the whole run
             yield from follow_frames(all_frames, started, settings, reader.info, threads=threads)
         except ImageError as error:
             raise VideoError(f"{source}: {error}") from error

@@ -192,6 +192,15 @@ class TestMemory:
         assert len(alive) == COUNT
         assert 0 < most <= QUEUED
 
+    def test_the_first_frames_are_let_go_when_they_have_been_taken(self) -> None:
+        images, rest = peek(drive(COUNT))
+        first = weakref.ref(images[0])
+        del images
+        assert first() is not None
+        for _ in islice(rest, FIRST_FRAMES + 1):
+            pass
+        assert first() is None
+
     def test_a_whole_run_holds_few_frames_at_a_time(self, red_clip: Path, tmp_path: Path) -> None:
         def frames_alive() -> int:
             return sum(isinstance(item, Frame) for item in gc.get_objects())

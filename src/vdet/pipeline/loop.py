@@ -198,7 +198,8 @@ def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
     """Return the images that `DetectorModel.for_video` gets, and an iterable of all frames."""
     rest = iter(frames)
     first = list(itertools.islice(rest, FIRST_FRAMES))
-    return [frame.image for frame in first], itertools.chain(first, rest)
+    # A list iterator lets go of its list at the end; the list itself would stay for the whole run.
+    return [frame.image for frame in first], itertools.chain(iter(first), rest)
 
 
 class NullDetector:
@@ -231,6 +232,7 @@ def _follow_job(
     try:
         roads = RoadFinder(job.lanes, settings.lanes, *size) if job.lanes else None
         detector = _detector(images, job.source, model, size)
+        del images  # else they stay in memory for the whole run
         yield from follow_frames(frames, detector, settings, video, threads=threads, roads=roads)
     except (ConfigError, ImageError) as error:
         raise VideoError(f"{job.source}: {error}") from error

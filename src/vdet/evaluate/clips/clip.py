@@ -132,6 +132,7 @@ def follow_variants(
     images, frames = peek(frames)
     size = video.width, video.height
     detectors = [each.model.for_video(*size, images) for each in variants]
+    del images  # else they stay in memory for the whole run
     trackers = [make_tracker(each.settings, *size) for each in variants]
     keys = [each.settings.detector.search_key for each in variants]
     searchers = dict(zip(keys, detectors, strict=True))
