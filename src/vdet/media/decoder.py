@@ -95,8 +95,9 @@ class Decoder:
         if packet is not None:
             self._recent.append(packet)
         damaged = self.losses.evident or any(picture.is_corrupt for picture in pictures)
-        # Several threads may lose the last errors.
-        if damaged or (packet is None and len(self._recent) > len(self._shown) + len(pictures)):
+        if packet is None and self.losses.paired:  # several threads hide errors at the end
+            damaged |= len(self._recent) > len(self._shown) + len(pictures)
+        if damaged:
             return self._decode_again(self._recent, at_end=packet is None)
         if len(self._recent) > _MAX_RECENT:
             self._recent = None
@@ -131,7 +132,7 @@ class Decoder:
         return True
 
     def _remember(self, recent: "list[Packet[Stream]]", picture: av.VideoFrame) -> None:
-        for index, key in enumerate(recent):
+        for index, key in enumerate(recent if picture.key_frame else []):
             if key.is_keyframe and key.pts == picture.pts is not None:
                 # Packets right after the key frame that are shown before it need older ones.
                 recent[:] = [key, *dropwhile(partial(_is_before, key), recent[index + 1 :])]

@@ -30,7 +30,7 @@ class Losses:
     def __init__(self, period: Fraction, *, paired: bool) -> None:
         self.evident = False
         self._period = period
-        self._paired = paired
+        self.paired = paired
         self._packets = self._corrupt_packets = self._unpaired = 0
         self._pictures = self._corrupt_pictures = 0
         self._read_errors = self._decode_errors = self._lost_at_end = 0
@@ -99,7 +99,7 @@ class Losses:
         self._corrupt_pictures += picture.is_corrupt
         self.evident |= picture.is_corrupt
         if picture.interlaced_frame:  # each of its two fields may have a packet
-            self._paired = False
+            self.paired = False
         if picture.pts is not None:
             self._step_to(picture.pts)
         return True
@@ -110,7 +110,7 @@ class Losses:
 
     def finish(self) -> None:
         """Note that no more pictures will come."""
-        if self._paired:
+        if self.paired:
             self._unpaired = self._packets - self._pictures
 
     def end(self, missing: int, file_size: int) -> bool:
