@@ -222,6 +222,13 @@ class TestLabel:
         draw_box(image, Box(x, y, 60, 60), GREEN, "#12")
         assert letters(image) == letters(middle) > 5
 
+    @pytest.mark.parametrize("corner", CORNERS)
+    def test_returns_the_area_that_it_changes(self, corner: tuple[int, int]) -> None:
+        image = blank()
+        tag = draw_label(image, "#7", corner, GREEN)
+        assert tag.clipped(320, 240) == tag
+        assert np.array_equal(touched(image), covered(tag, image))
+
     def test_stands_above_its_box_where_there_is_room(self) -> None:
         image, box = blank(), Box(100, 100, 60, 60)
         draw_box(image, box, GREEN, "#12")

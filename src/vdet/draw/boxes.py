@@ -58,11 +58,11 @@ def draw_box(
         draw_label(image, label, (box.x, box.y), color)
 
 
-def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -> None:
-    """Write text on a filled tag whose lower left corner is `corner`, `(x, y)` in pixels.
+def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -> Box:
+    """Write text on a filled tag whose lower left corner is `corner`, and return the tag.
 
-    The tag is moved so that it lies in the image. Text that is wider than the image becomes
-    smaller; if it still does not fit, its end is cut off.
+    The corner is `(x, y)` in pixels. The tag is moved so that it lies in the image. A text that is
+    wider than the image becomes smaller; if it still does not fit, its end is cut off.
     """
     rows, columns = image.shape[:2]
     scale = _text_scale(image, text)
@@ -72,9 +72,11 @@ def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -
     tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
     x = max(0, min(corner[0], columns - tag_width))
     y = max(0, min(corner[1], rows) - tag_height)
-    _fill(image, Box(x, y, tag_width, tag_height), color)
+    tag = Box(x, y, tag_width, tag_height)
+    _fill(image, tag, color)
     origin = (x + margin, y + margin + height)
     cv2.putText(image, text, origin, _FONT, scale, text_color(color), stroke, cv2.LINE_AA)
+    return tag
 
 
 def text_color(background: Color) -> Color:

@@ -4,17 +4,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.draw.boxes import Color, draw_label, line_width
 from vdet.geometry import Float64Array
 from vdet.lanes.lane import Lane
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
-Color = tuple[int, int, int]
-
 AREA: Color = (80, 200, 60)
 LINE: Color = (40, 60, 255)
-_TEXT: Color = (255, 255, 255)
-_SHADOW: Color = (0, 0, 0)
 _OPACITY = 0.3
 _SHIFT = 4  # fractional bits of the coordinates given to OpenCV
 _SCALE = 2  # top views are small, so their pictures are enlarged
@@ -23,8 +20,9 @@ _SCALE = 2  # top views are small, so their pictures are enlarged
 def draw_lane(image: Image, lane: Lane) -> None:
     """Draw the lane's area and lines into an undistorted frame, and write its numbers."""
     _draw_area(image, lane.left, lane.right)
-    for number, text in enumerate(lane_text(lane)):
-        _write(image, text, number)
+    first, second = lane_text(lane)
+    tag = draw_label(image, first, (0, 0), AREA)
+    draw_label(image, second, (0, 2 * tag.height), AREA)
 
 
 def lane_text(lane: Lane) -> tuple[str, str]:
@@ -55,7 +53,7 @@ def stage_pictures(
     """
     road = image.copy()
     outline = _fixed_point(top_view.outline)
-    cv2.polylines(road, [outline], True, LINE, _thickness(image), cv2.LINE_AA, _SHIFT)
+    cv2.polylines(road, [outline], True, LINE, line_width(image), cv2.LINE_AA, _SHIFT)
     fit = _enlarge(top)
     if lane:
         _draw_area(fit, *(top_view.frame_to_top(line) * _SCALE for line in (lane.left, lane.right)))
@@ -78,26 +76,12 @@ def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
     cv2.fillPoly(tinted, [_fixed_point(area - (x0, y0))], AREA, cv2.LINE_8, _SHIFT)
     around[:] = cv2.addWeighted(tinted, _OPACITY, around, 1 - _OPACITY, 0)
     lines = [_fixed_point(left), _fixed_point(right)]
-    cv2.polylines(image, lines, False, LINE, _thickness(image), cv2.LINE_AA, _SHIFT)
-
-
-def _write(image: Image, text: str, number: int) -> None:
-    """Write text into the upper left corner, in line `number` from 0."""
-    scale = max(0.35, len(image) / 900)
-    thickness = max(1, round(2 * scale))
-    origin = round(20 * scale), round(40 * scale * (number + 1))
-    font = cv2.FONT_HERSHEY_SIMPLEX
-    cv2.putText(image, text, origin, font, scale, _SHADOW, 3 * thickness, cv2.LINE_8)
-    cv2.putText(image, text, origin, font, scale, _TEXT, thickness, cv2.LINE_AA)
+    cv2.polylines(image, lines, False, LINE, line_width(image), cv2.LINE_AA, _SHIFT)
 
 
 def _enlarge(picture: Image) -> Image:
     size = (picture.shape[1] * _SCALE, picture.shape[0] * _SCALE)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST), np.uint8)
-
-
-def _thickness(image: Image) -> int:
-    return max(1, len(image) // 240)
 
 
 def _fixed_point(points: Float64Array) -> npt.NDArray[np.int32]:
