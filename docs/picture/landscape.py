@@ -59,19 +59,29 @@ _ROWS = (
 )  # fmt: skip
 
 
-def landscape(x: Float32Array, y: Float32Array) -> tuple[Float32Array, Float32Array]:
-    """Return what rays see where no vehicle is: colours, and distances `z` (infinite: the sky)."""
-    color = np.zeros((*x.shape, 3), np.float32)
-    depth = np.full(x.shape, np.inf, np.float32)
+@dataclass(frozen=True)
+class Canvas:
+    """What rays see: colours `(rows, columns, 3)`, and distances `z`, infinite in the sky."""
+
+    x: Float32Array
+    y: Float32Array
+    color: Float32Array
+    depth: Float32Array
+
+
+def landscape(x: Float32Array, y: Float32Array) -> Canvas:
+    """Return what rays see where no vehicle is."""
+    canvas = Canvas(x, y, np.zeros((*x.shape, 3), np.float32), np.full_like(x, np.inf))
     above = y > -1e-4
-    color[above] = _with_hills(_sky(x[above], y[above]), x[above], y[above])
+    canvas.color[above] = _with_hills(_sky(x[above], y[above]), x[above], y[above])
     z = CAMERA.above_ground / -y[~above]
-    color[~above], depth[~above] = haze(_ground(x[~above], z), z), z
+    canvas.color[~above] = haze(_ground(x[~above], z), z)
+    canvas.depth[~above] = z
     for number in range(1, len(_ROWS) + 1):
-        _paint_trees(color, depth, x, y, number)
+        _paint_trees(canvas, number)
     for lateral in _RAILS:
-        _paint_rail(color, depth, x, y, lateral)
-    return color, depth
+        _paint_rail(canvas, lateral)
+    return canvas
 
 
 def bend(z: Float32Array | float) -> Float32Array | float:
@@ -154,20 +164,18 @@ def _wall(x: Float32Array, lateral: float) -> Float32Array:
     return np.where(seen, z, np.inf).astype(np.float32)
 
 
-def _paint_trees(
-    color: Float32Array,
-    depth: Float32Array,
-    x: Float32Array,
-    y: Float32Array,
-    number: int,
-) -> None:
+def _paint_trees(canvas: Canvas, number: int) -> None:
     """Paint row `number` of the trees, from 1, as a wall with a ragged top and leaves of noise."""
     trees = _ROWS[number - 1]
-    wall = _wall(x, trees.lateral)
-    height = CAMERA.above_ground + y * np.minimum(wall, 1e4)
+    wall = _wall(canvas.x, trees.lateral)
+    height = CAMERA.above_ground + canvas.y * np.minimum(wall, 1e4)
     size, variation = trees.height, trees.variation
     place = np.nonzero(
-        (wall > 14) & (wall < 600) & (wall < depth) & (height > 0) & (height < 2 * size + variation)
+        (wall > 14)
+        & (wall < 600)
+        & (wall < canvas.depth)
+        & (height > 0)
+        & (height < 2 * size + variation)
     )
     z, up = wall[place], height[place]
     # Along the logarithm of the distance, trees are as wide as they are high at any distance.
@@ -184,23 +192,21 @@ def _paint_trees(
     tree = haze(tree * light[..., None] * np.array([0.93, 0.87, 0.68], np.float32), z)
     seen = up < top + ragged
     place = tuple(index[seen] for index in place)
-    color[place], depth[place] = tree[seen], z[seen]
+    canvas.color[place], canvas.depth[place] = tree[seen], z[seen]
 
 
-def _paint_rail(
-    color: Float32Array, depth: Float32Array, x: Float32Array, y: Float32Array, lateral: float
-) -> None:
+def _paint_rail(canvas: Canvas, lateral: float) -> None:
     """Paint a guard rail: posts every 4 m, before them a beam with two ridges."""
-    wall = _wall(x, lateral)
-    height = CAMERA.above_ground + y * np.minimum(wall, 1e4)
-    place = np.nonzero((wall < 400) & (wall < depth) & (height > 0) & (height < 1))
+    wall = _wall(canvas.x, lateral)
+    height = CAMERA.above_ground + canvas.y * np.minimum(wall, 1e4)
+    place = np.nonzero((wall < 400) & (wall < canvas.depth) & (height > 0) & (height < 1))
     z, up = wall[place], height[place]
     across, along = z / CAMERA.focal, z * z / CAMERA.focal / abs(lateral)  # of a pixel
     from_post = np.abs((z + 1) % 4 - 2)
     post = np.clip((0.07 - from_post) / along + 0.5, 0, 1) * np.clip(0.14 / along, 0, 1)
-    seen = mix(color[place], haze(0.4 * _STEEL, z), (up < 0.6) * post)
+    seen = mix(canvas.color[place], haze(0.4 * _STEEL, z), (up < 0.6) * post)
     angle = (up - 0.44) / 0.32 * 4 * np.pi
     light = 0.63 + 0.23 * np.cos(angle) + 0.17 * np.sin(angle)
     light *= 1 - 0.35 * (np.abs(z % 4 - 2) < 0.05) * np.clip(25 / z, 0, 1)
     beam = np.clip((0.16 - np.abs(up - 0.6)) / across + 0.5, 0, 1)
-    color[place] = mix(seen, haze(_STEEL * light[..., None], z), beam)
+    canvas.color[place] = mix(seen, haze(_STEEL * light[..., None], z), beam)

@@ -29,8 +29,12 @@ SUNLIGHT = np.array([3.2, 2.65, 2.0], np.float32)
 SKYLIGHT = rgb(158, 186, 228)
 
 _HAZE = rgb(214, 214, 212)
-_ZENITH, _MIDDLE, _HORIZON = rgb(44, 98, 178), rgb(122, 170, 222), rgb(232, 222, 205)
-_CLOUD, _CLOUD_SHADOW = rgb(255, 250, 243), rgb(196, 204, 218)
+_ZENITH, _MIDDLE, _HORIZON = (
+    1.3 * rgb(44, 98, 178),
+    1.3 * rgb(122, 170, 222),
+    1.3 * rgb(232, 222, 205),
+)
+_CLOUD, _CLOUD_SHADOW = 1.5 * rgb(255, 250, 243), 1.3 * rgb(196, 204, 218)
 _TREES, _GROUND = rgb(58, 70, 44), rgb(104, 104, 104)
 
 

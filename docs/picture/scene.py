@@ -77,8 +77,8 @@ class Motorway:
             landscape(self._x[start : start + _STRIP], self._y[start : start + _STRIP])
             for start in range(0, len(rows), _STRIP)
         ]
-        self._color = np.concatenate([color for color, _ in strips])
-        self._depth = np.concatenate([depth for _, depth in strips])
+        self._color = np.concatenate([strip.color for strip in strips])
+        self._depth = np.concatenate([strip.depth for strip in strips])
 
     def image(self, vehicles: Iterable[Vehicle]) -> Image:
         """Return the road with vehicles, BGR uint8 of the camera's size."""
@@ -94,13 +94,13 @@ class Motorway:
     def _cast_shadow(self, color: Float32Array, vehicle: Vehicle) -> None:
         """Take the light from the road that the vehicle keeps off."""
         shape, reach = vehicle.shape, 2 * vehicle.shape.height
-        place = np.nonzero(
-            (self._y < 0)
-            & (self._depth > vehicle.ahead - 1.5)
-            & (self._depth < vehicle.ahead + shape.length + reach)
-            & (np.abs(self._x * self._depth - bend(self._depth) - vehicle.lateral) < 2 + reach)
-            & (np.abs(self._y * self._depth + CAMERA.above_ground) < 0.01)
-        )
+        ahead = self._depth - vehicle.ahead
+        rows = (self._y < 0) & (ahead > -1.5) & (ahead < shape.length + reach)
+        place = np.nonzero(rows)
+        x, z = self._x[place], self._depth[place]
+        on_road = np.abs(self._y[place] * z + CAMERA.above_ground) < 0.01
+        near = on_road & (np.abs(x * z - bend(z) - vehicle.lateral) < 2 + reach)
+        place = place[0][near], place[1][near]
         x, z = self._x[place], self._depth[place]
         points = vehicle.to_local(np.stack([x * z, np.full_like(z, 0.004), z], axis=-1))
         sun = _sunlight(shape.distance, points, vehicle.axes @ SUN, 0.02, 7)
