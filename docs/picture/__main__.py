@@ -24,12 +24,12 @@ FRAMES = 22
 def vehicles(time: float) -> tuple[Vehicle, ...]:
     """Return the vehicles; `time` is seconds, 0 in the last frame."""
     return (
-        Vehicle(HATCHBACK, 10.4, 3.6, (30, 32, 36), "VD ET 1"),
-        Vehicle(SALOON, 18.3 - 9 * time, 3.8, (52, 58, 66), "VD ET 2", braking=True),
-        Vehicle(OFF_ROADER, 15.5 + 0.7 * time, -3.6, (28, 62, 120), "VD ET 3"),
-        Vehicle(SALOON, 27 + time, 0.15, (226, 228, 228), "VD ET 4"),
+        Vehicle(OFF_ROADER, 15.5 + 0.7 * time, -3.6, (28, 62, 120), "VD ET 1"),
+        Vehicle(HATCHBACK, 18 - time, 3.9, (110, 16, 22), "VD ET 2"),
+        Vehicle(SALOON, 28 + time, 0.15, (226, 228, 228), "VD ET 3"),
+        Vehicle(SALOON, 46 - 2 * time, 3.75, (52, 58, 66), "VD ET 4"),
         Vehicle(VAN, 46 + 2 * time, -3.6, (238, 238, 236), "VD ET 5"),
-        Vehicle(LORRY, 72 - 2 * time, 3.8, (20, 88, 150)),
+        Vehicle(LORRY, 85 - 2 * time, 3.8, (20, 88, 150)),
     )
 
 
