@@ -17,12 +17,12 @@ from vdet.pipeline.loop import VideoJob, run_video
 from vdet.pipeline.sinks.protocol import Output
 
 FRAMES = 20_000
-FEWEST = 1000
-WARM = 500  # frames after which nothing may grow
+MIN_FRAMES = 1000
+WARM_UP_FRAMES = 500  # frames after which nothing may grow
 ENDING = 50  # last frames, in which the reader may have closed its files and threads
-EVERY = 50  # frames between samples
+SAMPLE_INTERVAL = 50  # frames between samples
 MEMORY_GROWTH = 0.10
-LEAST_SPEED = 0.85  # of the last tenth, against the first
+MIN_SPEED_RATIO = 0.85  # of the last tenth, against the first
 ROWS = 11
 
 
@@ -43,7 +43,7 @@ class Sample:
 
 
 class ResourceMonitor:
-    """Takes a sample every `EVERY` frames; it is the `progress` of a run."""
+    """Takes a sample every `SAMPLE_INTERVAL` frames; it is the `progress` of a run."""
 
     def __init__(self) -> None:
         self.samples: list[Sample] = []
@@ -59,9 +59,9 @@ class ResourceMonitor:
     def _advance(self, frames: int) -> None:
         before = self._frames
         self._frames += frames
-        if self._frames // EVERY > before // EVERY:
+        if self._frames // SAMPLE_INTERVAL > before // SAMPLE_INTERVAL:
             self.samples.append(self._sample())
-            if self._frames % 1000 < EVERY:
+            if self._frames % 1000 < SAMPLE_INTERVAL:
                 print(f"\r{self._frames} frames", end="", file=sys.stderr, flush=True)
 
     def _sample(self) -> Sample:
@@ -80,13 +80,13 @@ def _megabytes(status: str, field: str) -> float:
 
 def find_growth(samples: Sequence[Sample]) -> list[str]:
     """Say what grew in a run, a line each; the first and last sample are its start and its end."""
-    warm = next(sample for sample in samples if sample.frames >= WARM)
-    later = [sample for sample in samples if sample.frames >= WARM]
+    warm = next(sample for sample in samples if sample.frames >= WARM_UP_FRAMES)
+    later = [sample for sample in samples if sample.frames >= WARM_UP_FRAMES]
     found = []
     if (growth := later[-1].peak / warm.peak - 1) > MEMORY_GROWTH:
         found.append(
-            f"peak memory grew by {growth:.1%} after the first {WARM} frames, from {warm.peak:.0f} "
-            f"to {later[-1].peak:.0f} MB"
+            f"peak memory grew by {growth:.1%} after the first {WARM_UP_FRAMES} frames, "
+            f"from {warm.peak:.0f} to {later[-1].peak:.0f} MB"
         )
     running = [s for s in later if s.frames <= later[-1].frames - ENDING]
     for name in ("files", "threads"):
@@ -94,7 +94,7 @@ def find_growth(samples: Sequence[Sample]) -> list[str]:
         if len(counts) > 1:
             found.append(f"the number of {name} went from {counts[0]} to {counts[-1]}")
     first, last = tenths(samples)
-    if last < LEAST_SPEED * first:
+    if last < MIN_SPEED_RATIO * first:
         found.append(f"the last tenth ran at {last:.1f} frames/s, the first at {first:.1f}")
     return found
 
@@ -156,8 +156,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak", description=main.__doc__)
     parser.add_argument("--frames", type=int, default=FRAMES, help="at least 1000")
     frames = parser.parse_args().frames
-    if frames < FEWEST:
-        parser.error(f"--frames must be at least {FEWEST}")
+    if frames < MIN_FRAMES:
+        parser.error(f"--frames must be at least {MIN_FRAMES}")
     monitor = ResourceMonitor()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -1,6 +1,6 @@
 """Tests of a ready model, or of freshly trained ones, on labelled patches."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -22,13 +22,11 @@ from vdet.learn.patch_eval.metrics import (
     reliability,
 )
 from vdet.learn.patch_eval.trials import Trial, TrialSplit, holdouts, model_trial, run_trial
+from vdet.pipeline.loop import Advance, Progress, no_progress
 from vdet.workers import make_workers
 
 MOST_MISTAKES = 24
 """Most mistakes of either kind in a report."""
-
-Advance = Callable[[int], object]
-Progress = Callable[[int | None], Advance]
 
 _MEANINGS = {
     "random": "random split: near-duplicates of test patches are in the training part",
@@ -85,7 +83,7 @@ def evaluate_splits(
     splits: Sequence[TrialSplit],
     *,
     jobs: int | None = None,
-    progress: Progress = lambda _: lambda _: None,
+    progress: Progress = no_progress,
 ) -> PatchReport:
     """Train for each split, and test on the patches that were held out.
 
@@ -117,7 +115,7 @@ def evaluate_model(
     settings: Settings,
     *,
     jobs: int | None = None,
-    progress: Progress = lambda _: lambda _: None,
+    progress: Progress = no_progress,
 ) -> PatchReport:
     """Test a ready model on all patches; parameters and errors as in `evaluate_splits`."""
     data = _extract(files, settings, model.features, jobs, progress(len(files)))
