@@ -4,8 +4,7 @@ The names below are the public API; `docs/api.md` shows them in use. They are lo
 first used: importing vdet itself does nothing else.
 """
 
-from typing import TYPE_CHECKING, Any
-
+TYPE_CHECKING = False  # as in `typing`, which a module of the current folder could replace here
 if TYPE_CHECKING:
     from vdet.api import (
         Box,
@@ -62,7 +61,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module 'vdet' has no attribute {name!r}")
     from vdet import api

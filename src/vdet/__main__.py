@@ -1,54 +1,33 @@
-"""Process entry point: signals end the program in order, also while its modules are loaded."""
+"""Entry point of the program: nothing is imported from the current folder."""
 
 import os
-import signal
 import sys
-import threading
-from typing import NoReturn
-
-from vdet.errors import INTERRUPTED
-
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
-CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
 
 
-def main() -> NoReturn:
-    """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
-    for number in _signals():
-        signal.signal(number, _interrupt)
+def main() -> None:
+    """Run the program and exit: see `vdet.process.run`."""
+    leave_out_current_folder()
+    from vdet.process import run
+
+    run()
+
+
+def leave_out_current_folder() -> None:
+    """Import nothing from the current folder, here and in child processes.
+
+    `python -m vdet` puts it on the path of modules, and so does an empty entry of `PYTHONPATH`. A
+    `queue.py` there would be run in place of Python's own. It stays where `PYTHONPATH` names it.
+    Before this, only `os` and `sys` may be imported: Python itself has loaded them already.
+    """
+    named = [entry for entry in os.environ.get("PYTHONPATH", "").split(os.pathsep) if entry]
+    os.environ["PYTHONPATH"] = os.pathsep.join(named)
+    os.environ["PYTHONSAFEPATH"] = "1"
     try:
-        from vdet.cli import main as run
-
-        run()
-    except KeyboardInterrupt:
-        sys.stderr.write("vdet: interrupted\n")
-        sys.exit(INTERRUPTED)
-    except SystemExit as end:
-        _exit_if_a_thread_hangs(end.code)
-        raise
-
-
-def _signals() -> list[signal.Signals]:
-    """Return those of `SIGNALS` that this system has and that are not ignored, as by `nohup`."""
-    numbers = [signal.Signals[name] for name in SIGNALS if name in signal.Signals.__members__]
-    return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
-
-
-def _interrupt(*_: object) -> NoReturn:
-    for number in _signals():
-        signal.signal(number, signal.SIG_IGN)  # a second signal must not interrupt the clean-up
-    forced_exit = threading.Timer(CLEANUP_TIMEOUT, os._exit, (INTERRUPTED,))
-    forced_exit.daemon = True
-    forced_exit.start()
-    raise KeyboardInterrupt
-
-
-def _exit_if_a_thread_hangs(code: object) -> None:
-    """Exit at once if a thread hangs in a read or write; unloading its libraries could crash it."""
-    if any(thread.daemon and thread.name.startswith("vdet-") for thread in threading.enumerate()):
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code if isinstance(code, int) else 1)
+        here = os.getcwd()  # noqa: PTH109
+    except OSError:  # it was removed
+        return
+    if here not in map(os.path.abspath, named):
+        sys.path[:] = [entry for entry in sys.path if os.path.abspath(entry) != here]  # noqa: PTH100
 
 
 if __name__ == "__main__":

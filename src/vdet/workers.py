@@ -34,9 +34,8 @@ R = TypeVar("R")
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 CLEANUP_TIMEOUT = 10.0  # seconds between SIGTERM and a forced exit
-SAFE_PATH = "PYTHONSAFEPATH"  # if set, Python imports no module from the current folder
 ENVIRONMENT = {
-    SAFE_PATH: "1",
+    "PYTHONSAFEPATH": "1",  # no module is imported from the current folder
     # A process for each core is enough: no further threads for linear algebra.
     "OMP_NUM_THREADS": "1",
     "OPENBLAS_NUM_THREADS": "1",
@@ -71,6 +70,13 @@ class Workers(Protocol):
         """
 
 
+def core_count() -> int:
+    """Return how many cores this process may use: its affinity and its control group limit them."""
+    from joblib import cpu_count
+
+    return int(cpu_count())
+
+
 def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:
     """Return the cluster of `scheduler` if given, else `jobs` processes; None: one for each core.
 
@@ -78,9 +84,7 @@ def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Worke
     """
     if scheduler:
         return DaskCluster(scheduler)
-    from joblib import cpu_count
-
-    count = jobs or cpu_count()
+    count = jobs or core_count()
     return ThisProcess() if count == 1 else LocalProcesses(count)
 
 
@@ -118,7 +122,7 @@ class LocalProcesses:
                 in_work[executor.submit(_run_task, function, item)] = number
 
         try:
-            with _worker_start():
+            with _ignored_sigint():
                 begin(self.count)
             while in_work:
                 for future in wait(in_work, return_when=FIRST_COMPLETED).done:
@@ -134,21 +138,16 @@ class LocalProcesses:
 
 
 @contextlib.contextmanager
-def _worker_start() -> Iterator[None]:
-    """Let processes start that ignore Ctrl-C and import no module from the current folder."""
-    in_main_thread = threading.current_thread() is threading.main_thread()
-    handler = signal.signal(signal.SIGINT, signal.SIG_IGN) if in_main_thread else None
-    safe_path = os.environ.get(SAFE_PATH)
-    os.environ[SAFE_PATH] = "1"
+def _ignored_sigint() -> Iterator[None]:
+    """Let processes start that ignore Ctrl-C."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        if safe_path is None:
-            del os.environ[SAFE_PATH]
-        else:
-            os.environ[SAFE_PATH] = safe_path
-        if in_main_thread:
-            signal.signal(signal.SIGINT, handler)
+        signal.signal(signal.SIGINT, handler)
 
 
 def _initialize_worker(parent: int) -> None:

@@ -23,7 +23,7 @@ from vdet.detect.factory import model_file
 from vdet.errors import SOME_FAILED, VdetError
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import Output, sink_kind
-from vdet.workers import DaskCluster, LocalProcesses, Workers
+from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -191,9 +191,7 @@ def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
     """Return the workers of a batch, and how many threads search each file there."""
     if options.scheduler:
         return DaskCluster(options.scheduler), 1
-    from joblib import cpu_count
-
-    cores = cpu_count()
+    cores = core_count()
     jobs = min(options.jobs or cores, files)
     return LocalProcesses(jobs), max(1, cores // jobs)
 

@@ -1,5 +1,6 @@
 """Results on their way out: tables as text, the checks of the output files, the report's file."""
 
+import contextlib
 import importlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -59,7 +60,7 @@ def check_outputs(
     if json_target not in (None, "-"):
         check_output(Path(json_target), overwrite=overwrite, inputs=inputs)
     if report is not None:
-        _check_matplotlib()
+        load_matplotlib()
         make_folder(report)
         check_output(report / PAGE, overwrite=overwrite)
 
@@ -71,8 +72,16 @@ def write_page(html: str, folder: Path) -> Path:
     return folder / PAGE
 
 
-def _check_matplotlib() -> None:
+def load_matplotlib() -> None:
+    """Import matplotlib; a file `matplotlibrc` in the current folder is not read.
+
+    Raises
+    ------
+    OutputError
+        It is not installed.
+    """
     try:
-        importlib.import_module("matplotlib")
+        with contextlib.chdir(Path(__file__).parent):  # there is no other way to keep it from that
+            importlib.import_module("matplotlib")
     except ImportError as error:
         raise OutputError('--report needs matplotlib; pip install "vdet[report]"') from error

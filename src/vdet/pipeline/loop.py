@@ -2,7 +2,6 @@
 
 import itertools
 import logging
-import os
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
@@ -29,6 +28,7 @@ from vdet.pipeline.threads import (
     single_threaded_libraries,
 )
 from vdet.track.factory import make_tracker
+from vdet.workers import core_count
 
 log = logging.getLogger("vdet")
 
@@ -121,7 +121,7 @@ def run_video(
     threads
         Number of threads that search; None for one per core.
     codec_threads
-        Number of threads of the decoder, and of the encoder; None lets them choose.
+        Number of threads of the decoder, and of the encoder; None for one per core.
     timeout
         Seconds in which the next frame must be read or written; after that the job fails, so that
         a disk or a network that hangs does not stop a batch. The duration of the part before
@@ -144,6 +144,7 @@ def run_video(
     ids: set[int] = set()
     frames = 0
     timeout += float(job.start or 0)
+    threads, codec_threads = threads or core_count(), codec_threads or core_count()
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles())
         stack.enter_context(_name_stalls(job, timeout))
@@ -154,7 +155,6 @@ def run_video(
         context = SinkContext(files, settings, info, job.is_part, job.at, codec_threads, timeout)
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         advance = progress(reader.expected)
-        threads = threads or os.cpu_count() or 1
         results = _follow_job(read, job, model, settings, video=info, threads=threads)
         for result in stack.enter_context(closing(results)):
             for sink in sinks:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 
 import vdet
+from vdet.evaluate.output import load_matplotlib
 from vdet.media.images import Image
 
 if TYPE_CHECKING:
@@ -168,10 +169,13 @@ def _uri(kind: str, data: bytes) -> str:
 
 def draw(plot: Callable[[Axes], object], width: float, height: float) -> str:
     """Return what `plot` draws on its axes as SVG; width and height are in inches."""
-    from matplotlib import rc_context
+    load_matplotlib()
+    from matplotlib import rc_context, rcdefaults, rcParams
     from matplotlib.figure import Figure
 
-    with rc_context(_CHART_STYLE):
+    with rc_context():
+        rcdefaults()  # a chart does not depend on the user's settings
+        rcParams.update(_CHART_STYLE)
         figure = Figure(figsize=(width, height), layout="constrained")
         plot(figure.add_subplot())
         return _svg(figure)

@@ -1,0 +1,105 @@
+"""The process of the program: its signals, its standard streams and its memory."""
+
+import contextlib
+import io
+import os
+import signal
+import sys
+import threading
+from typing import Any, NoReturn
+
+from vdet.errors import INTERRUPTED
+
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
+LOADED_BYTES = 1_000_000_000  # of addresses: the libraries, and room for a small video
+THREAD_BYTES = 100_000_000  # of addresses: stack and buffers of a thread of OpenBLAS
+_STDOUT, _STDERR = 1, 2
+
+
+def run() -> NoReturn:
+    """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
+    prepare_streams()
+    check_memory()
+    for number in _signals():
+        signal.signal(number, _interrupt)
+    try:
+        from vdet.cli import main
+
+        main()
+    except KeyboardInterrupt:
+        sys.stderr.write("vdet: interrupted\n")
+        sys.exit(INTERRUPTED)
+    except SystemExit as end:
+        _exit_if_a_thread_hangs(end.code)
+        raise
+
+
+class LossyFile(io.FileIO):
+    """A file that drops what cannot be written: the disk is full, or its reader has ended."""
+
+    def write(self, data: Any) -> int:
+        """Write the bytes, or drop them, and return their number."""
+        with contextlib.suppress(OSError):
+            return super().write(data) or len(data)
+        return len(data)
+
+
+def prepare_streams() -> None:
+    """Let no message fail: where standard error cannot be written, messages are dropped.
+
+    Standard streams that are closed are opened, so that no output file takes their place.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDONLY)  # takes the lowest number that is free
+            os.set_inheritable(number, True)
+    if sys.stdout is None:
+        sys.stdout = open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
+    file = io.BufferedWriter(LossyFile(_STDERR, "w", closefd=False))
+    encoding = sys.stderr.encoding if sys.stderr else "utf-8"
+    sys.stderr = io.TextIOWrapper(file, encoding, "backslashreplace", line_buffering=True)
+
+
+def check_memory() -> None:
+    """Exit if the process may use too little memory: OpenBLAS would hang or crash as it loads."""
+    try:
+        import resource
+
+        cores = len(os.sched_getaffinity(0))
+    except (ImportError, AttributeError):  # not Linux
+        return
+    needed = LOADED_BYTES + cores * THREAD_BYTES  # OpenBLAS starts a thread for each core
+    for option, kind in (("-v", resource.RLIMIT_AS), ("-d", resource.RLIMIT_DATA)):
+        limit, _ = resource.getrlimit(kind)
+        if limit != resource.RLIM_INFINITY and limit < needed:
+            sys.stderr.write(
+                f"vdet: the limit on memory is {limit / 1e9:.1f} GB, and vdet needs "
+                f"{needed / 1e9:.1f} GB on {cores} cores; raise it: ulimit {option} unlimited\n"
+            )
+            sys.exit(1)
+
+
+def _signals() -> list[signal.Signals]:
+    """Return those of `SIGNALS` that this system has and that are not ignored, as by `nohup`."""
+    numbers = [signal.Signals[name] for name in SIGNALS if name in signal.Signals.__members__]
+    return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+
+
+def _interrupt(*_: object) -> NoReturn:
+    for number in _signals():
+        signal.signal(number, signal.SIG_IGN)  # a second signal must not interrupt the clean-up
+    forced_exit = threading.Timer(CLEANUP_TIMEOUT, os._exit, (INTERRUPTED,))
+    forced_exit.daemon = True
+    forced_exit.start()
+    raise KeyboardInterrupt
+
+
+def _exit_if_a_thread_hangs(code: object) -> None:
+    """Exit at once if a thread hangs in a read or write; unloading its libraries could crash it."""
+    if any(thread.daemon and thread.name.startswith("vdet-") for thread in threading.enumerate()):
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code if isinstance(code, int) else 1)
