@@ -17,7 +17,7 @@ from vdet.files import (
     printable,
     read_whole,
     remove_stale,
-    replacing,
+    staged,
 )
 
 
@@ -26,7 +26,7 @@ def names(folder: Path) -> list[str]:
 
 
 def test_the_file_appears_only_when_the_block_ends_without_an_error(tmp_path: Path) -> None:
-    with replacing(tmp_path / "out.txt") as temporary:
+    with staged(tmp_path / "out.txt") as temporary:
         temporary.write_text("whole")
         assert not (tmp_path / "out.txt").exists()
     assert (tmp_path / "out.txt").read_text() == "whole"
@@ -34,7 +34,7 @@ def test_the_file_appears_only_when_the_block_ends_without_an_error(tmp_path: Pa
 
 
 def test_the_temporary_file_lies_beside_and_keeps_the_suffix(tmp_path: Path) -> None:
-    with replacing(tmp_path / "out.mp4") as temporary:
+    with staged(tmp_path / "out.mp4") as temporary:
         assert temporary.parent == tmp_path
         assert temporary.suffix == ".mp4"
 
@@ -42,7 +42,7 @@ def test_the_temporary_file_lies_beside_and_keeps_the_suffix(tmp_path: Path) -> 
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
 def test_an_error_leaves_nothing_behind(tmp_path: Path, error: type[BaseException]) -> None:
     def write() -> None:
-        with replacing(tmp_path / "out.txt") as temporary:
+        with staged(tmp_path / "out.txt") as temporary:
             temporary.write_text("half")
             raise error
 
@@ -56,7 +56,7 @@ def test_an_error_leaves_the_older_file_as_it_was(tmp_path: Path) -> None:
     path.write_text("older")
 
     def write() -> None:
-        with replacing(path) as temporary:
+        with staged(path) as temporary:
             temporary.write_text("half")
             raise ValueError
 
@@ -66,17 +66,91 @@ def test_an_error_leaves_the_older_file_as_it_was(tmp_path: Path) -> None:
     assert names(tmp_path) == ["out.txt"]
 
 
-def test_a_complete_file_replaces_the_older_one(tmp_path: Path) -> None:
+def test_a_complete_file_replaces_the_older_one_if_asked_and_keeps_its_permissions(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "out.txt"
     path.write_text("older")
-    with replacing(path) as temporary:
+    path.chmod(0o440)
+    with staged(path, overwrite=True) as temporary:
         temporary.write_text("newer")
+        assert temporary.stat().st_mode & 0o777 == 0o640, "others can read what is private"
     assert path.read_text() == "newer"
+    assert path.stat().st_mode & 0o777 == 0o440
+
+
+def without_links(*_: object) -> None:
+    raise PermissionError(1, "Operation not permitted")
+
+
+@pytest.mark.parametrize("has_links", [True, False])
+@pytest.mark.parametrize("kind", ["file", "empty file", "dangling link", "link"])
+def test_what_appears_during_the_run_is_kept(
+    kind: str, has_links: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not has_links:
+        monkeypatch.setattr("os.link", without_links)
+    path = tmp_path / "out.txt"
+    files = OutputFiles()
+    files.stage(tmp_path / "first.txt").write_text("new")
+    files.stage(path).write_text("new")
+    if "link" in kind:
+        path.symlink_to("none" if "dangling" in kind else tmp_path)
+    else:
+        path.write_text("theirs" if kind == "file" else "")
+    with pytest.raises(OutputError, match="has appeared during the run, so it is kept"), files:
+        pass
+    assert names(tmp_path) == ["out.txt"]
+    assert path.is_symlink() == ("link" in kind)
+    assert path.is_symlink() or path.read_text() == ("theirs" if kind == "file" else "")
+
+
+def test_without_hard_links_a_file_appears_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("os.link", without_links)
+    with staged(tmp_path / "out.txt") as temporary:
+        temporary.write_text("whole")
+    assert (tmp_path / "out.txt").read_text() == "whole"
+    assert names(tmp_path) == ["out.txt"]
+
+
+def test_of_three_runs_to_one_output_one_succeeds(tmp_path: Path) -> None:
+    path = tmp_path / "out.txt"
+    runs = [OutputFiles() for _ in range(3)]
+    for number, files in enumerate(runs):
+        files.stage(path).write_text(str(number))
+    with runs[1]:
+        pass
+    for files in (runs[0], runs[2]):
+        with pytest.raises(OutputError, match="is kept"), files:
+            pass
+    assert path.read_text() == "1"
+    assert names(tmp_path) == ["out.txt"]
+
+
+def test_what_may_not_be_replaced_is_kept_also_if_it_appears_during_the_run(tmp_path: Path) -> None:
+    path = tmp_path / "out.txt"
+    files = OutputFiles(overwrite=True)
+    files.stage(path, lambda path: path.read_text() == "ours").write_text("new")
+    path.write_text("theirs")
+    with pytest.raises(OutputError, match="vdet did not write it, so it is kept"), files:
+        pass
+    assert path.read_text() == "theirs"
+
+
+def test_a_link_is_replaced_and_not_what_it_leads_to(tmp_path: Path) -> None:
+    (tmp_path / "precious").write_text("precious")
+    (tmp_path / "out.txt").symlink_to("precious")
+    with staged(tmp_path / "out.txt", overwrite=True) as temporary:
+        temporary.write_text("new")
+    assert (tmp_path / "precious").read_text() == "precious"
+    assert (tmp_path / "out.txt").read_text() == "new"
 
 
 def test_a_full_disk_names_the_output(tmp_path: Path) -> None:
     def write() -> None:
-        with replacing(tmp_path / "out.txt"):
+        with staged(tmp_path / "out.txt"):
             raise OSError(28, "No space left on device")
 
     with pytest.raises(OutputError, match=r"out\.txt: cannot be written: No space left on device"):
@@ -86,7 +160,7 @@ def test_a_full_disk_names_the_output(tmp_path: Path) -> None:
 
 def test_an_error_of_vdet_passes_unchanged(tmp_path: Path) -> None:
     def write() -> None:
-        with replacing(tmp_path / "out.mp4"):
+        with staged(tmp_path / "out.mp4"):
             raise VideoError("in.mp4: is cut off")
 
     with pytest.raises(VideoError, match=r"^in\.mp4: is cut off$"):
@@ -94,13 +168,13 @@ def test_an_error_of_vdet_passes_unchanged(tmp_path: Path) -> None:
 
 
 def test_a_missing_folder_is_an_output_error(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be written"), replacing(tmp_path / "no" / "out"):
+    with pytest.raises(OutputError, match="cannot be written"), staged(tmp_path / "no" / "out"):
         pass
 
 
 def test_a_folder_of_that_name_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
-    with pytest.raises(OutputError, match="cannot be written"), replacing(tmp_path / "out"):
+    with pytest.raises(OutputError, match="is kept"), staged(tmp_path / "out"):
         pass
     assert names(tmp_path) == ["out"]
 
@@ -108,9 +182,9 @@ def test_a_folder_of_that_name_is_not_replaced(tmp_path: Path) -> None:
 LEAVE_ONE = """
 import os, sys
 from pathlib import Path
-from vdet.files import replacing
+from vdet.files import staged
 
-with replacing(Path(sys.argv[1])):
+with staged(Path(sys.argv[1])):
     os._exit(1)
 """
 
@@ -148,18 +222,18 @@ class TestOutputFiles:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         steps: list[str] = []
-        fsync, replace = os.fsync, Path.replace
+        fsync, link = os.fsync, os.link
 
         def note_sync(descriptor: int) -> None:
             fsync(descriptor)
             steps.append("sync")
 
-        def note_rename(path: Path, target: Path) -> None:
-            replace(path, target)
+        def note_name(path: Path, target: Path) -> None:
+            link(path, target)
             steps.append(target.name)
 
         monkeypatch.setattr("os.fsync", note_sync)
-        monkeypatch.setattr(Path, "replace", note_rename)
+        monkeypatch.setattr("os.link", note_name)
         with OutputFiles() as files:
             self.write(tmp_path, files, 3, 1, 2)
         assert steps == ["sync", "sync", "sync", "3.txt", "1.txt", "2.txt"]
@@ -210,8 +284,8 @@ class TestOutputFiles:
         (tmp_path / "2.txt").write_text("old")
         (tmp_path / "3.txt").mkdir()
         with (
-            pytest.raises(OutputError, match=r"3\.txt: cannot be written: Is a directory"),
-            OutputFiles() as files,
+            pytest.raises(OutputError, match=r"3\.txt: is no ordinary file, and is kept"),
+            OutputFiles(overwrite=True) as files,
         ):
             self.write(tmp_path, files, 1, 2, 3, 4)
         assert names(tmp_path) == ["2.txt", "3.txt"]
@@ -237,16 +311,16 @@ def test_the_file_of_an_ended_process_is_removed(tmp_path: Path) -> None:
 
 
 def test_a_file_in_use_is_kept(tmp_path: Path) -> None:
-    with replacing(tmp_path / "out.mp4") as temporary:
+    with staged(tmp_path / "out.mp4") as temporary:
         remove_stale(tmp_path)
         assert temporary.exists()
-        with replacing(tmp_path / "out.mp4"), replacing(tmp_path / "other.txt"):
+        with staged(tmp_path / "more.mp4"), staged(tmp_path / "other.txt"):
             assert temporary.exists()
 
 
 def test_writing_a_file_removes_stale_files_in_its_folder(tmp_path: Path) -> None:
     leave_one(tmp_path / "a.csv")
-    with replacing(tmp_path / "b.mp4"):
+    with staged(tmp_path / "b.mp4"):
         pass
     assert [path.name for path in tmp_path.iterdir()] == ["b.mp4"]
 
@@ -274,7 +348,7 @@ def test_a_missing_folder_has_no_stale_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize("stem", ["x" * 250, "ü" * 125, "\udcff" * 250])
 def test_names_may_have_any_length(tmp_path: Path, stem: str) -> None:
     path = tmp_path / f"{stem}.mp4"
-    with replacing(path) as temporary:
+    with staged(path) as temporary:
         temporary.write_text("whole")
     assert path.read_text() == "whole"
 
@@ -284,7 +358,7 @@ def test_without_locks_nothing_is_stale(tmp_path: Path, monkeypatch: pytest.Monk
         raise OSError(38, "Function not implemented")
 
     monkeypatch.setattr("fcntl.flock", refuse)
-    with replacing(tmp_path / "a.mp4") as temporary:
+    with staged(tmp_path / "a.mp4") as temporary:
         remove_stale(tmp_path)
         assert temporary.exists()
     assert names(tmp_path) == ["a.mp4"]
@@ -303,7 +377,7 @@ def test_a_file_removed_before_it_is_locked_is_made_again(
         return fstat(descriptor)
 
     monkeypatch.setattr("os.fstat", remove_the_first)
-    with replacing(tmp_path / "a.mp4") as temporary:
+    with staged(tmp_path / "a.mp4") as temporary:
         assert temporary.exists()
         assert [temporary] != made
 
@@ -314,6 +388,29 @@ def test_an_existing_output_is_refused_without_overwrite(tmp_path: Path) -> None
     with pytest.raises(OutputError, match="give --overwrite"):
         check_output(path, overwrite=False)
     check_output(path, overwrite=True)
+
+
+def test_a_dangling_link_is_there_too(tmp_path: Path) -> None:
+    (tmp_path / "out.txt").symlink_to("none")
+    with pytest.raises(OutputError, match="give --overwrite"):
+        check_output(tmp_path / "out.txt", overwrite=False)
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_what_is_no_ordinary_file_is_never_replaced(tmp_path: Path, overwrite: bool) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="is no ordinary file, and is kept"):
+        check_output(tmp_path / "pipe", overwrite=overwrite)
+
+
+@pytest.mark.parametrize("overwrite", [True, False])
+def test_the_message_does_not_invite_to_replace_what_may_not_be(
+    tmp_path: Path, overwrite: bool
+) -> None:
+    (tmp_path / "out.txt").touch()
+    with pytest.raises(OutputError) as caught:
+        check_output(tmp_path / "out.txt", overwrite=overwrite, may_replace=lambda _: False)
+    assert "vdet did not write it, so it is kept; give another output" in str(caught.value)
 
 
 def test_a_new_output_passes_and_is_not_made(tmp_path: Path) -> None:

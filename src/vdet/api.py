@@ -217,8 +217,8 @@ def detect_video(
     settings = settings or Settings()
     named = {"video": video, "tracks": tracks, **(outputs or {})}
     wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
-    job = VideoJob(Path(source), wanted)
-    check_job(job, overwrite=overwrite)
+    job = VideoJob(Path(source), wanted, overwrite=overwrite)
+    check_job(job)
     return run_video(job, load_detector(settings.detector, _path(model)), settings, threads=threads)
 
 
@@ -250,7 +250,8 @@ def detect_image(
     wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
     check_sinks(wanted, overwrite=overwrite, inputs=[Path(source)])
     job = PictureJob(Path(source), wanted)
-    return run_picture(job, load_detector(settings.detector, _path(model)), settings).detections
+    detector = load_detector(settings.detector, _path(model))
+    return run_picture(job, detector, settings, overwrite=overwrite).detections
 
 
 def _path(path: PathName | None) -> Path | None:

@@ -11,8 +11,10 @@ import json
 import os
 import re
 import secrets
+import stat
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
@@ -31,8 +33,22 @@ _CHUNK = 1_000_000  # bytes
 _MAX_SHOWN = 80  # characters of a name
 
 
+MayReplace = Callable[[Path], bool]
+"""Says whether a file that is there may be replaced, if the user asks for it."""
+
+
+def any_file(_: Path) -> bool:
+    """Let every file be replaced."""
+    return True
+
+
 def check_output(
-    path: Path, *, overwrite: bool, inputs: Iterable[Path] = (), makes_folder: bool = False
+    path: Path,
+    *,
+    overwrite: bool,
+    inputs: Iterable[Path] = (),
+    makes_folder: bool = False,
+    may_replace: MayReplace = any_file,
 ) -> None:
     """Refuse an output that could not be written, before any work is done.
 
@@ -42,19 +58,23 @@ def check_output(
         Files that the work reads; they are never overwritten.
     makes_folder
         The work makes the folder of the output if it is missing.
+    may_replace
+        Called if `path` is there.
 
     Raises
     ------
     OutputError
-        `path` is an input, is a folder, is there already (without `overwrite`), or its folder
-        cannot be written to.
+        `path` is an input, is a folder, is there already (without `overwrite`) or may not be
+        replaced, or its folder cannot be written to.
     """
     if path.resolve() in {source.resolve() for source in inputs}:
         raise OutputError(f"{path}: is the input itself; give another output")
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file")
-    if path.exists() and not overwrite:
-        raise OutputError(f"{path}: is there already; give --overwrite to replace it")
+    if os.path.lexists(path):
+        _check_replaceable(path, may_replace)
+        if not overwrite:
+            raise OutputError(f"{path}: is there already; give --overwrite to replace it")
     folder = path.parent
     if makes_folder:
         folder = next((parent for parent in path.parents if parent.exists()), folder)
@@ -65,6 +85,13 @@ def check_output(
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
 
 
+def _check_replaceable(path: Path, may_replace: MayReplace) -> None:
+    if not (path.is_file() or path.is_symlink()):
+        raise OutputError(f"{path}: is no ordinary file, and is kept; give another output")
+    if not may_replace(path):
+        raise OutputError(f"{path}: vdet did not write it, so it is kept; give another output")
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder, and those above it, where it is missing. Raises `OutputError`."""
     try:
@@ -73,36 +100,62 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
 
 
+@dataclass(frozen=True, slots=True)
+class _Staged:
+    """A temporary file that becomes `path`."""
+
+    temporary: Path
+    path: Path
+    may_replace: MayReplace
+
+
 class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
-    When the block ends without an error, all staged files are synced to the disk and then renamed,
-    in the order in which they were staged. When it ends with an error, none appears.
+    When the block ends without an error, all staged files are synced to the disk and then get their
+    names, in the order in which they were staged. When it ends with an error, none appears.
+
+    Parameters
+    ----------
+    overwrite
+        Replace files that have these names, and keep their permissions. A link is replaced, and
+        not what it leads to. Without it every file that is there is kept, also one that appears
+        while the run writes.
 
     Raises
     ------
     OutputError
-        A file cannot be made, synced or renamed. The files of this run that have been renamed
-        before are removed, except where they replaced older files.
+        A file cannot be made or synced, or cannot get its name, because there is one that is kept.
+        The files of this run that have appeared before are removed, except where they replaced
+        older files.
     """
 
-    def __init__(self) -> None:
-        self._staged: list[tuple[Path, Path]] = []  # temporary and final path
+    def __init__(self, *, overwrite: bool = False) -> None:
+        self._overwrite = overwrite
+        self._staged: list[_Staged] = []
         self._cleanup = contextlib.ExitStack()
 
-    def stage(self, path: Path) -> Path:
+    def stage(self, path: Path, may_replace: MayReplace = any_file) -> Path:
         """Return a new, empty file beside `path` that will become `path`.
 
         It has the suffix of `path`, for writers that choose a format by it. Temporary files that
         killed runs left in the folder are removed.
+
+        Parameters
+        ----------
+        may_replace
+            Called at the end if `path` is there and is to be overwritten.
         """
         with output_errors(path):
             remove_stale(path.parent)
             temporary, descriptor = _create(path)
+            if self._overwrite and path.is_file() and not path.is_symlink():
+                # What replaces a private file is private from the beginning.
+                temporary.chmod(stat.S_IMODE(path.stat().st_mode) | stat.S_IRUSR | stat.S_IWUSR)
         if descriptor is not None:
             self._cleanup.callback(os.close, descriptor)
         self._cleanup.callback(_try_to_remove, temporary)
-        self._staged.append((temporary, path))
+        self._staged.append(_Staged(temporary, path, may_replace))
         return temporary
 
     def __enter__(self) -> Self:
@@ -116,31 +169,73 @@ class OutputFiles:
                 self._publish()
 
     def _publish(self) -> None:
-        for temporary, path in self._staged:
-            with output_errors(path):
-                _sync(temporary)
+        for file in self._staged:
+            with output_errors(file.path):
+                _sync(file.temporary)
         with contextlib.ExitStack() as undo:
-            for temporary, path in self._staged:
-                is_new = not os.path.lexists(path)
-                with output_errors(path):
-                    temporary.replace(path)
-                if is_new:
-                    undo.callback(_try_to_remove, path)
+            for file in self._staged:
+                with output_errors(file.path):
+                    if self._overwrite and os.path.lexists(file.path):
+                        _replace(file)
+                    else:
+                        _add_name(file.temporary, file.path)
+                        undo.callback(_try_to_remove, file.path)
             undo.pop_all()
 
 
+def _replace(file: _Staged) -> None:
+    """Replace the file that is there; keep its permissions."""
+    _check_replaceable(file.path, file.may_replace)
+    if not file.path.is_symlink():
+        file.temporary.chmod(stat.S_IMODE(file.path.stat().st_mode))
+    file.temporary.replace(file.path)
+
+
+def _add_name(temporary: Path, path: Path) -> None:
+    """Give a file its final name, unless there is a file of this name; in one step of the system.
+
+    Raises
+    ------
+    OutputError
+        There is one.
+    """
+    try:
+        try:
+            os.link(temporary, path)
+        except FileExistsError:
+            raise
+        except OSError:  # a file system without hard links
+            _take_name(temporary, path)
+    except FileExistsError:
+        raise OutputError(
+            f"{path}: has appeared during the run, so it is kept; give another output"
+        ) from None
+
+
+def _take_name(temporary: Path, path: Path) -> None:
+    """Make an empty file of the final name, and replace it. Raises `FileExistsError`."""
+    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
+    try:
+        temporary.replace(path)
+    except BaseException:
+        _try_to_remove(path)
+        raise
+
+
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def staged(
+    path: Path, *, overwrite: bool = False, may_replace: MayReplace = any_file
+) -> Iterator[Path]:
     """Give a temporary file that becomes `path` when the block ends without an error.
 
     Raises
     ------
     OutputError
-        The file cannot be made or renamed, or the block raises an `OSError` that is not a
-        `VdetError`.
+        The file cannot be made, or cannot get its name (see `OutputFiles`), or the block raises an
+        `OSError` that is not a `VdetError`.
     """
-    with OutputFiles() as files:
-        temporary = files.stage(path)
+    with OutputFiles(overwrite=overwrite) as files:
+        temporary = files.stage(path, may_replace)
         with output_errors(path):
             yield temporary
 
@@ -156,13 +251,13 @@ def output_errors(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def write_json(values: Any, target: str) -> None:
+def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
     """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
     text = json.dumps(values, indent=2, allow_nan=False) + "\n"
     if target == "-":
         sys.stdout.write(text)
         return
-    with replacing(Path(target)) as temporary:
+    with staged(Path(target), overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 

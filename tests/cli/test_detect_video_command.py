@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from clips import write_clip as write_foreign
 from conftest import Run
 from quick import QUICK_OPTIONS
+from running import names
 from vdet.media import VideoReader
 from vdet.media.images import read_image
 
@@ -118,6 +120,44 @@ def test_keeps_what_is_there(run: Run, clip_path: Path, tmp_path: Path) -> None:
     assert result.code == 1
     assert "is there already; give --overwrite" in result.err
     assert out.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("more", [(), ("--overwrite",), ("--overwrite", "--frames", "1")])
+def test_a_video_of_another_program_is_kept_and_the_message_shows_the_command_for_several(
+    run: Run, tmp_path: Path, more: tuple[str, ...]
+) -> None:
+    clips = [write_foreign(tmp_path / f"{name} 1.mp4") for name in "abc"]
+    before = [clip.read_bytes() for clip in clips]
+    for several in (clips[:2], clips):
+        result = run("detect-video", *several, *more)
+        assert result.code == 2
+        dots = " …" if len(several) > 2 else ""
+        assert f"vdet detect-video '{clips[0]}' '{clips[1]}'{dots} -d found" in result.err
+    assert [clip.read_bytes() for clip in clips] == before
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_video_of_another_program_in_the_folder_of_a_batch_is_kept(
+    run: Run, clip_path: Path, tmp_path: Path
+) -> None:
+    theirs = write_foreign(tmp_path / clip_path.name)
+    for option in ("--overwrite", "--skip-existing"):
+        result = run("detect-video", clip_path, "-d", tmp_path, option)
+        assert (result.code, result.err.count("\n")) == (1, 1)
+        assert f"{theirs}: vdet did not write it, so it is kept" in result.err
+    assert names(tmp_path) == [clip_path.name]
+
+
+@pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
+def test_what_vdet_wrote_and_what_is_no_video_is_replaced(
+    run: Run, clip_path: Path, tmp_path: Path, suffix: str
+) -> None:
+    out = tmp_path / f"out{suffix}"
+    out.write_bytes(b"This is no video.")
+    for frames in (2, 3):
+        options = ("--overwrite", "--frames", str(frames))
+        assert run("detect-video", clip_path, out, *options).code == 0
+        assert len(_times(out)) == frames
 
 
 @pytest.mark.parametrize(("option", "suffix"), [("out", ".mp4"), ("tracks", ".csv")])

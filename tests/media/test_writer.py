@@ -10,11 +10,14 @@ import av
 import numpy as np
 import pytest
 
+import vdet
+from clips import write_clip
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.files import replacing
+from vdet.files import staged
 from vdet.media import ColorTags, Frame, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image
+from vdet.media.writer import may_replace_video
 
 Draw = Callable[[int, int, int], Image]
 Writer = Callable[..., Path]
@@ -36,7 +39,7 @@ def failing(frames: list[Frame], error: type[BaseException]) -> Iterator[Frame]:
 
 
 def write(path: Path, frames: Iterable[Frame], info: VideoInfo = INFO) -> Path:
-    with replacing(path) as temporary, VideoWriter(temporary, info, FAST, name=path) as writer:
+    with staged(path) as temporary, VideoWriter(temporary, info, FAST, name=path) as writer:
         for frame in frames:
             writer.write(frame)
     return path
@@ -49,6 +52,43 @@ def read(path: Path) -> list[Frame]:
 
 def listing(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
+
+
+class TestMark:
+    """What vdet wrote can be told from what it did not write."""
+
+    @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
+    def test_every_kind_of_file_has_the_mark(
+        self, suffix: str, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        path = write(tmp_path / f"out{suffix}", frames)
+        with av.open(str(path)) as container:
+            tags = {key.lower(): value for key, value in container.metadata.items()}
+        assert tags["comment"] == f"made by vdet {vdet.__version__}"
+        assert may_replace_video(path)
+        path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+        assert may_replace_video(path), "it is damaged, and vdet wrote it all the same"
+
+    @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".avi", ".ts"])
+    @pytest.mark.parametrize("share", [1, 0.5])
+    def test_other_videos_do_not_even_if_they_are_cut_off(
+        self, suffix: str, share: float, tmp_path: Path
+    ) -> None:
+        path = write_clip(tmp_path / f"in{suffix}")
+        path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
+        assert not may_replace_video(path)
+
+    @pytest.mark.parametrize("content", [b"", b"notes", bytes(1000)])
+    def test_what_is_no_video_may_be_replaced(self, content: bytes, tmp_path: Path) -> None:
+        (tmp_path / "out.mp4").write_bytes(content)
+        assert may_replace_video(tmp_path / "out.mp4")
+
+    def test_a_link_is_judged_by_what_it_leads_to(self, tmp_path: Path) -> None:
+        link = tmp_path / "link.mp4"
+        link.symlink_to("in.mp4")
+        assert may_replace_video(link)
+        write_clip(tmp_path / "in.mp4")
+        assert not may_replace_video(link)
 
 
 class TestFile:
@@ -151,7 +191,7 @@ class TestAllOrNothing:
         self, frames: list[Frame], tmp_path: Path
     ) -> None:
         path = tmp_path / "out.mp4"
-        with replacing(path) as temporary, VideoWriter(temporary, INFO, FAST) as writer:
+        with staged(path) as temporary, VideoWriter(temporary, INFO, FAST) as writer:
             writer.write(frames[0])
             assert not path.exists()
         assert listing(tmp_path) == ["out.mp4"]

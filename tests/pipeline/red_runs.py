@@ -100,7 +100,7 @@ def write(
 
     Without a `video` they are those of pictures. `at` is the moment that is asked for.
     """
-    with OutputFiles() as files:
+    with OutputFiles(overwrite=True) as files:
         context = SinkContext(files, settings, video, at=at)
         with open_sink(output, context) as sink:
             for result in results:

@@ -81,9 +81,9 @@ def calibrate(
     calibration = fit_camera(found, pattern)
     for skip in calibration.skipped:
         log.warning("%s: not used: %s", skip.path, skip.reason)
-    save_camera(calibration.camera, output)
+    save_camera(calibration.camera, output, overwrite=overwrite)
     if preview:
-        write_previews(preview, calibration, pattern)
+        write_previews(preview, calibration, pattern, overwrite=overwrite)
     camera = calibration.camera
     click.echo(
         f"{output}: {camera.width}×{camera.height}, focal length {camera.focal[0]:.0f} px, "

@@ -13,6 +13,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.files import check_output, make_folder
+from vdet.media.writer import may_replace_video
 from vdet.pipeline.loop import Progress, VideoJob, check_job, no_progress, run_video
 from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic import demo_scene, write_clip, write_patches, write_truth
@@ -60,6 +61,7 @@ def demo(
             files,
             settings,
             seed=seed,
+            overwrite=overwrite,
             report_step=(lambda _: None) if quiet else print_message,
             progress=progress,
         )
@@ -147,9 +149,10 @@ class DemoResult:
 def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
     """Make the folder, and refuse to replace an earlier demo. Raises `OutputError`."""
     make_folder(files.folder)
-    for path in (files.clip, files.truth, files.model, files.report):
+    check_output(files.clip, overwrite=overwrite, may_replace=may_replace_video)
+    for path in (files.truth, files.model, files.report):
         check_output(path, overwrite=overwrite)
-    check_job(files.job, overwrite=overwrite)
+    check_job(replace(files.job, overwrite=overwrite))
 
 
 def run_demo(
@@ -157,6 +160,7 @@ def run_demo(
     settings: Settings,
     *,
     seed: int = 1,
+    overwrite: bool = False,
     report_step: Callable[[str], object] = lambda _: None,
     progress: Progress = no_progress,
 ) -> DemoResult:
@@ -166,6 +170,8 @@ def run_demo(
     ----------
     seed
         Of everything that is drawn; the same seed gives the same data.
+    overwrite
+        Replace the files of an earlier demo.
     report_step
         Called with a line before each step.
     progress
@@ -178,17 +184,19 @@ def run_demo(
     from vdet.learn.training import train
 
     report_step(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
-    write_patches(files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES)
+    write_patches(
+        files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES, overwrite=overwrite
+    )
     scene = demo_scene(seed)
-    write_clip(files.clip, scene)
-    write_truth(files.truth, scene)
+    write_clip(files.clip, scene, overwrite=overwrite)
+    write_truth(files.truth, scene, overwrite=overwrite)
     report_step("2/4 training …")
     patches = find_patches([files.patches])
     model, report = train(patches, settings, progress=progress(len(patches)))
-    save_model(model, files.model)
-    report.write(files.report)
+    save_model(model, files.model, overwrite=overwrite)
+    report.write(files.report, overwrite=overwrite)
     report_step("3/4 finding the vehicles …")
-    job = replace(files.job, at=scene.frames / scene.rate / 2)
+    job = replace(files.job, at=scene.frames / scene.rate / 2, overwrite=overwrite)
     detector = load_detector(settings.detector, files.model)
     summary = run_video(job, detector, settings, progress=progress)
     report_step("4/4 comparing with the truth …")

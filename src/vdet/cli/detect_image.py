@@ -74,7 +74,7 @@ def detect_image(
     sources = find_images(images)
     check_sinks(shared, overwrite=overwrite, inputs=sources)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
-    failures = run_pictures(jobs, shared, model, settings, request)
+    failures = run_pictures(jobs, shared, model, settings, request, overwrite=overwrite)
     if failures:
         *others, last = failures
         for failure in others:

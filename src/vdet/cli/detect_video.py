@@ -1,5 +1,6 @@
 """`vdet detect-video`: find and follow vehicles in one video, or in many."""
 
+import shlex
 from fractions import Fraction
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from vdet.cli.options import (
 )
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
+from vdet.media.writer import may_replace_video
 from vdet.pipeline.loop import VideoJob, check_job, run_video
 from vdet.pipeline.sinks.protocol import Output
 
@@ -111,7 +113,7 @@ def detect_video(
         )
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments)
-    job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request)
+    job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request, overwrite)
     if batch_outputs is not None:
         load_detector(settings.detector, model_path)  # an error is raised before any work
         return process_batch(
@@ -124,16 +126,20 @@ def detect_video(
             threads=threads,
             quiet=quiet,
         )
-    _process_one(job, settings, model_path, threads, overwrite=overwrite, quiet=quiet)
+    _process_one(job, settings, model_path, threads, quiet=quiet)
     return 0
 
 
 def _in_and_out(clips: tuple[Path, ...], batch: BatchOptions) -> tuple[Path, Path | None]:
     if batch.need_folder:
         raise click.UsageError("--jobs, --skip-existing, --dry-run and --scheduler go with -d DIR")
-    if len(clips) > 2:
-        raise click.UsageError("give IN and OUT, or -d DIR for several videos")
     source, *outputs = clips
+    if len(outputs) > 1 or (outputs and outputs[0].is_file() and not may_replace_video(outputs[0])):
+        shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
+        raise click.UsageError(
+            f"{outputs[0]} would be the output, and a video that vdet did not write is kept; for "
+            f"several videos name a folder: vdet detect-video {shown} -d found"
+        )
     return source, outputs[0] if outputs else None
 
 
@@ -166,11 +172,10 @@ def _process_one(
     model_path: Path | None,
     threads: int | None,
     *,
-    overwrite: bool,
     quiet: bool,
 ) -> None:
     model = load_detector(settings.detector, model_path)
-    check_job(job, overwrite=overwrite)
+    check_job(job)
     with progress_bar(" frames", quiet=quiet) as progress:
         summary = run_video(job, model, settings, threads=threads, progress=progress)
     if not quiet:

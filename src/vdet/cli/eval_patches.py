@@ -88,4 +88,5 @@ def patches(
         lambda: patch_page(result),
         json_target=json_target,
         report=report,
+        overwrite=overwrite,
     )

@@ -53,4 +53,5 @@ def tracks(
         lambda: video_page([run]),
         json_target=json_target,
         report=report,
+        overwrite=overwrite,
     )

@@ -95,11 +95,12 @@ def video(
     check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:
-        runs = evaluate_clips(clips, variants, progress, outputs=outputs)
+        runs = evaluate_clips(clips, variants, progress, outputs=outputs, overwrite=overwrite)
     print_results(
         run_lines(runs),
         plain(runs),
         lambda: video_page(runs),
         json_target=json_target,
         report=report,
+        overwrite=overwrite,
     )

@@ -87,7 +87,7 @@ def mine(
     file = model_file(settings.detector, model_path)
     inputs = [video, truth, *([file] if file else [])]
     check_output(output, overwrite=overwrite, inputs=inputs)
-    job = MiningJob(video, truth, output, every, first, until)
+    job = MiningJob(video, truth, output, every, first, until, overwrite)
     with progress_bar(" frames", quiet=quiet) as progress:
         mined = mine_patches(job, settings, model_path, progress=progress)
     click.echo(

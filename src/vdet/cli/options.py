@@ -168,11 +168,13 @@ def print_results(
     *,
     json_target: str | None,
     report: Path | None,
+    overwrite: bool,
 ) -> None:
     """Print the table, and write the files that `results_options` ask for."""
     to_stderr = json_target == "-"
     click.echo("\n".join(lines), err=to_stderr)
     if json_target is not None:
-        write_json(values, json_target)
+        write_json(values, json_target, overwrite=overwrite)
     if report is not None:
-        click.echo(f"\n{write_page(make_page(), report)}: the report", err=to_stderr)
+        page = write_page(make_page(), report, overwrite=overwrite)
+        click.echo(f"\n{page}: the report", err=to_stderr)

@@ -75,7 +75,7 @@ def train(
             scheduler=scheduler,
             progress=start(len(files) + len(boxed)),
         )
-    save_model(model, output)
-    report.write(report_path)
+    save_model(model, output, overwrite=overwrite)
+    report.write(report_path, overwrite=overwrite)
     click.echo("\n".join(report.lines()))
     click.echo(f"\n{output}: the model; {report_path}: the report")

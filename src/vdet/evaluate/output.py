@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from vdet.errors import OutputError
-from vdet.files import check_output, make_folder, replacing
+from vdet.files import check_output, make_folder, staged
 
 PAGE = "report.html"
 ABSENT = "–"
@@ -65,9 +65,9 @@ def check_outputs(
         check_output(report / PAGE, overwrite=overwrite)
 
 
-def write_page(html: str, folder: Path) -> Path:
+def write_page(html: str, folder: Path, *, overwrite: bool = False) -> Path:
     """Write a report into its folder and return the file. Raises `OutputError`."""
-    with replacing(folder / PAGE) as temporary:
+    with staged(folder / PAGE, overwrite=overwrite) as temporary:
         temporary.write_text(html, encoding="utf-8")
     return folder / PAGE
 

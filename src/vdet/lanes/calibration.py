@@ -120,14 +120,16 @@ def check_previews(folder: Path, paths: Sequence[Path], *, overwrite: bool) -> N
         check_output(picture, overwrite=overwrite, inputs=paths)
 
 
-def write_previews(folder: Path, calibration: Calibration, pattern: Pattern) -> None:
+def write_previews(
+    folder: Path, calibration: Calibration, pattern: Pattern, *, overwrite: bool = False
+) -> None:
     """Write each used photograph with its corners, as it is and undistorted, side by side."""
     for photo in calibration.photos:
         image = read_image(photo.path)
         undistorter = Undistorter(calibration.camera, *photo.size)
         cv2.drawChessboardCorners(image, pattern, photo.corners[:, None], True)
         both = np.hstack([image, undistorter.image(image)])
-        write_image(_preview_of(photo.path, folder), both)
+        write_image(_preview_of(photo.path, folder), both, overwrite=overwrite)
 
 
 def _preview_of(path: Path, folder: Path) -> Path:

@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 from vdet.config.document import Document, config_error, format_key, read_document
 from vdet.config.section import Section
 from vdet.errors import ConfigError
-from vdet.files import replacing
+from vdet.files import staged
 from vdet.lanes.camera import CalibratedCamera
 
 _Side = Annotated[int, Field(ge=16, le=100_000)]
@@ -32,7 +32,7 @@ class _CameraFile(Section):
         return self
 
 
-def save_camera(camera: CalibratedCamera, path: Path) -> None:
+def save_camera(camera: CalibratedCamera, path: Path, *, overwrite: bool = False) -> None:
     """Write a camera as YAML. Raises `OutputError`."""
     rows = "\n".join(f"  - [{', '.join(map(repr, row))}]" for row in camera.matrix.tolist())
     text = f"""\
@@ -49,7 +49,7 @@ distortion: [{", ".join(map(repr, camera.distortion))}]
 # root mean square error of the chessboard corners, pixels
 rms: {camera.rms!r}
 """
-    with replacing(path) as temporary:
+    with staged(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -21,7 +21,7 @@ import cv2
 
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import DataError
-from vdet.files import escaped, printable, read_whole, replacing
+from vdet.files import escaped, printable, read_whole, staged
 from vdet.media.images import PICTURE_SUFFIXES, Image, decode_image
 
 CLASSES = {"vehicles": True, "non-vehicles": False}
@@ -229,12 +229,12 @@ class PatchArchive:
 
 
 @contextmanager
-def patch_archive(path: Path) -> Iterator[PatchArchive]:
+def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[PatchArchive]:
     """Yield an archive that appears at `path` if the block ends without an error.
 
     The same patches give the same bytes. Raises `OutputError`.
     """
-    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w") as file:
+    with staged(path, overwrite=overwrite) as temporary, zipfile.ZipFile(temporary, "w") as file:
         archive = PatchArchive(file)
         yield archive
         archive.add_table()

@@ -104,9 +104,9 @@ class TrainingReport:
         yield ""
         yield f"one prediction: {self.milliseconds_per_prediction:.2f} ms, features included"
 
-    def write(self, path: Path) -> None:
+    def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the report as JSON. Raises `OutputError`."""
-        write_json(asdict(self), str(path))
+        write_json(asdict(self), str(path), overwrite=overwrite)
 
 
 _SPLITS = {

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.errors import ImageError
-from vdet.files import read_whole, replacing
+from vdet.files import read_whole, staged
 from vdet.media.picture_size import picture_size
 
 Image = npt.NDArray[np.uint8]
@@ -81,10 +81,10 @@ def encode_image(image: Image, path: Path) -> bytes:
     return data.tobytes()
 
 
-def write_image(path: Path, image: Image) -> None:
+def write_image(path: Path, image: Image, *, overwrite: bool = False) -> None:
     """Write a picture in the format that the suffix names. Raises `ImageError`, `OutputError`."""
     data = encode_image(image, path)
-    with replacing(path) as temporary:
+    with staged(path, overwrite=overwrite) as temporary:
         temporary.write_bytes(data)
 
 

@@ -46,6 +46,12 @@ def check_mp4_index(path: Path) -> None:
         )
 
 
+def begins_like_mp4(path: Path) -> bool:
+    """Return whether the first bytes of a file are those of an MP4 or MOV file."""
+    with path.open("rb") as file:
+        return file.read(8)[4:] in _FIRST_BOXES
+
+
 def _claims(file: BinaryIO, size: int) -> Iterator[int]:
     """Yield the number of samples of one size that each box claims."""
     position = 0

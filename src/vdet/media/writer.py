@@ -8,17 +8,37 @@ from typing import Self
 
 import av
 
+import vdet
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
+from vdet.media.demux import open_input
 from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
+from vdet.media.mp4_index import begins_like_mp4
 from vdet.media.pixels import to_i420
 from vdet.media.sound import SoundCopy
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
+_MARK = "made by vdet"
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 _BT601 = 6  # matrix code of ITU-T H.273
 _LIMITED = 1  # av.video.reformatter.ColorRange.MPEG
+
+
+def may_replace_video(path: Path) -> bool:
+    """Return whether a file may be replaced by a video: one that vdet wrote, or no video.
+
+    `VideoWriter` marks what it writes in the comment of the file. What cannot be opened but begins
+    like an MP4 file is kept: it may be a recording that was cut off, and could be repaired.
+    """
+    if not path.is_file():
+        return path.is_symlink()  # it leads nowhere
+    try:
+        with open_input(path) as container:
+            tags = {key.lower(): value for key, value in container.metadata.items()}
+    except VideoError:
+        return not begins_like_mp4(path)
+    return tags.get("comment", "").startswith(_MARK)
 
 
 class VideoWriter:
@@ -132,6 +152,7 @@ class _Encoder:
         self._container = av.open(
             str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
         )
+        self._container.metadata["comment"] = f"{_MARK} {vdet.__version__}"
         self._stream = self._add_picture(info, settings, threads)
         self._sound = SoundCopy(info.path, self._container, origin) if info.has_sound else None
 

@@ -60,6 +60,8 @@ class VideoJob:
         Time of the stage pictures, seconds from the first frame.
     lanes
         If it is given, the lane is found too, and everything is drawn on undistorted frames.
+    overwrite
+        Outputs that are there already are replaced.
     """
 
     source: Path
@@ -69,6 +71,7 @@ class VideoJob:
     frames: int | None = None
     at: Fraction = Fraction(0)
     lanes: LaneRequest | None = None
+    overwrite: bool = False
 
     @property
     def is_part(self) -> bool:
@@ -97,9 +100,9 @@ class Summary:
     seconds: float
 
 
-def check_job(job: VideoJob, *, overwrite: bool) -> None:
+def check_job(job: VideoJob) -> None:
     """Refuse a job whose outputs cannot be written, before any work. Raises `OutputError`."""
-    check_sinks(job.outputs, overwrite=overwrite, inputs=[job.source])
+    check_sinks(job.outputs, overwrite=job.overwrite, inputs=[job.source])
 
 
 def run_video(
@@ -146,7 +149,7 @@ def run_video(
     timeout += float(job.start or 0)
     threads, codec_threads = threads or core_count(), codec_threads or core_count()
     with ExitStack() as stack:
-        files = stack.enter_context(OutputFiles())
+        files = stack.enter_context(OutputFiles(overwrite=job.overwrite))
         stack.enter_context(_name_stalls(job, timeout))
         stack.enter_context(single_threaded_libraries())
         reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)

@@ -106,6 +106,8 @@ def run_pictures(
     model: DetectorModel,
     settings: Settings,
     lanes: LaneRequest | None = None,
+    *,
+    overwrite: bool = False,
 ) -> list[ImageError]:
     """Search pictures; return the errors of those that cannot be read or searched.
 
@@ -119,11 +121,12 @@ def run_pictures(
     """
     failures: list[ImageError] = []
     with ExitStack() as stack:
-        context = SinkContext(stack.enter_context(OutputFiles()), settings)
+        files = stack.enter_context(OutputFiles(overwrite=overwrite))
+        context = SinkContext(files, settings)
         sinks = [stack.enter_context(open_sink(output, context)) for output in shared]
         for job in jobs:
             try:
-                run_picture(job, model, settings, lanes, shared=sinks)
+                run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
             except ImageError as error:
                 failures.append(error)
     return failures
@@ -136,6 +139,7 @@ def run_picture(
     lanes: LaneRequest | None = None,
     *,
     shared: Sequence[Sink] = (),
+    overwrite: bool = False,
 ) -> FrameResult:
     """Search a picture, write its outputs together, and give the result to the shared sinks.
 
@@ -148,7 +152,8 @@ def run_picture(
     """
     result = detect_picture(job.source, read_image(job.source), model, settings, lanes)
     with ExitStack() as stack:
-        context = SinkContext(stack.enter_context(OutputFiles()), settings)
+        files = stack.enter_context(OutputFiles(overwrite=overwrite))
+        context = SinkContext(files, settings)
         own = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         for sink in (*own, *shared):
             sink.write(result)

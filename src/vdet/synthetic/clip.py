@@ -5,8 +5,9 @@ from fractions import Fraction
 from pathlib import Path
 
 from vdet.config.schema import OutputSettings
-from vdet.files import replacing
+from vdet.files import staged
 from vdet.media import Frame, VideoInfo, VideoWriter
+from vdet.media.writer import may_replace_video
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
@@ -21,7 +22,7 @@ def frames(scene: Scene) -> Iterator[Frame]:
         yield Frame(index, Fraction(index) / scene.rate, renderer.image(index))
 
 
-def write_clip(path: Path, scene: Scene) -> None:
+def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     """Write a scene as an H.264 video without sound.
 
     Raises
@@ -38,14 +39,14 @@ def write_clip(path: Path, scene: Scene) -> None:
         frames=scene.frames,
     )
     with (
-        replacing(path) as temporary,
+        staged(path, overwrite=overwrite, may_replace=may_replace_video) as temporary,
         VideoWriter(temporary, info, OutputSettings(), name=path) as writer,
     ):
         for frame in frames(scene):
             writer.write(frame)
 
 
-def write_truth(path: Path, scene: Scene) -> None:
+def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     """Write the true box of each vehicle, in the columns of MOTChallenge ground truth.
 
     One line per box: `frame, id, left, top, width, height, flag, class, visibility`; frames and
@@ -57,7 +58,10 @@ def write_truth(path: Path, scene: Scene) -> None:
     OutputError
         The file cannot be written.
     """
-    with replacing(path) as temporary, temporary.open("w", encoding="ascii", newline="\n") as file:
+    with (
+        staged(path, overwrite=overwrite) as temporary,
+        temporary.open("w", encoding="ascii", newline="\n") as file,
+    ):
         for index in range(scene.frames):
             for box in true_boxes(scene, index):
                 file.write(_line(index + 1, box, scene.camera.height))

@@ -62,7 +62,9 @@ def background_patches(count: int, rng: np.random.Generator) -> Image:
     return _stacked(_collect(_background_samples(rng), BACKGROUND_GROUPS, count))
 
 
-def write_patches(folder: Path, *, seed: int, vehicles: int, non_vehicles: int) -> None:
+def write_patches(
+    folder: Path, *, seed: int, vehicles: int, non_vehicles: int, overwrite: bool = False
+) -> None:
     """Write `vehicles/<group>/image0001.png` … and `non-vehicles/<group>/…` below a folder.
 
     The groups of a class get the same number of patches, to within one.
@@ -73,9 +75,10 @@ def write_patches(folder: Path, *, seed: int, vehicles: int, non_vehicles: int) 
         A folder or file cannot be written.
     """
     rng = np.random.default_rng(seed)
-    _write(folder / "vehicles", _collect(_vehicle_samples(rng), VEHICLE_GROUPS, vehicles))
+    cars = _collect(_vehicle_samples(rng), VEHICLE_GROUPS, vehicles)
     background = _collect(_background_samples(rng), BACKGROUND_GROUPS, non_vehicles)
-    _write(folder / "non-vehicles", background)
+    _write(folder / "vehicles", cars, overwrite=overwrite)
+    _write(folder / "non-vehicles", background, overwrite=overwrite)
 
 
 def _stacked(samples: list[_Sample]) -> Image:
@@ -83,13 +86,13 @@ def _stacked(samples: list[_Sample]) -> Image:
     return np.stack(patches) if patches else np.zeros((0, PATCH, PATCH, 3), np.uint8)
 
 
-def _write(folder: Path, samples: list[_Sample]) -> None:
+def _write(folder: Path, samples: list[_Sample], *, overwrite: bool) -> None:
     numbers: Counter[str] = Counter()
     for sample in samples:
         numbers[sample.group] += 1
         path = folder / sample.group / f"image{numbers[sample.group]:04}.png"
         _make_folder(path.parent)
-        write_image(path, sample.patch)
+        write_image(path, sample.patch, overwrite=overwrite)
 
 
 def _make_folder(folder: Path) -> None:

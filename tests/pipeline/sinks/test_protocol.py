@@ -169,7 +169,7 @@ class TestFailure:
         assert [path.name for path in tmp_path.iterdir()] == ["stages"]
         assert list((tmp_path / "stages").iterdir()) == []
         self.set_failure(register, "never", RuntimeError())
-        check_job(job, overwrite=False)
+        check_job(job)
         run_red(job)
         names = {path.name for path in tmp_path.iterdir()}
         assert names == {"fragile.txt", "out.csv", "out.mp4", "stages"}
@@ -282,4 +282,4 @@ class TestCheck:
     def test_one_path_for_two_outputs_is_refused(self, tmp_path: Path) -> None:
         twice = outputs(tracks=tmp_path / "a.txt", json=tmp_path / "." / "a.txt")
         with pytest.raises(OutputError, match=r"a\.txt: is given for two outputs"):
-            check_job(VideoJob(tmp_path / "in.mp4", twice), overwrite=True)
+            check_job(VideoJob(tmp_path / "in.mp4", twice))

@@ -22,7 +22,7 @@ from vdet.archives import open_archive, read_member
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import Layout
 from vdet.errors import ModelError
-from vdet.files import read_whole, replacing
+from vdet.files import read_whole, staged
 from vdet.geometry import Float32Array
 
 FORMAT_VERSION = 2
@@ -95,7 +95,7 @@ class LinearModel:
         return np.asarray((1 / (1 + np.exp(exponent))).mean(axis=1), np.float32)
 
 
-def save_model(model: LinearModel, path: Path) -> None:
+def save_model(model: LinearModel, path: Path, *, overwrite: bool = False) -> None:
     """Write a model as `.npz` without pickle: arrays and a JSON header. Raises `OutputError`."""
     header = {
         "format": "vdet model",
@@ -110,7 +110,7 @@ def save_model(model: LinearModel, path: Path) -> None:
             name: part.astype(np.float32) for name, part in zip(_BOX_ARRAYS, parts, strict=True)
         }
     text = np.frombuffer(json.dumps(header).encode(), np.uint8)
-    with replacing(path) as temporary, temporary.open("wb") as file:
+    with staged(path, overwrite=overwrite) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, header=text, **arrays)
 
 

@@ -70,6 +70,8 @@ def find_tracks(
     variants: Sequence[Variant],
     progress: Progress,
     outputs: Sequence[Output] = (),
+    *,
+    overwrite: bool = False,
 ) -> list[LabelledVideo]:
     """Find and follow the vehicles of a clip under each of the settings, in one pass.
 
@@ -80,6 +82,8 @@ def find_tracks(
         the number of frames done since the last call.
     outputs
         Outputs that get the results under the first of the settings.
+    overwrite
+        Replace outputs that are there.
 
     Raises
     ------
@@ -93,7 +97,7 @@ def find_tracks(
     rows: list[list[Row]] = [[] for _ in variants]
     frames = 0
     with ExitStack() as stack:
-        files = stack.enter_context(OutputFiles())
+        files = stack.enter_context(OutputFiles(overwrite=overwrite))
         reader = stack.enter_context(
             VideoReader(clip.video, frames=clip.until, settings=variants[0].settings.input)
         )

@@ -53,6 +53,7 @@ def evaluate_clips(
     progress: Progress = no_progress,
     *,
     outputs: Sequence[Output] = (),
+    overwrite: bool = False,
 ) -> list[RunResult]:
     """Find the vehicles in every clip, in one pass for all settings, and score each.
 
@@ -62,13 +63,15 @@ def evaluate_clips(
         As `find_tracks` takes it, called for each clip.
     outputs
         Outputs that get the results; only with one clip and one variant.
+    overwrite
+        Replace outputs that are there.
 
     Raises
     ------
     VideoError, TruthError, OutputError
         As `find_tracks`.
     """
-    found = [find_tracks(clip, variants, progress, outputs) for clip in clips]
+    found = [find_tracks(clip, variants, progress, outputs, overwrite=overwrite) for clip in clips]
     results = []
     for number, variant in enumerate(variants):
         of_clips = [

@@ -48,7 +48,8 @@ class MiningJob:
     """The video to mine, its truth, and the zip file to write.
 
     The frames `first` to `last` are used, counted from 1: one in `every`, and all that cut a
-    vehicle off. If `last` is None, the last frame is that of the truth.
+    vehicle off. If `last` is None, the last frame is that of the truth. `overwrite`: replace a zip
+    file that is there.
     """
 
     video: Path
@@ -57,6 +58,7 @@ class MiningJob:
     every: int = 4
     first: int = 1
     last: int | None = None
+    overwrite: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,10 @@ def mine(
         )
     searched, number = 0, 0
     counts: Counter[PatchKind] = Counter()
-    with VideoReader(job.video, frames=last) as reader, patch_archive(job.output) as archive:
+    with (
+        VideoReader(job.video, frames=last) as reader,
+        patch_archive(job.output, overwrite=job.overwrite) as archive,
+    ):
         advance = progress(last)
         images, frames = peek(reader)
         search = _window_search(job, detector, reader.info, images)

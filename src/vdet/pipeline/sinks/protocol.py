@@ -9,7 +9,14 @@ from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.files import OutputFiles, check_output, make_folder, output_errors
+from vdet.files import (
+    MayReplace,
+    OutputFiles,
+    any_file,
+    check_output,
+    make_folder,
+    output_errors,
+)
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
 from vdet.plugins import SINKS, load_plugin
@@ -87,6 +94,9 @@ class SinkKind:
         Whether the path `-` means standard output.
     takes
         "videos" or "pictures" if the sink can take results of these only.
+    may_replace
+        Says whether `--overwrite` may replace a file that is there. `OutputFiles.stage` takes it
+        too, for a file that appears during the run.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -95,6 +105,7 @@ class SinkKind:
     marker: str = ""
     writes_standard_output: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
+    may_replace: MayReplace = any_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +150,13 @@ def check_sinks(
         if kind.marker:
             make_folder(path)
             path = next(path.glob(kind.marker), path / kind.marker)
-        check_output(path, overwrite=overwrite, inputs=inputs, makes_folder=makes_folder)
+        check_output(
+            path,
+            overwrite=overwrite,
+            inputs=inputs,
+            makes_folder=makes_folder,
+            may_replace=kind.may_replace,
+        )
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:

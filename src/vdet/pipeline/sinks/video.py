@@ -10,7 +10,7 @@ from vdet.draw.boxes import color_of, draw_box
 from vdet.lanes.drawing import draw_lane
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
-from vdet.media.writer import VIDEO_SUFFIXES
+from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.threads import write_async
@@ -31,7 +31,7 @@ class VideoSink:
     def __enter__(self) -> Self:
         context = self._context
         writer = VideoWriter(
-            context.files.stage(self._path),
+            context.files.stage(self._path, may_replace_video),
             self._video,
             context.settings.output,
             name=self._path,
@@ -54,7 +54,7 @@ class VideoSink:
         self._encode(Frame(result.frame.index, result.frame.time, image))
 
 
-VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos")
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
 
 
 def annotate(result: FrameResult, *, scores: bool) -> Image:
