@@ -17,7 +17,10 @@ class VdetError(Exception):
 
 
 class ConfigError(VdetError, ValueError):
-    """Settings are wrong; one line for each mistake."""
+    """Settings are wrong; each argument is a mistake, and a line of the message."""
+
+    def __str__(self) -> str:
+        return "\n".join(self.args)
 
 
 class DataError(VdetError, ValueError):
@@ -62,5 +65,7 @@ def in_one_line(error: Exception) -> str:
         return str(error)
     if isinstance(error, OSError):
         return f"{error.filename or 'input'}: {error.strerror or error}"
+    if isinstance(error, MemoryError):
+        return "there is too little memory; end other programs, or raise the limit (ulimit -v)"
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return f"internal error, please report it ({text}); VDET_DEBUG=1 shows more"

@@ -291,13 +291,18 @@ def _create(path: Path) -> tuple[Path, int | None]:
             os.close(descriptor)
             return candidate, None
         # Another run may have taken it for stale and removed it before it was locked.
-        if _lock(descriptor) and os.fstat(descriptor).st_nlink:
+        if try_to_lock(descriptor) and os.fstat(descriptor).st_nlink:
             return candidate, descriptor
         os.close(descriptor)
 
 
-def _lock(descriptor: int) -> bool:
-    """Return False if another has the lock; True on a file system without locks."""
+def try_to_lock(descriptor: int) -> bool:
+    """Lock a file for this process until it is closed; return False if another has locked it.
+
+    Without locks, as on some network disks, the answer is True.
+    """
+    if fcntl is None:
+        return True
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -350,9 +355,9 @@ def _chunks(file: IO[bytes], most: int) -> Iterator[bytes]:
         most -= len(chunk)
 
 
-def escaped(name: str) -> str:
-    """Return a name from outside on one line, without characters that control a terminal."""
-    return name if name.isprintable() else ascii(name)
+def escaped(text: str) -> str:
+    """Return text on one line, without characters that control a terminal."""
+    return "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text)
 
 
 def printable(name: str) -> str:

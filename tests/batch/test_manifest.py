@@ -1,6 +1,8 @@
 """The manifest: whole lines, whatever is there already."""
 
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -34,6 +36,8 @@ def test_a_record_is_there_as_soon_as_it_is_added(tmp_path: Path) -> None:
         "tracks": 1,
         "warnings": [],
         "error": None,
+        "digest": None,
+        "sizes": {},
         "program": "vdet 1.2",
         "model": "m.npz",
         "model_sha256": "ab" * 32,
@@ -78,13 +82,45 @@ def test_a_manifest_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         open_it()
 
 
-def test_a_full_disk_is_named() -> None:
+def test_a_full_disk_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
     def fill() -> None:
-        with open_manifest(Path("/dev/full"), ORIGIN) as add:
+        with open_manifest(tmp_path / "m.jsonl", ORIGIN) as add:
+            monkeypatch.setattr("os.fsync", full)
             add(RECORD)
 
-    with pytest.raises(OutputError, match="/dev/full: cannot be written: No space left on device"):
+    with pytest.raises(OutputError, match=r"m\.jsonl: cannot be written: No space left on device"):
         fill()
+
+
+def test_a_second_batch_into_the_folder_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "m.jsonl"
+
+    def open_again() -> None:
+        with open_manifest(path, ORIGIN):
+            pass
+
+    with open_manifest(path, ORIGIN) as add:
+        with pytest.raises(OutputError, match=r"m\.jsonl: another batch writes into this folder"):
+            open_again()
+        add(RECORD)
+    open_again()
+    assert len(lines(path)) == 1
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("elsewhere")])
+def test_what_is_no_ordinary_file_is_not_opened(
+    make: Callable[[Path], object], tmp_path: Path
+) -> None:
+    make(tmp_path / "m.jsonl")
+    with (
+        pytest.raises(OutputError, match=r"m\.jsonl: is no ordinary file"),
+        open_manifest(tmp_path / "m.jsonl", ORIGIN),
+    ):
+        pass
+    assert not (tmp_path / "elsewhere").exists()
 
 
 def test_an_error_in_the_block_is_not_one_of_the_manifest(tmp_path: Path) -> None:

@@ -1,18 +1,21 @@
 """The plan of a batch, and what is refused before any work."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from vdet.batch.digest import result_digest
+from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.errors import BatchError, ConfigError, OutputError
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import Output
 
 COMMON = VideoJob(Path(), frames=7)
+DIGEST = "settings"
 VIDEO: dict[str, str | None] = {"video": None}
 
 
@@ -35,13 +38,23 @@ def plan(*inputs: str, folder: str = "out", tracks: str | None = None, **options
 def plan_outputs(
     *inputs: str, suffixes: Mapping[str, str | None], folder: str = "out", **options: bool
 ) -> Plan:
-    return make_plan(
-        [Path(p) for p in inputs], Path(folder), COMMON, OutputOptions(suffixes, **options)
-    )
+    clips = [Path(path) for path in inputs]
+    return make_plan(clips, Path(folder), COMMON, OutputOptions(suffixes, **options), DIGEST)
 
 
 def outputs(jobs: tuple[VideoJob, ...]) -> list[list[str]]:
     return [[str(output.path) for output in job.outputs] for job in jobs]
+
+
+def record(source: str, *paths: str, work: str = DIGEST) -> None:
+    """Write outputs, and what the manifest says about them."""
+    Path("out").mkdir(exist_ok=True)
+    for path in paths:
+        Path(path).write_bytes(b"result")
+    sizes = {str(Path(path).absolute()): len(b"result") for path in paths}
+    digest = result_digest(work, Path(source))
+    with open_manifest(Path("out/manifest.jsonl"), Origin("vdet", None, None)) as add:
+        add(Record(source, {}, "now", 0.0, digest=digest, sizes=sizes))
 
 
 @pytest.mark.usefixtures("clips")
@@ -74,15 +87,48 @@ class TestJobs:
         made = plan_outputs("clips/a.mp4", "clips/c.avi", suffixes={"video": ".mkv"})
         assert outputs(made.jobs) == [["out/a.mkv"], ["out/c.mkv"]]
 
-    def test_jobs_with_all_their_outputs_are_skipped(self) -> None:
-        Path("out").mkdir()
-        for name in ("a.mp4", "a.csv", "b.MKV"):
-            Path("out", name).touch()
+    def test_jobs_whose_outputs_are_all_there_and_up_to_date_are_skipped(self) -> None:
+        record("clips/a.mp4", "out/a.mp4", "out/a.csv")
+        record("clips/b.MKV", "out/b.MKV")
         made = plan("clips", tracks=".csv", skip_existing=True)
         assert [job.source.name for job in made.skipped] == ["a.mp4"]
-        assert [str(job.source) for job in made.jobs] == [
-            *("clips/b.MKV", "clips/c.avi", "clips/day/a.mp4"),
+        assert [(str(job.source), job.overwrite) for job in made.jobs] == [
+            ("clips/b.MKV", True),
+            ("clips/c.avi", False),
+            ("clips/day/a.mp4", False),
         ]
+
+    def test_what_was_written_in_parts_is_up_to_date_too(self) -> None:
+        record("clips/a.mp4", "out/a.csv")
+        record("clips/a.mp4", "out/a.mp4")
+        assert plan("clips/a.mp4", tracks=".csv", skip_existing=True).skipped
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda: Path("out/a.mp4").write_bytes(b""),
+            lambda: Path("out/a.mp4").write_bytes(b"junk"),
+            lambda: Path("out/a.mp4").unlink(),
+            lambda: Path("clips/a.mp4").write_bytes(b"longer clip"),
+            lambda: os.utime("clips/a.mp4", (0, 0)),
+            lambda: Path("out/manifest.jsonl").unlink(),
+            lambda: Path("out/manifest.jsonl").write_text('"junk"\n{"sizes": 1}\n[[[\n'),
+            lambda: record("clips/a.mp4", "out/a.mp4", work="other settings"),
+        ],
+    )
+    def test_what_is_empty_junk_or_out_of_date_is_done_again(
+        self, change: Callable[[], object]
+    ) -> None:
+        record("clips/a.mp4", "out/a.mp4")
+        assert plan("clips/a.mp4", skip_existing=True).skipped
+        change()
+        assert plan("clips/a.mp4", skip_existing=True).skipped == ()
+
+    def test_an_output_folder_that_was_named_otherwise_is_the_same(self) -> None:
+        record("clips/a.mp4", "out/a.mp4")
+        Path("link").symlink_to("out")
+        assert plan("clips/a.mp4", folder="link", skip_existing=True).skipped
+        assert plan("clips/a.mp4", folder="clips/../out", skip_existing=True).skipped
 
     def test_an_output_that_is_there_is_refused_or_replaced(self) -> None:
         Path("out").mkdir()
@@ -149,6 +195,15 @@ class TestRefused:
         Path("out/a.mp4").symlink_to(Path("clips/a.mp4").absolute())
         with pytest.raises(OutputError, match=r"out/a\.mp4: is an input itself"):
             plan("clips", overwrite=True)
+
+    @pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("elsewhere")])
+    def test_a_manifest_that_is_no_ordinary_file(self, make: Callable[[Path], object]) -> None:
+        Path("out").mkdir()
+        make(Path("out/manifest.jsonl"))
+        for skip_existing in (False, True):
+            with pytest.raises(OutputError, match=r"manifest\.jsonl: is no ordinary file"):
+                plan("clips", skip_existing=skip_existing)
+        assert not Path("out/elsewhere").exists()
 
     def test_a_folder_that_is_a_file(self) -> None:
         Path("out").touch()

@@ -9,6 +9,7 @@ import pytest
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, red_finder
 from running import names, write_drive
+from vdet.batch.digest import result_digest
 from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.detect.svm.model import save_model
 from vdet.pipeline.loop import VideoJob, run_video
@@ -46,6 +47,9 @@ def test_the_record_says_what_was_done_and_folders_are_made(
     assert record.seconds > 0
     assert before <= datetime.fromisoformat(record.started) <= datetime.now(UTC)
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
+    paths = [output.path for output in job.outputs]
+    assert record.sizes == {str(path): path.stat().st_size for path in paths}
+    assert record.digest == result_digest(work.digest, job.source)
 
 
 def test_only_warnings_about_this_file_are_recorded(
@@ -70,6 +74,7 @@ def test_an_error_is_recorded_without_numbers(job: VideoJob, work: Work) -> None
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: is not a video")
     assert (record.width, record.height, record.frames, record.tracks) == (None,) * 4
+    assert (record.digest, record.sizes) == (None, {})
 
 
 def test_a_folder_that_cannot_be_made_is_an_error_of_the_file(

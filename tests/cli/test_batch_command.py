@@ -12,6 +12,7 @@ from conftest import Run
 from running import frames_of, names, write_drive
 from vdet.config.schema import Settings
 from vdet.detect.svm.kind import shipped_model
+from vdet.detect.svm.model import load_model, save_model
 
 
 @pytest.fixture
@@ -38,9 +39,8 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert first.code == 3
     assert f"{clips}/a.mp4: 12 frames, 0 vehicles, " in first.err
     assert f"vdet: error: {clips}/bad.mp4: is not a video" in first.err
-    *_, summary, last = first.err.splitlines()
-    assert summary == f"{out}/manifest.jsonl: 2 files done, 1 failed"
-    assert last.startswith(f"failed: {clips}/bad.mp4: is not a video")
+    assert first.err.count("bad.mp4") == 1, "an error is printed once"
+    assert first.err.splitlines()[-1] == f"{out}/manifest.jsonl: 2 files done, 1 failed"
     made = ["a.csv", "a.mp4", "day2/b.csv", "day2/b.mp4", "manifest.jsonl"]
     assert names(out) == made
     assert (frames_of(out / "a.mp4"), frames_of(out / "day2" / "b.mp4")) == (12, 6)
@@ -73,7 +73,7 @@ def test_when_none_works_the_code_is_1(run: Run, tmp_path: Path) -> None:
         (tmp_path / f"{name}.mp4").write_bytes(b"no video")
     result = run("detect-video", tmp_path / "*.mp4", "-d", tmp_path / "out", "--jobs", "2")
     assert result.code == 1
-    assert result.err.count("\nfailed: ") == 2
+    assert result.err.count("vdet: error: ") == 2
     assert names(tmp_path / "out") == ["manifest.jsonl"]
 
 
@@ -107,9 +107,29 @@ def test_a_dry_run_lists_and_does_nothing(run: Run, clips: Path, tmp_path: Path)
     (out / "a.mp4").touch()
     result = run("detect-video", clips, "-d", out, "--skip-existing", "--dry-run")
     assert result.out.splitlines() == [
-        f"{clips}/a.mp4: {out}/a.mp4 there already",
+        f"{clips}/a.mp4 → {out}/a.mp4",
         f"{clips}/day2/b.mp4 → {out}/day2/b.mp4",
     ]
+
+
+def test_other_settings_another_model_or_a_newer_input_are_not_there_already(
+    run: Run, clips: Path, tmp_path: Path
+) -> None:
+    out, model = tmp_path / "out", tmp_path / "other.npz"
+    save_model(load_model(shipped_model(Settings().svm)), model)
+    arguments = ("detect-video", clips, "-d", out, "--no-video", "--tracks", ".csv")
+    assert run(*arguments).code == 0
+    dry = (*arguments, "--skip-existing", "--dry-run")
+    assert run(*dry).out.count("there already") == 2
+    for change in (("--set", "tracker.needed=0.3"), ("--model", model), ("--frames", "3")):
+        assert run(*dry, *change).out.count("→") == 2
+    assert run(*dry, "--set", "mining.parts=0", "--set", "training.C=1").out.count("→") == 0
+    write_drive(clips / "a.mp4", 8)
+    again = run(*arguments, "--skip-existing")
+    assert again.code == 0, again.err
+    assert "a.mp4: 8 frames" in again.err
+    assert "1 files done, 1 there already" in again.err
+    assert "all of 2 files" in run(*arguments, "--skip-existing").err
 
 
 @pytest.mark.parametrize(
@@ -126,7 +146,7 @@ def test_a_dry_run_lists_and_does_nothing(run: Run, clips: Path, tmp_path: Path)
         (("out.mp4", "--skip-existing"), "go with -d DIR"),
         (("out.mp4", "--jobs", "2"), "go with -d DIR"),
         (("out.mp4", "--scheduler", "tcp://x:1"), "go with -d DIR"),
-        (("b.mp4", "c.mp4"), "or -d DIR for several videos"),
+        (("b.mp4", "c.mp4"), "for several videos name a folder: vdet detect-video "),
     ],
 )
 def test_wrong_usage(

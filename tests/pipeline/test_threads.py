@@ -321,6 +321,41 @@ class TestWriteAsync:
         with pytest.raises(ValueError, match=place), write_async(int, within=within()) as hand_over:
             hand_over(0)
 
+    @pytest.mark.parametrize("place", ["last item", "one before", "end of the context"])
+    def test_a_taker_that_hangs_at_its_end_is_abandoned(
+        self, place: str, hang: threading.Event
+    ) -> None:
+        def take(item: int) -> None:
+            if place == ("last item" if item == 3 else "one before" if item == 2 else ""):
+                hang.wait()
+
+        @contextmanager
+        def context() -> Iterator[None]:
+            yield
+            if place == "end of the context":
+                hang.wait()
+
+        def give() -> None:
+            with write_async(take, within=context(), timeout=0.1) as put:
+                for item in range(4):
+                    put(item)
+
+        with pytest.raises(StalledError):
+            give()
+        assert threads_of_vdet() == ["vdet-write"]
+
+    def test_the_end_has_the_time_that_it_is_given_and_as_long_as_it_gets_on(self) -> None:
+        passed: list[int] = []
+
+        def take(item: int) -> None:
+            time.sleep(0.2)
+            passed.append(item)
+
+        with write_async(take, timeout=0.1, depth=9, end_timeout=lambda: SOON) as put:
+            for item in range(5):
+                put(item)
+        assert passed == list(range(5))
+
     def test_a_taker_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
         left: list[str] = []
         first_is_taken = threading.Event()

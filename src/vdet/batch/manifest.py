@@ -3,12 +3,19 @@
 import errno
 import json
 import os
-from collections.abc import Callable, Iterator
+import stat
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import BinaryIO
+
+from pydantic import BaseModel, ValidationError
 
 from vdet.errors import OutputError
+from vdet.files import output_errors, try_to_lock
+
+_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +48,10 @@ class Record:
         How many frames were read, and how many vehicles were followed.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
+    digest
+        Of all that the outputs depend on: see `vdet.batch.digest`. None if there are none.
+    sizes
+        Bytes of each output, by its path.
     """
 
     input: str
@@ -53,45 +64,94 @@ class Record:
     tracks: int | None = None
     warnings: tuple[str, ...] = ()
     error: str | None = None
+    digest: str | None = None
+    sizes: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """An output that a manifest names: the digest of what it depends on, and its size in bytes."""
+
+    digest: str
+    size: int
+
+
+class _Line(BaseModel):
+    digest: str
+    sizes: dict[str, int]
+
+
+def check_manifest(path: Path) -> None:
+    """Refuse a link, which may lead out of the folder, and a FIFO, which may block for ever.
+
+    Raises
+    ------
+    OutputError
+        What is there is no ordinary file.
+    """
+    if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
+        raise OutputError(f"{path}: is no ordinary file; remove it, or give another folder")
+
+
+def read_written(path: Path) -> dict[str, Written]:
+    """Return the latest record of each output, by its real path; none if there is no manifest.
+
+    Lines that are no records of outputs are skipped.
+
+    Raises
+    ------
+    OutputError
+        The manifest cannot be read.
+    """
+    found: dict[str, Written] = {}
+    if not os.path.lexists(path):
+        return found
+    with output_errors(path), os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb") as file:
+        for text in file:
+            try:
+                line = _Line.model_validate_json(text)
+            except ValidationError:
+                continue
+            for name, size in line.sizes.items():
+                found[os.path.realpath(name)] = Written(line.digest, size)
+    return found
 
 
 @contextmanager
 def open_manifest(path: Path, origin: Origin) -> Iterator[Callable[[Record], None]]:
     """Give a function that adds a record to the manifest; it returns when the disk has it.
 
+    The manifest is locked: no other batch can write into the folder until the block ends.
+
     Raises
     ------
     OutputError
-        The file cannot be written (from the function, too).
+        The file cannot be written (from the function, too), or another batch has locked it.
     """
-    with _named_errors(path):
-        file = path.open("ab", buffering=0)
-    with file:
+    check_manifest(path)
+    with output_errors(path):
+        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | _FLAGS, 0o666)
+    with os.fdopen(descriptor, "r+b", buffering=0) as file:
+        if not try_to_lock(descriptor):
+            raise OutputError(
+                f"{path}: another batch writes into this folder; wait for its end, or give another"
+            )
 
         def add(record: Record) -> None:
             line = json.dumps(asdict(record) | asdict(origin), allow_nan=False) + "\n"
-            with _named_errors(path):
+            with output_errors(path):
                 if file.write(line.encode()) != len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-                os.fsync(file.fileno())
+                os.fsync(descriptor)
 
-        with _named_errors(path):
-            _end_last_line(path, file.write)
+        with output_errors(path):
+            _end_last_line(file)
         yield add
 
 
-@contextmanager
-def _named_errors(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def _end_last_line(path: Path, write: Callable[[bytes], object]) -> None:
+def _end_last_line(file: BinaryIO) -> None:
     """End a last line that was cut off by a full disk."""
-    with path.open("rb") as file:
-        if file.seek(0, os.SEEK_END):
-            file.seek(-1, os.SEEK_END)
-            if file.read(1) != b"\n":
-                write(b"\n")
+    if file.seek(0, os.SEEK_END):
+        file.seek(-1, os.SEEK_END)
+        if file.read(1) != b"\n":
+            file.write(b"\n")

@@ -1,10 +1,13 @@
 """The plan of a batch: a job for each video. A wrong plan is refused before any work."""
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from vdet.batch.digest import result_digest
 from vdet.batch.inputs import Source, find_sources
+from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
 from vdet.pipeline.loop import VideoJob
@@ -25,7 +28,8 @@ class OutputOptions:
     overwrite
         Outputs that are there already are replaced.
     skip_existing
-        A job is left out if all its outputs are there. If only some are, all are made again.
+        A job is left out if all its outputs are there, and the manifest says that they are up to
+        date. Else all are made again.
     """
 
     suffixes: Mapping[str, str | None]
@@ -48,7 +52,11 @@ class Plan:
 
 
 def make_plan(
-    clips: Sequence[Path], folder: Path, common: VideoJob, options: OutputOptions
+    clips: Sequence[Path],
+    folder: Path,
+    common: VideoJob,
+    options: OutputOptions,
+    digest: str = "",
 ) -> Plan:
     """Plan a job for every video of `clips`; outputs lie in `folder` by the places of the videos.
 
@@ -56,6 +64,8 @@ def make_plan(
     ----------
     common
         A job with the times, the number of frames and the lanes of all jobs.
+    digest
+        From `work_digest`, for `skip_existing`.
 
     Raises
     ------
@@ -63,7 +73,7 @@ def make_plan(
         There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
         name.
     OutputError
-        An output cannot be written, or is there already.
+        An output cannot be written, or is there already; the manifest cannot be used.
     ConfigError
         There is no sink of a name.
     """
@@ -72,16 +82,17 @@ def make_plan(
     jobs = [_job(source, folder, common, options) for source in sources]
     _refuse_inside(sources, folder)
     _refuse_shared(jobs, folder)
+    manifest = folder / MANIFEST
+    check_manifest(manifest)
+    check_output(manifest, overwrite=True, makes_folder=True)
+    written = read_written(manifest) if options.skip_existing else {}
     to_do: list[VideoJob] = []
     skipped: list[VideoJob] = []
     for job in jobs:
-        (skipped if options.skip_existing and _is_done(job) else to_do).append(job)
-    plan = Plan(folder, tuple(to_do), tuple(skipped))
-    check_output(plan.manifest, overwrite=True, makes_folder=True)
-    replaces = options.overwrite or options.skip_existing
-    for job in plan.jobs:
-        check_sinks(job.outputs, overwrite=replaces, makes_folder=True)
-    return plan
+        (skipped if written and _is_done(job, digest, written) else to_do).append(job)
+    for job in to_do:
+        check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
+    return Plan(folder, tuple(to_do), tuple(skipped))
 
 
 def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions) -> VideoJob:
@@ -89,7 +100,10 @@ def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions)
     outputs = [
         Output(sink, _path(place, sink, suffix)) for sink, suffix in options.suffixes.items()
     ]
-    return replace(common, source=source.path, outputs=tuple(outputs))
+    replaces = options.overwrite or (
+        options.skip_existing and any(os.path.lexists(output.path) for output in outputs)
+    )
+    return replace(common, source=source.path, outputs=tuple(outputs), overwrite=replaces)
 
 
 def _path(place: Path, sink: str, suffix: str | None) -> Path:
@@ -101,8 +115,15 @@ def _path(place: Path, sink: str, suffix: str | None) -> Path:
     return place.with_suffix(writable[0])
 
 
-def _is_done(job: VideoJob) -> bool:
-    return all(output.path.is_file() for output in job.outputs)
+def _is_done(job: VideoJob, digest: str, written: Mapping[str, Written]) -> bool:
+    """Return whether all outputs of a job are as they were written, for this work and input."""
+    digest = result_digest(digest, job.source)
+    return all(
+        output.path.is_file()
+        and written.get(os.path.realpath(output.path))
+        == Written(digest, output.path.stat().st_size)
+        for output in job.outputs
+    )
 
 
 def _refuse_nested(clips: Iterable[Path], folder: Path) -> None:

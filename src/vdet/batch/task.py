@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from vdet.batch.digest import result_digest
 from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import in_one_line
 from vdet.files import make_folder
-from vdet.pipeline.loop import Summary, VideoJob, run_video
+from vdet.pipeline.loop import VideoJob, run_video
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +29,14 @@ class Work:
         A model file; None for the shipped one, or for a detector without one.
     threads
         Of the search, of the decoder and of the encoder of each video.
+    digest
+        From `work_digest`, for the records.
     """
 
     settings: Settings
     model: Path | None
     threads: int
+    digest: str = ""
 
 
 def process_file(job: VideoJob, *, work: Work) -> Record:
@@ -42,6 +46,7 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
     """
     began, started = time.perf_counter(), _now()
     summary, error = None, None
+    digest = result_digest(work.digest, job.source)
     threads = work.threads
     with _collected_warnings(job) as warnings:
         try:
@@ -54,7 +59,19 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
             if os.environ.get("VDET_DEBUG") == "1":
                 traceback.print_exc()
     seconds = time.perf_counter() - began
-    return _record(job, started, seconds, summary=summary, warnings=tuple(warnings), error=error)
+    record = _record(job, started, seconds, warnings=tuple(warnings), error=error)
+    if summary is None:
+        return record
+    paths = [output.path.absolute() for output in job.outputs]
+    return replace(
+        record,
+        width=summary.width,
+        height=summary.height,
+        frames=summary.frames,
+        tracks=summary.tracks,
+        digest=digest,
+        sizes={str(path): path.stat().st_size for path in paths},
+    )
 
 
 def record_of_killed(job: VideoJob) -> Record:
@@ -69,25 +86,15 @@ def _record(
     seconds: float,
     *,
     error: str | None,
-    summary: Summary | None = None,
     warnings: tuple[str, ...] = (),
 ) -> Record:
-    record = Record(
+    return Record(
         input=str(job.source.absolute()),
         outputs={output.sink: str(output.path.absolute()) for output in job.outputs},
         started=started,
         seconds=round(seconds, 3),
         warnings=warnings,
         error=error,
-    )
-    if summary is None:
-        return record
-    return replace(
-        record,
-        width=summary.width,
-        height=summary.height,
-        frames=summary.frames,
-        tracks=summary.tracks,
     )
 
 

@@ -12,11 +12,12 @@ from typing import Any, TypeVar
 import click
 
 import vdet
+from vdet.batch.digest import work_digest
 from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
-from vdet.cli.messages import files_bar, print_message
+from vdet.cli.messages import files_bar, print_lines, print_message
 from vdet.cli.options import PATH, POSITIVE, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
@@ -56,7 +57,7 @@ def batch_options(command: F) -> F:
         click.option(
             "--skip-existing",
             is_flag=True,
-            help="With -d: leave out videos whose outputs are all there.",
+            help="With -d: leave out videos whose outputs are all there and up to date.",
         ),
         click.option(
             "--jobs",
@@ -133,16 +134,18 @@ def process_batch(
     if options.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
         model = model.absolute() if model else None
-    plan = make_plan(clips, folder, common, outputs)
+    origin = _origin(settings, model)
+    digest = work_digest(origin, settings, common)
+    plan = make_plan(clips, folder, common, outputs, digest)
     if options.dry_run:
-        click.echo("\n".join(_plan_lines(plan)))
+        print_lines(*_plan_lines(plan))
         return 0
     if not plan.jobs:
         click.echo(f"all of {len(plan.skipped)} files are there already", err=True)
         return 0
     workers, search_threads = _workers(options, len(plan.jobs))
-    work = Work(settings, model, threads or search_threads)
-    failed = _run(plan, work, workers, quiet=quiet)
+    work = Work(settings, model, threads or search_threads, digest)
+    failed = _run(plan, work, origin, workers, quiet=quiet)
     if not failed:
         return 0
     return SOME_FAILED if plan.skipped or len(failed) < len(plan.jobs) else VdetError.exit_code
@@ -160,9 +163,9 @@ def _output_names(job: VideoJob) -> str:
     return ", ".join(str(output.path) for output in job.outputs)
 
 
-def _run(plan: Plan, work: Work, workers: Workers, *, quiet: bool) -> list[Record]:
+def _run(plan: Plan, work: Work, origin: Origin, workers: Workers, *, quiet: bool) -> list[Record]:
     """Run the batch, print the result of each file, and return the records of those that failed."""
-    results = run_batch(plan, work, _origin(work), workers=workers)
+    results = run_batch(plan, work, origin, workers=workers)
     failed = []
     with files_bar(len(plan.jobs), quiet=quiet) as advance, closing(results):
         for job, record in results:
@@ -174,14 +177,12 @@ def _run(plan: Plan, work: Work, workers: Workers, *, quiet: bool) -> list[Recor
         skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
         done = len(plan.jobs) - len(failed)
         print_message(f"{plan.manifest}: {done} files done, {skipped}{len(failed)} failed")
-    for record in failed:
-        print_message(f"failed: {record.error}")
     return failed
 
 
-def _origin(work: Work) -> Origin:
+def _origin(settings: Settings, model: Path | None) -> Origin:
     program = f"vdet {vdet.__version__}"
-    path = model_file(work.settings.detector, work.model)
+    path = model_file(settings.detector, model)
     if path is None:
         return Origin(program, None, None)
     return Origin(program, path.name, hashlib.sha256(path.read_bytes()).hexdigest())

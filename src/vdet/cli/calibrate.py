@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from vdet.cli.messages import print_lines
 from vdet.cli.options import PATH, overwrite_option
 from vdet.errors import OutputError
 from vdet.files import check_output
@@ -85,7 +86,7 @@ def calibrate(
     if preview:
         write_previews(preview, calibration, pattern, overwrite=overwrite)
     camera = calibration.camera
-    click.echo(
+    print_lines(
         f"{output}: {camera.width}×{camera.height}, focal length {camera.focal[0]:.0f} px, "
         f"RMS error {camera.rms:.2f} px, {len(calibration.photos)} of {len(found)} photographs used"
     )

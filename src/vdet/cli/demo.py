@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.messages import print_message, progress_bar
+from vdet.cli.messages import print_lines, print_message, progress_bar
 from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
@@ -66,20 +66,21 @@ def demo(
             progress=progress,
         )
     for split in result.training.splits:
-        click.echo(f"patches, {split.split} split: test accuracy {split.test_accuracy:.3f}")
+        print_lines(f"patches, {split.split} split: test accuracy {split.test_accuracy:.3f}")
     scores = result.scores
-    click.echo(
+    print_lines(
         f"video: {result.frames} frames in {result.seconds:.1f} s "
-        f"({result.frames / result.seconds:.1f} frames/s)\n"
+        f"({result.frames / result.seconds:.1f} frames/s)",
         f"found boxes against the truth: precision {scores.precision:.2f}, "
         f"recall {scores.recall:.2f}, F1 {scores.f1:.2f} at IoU 0.5; "
-        f"IDF1 {scores.idf1:.2f}, {scores.id_switches} id switches\n\n"
-        f"Look at\n"
-        f"  {files.result}  the road with the vehicles found\n"
-        f"  {files.stages}/  every stage of one frame as a picture\n"
-        f"  {files.tracks}  the boxes, a record for each frame; {files.truth} has the true ones\n"
-        f"  {files.report}  what training measured\n"
-        f"Then try your own:  vdet detect-video in.mp4 out.mp4"
+        f"IDF1 {scores.idf1:.2f}, {scores.id_switches} id switches",
+        "",
+        "Look at",
+        f"  {files.result}  the road with the vehicles found",
+        f"  {files.stages}/  every stage of one frame as a picture",
+        f"  {files.tracks}  the boxes, a record for each frame; {files.truth} has the true ones",
+        f"  {files.report}  what training measured",
+        "Then try your own:  vdet detect-video in.mp4 out.mp4",
     )
 
 

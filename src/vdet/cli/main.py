@@ -3,7 +3,7 @@
 import os
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
 import click
@@ -16,12 +16,13 @@ from vdet.cli.detect_video import detect_video
 from vdet.cli.eval_patches import patches
 from vdet.cli.eval_tracks import tracks
 from vdet.cli.eval_video import video
-from vdet.cli.messages import set_up_logs
+from vdet.cli.messages import print_lines, set_up_logs
 from vdet.cli.mine import mine
 from vdet.cli.options import read_settings, settings_options
 from vdet.cli.train import train
 from vdet.config.rendering import render
-from vdet.errors import INTERRUPTED, VdetError, in_one_line
+from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
+from vdet.files import escaped
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -66,22 +67,23 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
     except click.ClickException as error:
+        error.message = escaped(error.message)  # type: ignore[misc]  # it may name a file
         error.show()
         sys.exit(error.exit_code)
     except (KeyboardInterrupt, click.Abort):
-        sys.exit(_print_error("interrupted", INTERRUPTED))
+        sys.exit(_print_error(["interrupted"], INTERRUPTED))
     except BrokenPipeError:  # whoever read our output has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except Exception as error:
         code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
-        sys.exit(_print_error(in_one_line(error), code))
+        lines = error.args if isinstance(error, ConfigError) else [in_one_line(error)]
+        sys.exit(_print_error(lines, code))
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _print_error(message: str, code: int) -> int:
-    for line in message.splitlines():
-        click.echo(f"vdet: {line}", err=True)
+def _print_error(lines: Iterable[str], code: int) -> int:
+    print_lines(*(f"vdet: {line}" for line in lines), err=True)
     if os.environ.get("VDET_DEBUG") == "1":
         traceback.print_exc()
     return code

@@ -8,13 +8,22 @@ from contextlib import ExitStack, contextmanager
 import click
 from tqdm import tqdm
 
+from vdet.files import escaped
 from vdet.pipeline.loop import Advance, Progress
+
+
+def print_lines(*lines: str, err: bool = False) -> None:
+    """Print each text as one line.
+
+    Texts may have names of files in them: a name could forge a line, or control the terminal.
+    """
+    click.echo("\n".join(map(escaped, lines)), err=err)
 
 
 def print_message(line: str) -> None:
     """Print a line on standard error; a progress bar moves below it."""
     with tqdm.external_write_mode():
-        click.echo(line, err=True)
+        print_lines(line, err=True)
 
 
 class _LogHandler(logging.Handler):

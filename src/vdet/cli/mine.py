@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.messages import progress_bar
+from vdet.cli.messages import print_lines, progress_bar
 from vdet.cli.options import (
     PATH,
     POSITIVE,
@@ -90,7 +90,7 @@ def mine(
     job = MiningJob(video, truth, output, every, first, until, overwrite)
     with progress_bar(" frames", quiet=quiet) as progress:
         mined = mine_patches(job, settings, model_path, progress=progress)
-    click.echo(
+    print_lines(
         f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "
         f"{mined.false_alarms} false alarms, {mined.parts} more on parts of vehicles; "
         f"from {mined.frames} frames"

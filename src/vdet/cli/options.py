@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
+from vdet.cli.messages import print_lines
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.evaluate.output import write_page
@@ -172,9 +173,9 @@ def print_results(
 ) -> None:
     """Print the table, and write the files that `results_options` ask for."""
     to_stderr = json_target == "-"
-    click.echo("\n".join(lines), err=to_stderr)
+    print_lines(*lines, err=to_stderr)
     if json_target is not None:
         write_json(values, json_target, overwrite=overwrite)
     if report is not None:
         page = write_page(make_page(), report, overwrite=overwrite)
-        click.echo(f"\n{page}: the report", err=to_stderr)
+        print_lines("", f"{page}: the report", err=to_stderr)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.messages import progress_bar
+from vdet.cli.messages import print_lines, progress_bar
 from vdet.cli.options import (
     PATH,
     POSITIVE,
@@ -77,5 +77,4 @@ def train(
         )
     save_model(model, output, overwrite=overwrite)
     report.write(report_path, overwrite=overwrite)
-    click.echo("\n".join(report.lines()))
-    click.echo(f"\n{output}: the model; {report_path}: the report")
+    print_lines(*report.lines(), "", f"{output}: the model; {report_path}: the report")

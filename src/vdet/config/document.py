@@ -56,7 +56,7 @@ def config_error(lines: Iterable[str], count: int) -> ConfigError:
     shown = list(islice(lines, MAX_MISTAKES))
     if count > len(shown):
         shown.append(f"… and {count - len(shown)} more mistakes")
-    return ConfigError("\n".join(shown))
+    return ConfigError(*shown)
 
 
 class _Loader(yaml.SafeLoader):

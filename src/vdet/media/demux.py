@@ -65,6 +65,8 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
         raise VideoError(f"{path}: there is no such file; check the name") from error
     except av.PermissionError as error:
         raise VideoError(f"{path}: may not be read; check its permissions") from error
+    except av.error.MemoryError as error:
+        raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error
     except av.FFmpegError as error:
         raise VideoError(
             f"{path}: is not a video, or one that was cut off while it was recorded "

@@ -9,12 +9,13 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.errors import ImageError
+from vdet.errors import ImageError, OutputError
 from vdet.files import read_whole, staged
 from vdet.media.picture_size import picture_size
 
@@ -96,8 +97,12 @@ def _decode(data: bytes) -> tuple[Image, str]:
     _check_size(*size)
     flags = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_ANYDEPTH
     image = None
-    with contextlib.suppress(cv2.error), capture_stderr() as comments:
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    try:
+        with capture_stderr() as comments:
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+    except cv2.error as error:
+        if error.code == cv2.Error.StsNoMem:
+            raise MemoryError from error
     if image is None:
         raise ImageError(_NO_PICTURE)
     _check_size(*image.shape[:2])  # should a decoder find another size than its header claims
@@ -118,9 +123,14 @@ def capture_stderr() -> Iterator[list[str]]:
     """Keep standard error silent in the block; the list then holds the lines written to it.
 
     The C libraries that decode pictures comment there on damaged files.
+
+    Raises
+    ------
+    OutputError
+        There is no folder for temporary files.
     """
     lines: list[str] = []
-    with _stderr_lock, tempfile.TemporaryFile() as file, contextlib.ExitStack() as stack:
+    with _stderr_lock, _temporary_file() as file, contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # a process may have no standard error
             outside = os.dup(_STDERR)
             stack.callback(os.close, outside)
@@ -129,6 +139,15 @@ def capture_stderr() -> Iterator[list[str]]:
         yield lines
         file.seek(0)
         lines += file.read(_MAX_COMMENTS).decode("utf-8", "replace").splitlines()
+
+
+def _temporary_file() -> IO[bytes]:
+    try:
+        return tempfile.TemporaryFile()
+    except OSError as error:
+        raise OutputError(
+            f"there is no folder for temporary files ({error.strerror}); name one as TMPDIR"
+        ) from error
 
 
 def _to_uint8(image: cv2.typing.MatLike) -> Image:

@@ -98,6 +98,11 @@ class VideoWriter:
         self._threads = threads
         self._encoder: _Encoder | None = None
 
+    @property
+    def size(self) -> int:
+        """Bytes of pictures that were encoded until now."""
+        return self._encoder.size if self._encoder else 0
+
     def write(self, frame: Frame) -> None:
         """Encode the next frame; times must increase from one to the next."""
         with self._naming_the_file():
@@ -149,6 +154,7 @@ class _Encoder:
         if info.time_base.denominator > _FINEST:
             self._time_base = Fraction(1, _FINEST)
         self._last = -1
+        self.size = 0
         self._container = av.open(
             str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
         )
@@ -164,7 +170,9 @@ class _Encoder:
         picture.pts = self._last
         picture.time_base = self._time_base
         picture.duration = round(self._period / self._time_base)
-        self._container.mux(self._stream.encode(picture))
+        packets = self._stream.encode(picture)
+        self.size += sum(packet.size for packet in packets)
+        self._container.mux(packets)
         if self._sound:
             self._sound.copy(since)
 

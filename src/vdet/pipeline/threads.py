@@ -45,6 +45,7 @@ class _Channel(Generic[T]):
     def __init__(self, depth: int) -> None:
         self._queue: queue.Queue[T | _End] = queue.Queue(depth)
         self._closed = threading.Event()
+        self.done = 0  # items whose taker has come back for the next one
 
     def put(self, item: T | _End, timeout: float | None = None) -> bool:
         """Wait for room; return False if the queue is closed."""
@@ -61,6 +62,7 @@ class _Channel(Generic[T]):
     def take(self, timeout: float | None = None) -> Iterator[T]:
         while not isinstance(item := self._next(timeout), _End):
             yield item
+            self.done += 1
         if item.error is not None:
             raise item.error
 
@@ -121,12 +123,15 @@ def write_async(
     *,
     within: AbstractContextManager[object] | None = None,
     timeout: float | None = None,
+    end_timeout: Callable[[], float | None] | None = None,
 ) -> Iterator[Callable[[T], None]]:
     """Give a function that passes items to `take` in a thread; at most `depth` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
     one. An error in the thread is raised by the next call, or when the block ends. A call raises
-    `StalledError` if there is no room within `timeout` seconds.
+    `StalledError` if there is no room within `timeout` seconds. So does the end of the block if the
+    last items, or leaving `within`, get no further within the seconds that `end_timeout` then
+    returns; without it, within `timeout`.
     """
     channel: _Channel[T] = _Channel(depth)
     failures: list[BaseException] = []
@@ -148,8 +153,8 @@ def write_async(
     thread.start()
     try:
         yield put
-        channel.put(_End())
-        thread.join()
+        channel.put(_End(), timeout)
+        _join(thread, channel, end_timeout() if end_timeout else timeout)
     except BaseException:
         with contextlib.suppress(StalledError):
             channel.put(_End(_ClosedError()), JOIN_TIMEOUT)
@@ -158,6 +163,16 @@ def write_async(
         raise
     if failures:
         raise failures[0]
+
+
+def _join(thread: threading.Thread, channel: _Channel[T], timeout: float | None) -> None:
+    """Wait for the end of a thread that takes items, as long as it gets on."""
+    done = -1
+    while thread.is_alive():
+        if channel.done == done:
+            raise StalledError
+        done = channel.done
+        thread.join(timeout)
 
 
 def _closing(items: Iterable[object]) -> AbstractContextManager[object]:

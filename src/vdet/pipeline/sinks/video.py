@@ -16,6 +16,9 @@ from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.threads import write_async
 from vdet.track.track import Track
 
+FINISH_RATE = 5_000_000
+"""Bytes a second. At its end an .mp4 is written once more, with its index in front."""
+
 
 class VideoSink:
     """Draws into copies of the frames, and encodes them in a thread."""
@@ -38,9 +41,14 @@ class VideoSink:
             whole_sound=not context.is_part,
             threads=context.codec_threads,
         )
+        timeout = context.timeout
+
+        def end_timeout() -> float | None:
+            return None if timeout is None else timeout + writer.size / FINISH_RATE
+
         with ExitStack() as stack:
             self._encode = stack.enter_context(
-                write_async(writer.write, within=writer, timeout=context.timeout)
+                write_async(writer.write, within=writer, timeout=timeout, end_timeout=end_timeout)
             )
             self._stack = stack.pop_all()
         return self
