@@ -137,6 +137,12 @@ def loaded_by_cli() -> set[str]:
     return set(done.stdout.split())
 
 
+def test_cores_are_counted_in_one_place() -> None:
+    """`os.cpu_count` does not know how many a control group allows."""
+    counting = [name for name, path in NAMES.items() if "cpu_count" in path.read_text("utf-8")]
+    assert counting == ["workers"]
+
+
 def test_no_text_names_a_place_on_somebodys_machine() -> None:
     assert len(TEXTS) > 100
     found = [

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.errors import ImageError, OutputError
+from vdet.errors import ImageError, OutputError, in_one_line
 from vdet.media.images import Image, capture_stderr, decode_image, read_image, write_image
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
@@ -58,6 +58,33 @@ def test_a_path_need_not_be_ascii(tmp_path: Path) -> None:
     path = tmp_path / "Straße_車.png"
     write_image(path, PICTURE)
     np.testing.assert_array_equal(read_image(path), PICTURE)
+
+
+def test_without_a_folder_for_temporary_files_that_is_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail() -> None:
+        raise FileNotFoundError(2, "No usable temporary directory found in ['/tmp', '/']")
+
+    write_image(tmp_path / "a.png", PICTURE)
+    monkeypatch.setattr("tempfile.TemporaryFile", fail)
+    with pytest.raises(OutputError, match=r"no folder for temporary files \(.*\); name one as TMP"):
+        read_image(tmp_path / "a.png")
+
+
+def test_too_little_memory_is_not_blamed_on_the_picture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        error = cv2.error("Failed to allocate 72000000 bytes")
+        error.code = cv2.Error.StsNoMem
+        raise error
+
+    write_image(tmp_path / "a.png", PICTURE)
+    monkeypatch.setattr("cv2.imdecode", fail)
+    with pytest.raises(MemoryError) as caught:
+        read_image(tmp_path / "a.png")
+    assert in_one_line(caught.value).startswith("there is too little memory; ")
 
 
 def test_the_content_decides_on_the_format_not_the_suffix(tmp_path: Path) -> None:

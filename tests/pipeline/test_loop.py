@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import count, islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,8 +31,10 @@ from red_cars import (
     by_perspective,
     car_at,
     drive,
+    red_model,
     road,
 )
+from running import write_drive
 from vdet.config.loading import load_settings
 from vdet.config.schema import OutputSettings, Settings
 from vdet.detect.factory import load_detector
@@ -39,7 +42,8 @@ from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
 from vdet.media.pixels import to_bgr
-from vdet.pipeline.loop import FIRST_FRAMES, VideoJob, follow_frames, peek
+from vdet.pipeline.loop import FIRST_FRAMES, VideoJob, follow_frames, peek, run_video
+from vdet.pipeline.threads import map_ordered
 from vdet.synthetic import frames, true_boxes
 from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import RulesTracker
@@ -220,6 +224,22 @@ class TestMemory:
 
 
 class TestRun:
+    def test_without_a_number_all_cores_that_the_process_may_use_search(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        pools: list[int] = []
+
+        def note(function: Any, items: Any, threads: int) -> Any:
+            pools.append(threads)
+            return map_ordered(function, items, threads)
+
+        monkeypatch.setattr("joblib.cpu_count", lambda: 3)  # it knows control groups
+        monkeypatch.setattr("vdet.pipeline.loop.map_ordered", note)
+        job = VideoJob(write_drive(tmp_path / "a.mp4", 2))
+        run_video(job, red_model(), SETTINGS)
+        run_video(job, red_model(), SETTINGS, threads=2)
+        assert pools == [3, 2]
+
     def test_the_summary_counts_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:
         job = VideoJob(red_clip, outputs(video=tmp_path / "out.mp4"), frames=20)
         summary = run_red(job)

@@ -1,0 +1,162 @@
+"""The process of the program: the current folder, its standard streams, its memory."""
+
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from running import Running, names, start, write_drive
+from vdet.__main__ import leave_out_current_folder
+from vdet.evaluate.report.page import draw
+from vdet.process import LossyFile, check_memory
+
+MODULES = ("queue", "typing", "selectors", "socket", "numpy", "joblib", "multiprocessing")
+KB = 1024
+
+
+@pytest.fixture
+def batch(tmp_path: Path) -> tuple[str, ...]:
+    """Arguments of a batch of three small clips."""
+    (tmp_path / "in").mkdir()
+    for name in "abc":
+        write_drive(tmp_path / "in" / f"{name}.mp4", 2)
+    options = ("--no-video", "--tracks", ".csv", "--jobs", "2")
+    return ("detect-video", str(tmp_path / "in"), "-d", str(tmp_path / "out"), *options)
+
+
+@pytest.fixture
+def running() -> Iterator[list[Running]]:
+    """Programs that are ended after the test."""
+    started: list[Running] = []
+    yield started
+    for each in started:
+        each.stop()
+
+
+def test_nothing_in_the_current_folder_is_imported(
+    batch: tuple[str, ...],
+    running: list[Running],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    folder = tmp_path / "current"
+    folder.mkdir()
+    for name in MODULES:
+        (folder / f"{name}.py").write_text("open('imported', 'a').write(__name__ + ' ')")
+    # An empty entry means the current folder.
+    monkeypatch.setenv("PYTHONPATH", os.pathsep + os.environ.get("PYTHONPATH", ""))
+    running.append(start(batch, before=lambda: os.chdir(folder)))
+    result = running[0].finish()
+    assert not (folder / "imported").exists(), (folder / "imported").read_text()
+    assert result.code == 0, result.err
+    assert names(tmp_path / "out") == ["a.csv", "b.csv", "c.csv", "manifest.jsonl"]
+
+
+def test_what_the_user_names_stays_on_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONSAFEPATH", "")  # and put back what it was
+    for named, expected in (("", ["/other"]), (".", [str(tmp_path), "", "/other"])):
+        monkeypatch.setenv("PYTHONPATH", os.pathsep.join(["", named, "/other"]))
+        monkeypatch.setattr(sys, "path", [str(tmp_path), "", "/other"])
+        leave_out_current_folder()
+        assert sys.path == expected
+        assert os.environ["PYTHONPATH"].split(os.pathsep) == [*([named] if named else []), "/other"]
+
+
+def test_a_folder_that_was_removed_is_no_place_for_modules(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("PYTHONPATH", "PYTHONSAFEPATH"):
+        monkeypatch.setenv(name, "")
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    monkeypatch.setattr(sys, "path", ["/other"])
+    leave_out_current_folder()
+    assert sys.path == ["/other"]
+
+
+def test_a_batch_goes_on_without_standard_error(
+    batch: tuple[str, ...], running: list[Running], tmp_path: Path
+) -> None:
+    running.append(start(batch, before=lambda: os.close(2)))
+    assert running[0].finish().code == 0
+    assert names(tmp_path / "out") == ["a.csv", "b.csv", "c.csv", "manifest.jsonl"]
+
+
+def test_what_cannot_be_written_is_dropped() -> None:
+    reader, writer = os.pipe()
+    with LossyFile(writer, "w") as file:
+        assert file.write(b"heard") == 5
+        assert os.read(reader, 9) == b"heard"
+        os.close(reader)
+        assert file.write(b"unheard") == 7
+    with LossyFile("/dev/full", "w") as file:
+        assert file.write(b"unheard") == 7
+
+
+def test_a_pipe_that_nobody_empties_takes_no_more() -> None:
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with LossyFile(writer, "w") as file:
+        for _ in range(1000):
+            assert file.write(bytes(1000)) > 0
+    os.close(reader)
+
+
+def test_too_little_memory_is_told_before_the_libraries_are_loaded(
+    running: list[Running], tmp_path: Path
+) -> None:
+    limit = 700_000 * KB
+
+    def limit_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+
+    arguments = ("detect-image", tmp_path / "a.png", "--json", "-")
+    running.append(start(arguments, before=limit_memory))
+    result = running[0].finish()
+    assert result.code == 1
+    assert result.err.startswith("vdet: the limit on memory is 0.7 GB, and vdet needs ")
+    assert result.err.endswith("raise it: ulimit -v unlimited\n")
+
+
+@pytest.mark.parametrize("kind", [resource.RLIMIT_AS, resource.RLIMIT_DATA])
+@pytest.mark.parametrize("gigabytes", [0.7, 1e6, None])
+def test_each_limit_on_memory_is_compared(
+    kind: int, gigabytes: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limit = resource.RLIM_INFINITY if gigabytes is None else int(gigabytes * 1e9)
+
+    def get(asked: int) -> tuple[int, int]:
+        return (limit if asked == kind else resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+
+    monkeypatch.setattr("resource.getrlimit", get)
+    if gigabytes == 0.7:
+        with pytest.raises(SystemExit) as ended:
+            check_memory()
+        assert ended.value.code == 1
+    else:
+        check_memory()
+
+
+def test_a_report_does_not_depend_on_settings_in_the_current_folder(tmp_path: Path) -> None:
+    (tmp_path / "matplotlibrc").write_text("no setting\nfont.size: 40\ntext.usetex: True\n")
+    code = (
+        "from vdet.evaluate.report.page import draw; "
+        "print(draw(lambda axes: axes.plot([1, 2]), 3, 2))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    assert done.stdout.rstrip() == draw(lambda axes: axes.plot([1, 2]), 3, 2).rstrip()
