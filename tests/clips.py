@@ -97,16 +97,18 @@ def _add_sound(container: av.container.OutputContainer, codec: str) -> av.AudioS
     return stream
 
 
-def _tone(stream: av.AudioStream, seconds: float) -> "list[av.Packet[Any]]":
+def _tone(stream: av.AudioStream, begin: Fraction, seconds: float) -> "list[av.Packet[Any]]":
     size = stream.codec_context.frame_size or 1024
     packets: list[av.Packet[Any]] = []
+    first_sample = round(begin * 48000)
     resampler = av.AudioResampler(format=stream.codec_context.format, layout="mono", rate=48000)
     for first in range(0, math.ceil(seconds * 48000), size):
         wave = 0.3 * np.sin(np.arange(first, first + size) * 2 * np.pi * 440 / 48000)
         frame = av.AudioFrame.from_ndarray(
             (wave[None] * 32767).astype(np.int16), format="s16", layout="mono"
         )
-        frame.sample_rate, frame.pts, frame.time_base = 48000, first, Fraction(1, 48000)
+        frame.sample_rate, frame.time_base = 48000, Fraction(1, 48000)
+        frame.pts = first_sample + first
         for resampled in resampler.resample(frame):
             packets += stream.encode(resampled)
     return packets + stream.encode(None)
@@ -141,7 +143,7 @@ def write_clip(
     full_range: bool = False,
     matrix: int | None = None,
 ) -> Path:
-    """Write `count` numbered frames, the first at `begin`; `size` is of the upright picture."""
+    """Write `count` numbered frames and sound from `begin` on; `size` is of the upright picture."""
     times = times or [index / rate for index in range(count)]
     upright = [draw_frame(number, *size) for number in range(len(times))]
     coded = [np.rot90(image, -rotation // 90) for image in upright]
@@ -158,7 +160,7 @@ def write_clip(
         colors = _tag_colors(stream, full_range, matrix) if pix_fmt.startswith("yuv") else {}
         audio = [_add_sound(container, name) for name in sounds]
         seconds = float(times[-1] + 1 / rate) if sound_seconds is None else sound_seconds
-        packets = [packet for track in audio for packet in _tone(track, seconds)]
+        packets = [packet for track in audio for packet in _tone(track, begin, seconds)]
         for image, time in zip(coded, times, strict=True):
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="bgr24")
             frame = frame.reformat(format=pix_fmt, **colors)

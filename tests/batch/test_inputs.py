@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vdet.batch.inputs import find_sources
-from vdet.errors import BatchError
+from vdet.errors import BatchError, VideoError
 
 
 @pytest.fixture
@@ -83,6 +83,64 @@ class TestFound:
         assert found("clips", "clips/b.mp4", "link/b.mp4", "clips/../clips") == found("clips")
 
 
+def pictures(folder: Path, *numbers: int) -> Path:
+    folder.mkdir(parents=True)
+    for number in numbers:
+        (folder / f"{number:010d}.png").touch()
+    return folder
+
+
+@pytest.mark.usefixtures("folder")
+class TestPictures:
+    @pytest.mark.parametrize("name", ["frames", "frames.v2"])
+    def test_a_folder_of_numbered_pictures_is_a_video_with_its_name(self, name: str) -> None:
+        folder = pictures(Path(name), 7, 8, 9)
+        assert found(name) == [(name, f"{name}.png")]
+        os.chdir(folder)
+        assert found(".") == [(".", f"{name}.png")]
+
+    def test_folders_of_pictures_are_found_next_to_videos(self) -> None:
+        pictures(Path("drives/one"), 0, 1)
+        pictures(Path("drives/rest/two"), 0, 1)
+        Path("drives/a.mp4").touch()
+        places = [place for _, place in found("drives")]
+        assert places == ["a.mp4", "one.png", "rest/two.png"]
+
+    def test_pictures_next_to_a_video_are_none(self) -> None:
+        Path(pictures(Path("card"), 1, 2), "clip.mp4").touch()
+        assert found("card") == [("card/clip.mp4", "clip.mp4")]
+
+    def test_pictures_with_a_gap_are_left_out_with_a_warning(
+        self, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        pictures(Path("drives/one"), 0, 2)
+        pictures(Path("drives/two"), 0, 1)
+        assert [place for _, place in found("drives")] == ["two.png"]
+        assert "drives/one: picture 1 is missing, between 0 and 2; add it" in caplog.text
+
+    def test_a_pattern_of_numbered_pictures_is_a_video_with_the_name_of_the_folder(self) -> None:
+        pictures(Path("frames"), 3, 4)
+        assert found("frames/%010d.png") == [("frames/%010d.png", "frames.png")]
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_pattern_without_a_suffix_takes_videos_only() -> None:
+    (Path("clips") / "notes.txt").touch()
+    assert [place for _, place in found("clips/*")] == [
+        "a.MOV",
+        "b.mp4",
+        "day1/c.avi",
+        "day1/evening/d.ts",
+        "day2/c.avi",
+    ]
+    assert found("clips/*.txt") == [("clips/notes.txt", "notes.txt")]
+
+
+def test_an_address_is_refused() -> None:
+    with pytest.raises(VideoError, match=r"^rtsp:/camera/1: streams are not read; record it"):
+        find_sources([Path("rtsp://camera/1")])
+
+
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     ("clip", "words"),
@@ -90,7 +148,7 @@ class TestFound:
         ("none.mp4", "none.mp4: there is no such file"),
         ("none/", "none: there is no such file"),
         ("empty", "empty: there is no video in this folder"),
-        ("*.mkv", r"\*.mkv: no file matches this pattern"),
+        ("*.mkv", r"\*.mkv: no video matches this pattern"),
     ],
 )
 def test_a_clip_that_gives_no_video_is_named(clip: str, words: str) -> None:

@@ -43,6 +43,55 @@ def test_a_doubled_per_cent_sign_means_one(tmp_path: Path) -> None:
     assert found == PictureSequence(f"{tmp_path}/50%%d/100%%_%d.png", 1)
 
 
+def test_numbers_may_have_any_width(tmp_path: Path) -> None:
+    make(tmp_path, *(f"{number:019d}.png" for number in range(3)))
+    found = find_sequence(tmp_path / "%019d.png")
+    assert found == PictureSequence(str(tmp_path / "%019d.png"), 0)
+    with pytest.raises(VideoError, match="numbers have at most 19 digits"):
+        find_sequence(tmp_path / "%020d.png")
+
+
+class TestFolder:
+    @pytest.mark.parametrize(
+        ("names", "pattern"),
+        [
+            (["0000000007.png", "0000000008.png", "notes.txt"], "%010d.png"),
+            (["9.jpg", "10.jpg", ".11.jpg"], "%d.jpg"),
+            (["cam 2_img_099.png", "cam 2_img_100.png"], "cam 2_img_%03d.png"),
+            (["100%_1_left.JPG"], "100%%_%d_left.JPG"),
+        ],
+    )
+    def test_its_numbered_pictures_are_found(
+        self, names: list[str], pattern: str, tmp_path: Path
+    ) -> None:
+        make(tmp_path, *names)
+        found = find_sequence(tmp_path)
+        assert found is not None
+        assert found.pattern == f"{tmp_path}/{pattern}"
+
+    @pytest.mark.parametrize(
+        ("names", "words"),
+        [
+            (["a.png"], "is a folder without numbered pictures; give a video file"),
+            (["1.png", "3.png"], "picture 2 is missing, between 1 and 3"),
+            (
+                ["a_01.png", "a_02.png", "b_01.png"],
+                "names of several kinds; give .*/a_%02d.png or .*/b_%02d.png",
+            ),
+        ],
+    )
+    def test_other_pictures_are_refused(self, names: list[str], words: str, tmp_path: Path) -> None:
+        make(tmp_path, *names)
+        with pytest.raises(VideoError, match=words):
+            find_sequence(tmp_path)
+
+
+def test_the_error_names_the_pattern_that_fits(tmp_path: Path) -> None:
+    make(tmp_path, "img_0001.png", "img_0002.png")
+    with pytest.raises(VideoError, match=r"no picture of such a name; give .*/img_%04d\.png$"):
+        find_sequence(tmp_path / "img_%d.png")
+
+
 @pytest.mark.parametrize(
     "name", ["in.mp4", "100%.mp4", "%s.png", "%4d.png", "%d-%d.png", "%%d.png"]
 )

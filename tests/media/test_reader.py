@@ -123,6 +123,16 @@ def test_a_turned_clip_looks_as_opencv_shows_it(
     assert np.abs(ours.astype(int) - other).mean() < 3
 
 
+def test_raw_motion_jpeg_is_read(
+    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+) -> None:
+    spec = {"codec": "mjpeg", "pix_fmt": "yuvj420p", "options": {"q": "2"}}
+    path = write_clip(tmp_path / "clip.mjpeg", **spec).rename(tmp_path / "clip.raw")
+    with VideoReader(path) as reader:
+        assert [read_number(frame.image) for frame in reader] == list(range(12))
+    assert warnings() == []
+
+
 def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> None:
     rate = Fraction(30_000, 1001)
     path = write_clip(tmp_path / "a.mp4", rate=rate, matrix=1, sounds=["aac"])
@@ -290,6 +300,16 @@ class TestRefusals:
 
     def test_a_folder(self, tmp_path: Path) -> None:
         assert "is a folder" in self.refusal(tmp_path)
+
+    @pytest.mark.parametrize("address", ["rtsp://camera/1", "https://host/a.mp4", "udp://@:1234"])
+    def test_an_address(self, address: str) -> None:
+        assert "streams are not read; record it into a file" in self.refusal(Path(address))
+
+    def test_standard_input(self) -> None:
+        assert "standard input is not read" in self.refusal(Path("-"))
+
+    def test_a_wrong_pattern_of_pictures(self, tmp_path: Path) -> None:
+        assert "give numbered pictures as img_%04d.png" in self.refusal(tmp_path / "img_%4d.png")
 
     @pytest.mark.parametrize(
         "content", ["", "plain text\n" * 40, "1\n00:00:01,000 --> 00:00:02,000\nsubtitle\n"]

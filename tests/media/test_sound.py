@@ -1,5 +1,7 @@
 """Sound is copied into the written video, packet by packet, in step with the picture."""
 
+import os
+import threading
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
@@ -162,3 +164,18 @@ def test_damaged_sound_does_not_affect_the_picture(
     with VideoReader(target) as reader:
         assert len(list(reader)) == 50
     assert sound(target)
+
+
+def test_the_sound_of_a_pipe_is_left_out_with_a_warning(
+    tmp_path: Path, write_clip: Writer, warnings: Warnings
+) -> None:
+    source, pipe = write_clip(tmp_path / "in.ts", sounds=["aac"]), tmp_path / "pipe.ts"
+    os.mkfifo(pipe)
+    feeder = threading.Thread(target=lambda: pipe.write_bytes(source.read_bytes()))
+    feeder.start()
+    target = copy(pipe, tmp_path / "out.mp4")
+    feeder.join()
+    with av.open(str(target)) as container:
+        assert container.streams.video[0].frames == 12
+        assert not container.streams.audio
+    assert warnings() == [f"{pipe}: its sound is left out: a pipe can be read only once"]

@@ -58,3 +58,8 @@ def test_the_error_names_a_missing_picture(run: Run, tmp_path: Path) -> None:
     assert result.code == 1
     assert "img_%03d.png: picture 2 is missing, between 1 and 3" in result.err
     assert not (tmp_path / "out.mp4").exists()
+
+
+def test_a_folder_of_pictures_is_a_video(tmp_path: Path, process: Process) -> None:
+    pattern = write_pictures(tmp_path / "frames" / "%010d.png", range(5, 9))
+    assert_whole(process(pattern.parent), [5, 6, 7, 8])

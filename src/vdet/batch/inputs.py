@@ -1,12 +1,18 @@
 """The videos of a batch, from files, folders and patterns."""
 
 import glob
+import logging
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.errors import BatchError
+from vdet.errors import BatchError, VideoError
+from vdet.media.demux import refuse_stream
+from vdet.media.images import PICTURE_SUFFIXES
+from vdet.media.numbered import find_sequence
+
+_log = logging.getLogger("vdet")
 
 VIDEO_INPUT_SUFFIXES = frozenset((
     ".264", ".265", ".3g2", ".3gp", ".asf", ".avi", ".dav", ".dv", ".f4v", ".flv", ".h264", ".h265",
@@ -29,16 +35,23 @@ def find_sources(clips: Sequence[Path]) -> list[Source]:
 
     Each clip is one of these, and its videos are in the order of their names:
 
-    * a file;
-    * a folder: the videos in it and below it, without hidden files and folders;
-    * a pattern with ``*``, ``?`` or ``[``, where ``**`` means any folders: the files that match,
-      and the videos in the folders that match. Their places are below the last folder of the
-      pattern that has no such character.
+    * a file, or numbered pictures such as ``img_%04d.png``;
+    * a folder: the videos in it and below it, without hidden files and folders. A folder without
+      videos in which there are numbered pictures is a video itself;
+    * a pattern with ``*``, ``?`` or ``[``, where ``**`` means any folders: the videos that match,
+      and those in the folders that match. Their places are below the last folder of the pattern
+      that has no such character. If the pattern ends in a suffix, as ``*.raw`` does, all files that
+      match are taken for videos.
+
+    Pictures below a folder that are no video, as one of them is missing, are left out with a
+    warning (logger "vdet").
 
     Raises
     ------
     BatchError
         One of `clips` gives no video, or a folder cannot be read.
+    VideoError
+        One of `clips` is an address, or numbered pictures with a gap.
     """
     found: dict[tuple[Path, Path], Source] = {}
     for clip in clips:
@@ -53,28 +66,53 @@ def find_sources(clips: Sequence[Path]) -> list[Source]:
 def _videos_of(clip: Path) -> Iterable[Source]:
     if clip.is_dir():
         return _below(clip, clip)
-    if clip.exists() or not glob.has_magic(str(clip)):
-        return [Source(clip, Path(clip.name))] if clip.exists() else []
-    return _matching(clip)
+    if clip.exists():
+        return [Source(clip, Path(clip.name))]
+    if glob.has_magic(str(clip)):
+        return _matching(clip)
+    refuse_stream(clip)
+    if find_sequence(clip):
+        return [Source(clip, Path(f"{clip.absolute().parent.name}{clip.suffix}"))]
+    return []
 
 
 def _matching(pattern: Path) -> Iterator[Source]:
     plain = [parent for parent in pattern.parents if not glob.has_magic(str(parent))]
+    takes_all = bool(pattern.suffix) and not glob.has_magic(pattern.suffix)
     for name in glob.glob(str(pattern), recursive=True):  # noqa: PTH207  # Path.glob cannot start at /
         path = Path(name)
         if path.is_dir():
             yield from _below(path, plain[0])
-        else:
+        elif takes_all or _is_video(path):
             yield Source(path, path.relative_to(plain[0]))
 
 
 def _below(folder: Path, base: Path) -> Iterator[Source]:
     for root, folders, names in os.walk(folder, onerror=_refuse_unreadable):
         folders[:] = [name for name in folders if not name.startswith(".")]
-        for name in names:
-            path = Path(root, name)
-            if path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not name.startswith("."):
-                yield Source(path, path.relative_to(base))
+        videos = [path for name in names if _is_video(path := Path(root, name))]
+        for path in videos:
+            yield Source(path, path.relative_to(base))
+        suffixes = {Path(name).suffix.lower() for name in names if not name.startswith(".")}
+        if not videos and suffixes & PICTURE_SUFFIXES:
+            yield from _pictures_in(Path(root), base)
+
+
+def _pictures_in(folder: Path, base: Path) -> Iterator[Source]:
+    """Give the numbered pictures of a folder as one video, named as the folder."""
+    try:
+        sequence = find_sequence(folder)
+    except VideoError as error:
+        _log.warning("%s; left out", error)
+        return
+    assert sequence is not None
+    place = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
+    suffix = Path(sequence.pattern).suffix
+    yield Source(folder, place.with_name(f"{place.name}{suffix}"))
+
+
+def _is_video(path: Path) -> bool:
+    return path.suffix.lower() in VIDEO_INPUT_SUFFIXES and not path.name.startswith(".")
 
 
 def _refuse_unreadable(error: OSError) -> None:
@@ -86,5 +124,5 @@ def _reason(clip: Path) -> str:
     if clip.is_dir():
         return "there is no video in this folder or below it; name the files"
     if glob.has_magic(str(clip)):
-        return "no file matches this pattern; check it"
+        return "no video matches this pattern; check it"
     return "there is no such file; check the name"

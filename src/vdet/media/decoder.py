@@ -11,9 +11,10 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 from av.video.stream import VideoStream
 
-from vdet.media.demux import MAX_PIXELS, open_input, packets
+from vdet.media.demux import MAX_PIXELS, is_pipe, open_input
 from vdet.media.losses import Losses
 from vdet.media.probe import check_size, period_of, picture_stream
+from vdet.media.restarts import continuous_packets, restarts_clock
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
 _MAX_RECENT = 500  # packets; key frames further apart than that are rare
@@ -25,7 +26,7 @@ class Decoder:
 
     Several threads decode several pictures at once until there is damage. Then a single thread goes
     on, from a key frame before the damage. So the pictures, and the number counted as lost, hardly
-    depend on the number of threads.
+    depend on the number of threads. What can be read only once (a FIFO) has a single thread.
 
     Parameters
     ----------
@@ -42,17 +43,20 @@ class Decoder:
 
     def __init__(self, path: Path, *, threads: int | None, frame_rate: float) -> None:
         self._open = partial(_open, path, frame_rate)
-        self.container, self.stream = self._open(threads or 0)
+        opens_once = is_pipe(path)
+        self.container, self.stream = self._open(1 if opens_once else threads or 0)
         self._opened = [self.container]
         self._context = self.stream.codec_context
         # The packets from the last key frame that was shown on, and the times shown since then.
-        self._recent: list[Packet[Stream]] | None = []
+        self._recent: list[Packet[Stream]] | None = None if opens_once else []
         self._shown: list[int | None] = []
         # In Matroska, damage shows only as a hole between the packets of all streams.
         self._all_streams = "matroska" in self.container.format.name
-        for other in self.container.streams:
-            if other is not self.stream and not self._all_streams:
-                other.discard = Discard.all
+        self.restarts = 0  # of the clock
+        if not self._all_streams and not restarts_clock(self.container):
+            for other in self.container.streams:
+                if other is not self.stream:
+                    other.discard = Discard.all
         paired = self._context.name not in _WITH_HIDDEN_PACKETS
         self.losses = Losses(period_of(self.stream), paired=paired)
 
@@ -80,12 +84,21 @@ class Decoder:
                 yield packet
 
     def _read(self) -> "Iterator[Packet[Stream]]":
-        streams = self.container.streams if self._all_streams else [self.stream]
-        for packet in packets(self.container, *streams, on_error=self.losses.fail_to_read):
+        others = tuple(self.container.streams) if self._all_streams else ()
+        for packet in continuous_packets(
+            self.container,
+            self.stream,
+            *others,
+            on_error=self.losses.fail_to_read,
+            on_restart=self._count_restart,
+        ):
             if self._all_streams and packet.pos is not None:
                 self.losses.pass_bytes(packet.pos, packet.size)
             if packet.stream.index == self.stream.index:
                 yield packet
+
+    def _count_restart(self) -> None:
+        self.restarts += 1
 
     def _decode(self, packet: "Packet[Stream] | None") -> Iterable[av.VideoFrame]:
         """Return the pictures that the decoder has ready; for None, all that are left."""

@@ -1,5 +1,6 @@
 """Open a video file, and read its packets in spite of damage."""
 
+import re
 from collections.abc import Callable, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -10,6 +11,7 @@ from av.packet import Packet
 from av.stream import Stream
 
 from vdet.errors import VideoError
+from vdet.media.images import PICTURE_SUFFIXES
 from vdet.media.mp4_index import check_mp4_index
 from vdet.media.numbered import find_sequence
 
@@ -19,6 +21,7 @@ MAX_PIXELS = 8192 * 4608
 MAX_SIDE = 16_384
 """Pixels; H.264 cannot be written larger."""
 
+_ADDRESS = re.compile(r"[a-z][a-z0-9+.-]+:/", re.IGNORECASE)  # "rtsp://…" as a path
 _MAX_FAILURES = 100  # in a row; a file with nothing but errors must end too
 
 # Formats that contain their pictures. Not among them are formats that name other files or addresses
@@ -32,7 +35,7 @@ _FORMATS = (
 
 
 def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
-    """Open a video file, or numbered pictures (`img_%04d.png`), for reading.
+    """Open a video file, or numbered pictures (`img_%04d.png`, or a folder), for reading.
 
     Parameters
     ----------
@@ -42,10 +45,10 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
     Raises
     ------
     VideoError
-        There is no such file, it cannot be read, or it is not a video; a picture is missing.
+        There is no such file, it cannot be read, it is not a video, or an address; a picture is
+        missing.
     """
-    if path.is_dir():
-        raise VideoError(f"{path}: is a folder; give the name of a video file")
+    refuse_stream(path)
     # "a:b.mp4" would be taken for a protocol; an absolute name is not.
     name, kind, options = str(path.absolute()), None, {"format_whitelist": ",".join(_FORMATS)}
     if sequence := find_sequence(path):
@@ -57,12 +60,13 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
             "start_number_range": "1",
         }
     else:
+        _check_exists(path)
         check_mp4_index(path)
+        if _is_raw_mjpeg(path):
+            kind = "mjpeg"  # FFmpeg may take it for a pipe of pictures, which is not read
     try:
         options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
-    except av.FileNotFoundError as error:
-        raise VideoError(f"{path}: there is no such file; check the name") from error
     except av.PermissionError as error:
         raise VideoError(f"{path}: may not be read; check its permissions") from error
     except av.error.MemoryError as error:
@@ -72,6 +76,42 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
             f"{path}: is not a video, or one that was cut off while it was recorded "
             f"({error.strerror}); give a file that plays"
         ) from error
+
+
+def refuse_stream(path: Path) -> None:
+    """Refuse what is no file: an address, or ``-``. Raises `VideoError`."""
+    if path.exists():
+        return
+    if _ADDRESS.match(str(path)):
+        raise VideoError(f"{path}: streams are not read; record it into a file first")
+    if path == Path("-"):
+        raise VideoError("-: standard input is not read; give the name of a file")
+
+
+def _check_exists(path: Path) -> None:
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError) as error:
+        hint = ", or give numbered pictures as img_%04d.png" if "%" in path.name else ""
+        raise VideoError(f"{path}: there is no such file; check the name{hint}") from error
+    except OSError:  # it is refused where it is opened
+        return
+
+
+def is_pipe(path: Path) -> bool:
+    """Return whether what is read from `path` can be read only once, as from a FIFO."""
+    return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def _is_raw_mjpeg(path: Path) -> bool:
+    """Return whether a file begins with a JPEG picture, and is not named as a single one."""
+    if not path.is_file() or path.suffix.lower() in PICTURE_SUFFIXES:
+        return False
+    try:
+        with path.open("rb") as file:
+            return file.read(3) == b"\xff\xd8\xff"
+    except OSError:  # it is refused where it is opened
+        return False
 
 
 def packets(

@@ -32,10 +32,11 @@ class VideoReader:
     dropped: only so are the indices exact in every file.
 
     The first stream of moving pictures is read. Frames are turned upright. A frame of another size
-    than the first is scaled to it. A time that is missing, or not later than the one before, is
-    guessed from the rate. Damaged packets are skipped. At the end, one warning (logger "vdet") says
-    how many frames were lost or damaged, whether the file ends before its declared end, whether
-    otherwise regular times have gaps, and which frames were scaled.
+    than the first is scaled to it. Where the clock of a recording restarts, its parts follow one
+    another. A time that is missing, or not later than the one before, is guessed from the rate.
+    Damaged packets are skipped. At the end, one warning (logger "vdet") says how many frames were
+    lost or damaged, whether the file ends before its declared end, whether otherwise regular times
+    have gaps, how often the clock restarts, and which frames were scaled.
 
     Parameters
     ----------
@@ -163,7 +164,9 @@ class VideoReader:
     def _check_length(self, frames: int, duration: Fraction) -> None:
         """Note a file that ends earlier than it declares."""
         stated = stated_duration(self._decoder.stream, self.info.start)
-        if stated is None or stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
+        if stated is None or self._decoder.restarts:  # it is then that of the last part
+            return
+        if stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
             return
         missing = round((stated - duration) * self.info.rate)
         if not self._decoder.losses.end(missing, self._decoder.container.size):
@@ -179,10 +182,14 @@ class VideoReader:
                 f"{self.info.path}: {self._faults[0]}, more than input.max_damaged "
                 f"({self._tolerated:g}) allows; raise it to take what is left"
             )
-        skipped = self._decoder.losses.skipped
+        restarts = self._decoder.restarts
+        skipped = max(0, self._decoder.losses.skipped - restarts)  # sound may outlast the pictures
         if not damaged and skipped > _TOLERANCE * total:
             share = f"{skipped} of {total + skipped}"
             self._faults.append(f"times jump as if {share} frames were missing")
+        if restarts:
+            times = "once" if restarts == 1 else f"{restarts} times"
+            self._faults.append(f"its clock restarts {times}; the parts follow one another")
         if self._scaled:
             sizes = ", ".join(f"{width}×{height}" for width, height in sorted(self._scaled))
             self._faults.append(

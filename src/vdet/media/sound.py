@@ -15,6 +15,8 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 
 from vdet.media.demux import open_input, packets
+from vdet.media.probe import picture_stream
+from vdet.media.restarts import continuous_packets, restarts_clock
 
 _log = logging.getLogger("vdet")
 
@@ -40,10 +42,11 @@ class SoundCopy:
     def __init__(self, source: Path, target: OutputContainer, origin: Fraction) -> None:
         self._path = source
         self._target = target
-        self._damaged = 0
+        self._damaged = self._untimed = 0
         self._origin = origin
         self._source = open_input(source)
         try:
+            self._pictures = picture_stream(self._source, source)
             self._streams = self._add_streams()
         except BaseException:
             self._source.close()
@@ -64,6 +67,12 @@ class SoundCopy:
         """Close the source; warn of packets that could not be copied."""
         if self._damaged:
             _log.warning("%s: %d damaged sound packets left out", self._path, self._damaged)
+        if self._untimed:
+            _log.warning(
+                "%s: %d sound packets without a time of their own left out",
+                self._path,
+                self._untimed,
+            )
         self._packets.close()
         self._source.close()
 
@@ -74,7 +83,8 @@ class SoundCopy:
         held = _try_sounds(self._path, kind)
         for stream in self._source.streams:
             if not isinstance(stream, AudioStream):
-                stream.discard = Discard.all
+                if stream.index != self._pictures.index or not restarts_clock(self._source):
+                    stream.discard = Discard.all
                 continue
             if not held.get(stream.index):
                 codec = stream.codec_context.name if stream.codec_context else "of unknown codec"
@@ -92,14 +102,17 @@ class SoundCopy:
             return
         wanted = [stream for stream in self._source.streams if stream.index in self._streams]
         last: dict[int, int] = {}
-        for packet in packets(self._source, *wanted, on_error=lambda: None):
+        for packet in continuous_packets(self._source, self._pictures, *wanted):
             index = packet.stream.index
+            if index not in self._streams:
+                continue
             if (
                 packet.pts is None
                 or packet.dts is None
                 or packet.dts <= last.get(index, packet.dts - 1)
             ):
-                continue  # muxers refuse times that do not increase
+                self._untimed += 1  # muxers refuse times that do not increase
+                continue
             last[index] = packet.dts
             shift = round(self._origin / packet.time_base)
             packet.pts -= shift

@@ -1,6 +1,7 @@
 """Write frames as H.264 into one container, next to the sound of their source."""
 
 import contextlib
+import logging
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -11,11 +12,13 @@ import av
 import vdet
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
-from vdet.media.demux import open_input
+from vdet.media.demux import is_pipe, open_input
 from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
 from vdet.media.mp4_index import begins_like_mp4
 from vdet.media.pixels import to_i420
 from vdet.media.sound import SoundCopy
+
+_log = logging.getLogger("vdet")
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
@@ -160,7 +163,11 @@ class _Encoder:
         )
         self._container.metadata["comment"] = f"{_MARK} {vdet.__version__}"
         self._stream = self._add_picture(info, settings, threads)
-        self._sound = SoundCopy(info.path, self._container, origin) if info.has_sound else None
+        self._sound = None
+        if info.has_sound and is_pipe(info.path):
+            _log.warning("%s: its sound is left out: a pipe can be read only once", info.path)
+        elif info.has_sound:
+            self._sound = SoundCopy(info.path, self._container, origin)
 
     def write(self, frame: Frame) -> None:
         """Encode a frame, and copy the sound up to it."""

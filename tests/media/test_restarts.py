@@ -1,0 +1,134 @@
+"""Recordings whose clock restarts: all frames and all sound, on one continuous time line."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from vdet.config.schema import OutputSettings
+from vdet.media import VideoReader, VideoWriter
+
+Number = Callable[[NDArray[np.uint8]], int]
+Writer = Callable[..., Path]
+Warnings = Callable[[], list[str]]
+KINDS: dict[str, dict[str, Any]] = {
+    "ts": {"codec": "libx264", "sounds": ["aac"], "options": {"g": "10", "bf": "2"}},
+    "vob": {"codec": "mpeg2video", "sounds": ["mp2"], "options": {"g": "10", "bf": "2"}},
+}
+COUNT = 30
+PERIOD = Fraction(1, 25)
+SOUND = Fraction(27, 1000)  # at least the length of a packet
+
+
+def join(path: Path, *parts: Path) -> Path:
+    path.write_bytes(b"".join(part.read_bytes() for part in parts))
+    return path
+
+
+def copy(source: Path, read_number: Number) -> tuple[list[int], list[Fraction], Path]:
+    """Copy a clip; return the numbers of its frames, their times, and the copy."""
+    target = source.with_name("copy.mkv")
+    with (
+        VideoReader(source) as reader,
+        VideoWriter(target, reader.info, OutputSettings(preset="ultrafast")) as writer,
+    ):
+        frames = list(reader)
+        for frame in frames:
+            writer.write(frame)
+        assert reader.damaged == 0
+    numbers = [read_number(frame.image) for frame in frames]
+    return numbers, [frame.time - frames[0].time for frame in frames], target
+
+
+def sound(path: Path) -> list[tuple[Fraction, bytes]]:
+    with av.open(str(path)) as container:
+        found = [each for each in container.demux(container.streams.audio) if each.size]
+        header = 7 if path.suffix == ".ts" else 0  # of AAC packets
+    return [((each.pts or 0) * each.time_base, bytes(each)[header:]) for each in found]
+
+
+def part(folder: Path, write_clip: Writer, kind: str, begin: int = 0) -> Path:
+    name = f"{begin}.{kind}"
+    return write_clip(folder / name, count=COUNT, begin=Fraction(begin), **KINDS[kind])
+
+
+@pytest.mark.parametrize(
+    ("kind", "begins"),
+    [
+        ("ts", [0, 0]),
+        ("vob", [0, 0]),
+        ("ts", [0, 100, 0]),  # goes forth and back
+        ("ts", [1000, 0]),  # FFmpeg takes it for a clock of 33 bits that overflows
+    ],
+)
+def test_all_frames_and_all_sound_follow_one_another(
+    kind: str,
+    begins: list[int],
+    *,
+    tmp_path: Path,
+    write_clip: Writer,
+    read_number: Number,
+    warnings: Warnings,
+) -> None:
+    parts = [part(tmp_path, write_clip, kind, begin) for begin in begins]
+    source = join(tmp_path / f"joined.{kind}", *parts)
+    numbers, times, target = copy(source, read_number)
+    assert numbers == list(range(COUNT)) * len(parts)
+    steps = [later - earlier for earlier, later in pairwise(times)]
+    within = [step for number, step in enumerate(steps, start=1) if number % COUNT]
+    assert set(within) == {PERIOD}
+    assert all(PERIOD <= step <= PERIOD + 2 * SOUND for step in steps)
+
+    heard = sound(target)
+    expected = [data for each in parts for _, data in sound(each)]
+    first = expected.index(heard[0][1])  # mkv holds none from before the first frame
+    assert first <= 2
+    assert [data for _, data in heard] == expected[first:]
+    gaps = [later - earlier for (earlier, _), (later, _) in pairwise(heard)]
+    assert all(0 < gap <= SOUND + PERIOD for gap in gaps)
+    count = len(parts) - 1
+    often = "once" if count == 1 else f"{count} times"
+    assert warnings() == [f"{source}: its clock restarts {often}; the parts follow one another"]
+
+
+def test_picture_and_sound_of_each_part_stay_in_step(
+    tmp_path: Path, write_clip: Writer, read_number: Number
+) -> None:
+    clip = part(tmp_path, write_clip, "ts")
+    _, times, target = copy(join(tmp_path / "joined.ts", clip, clip), read_number)
+    alone = sound(clip)
+    with VideoReader(clip) as reader:
+        lead = alone[0][0] - reader.info.start
+    second = sound(target)[-len(alone) :]
+    assert float(second[0][0] - times[COUNT]) == pytest.approx(float(lead), abs=0.002)
+
+
+def test_a_pause_of_the_pictures_is_kept_while_the_sound_goes_on(
+    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+) -> None:
+    times = [Fraction(index, 25) + (12 if index >= 20 else 0) for index in range(COUNT)]
+    clip = write_clip(tmp_path / "pause.ts", times=times, **KINDS["ts"])
+    numbers, found, _ = copy(clip, read_number)
+    assert numbers == list(range(COUNT))
+    assert found == times
+    assert not any("clock" in warning for warning in warnings())
+
+
+def test_sound_without_times_of_its_own_is_left_out_with_a_warning(
+    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+) -> None:
+    clip = part(tmp_path, write_clip, "ts")
+    data = clip.read_bytes()
+    cells = [data[first : first + 188] for first in range(0, len(data), 188)]
+    heard = [cell for cell in cells if int.from_bytes(cell[1:3]) & 0x1FFF == 0x101]
+    repeated = tmp_path / "repeated.ts"
+    repeated.write_bytes(data + b"".join(heard[-9:]))  # the last sound once more
+    copy(repeated, read_number)
+    (warning,) = warnings()
+    assert "sound packets without a time of their own left out" in warning
