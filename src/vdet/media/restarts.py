@@ -106,21 +106,24 @@ class _Joined:
         self._places: dict[int, int] = {}  # the part of each stream of sound
 
     def __iter__(self) -> "Iterator[Packet[Stream]]":
-        for entry in self._entries:
+        for number, entry in enumerate(self._entries):
             self._ahead.append(entry)
-            if self._parts and len(self._ahead) >= _AHEAD:
-                break
+            # The first packets come at once, also from a pipe.
+            if self._parts and len(self._ahead) > min(number // 2, _AHEAD):
+                yield self._next()
         while self._ahead:
-            entry = self._ahead.popleft()
-            part = self._part_of(entry)
-            if part.offset is None:
-                self._align(part)
-            packet = entry.packet
-            if packet.is_corrupt and self._ends_part(entry):
-                packet = _without_flags(packet)
-            _shift(packet, part.offset or Fraction(0))
-            yield packet
-            self._ahead.extend(islice(self._entries, 1))
+            yield self._next()
+
+    def _next(self) -> "Packet[Stream]":
+        entry = self._ahead.popleft()
+        part = self._part_of(entry)
+        if part.offset is None:
+            self._align(part)
+        packet = entry.packet
+        if packet.is_corrupt and self._ends_part(entry):
+            packet = _without_flags(packet)
+        _shift(packet, part.offset or Fraction(0))
+        return packet
 
     def _enter(self, packet: "Packet[Stream]") -> _Entry:
         ticks = packet.pts if packet.dts is None else packet.dts
