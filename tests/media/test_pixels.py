@@ -30,12 +30,12 @@ def test_an_odd_side_grows_by_its_last_row_or_column() -> None:
 )
 def test_colours_are_the_same_after_encoding_and_decoding(color: tuple[int, int, int]) -> None:
     image = np.full((32, 48, 3), color, np.uint8)
-    assert np.abs(to_bgr(to_i420(image), 0).astype(int) - color).max() <= 3
+    assert np.abs(to_bgr(to_i420(image)).astype(int) - color).max() <= 3
 
 
 def test_the_image_of_a_bgr_picture_is_a_copy() -> None:
     picture = av.VideoFrame.from_ndarray(np.zeros((32, 64, 3), np.uint8), format="bgr24")
-    to_bgr(picture, 0)[:] = 255
+    to_bgr(picture)[:] = 255
     assert not picture.to_ndarray().any()
 
 

@@ -1,5 +1,6 @@
 """The video reader: parts of a file, damaged files, files that are no videos, and frame times."""
 
+import struct
 from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame, VideoReader
+from vdet.media.frame import ColorTags, Orientation
 from vdet.media.reader import Clock
 
 Image = NDArray[np.uint8]
@@ -119,8 +121,103 @@ def test_a_turned_clip_looks_as_opencv_shows_it(
     capture.release()
     with VideoReader(path) as reader:
         ours = next(iter(reader)).image
-        assert reader.info.rotation == rotation
+        assert reader.info.orientation == Orientation(rotation)
     assert np.abs(ours.astype(int) - other).mean() < 3
+
+
+def set_matrix(path: Path, a: float, b: float, c: float, d: float) -> Path:
+    """Set what becomes of x (a, b) and of y (c, d) in the track header of an MP4 file."""
+    data = bytearray(path.read_bytes())
+    place = data.index(b"tkhd") + 44
+    values = [round(value * 65_536) for value in (a, b, 0, c, d, 0, 0, 0)]
+    struct.pack_into(">9i", data, place, *values, 1 << 30)
+    path.write_bytes(data)
+    return path
+
+
+FLIP = np.array([[-1, 0], [0, 1]])
+
+
+@pytest.mark.parametrize("turns", range(4))
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_all_eight_orientations_are_upright(
+    turns: int, mirrored: bool, tmp_path: Path, write_clip: Writer
+) -> None:
+    path = write_clip(tmp_path / "clip.mp4", count=1)
+    with VideoReader(path) as reader:
+        stored = next(iter(reader)).image
+    quarter = np.linalg.matrix_power(np.array([[0, -1], [1, 0]]), turns)
+    matrix = FLIP @ quarter if mirrored else quarter
+    with VideoReader(set_matrix(path, *matrix.ravel() * 0.5)) as reader:
+        image = next(iter(reader)).image
+        assert reader.info.orientation == Orientation(turns * 90, mirrored)
+        assert image.shape == (reader.info.height, reader.info.width, 3)
+    expected = np.rot90(stored[:, ::-1] if mirrored else stored, turns)
+    np.testing.assert_array_equal(image, expected)
+
+
+@pytest.mark.parametrize("degrees", [45, 20])
+def test_a_matrix_that_is_no_quarter_turn_is_told(
+    degrees: int, tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+) -> None:
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    path = set_matrix(write_clip(tmp_path / "clip.mp4"), cosine, -sine, sine, cosine)
+    with VideoReader(path) as reader:
+        assert [read_number(frame.image) for frame in reader] == list(range(12))
+    assert warnings() == [f"{path}: its display matrix is no quarter turn; frames stay as stored"]
+
+
+def test_other_video_streams_are_told(
+    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
+) -> None:
+    source, path = write_clip(tmp_path / "front.mp4"), tmp_path / "both.mp4"
+    with av.open(str(source)) as front, av.open(str(path), "w") as target:
+        copies = [target.add_stream_from_template(front.streams.video[0]) for _ in range(2)]
+        for packet in front.demux(video=0):
+            for copy in copies if packet.size else []:
+                packet.stream = copy
+                target.mux(packet)
+    with VideoReader(path) as reader:
+        assert [read_number(frame.image) for frame in reader] == list(range(12))
+    assert warnings() == [f"{path}: has 2 video streams; only the first is used"]
+
+
+def write_hdr(path: Path, transfer: int, luma: int) -> Path:
+    """Write 10-bit grey frames with a transfer of BT.2100 and primaries of BT.2020."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=25)
+        assert isinstance(stream, av.VideoStream)
+        stream.width, stream.height, stream.pix_fmt = 160, 96, "yuv420p10le"
+        context = stream.codec_context
+        context.color_trc, context.color_primaries, context.colorspace = transfer, 9, 9
+        context.color_range = 1
+        planes = np.full((144, 160), 512, np.uint16)
+        planes[:96] = luma
+        frame = av.VideoFrame.from_ndarray(planes, format="yuv420p10le")
+        container.mux(stream.encode(frame) + stream.encode(None))
+    return path
+
+
+@pytest.mark.parametrize(("transfer", "name"), [(16, "PQ"), (18, "HLG")])
+@pytest.mark.parametrize("share", [0, 0.01, 0.18, 0.5])
+def test_hdr_is_read_as_standard_range_and_told(
+    transfer: int, name: str, share: float, *, tmp_path: Path, warnings: Warnings
+) -> None:
+    """`share` of the light of reference white, 203 cd/m², is shown as so much light."""
+    if name == "PQ":
+        power = (203 * share / 10_000) ** 0.1593017578125
+        signal = ((0.8359375 + 18.8515625 * power) / (1 + 18.6875 * power)) ** 78.84375
+    else:
+        scene = (0.203 * share) ** (1 / 1.2)
+        curved = 0.17883277 * np.log(max(12 * scene - 0.28466892, 1e-9)) + 0.55991073
+        signal = np.sqrt(3 * scene) if scene <= 1 / 12 else curved
+    path = write_hdr(tmp_path / "hdr.mkv", transfer, round(64 + 876 * signal))
+    with VideoReader(path) as reader:
+        (frame,) = reader
+        assert reader.info.color == ColorTags(1, 1, 1)
+    expected = 255 * share ** (1 / 2.4)
+    assert np.abs(frame.image - expected).max() < 5
+    assert warnings() == [f"{path}: is HDR ({name}) and is read as standard range (BT.709)"]
 
 
 def test_raw_motion_jpeg_is_read(

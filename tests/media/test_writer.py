@@ -1,5 +1,6 @@
 """The video writer: what it writes, and that a staged file appears complete or not at all."""
 
+import re
 import resource
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -16,6 +17,7 @@ from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
 from vdet.media import ColorTags, Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.media.frame import Tags
 from vdet.media.images import Image
 from vdet.media.writer import may_replace_video
 
@@ -158,7 +160,7 @@ class TestFile:
         [
             (ColorTags(), ColorTags()),
             (ColorTags(1, 1, 1), ColorTags(1, 1, 6)),
-            (ColorTags(9, 16, 9), ColorTags(9, 16, 6)),
+            (ColorTags(9, 14, 9), ColorTags(9, 14, 6)),
         ],
     )
     def test_colours_are_tagged_if_the_source_is(
@@ -169,6 +171,29 @@ class TestFile:
             assert reader.info.color == written
             corner = next(iter(reader)).image[60:90, 10:70]
         assert np.abs(corner.mean(axis=(0, 1)) - (40, 30, 210)).max() < 5
+
+    TAGS = Tags("2020-01-02T03:04:05.000000Z", "+48.1000-011.5000/", "a drive", "01:02:03:04")
+
+    @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
+    def test_what_the_source_says_of_the_recording_is_kept(
+        self, suffix: str, frames: list[Frame], tmp_path: Path
+    ) -> None:
+        info = replace(INFO, start=Fraction(7), tags=self.TAGS)
+        with VideoReader(write(tmp_path / f"out{suffix}", frames, info)) as reader:
+            found = reader.info.tags
+        assert found.location is not None
+        location = [float(each) for each in re.findall(r"[+-][\d.]+", found.location)]
+        assert location == [48.1, -11.5]
+        assert replace(found, location=None) == replace(self.TAGS, location=None)
+
+    def test_the_time_code_of_the_first_frame_is_left_out_of_a_part_with_a_warning(
+        self, frames: list[Frame], tmp_path: Path, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        info = replace(INFO, start=Fraction(6), tags=self.TAGS)
+        with VideoReader(write(tmp_path / "out.mp4", frames, info)) as reader:
+            assert reader.info.tags.timecode is None
+            assert reader.info.tags.title == "a drive"
+        assert "its time code is left out: it is that of the first frame" in caplog.text
 
     def test_a_file_may_be_written_without_staging(
         self, frames: list[Frame], tmp_path: Path

@@ -15,6 +15,7 @@ from pipeline.red_runs import outputs, read, run_red, with_search
 from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, road
 from vdet.config.schema import WindowSettings
 from vdet.media import VideoReader
+from vdet.media.frame import Orientation
 from vdet.pipeline.loop import VideoJob
 
 TONE_RATE = 48_000
@@ -119,7 +120,7 @@ class TestFidelity:
         summary = run_red(job, with_search(SETTINGS, probability=1.0))
         assert summary.frames == 5
         with VideoReader(tmp_path / "out.mp4") as reader:
-            assert reader.info.rotation == 0
+            assert reader.info.orientation == Orientation()
             written = [frame.image for frame in reader]
         turned = np.rot90(road(car_at(2)), rotation // 90)
         assert written[2].shape == turned.shape

@@ -17,6 +17,6 @@ class OutputSettings(Section):
         Field("superfast", description="speed of the encoder; slower presets write smaller files")
     )
     crf: int = Field(
-        20, ge=0, le=51, description="quality of the video: 0 is the best, 51 the worst"
+        25, ge=0, le=51, description="quality of the video: 0 is the best, 51 the worst"
     )
     scores: bool = Field(False, description="write the score of each vehicle into its label")

@@ -25,11 +25,35 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class ColorTags:
-    """How the colours of a video are coded, as the file says, in codes of ITU-T H.273."""
+    """How the colours of a video are coded, in codes of ITU-T H.273."""
 
     primaries: int = UNSPECIFIED
     transfer: int = UNSPECIFIED
     matrix: int = UNSPECIFIED
+
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """How a coded picture becomes upright: mirrored left to right, or not, and then turned.
+
+    `rotation` is counter-clockwise: 0, 90, 180 or 270 degrees.
+    """
+
+    rotation: int = 0
+    mirrored: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Tags:
+    """What a file says of the recording, as it says it; None where it says nothing.
+
+    `timecode` is that of the first frame.
+    """
+
+    creation_time: str | None = None
+    location: str | None = None
+    title: str | None = None
+    timecode: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +63,9 @@ class VideoInfo:
     `width` and `height` are of the upright picture in pixels. `rate` is the average in frames per
     second (25 where the file gives none), `time_base` the unit of the file's times in seconds,
     `start` the time of the first frame. `frames` and `duration` (seconds) are what the file
-    declares, or an estimate: not exact, None where unknown. `rotation` is how many degrees
-    counter-clockwise the coded picture was turned to stand upright: 0, 90, 180 or 270.
-    `pixel_aspect` is the width of an upright pixel over its height.
+    declares, or an estimate: not exact, None where unknown. `orientation` says how the coded
+    picture was turned to stand upright. `pixel_aspect` is the width of an upright pixel over its
+    height. `color` is of the images: where the file is HDR (PQ or HLG), they are BT.709.
     """
 
     path: Path
@@ -52,7 +76,8 @@ class VideoInfo:
     start: Fraction = Fraction(0)
     frames: int | None = None
     duration: Fraction | None = None
-    rotation: int = 0
+    orientation: Orientation = Orientation()
     pixel_aspect: Fraction = Fraction(1)
     color: ColorTags = ColorTags()
     has_sound: bool = False
+    tags: Tags = Tags()

@@ -1,9 +1,13 @@
 """Convert decoded pictures to upright BGR images, and BGR images to pictures to be encoded."""
 
+import math
+
 import av
 import cv2
 import numpy as np
+import numpy.typing as npt
 
+from vdet.media.frame import Orientation
 from vdet.media.images import Image
 
 _TURNS = {
@@ -11,24 +15,51 @@ _TURNS = {
     180: cv2.ROTATE_180,
     270: cv2.ROTATE_90_CLOCKWISE,
 }
+_COSINES = {0: 1, 90: 0, 180: -1, 270: 0}
+_SLANT = 0.1  # as much of a matrix may differ from a quarter turn; that is 6°
 
 
-def quarter_turns(picture: av.VideoFrame) -> int:
-    """Return the rotation of the display matrix: 0, 90, 180 or 270° counter-clockwise."""
-    return round(picture.rotation / 90) * 90 % 360
+def orientation(picture: av.VideoFrame) -> Orientation | None:
+    """Return what the display matrix asks for; None if that is no quarter turn."""
+    matrix = _display_matrix(picture)
+    if matrix is None:
+        return Orientation()
+    mirrored = bool(np.linalg.det(matrix) < 0)
+    if mirrored:
+        matrix = matrix * [[-1], [1]]  # of x
+    degrees = round(math.degrees(math.atan2(-matrix[0, 1], matrix[0, 0])) / 90) * 90 % 360
+    cosine, sine = _COSINES[degrees], _COSINES[(degrees - 90) % 360]
+    scale = math.sqrt(abs(np.linalg.det(matrix)))
+    if np.abs(matrix - scale * np.array([[cosine, -sine], [sine, cosine]])).max() > _SLANT * scale:
+        return None
+    return Orientation(degrees, mirrored)
 
 
-def to_bgr(picture: av.VideoFrame, rotation: int) -> Image:
-    """Return `picture` turned by `rotation` degrees counter-clockwise, BGR uint8, (H, W, 3).
+def _display_matrix(picture: av.VideoFrame) -> npt.NDArray[np.float64] | None:
+    """Return what x and y become, as rows, of the display matrix (ISO/IEC 14496-12, 6.2.2)."""
+    if "DISPLAYMATRIX" not in picture.side_data:
+        return None
+    data = bytes(picture.side_data["DISPLAYMATRIX"])
+    return np.frombuffer(data, np.int32).reshape(3, 3)[:2, :2] / 65_536
+
+
+def to_bgr(picture: av.VideoFrame) -> Image:
+    """Return `picture` as coded, BGR uint8, (H, W, 3).
 
     Colour matrix and range are those that the picture names; else BT.601 and limited.
     """
     image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), dtype=np.uint8)
-    if rotation:
-        return cv2.rotate(image, _TURNS[rotation]).astype(np.uint8, copy=False)
     if picture.format.name == "bgr24":
         return image.copy()  # it shares the memory of the decoder
     return np.ascontiguousarray(image)
+
+
+def upright(image: Image, orientation: Orientation) -> Image:
+    """Return `image` as it is to be seen."""
+    turned: cv2.typing.MatLike = cv2.flip(image, 1) if orientation.mirrored else image
+    if orientation.rotation:
+        turned = cv2.rotate(turned, _TURNS[orientation.rotation])
+    return turned.astype(np.uint8, copy=False)
 
 
 def resized(image: Image, width: int, height: int) -> Image:

@@ -1,19 +1,23 @@
 """What a video file declares: its size, rate, length, colours."""
 
+from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
 
 import av
 from av.container import InputContainer
-from av.stream import Disposition
+from av.stream import Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
-from vdet.media.frame import ColorTags, VideoInfo
-from vdet.media.pixels import quarter_turns
+from vdet.media.frame import ColorTags, Orientation, Tags, VideoInfo
+from vdet.media.hdr import HDR_TRANSFERS
+from vdet.media.pixels import orientation
 
 _DEFAULT_RATE = Fraction(25)
+_BT709 = ColorTags(1, 1, 1)
+_APPLE_LOCATION = "com.apple.quicktime.location.iso6709"
 _MAX_TERM = 1_000_000  # of a rate as a fraction; the encoder has 32-bit integers
 
 
@@ -25,13 +29,17 @@ def picture_stream(container: InputContainer, path: Path) -> VideoStream:
     VideoError
         There is none, or no decoder for it.
     """
-    stills = Disposition.attached_pic | Disposition.timed_thumbnails
-    for stream in container.streams.video:
-        if not stream.disposition & stills:
-            if stream.codec_context is None:
-                raise VideoError(f"{path}: its codec is not known here; convert it to H.264 first")
-            return stream
+    for stream in moving_streams(container):
+        if stream.codec_context is None:
+            raise VideoError(f"{path}: its codec is not known here; convert it to H.264 first")
+        return stream
     raise VideoError(f"{path}: has no moving pictures; give a video file")
+
+
+def moving_streams(container: InputContainer) -> list[VideoStream]:
+    """Return the streams of moving pictures: not those of a cover or of thumbnails."""
+    stills = Disposition.attached_pic | Disposition.timed_thumbnails
+    return [stream for stream in container.streams.video if not stream.disposition & stills]
 
 
 def check_size(path: Path, width: int, height: int) -> None:
@@ -51,9 +59,9 @@ def describe(
     rate = _first_sensible(stream.average_rate, stream.guessed_rate)
     start = (first.pts or 0) * time_base
     duration = stated_duration(stream, start) or _longest(container)
-    rotation = quarter_turns(first)
+    turn = orientation(first) or Orientation()
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
-    if rotation in (90, 270):
+    if turn.rotation in (90, 270):
         width, height, aspect = height, width, 1 / aspect
     return VideoInfo(
         path=path,
@@ -64,11 +72,28 @@ def describe(
         start=start,
         frames=stream.frames or (round(duration * rate) if duration else None),
         duration=duration,
-        rotation=rotation,
+        orientation=turn,
         pixel_aspect=aspect,
-        color=ColorTags(first.color_primaries, first.color_trc, first.colorspace),
+        color=_BT709 if first.color_trc in HDR_TRANSFERS else _colors(first),
         has_sound=bool(container.streams.audio),
+        tags=_tags(container, stream),
     )
+
+
+def _colors(picture: av.VideoFrame) -> ColorTags:
+    return ColorTags(picture.color_primaries, picture.color_trc, picture.colorspace)
+
+
+def _tags(container: InputContainer, stream: VideoStream) -> Tags:
+    """Return what a file says of the recording, in the words of any container."""
+    found: dict[str, str] = {}
+    streams: list[Stream] = [stream, *container.streams.data]
+    for metadata in (container.metadata, *(each.metadata for each in streams)):
+        for name, value in metadata.items():
+            found.setdefault(name.lower(), value)
+    found.setdefault("location", found.get(_APPLE_LOCATION, ""))
+    names = (field.name for field in fields(Tags))
+    return Tags(**{name: found.get(name) or None for name in names})
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:

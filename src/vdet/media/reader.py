@@ -15,9 +15,10 @@ from vdet.errors import VideoError
 from vdet.media.decoder import Decoder
 from vdet.media.demux import MAX_PIXELS
 from vdet.media.frame import Frame, VideoInfo
+from vdet.media.hdr import HDR_TRANSFERS, StandardRange
 from vdet.media.images import Image
-from vdet.media.pixels import resized, to_bgr
-from vdet.media.probe import check_size, describe, stated_duration
+from vdet.media.pixels import orientation, resized, to_bgr, upright
+from vdet.media.probe import check_size, describe, moving_streams, stated_duration
 
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
@@ -31,12 +32,14 @@ class VideoReader:
     Seconds count from the file's first frame, as in a player. Frames before `start` are decoded and
     dropped: only so are the indices exact in every file.
 
-    The first stream of moving pictures is read. Frames are turned upright. A frame of another size
+    The first stream of moving pictures is read. Frames are turned upright, and mirrored where the
+    file says so. HDR (PQ or HLG) is converted to BT.709. A frame of another size
     than the first is scaled to it. Where the clock of a recording restarts, its parts follow one
     another. A time that is missing, or not later than the one before, is guessed from the rate.
     Damaged packets are skipped. At the end, one warning (logger "vdet") says how many frames were
     lost or damaged, whether the file ends before its declared end, whether otherwise regular times
-    have gaps, how often the clock restarts, and which frames were scaled.
+    have gaps, how often the clock restarts, which frames were scaled, and what of the file was not
+    used (other video streams, HDR, a display matrix that is no quarter turn).
 
     Parameters
     ----------
@@ -88,9 +91,12 @@ class VideoReader:
             self.info: VideoInfo = describe(
                 path, self._decoder.container, self._decoder.stream, first
             )
+            hdr = first.color_trc in HDR_TRANSFERS
+            self._standard_range = StandardRange(first.color_trc) if hdr else None
         except BaseException:
             self._decoder.close()
             raise
+        self._note_what_is_left_out(first)
         self._frames = self._deliver(first)
 
     @property
@@ -123,6 +129,16 @@ class VideoReader:
         self._frames.close()
         self._decoder.close()
 
+    def _note_what_is_left_out(self, first: av.VideoFrame) -> None:
+        if orientation(first) is None:
+            self._faults.append("its display matrix is no quarter turn; frames stay as stored")
+        if self._standard_range:
+            name = HDR_TRANSFERS[first.color_trc]
+            self._faults.append(f"is HDR ({name}) and is read as standard range (BT.709)")
+        streams = len(moving_streams(self._decoder.container))
+        if streams > 1:
+            self._faults.append(f"has {streams} video streams; only the first is used")
+
     def _deliver(self, first: av.VideoFrame) -> Generator[Frame, None, None]:
         try:
             yield from itertools.islice(self._selected(first), self._limit)
@@ -141,12 +157,15 @@ class VideoReader:
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
-            image = to_bgr(picture, info.rotation)
+            image = to_bgr(picture)
         except (av.FFmpegError, ValueError) as error:
             coding = picture.format.name
             raise VideoError(
                 f"{info.path}: its pixels ({coding}) cannot be converted; convert it to H.264 first"
             ) from error
+        if self._standard_range:
+            image = self._standard_range.convert(image)
+        image = upright(image, info.orientation)
         height, width = image.shape[:2]
         if (width, height) != (info.width, info.height):
             self._scaled.add((width, height))

@@ -3,6 +3,7 @@
 import contextlib
 import logging
 from collections.abc import Iterator
+from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -54,7 +55,8 @@ class VideoWriter:
     (mkv: to the millisecond), the last for one period of the average rate. Sides of odd length grow
     by one pixel, the last row or column repeated: 4:2:0 needs even ones. Colours are coded by
     BT.601, limited range, and tagged so if the source was tagged at all. Sound packets are copied,
-    not encoded again.
+    not encoded again. Creation time, location, title and time code are kept; the time code only if
+    the first frame of the source is written.
 
     Parameters
     ----------
@@ -163,6 +165,7 @@ class _Encoder:
         )
         self._container.metadata["comment"] = f"{_MARK} {vdet.__version__}"
         self._stream = self._add_picture(info, settings, threads)
+        self._container.metadata.update(_tags(info, origin))
         self._sound = None
         if info.has_sound and is_pipe(info.path):
             _log.warning("%s: its sound is left out: a pipe can be read only once", info.path)
@@ -216,3 +219,12 @@ class _Encoder:
             context.colorspace = _BT601
             context.color_range = _LIMITED
         return stream
+
+
+def _tags(info: VideoInfo, origin: Fraction) -> dict[str, str]:
+    """Return what the source says of the recording, if that is true of a video from `origin` on."""
+    tags = {name: value for name, value in asdict(info.tags).items() if value}
+    if "timecode" in tags and origin != info.start:
+        del tags["timecode"]
+        _log.warning("%s: its time code is left out: it is that of the first frame", info.path)
+    return tags
