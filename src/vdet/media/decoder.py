@@ -1,5 +1,6 @@
 """Decode a picture stream from end to end, in spite of damage."""
 
+import contextlib
 from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import chain, dropwhile, pairwise
@@ -15,6 +16,7 @@ from vdet.media.demux import MAX_PIXELS, is_pipe, open_input
 from vdet.media.losses import Losses
 from vdet.media.probe import check_size, period_of, picture_stream
 from vdet.media.restarts import continuous_packets, restarts_clock
+from vdet.media.seek import Entry, find_entry
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
 _MAX_RECENT = 500  # packets; key frames further apart than that are rare
@@ -34,6 +36,8 @@ class Decoder:
         Of the decoder; None lets it choose.
     frame_rate
         Of numbered pictures, per second.
+    entry
+        Where to begin; None for the first picture.
 
     Raises
     ------
@@ -41,9 +45,12 @@ class Decoder:
         The file cannot be read, has no moving pictures, or its frames are too large.
     """
 
-    def __init__(self, path: Path, *, threads: int | None, frame_rate: float) -> None:
+    def __init__(
+        self, path: Path, *, threads: int | None, frame_rate: float, entry: Entry | None = None
+    ) -> None:
         self._open = partial(_open, path, frame_rate)
-        opens_once = is_pipe(path)
+        self._opens_once = opens_once = is_pipe(path)
+        self._entry = entry
         self.container, self.stream = self._open(1 if opens_once else threads or 0)
         self._opened = [self.container]
         self._context = self.stream.codec_context
@@ -53,10 +60,10 @@ class Decoder:
         # In Matroska, damage shows only as a hole between the packets of all streams.
         self._all_streams = "matroska" in self.container.format.name
         self.restarts = 0  # of the clock
-        if not self._all_streams and not restarts_clock(self.container):
-            for other in self.container.streams:
-                if other is not self.stream:
-                    other.discard = Discard.all
+        if not self._all_streams:
+            _discard_others(self.container, self.stream)
+        if entry and entry.target is not None:
+            self.container.seek(entry.target, stream=self.stream)
         paired = self._context.name not in _WITH_HIDDEN_PACKETS
         self.losses = Losses(period_of(self.stream), paired=paired)
 
@@ -67,6 +74,18 @@ class Decoder:
                 if self._is_new(picture) and self.losses.receive(picture):
                     yield picture
         self.losses.finish()
+
+    def find_entry(self, first: av.VideoFrame, time: int) -> Entry | None:
+        """Return where a decoder may begin that needs no picture before `time`.
+
+        `first` is the first picture, and `time` is in units of the time base. None: at the first.
+        """
+        if self._opens_once:
+            return None
+        container, stream = self._open(1)
+        with contextlib.closing(container):
+            _discard_others(container, stream)
+            return find_entry(container, stream, first, time)
 
     def close(self) -> None:
         """Close the file."""
@@ -84,6 +103,7 @@ class Decoder:
                 yield packet
 
     def _read(self) -> "Iterator[Packet[Stream]]":
+        skipped = self._entry.packets if self._entry else 0
         others = tuple(self.container.streams) if self._all_streams else ()
         for packet in continuous_packets(
             self.container,
@@ -92,10 +112,18 @@ class Decoder:
             on_error=self.losses.fail_to_read,
             on_restart=self._count_restart,
         ):
+            is_picture = packet.stream_index == self.stream.index
+            if skipped:
+                skipped -= is_picture
+                continue
             if self._all_streams and packet.pos is not None:
                 self.losses.pass_bytes(packet.pos, packet.size)
-            if packet.stream.index == self.stream.index:
+            if is_picture and not self._needs_older_ones(packet):
                 yield packet
+
+    def _needs_older_ones(self, packet: "Packet[Stream]") -> bool:
+        """Return whether a picture is shown before the key frame at which decoding began."""
+        return bool(self._entry and packet.pts is not None and packet.pts < self._entry.pts)
 
     def _count_restart(self) -> None:
         self.restarts += 1
@@ -156,6 +184,14 @@ class Decoder:
 
 def _is_before(key: "Packet[Stream]", packet: "Packet[Stream]") -> bool:
     return key.pts is not None and packet.pts is not None and packet.pts < key.pts
+
+
+def _discard_others(container: InputContainer, stream: VideoStream) -> None:
+    """Leave out what is not read; where the clock may restart, the sound is read too."""
+    if not restarts_clock(container):
+        for other in container.streams:
+            if other is not stream:
+                other.discard = Discard.all
 
 
 def _open(path: Path, frame_rate: float, threads: int) -> tuple[InputContainer, VideoStream]:

@@ -1,6 +1,8 @@
 """Convert decoded pictures to upright BGR images, and BGR images to pictures to be encoded."""
 
 import math
+from collections.abc import Mapping
+from typing import cast
 
 import av
 import cv2
@@ -37,10 +39,10 @@ def orientation(picture: av.VideoFrame) -> Orientation | None:
 
 def _display_matrix(picture: av.VideoFrame) -> npt.NDArray[np.float64] | None:
     """Return what x and y become, as rows, of the display matrix (ISO/IEC 14496-12, 6.2.2)."""
-    if "DISPLAYMATRIX" not in picture.side_data:
+    side_data = cast(Mapping[str, bytes], picture.side_data)  # it is not typed as such
+    if "DISPLAYMATRIX" not in side_data:
         return None
-    data = bytes(picture.side_data["DISPLAYMATRIX"])
-    return np.frombuffer(data, np.int32).reshape(3, 3)[:2, :2] / 65_536
+    return np.frombuffer(bytes(side_data["DISPLAYMATRIX"]), np.int32).reshape(3, 3)[:2, :2] / 65_536
 
 
 def to_bgr(picture: av.VideoFrame) -> Image:

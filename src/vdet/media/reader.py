@@ -3,8 +3,9 @@
 import itertools
 import logging
 import math
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -19,9 +20,11 @@ from vdet.media.hdr import HDR_TRANSFERS, StandardRange
 from vdet.media.images import Image
 from vdet.media.pixels import orientation, resized, to_bgr, upright
 from vdet.media.probe import check_size, describe, moving_streams, stated_duration
+from vdet.media.restarts import restarts_clock
 
 _log = logging.getLogger("vdet")
 _DEFAULTS = InputSettings()
+_MAX_TICKS = 2**62
 _TOLERANCE = Fraction(1, 100)  # share of its duration, or frames, that a whole file may lack
 
 
@@ -29,8 +32,10 @@ class VideoReader:
     """The frames of a video file, in order; a context manager. They can be read once.
 
     It gives the frames with ``start <= time - info.start < end``, and at most `frames` of them.
-    Seconds count from the file's first frame, as in a player. Frames before `start` are decoded and
-    dropped: only so are the indices exact in every file.
+    Seconds count from the file's first frame, as in a player. Decoding begins at the key frame
+    before `start`, where the frames before it can be counted (see `vdet.media.seek`). Elsewhere all
+    frames are decoded, and those before `start` dropped. Indices, times and images do not depend on
+    it.
 
     The first stream of moving pictures is read. Frames are turned upright, and mirrored where the
     file says so. HDR (PQ or HLG) is converted to BT.709. A frame of another size
@@ -77,8 +82,10 @@ class VideoReader:
         self._limit = frames
         self._tolerated = settings.max_damaged
         self._faults: list[str] = []
+        self._length: Fraction | None = None
         self._scaled: set[tuple[int, int]] = set()
-        self._decoder = Decoder(path, threads=threads, frame_rate=settings.frame_rate)
+        open_decoder = partial(Decoder, path, threads=threads, frame_rate=settings.frame_rate)
+        self._decoder = open_decoder()
         try:
             self._pictures = self._decoder.pictures()
             first = next(self._pictures, None)
@@ -93,16 +100,26 @@ class VideoReader:
             )
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
+            self._note_what_is_left_out(first)
+            self._frames = self._deliver(*self._begin(first, open_decoder))
         except BaseException:
             self._decoder.close()
             raise
-        self._note_what_is_left_out(first)
-        self._frames = self._deliver(first)
 
     @property
     def damaged(self) -> int:
         """Frames lost, or shown with errors, so far."""
         return self._decoder.losses.damaged
+
+    @property
+    def length(self) -> Fraction | None:
+        """Seconds from the first frame to the end of the last; None where that is not known.
+
+        Before all frames were read it is what the file declares.
+        """
+        if self._length is None and not restarts_clock(self._decoder.container):
+            return stated_duration(self._decoder.stream, self.info.start)
+        return self._length
 
     @property
     def expected(self) -> int | None:
@@ -139,15 +156,33 @@ class VideoReader:
         if streams > 1:
             self._faults.append(f"has {streams} video streams; only the first is used")
 
-    def _deliver(self, first: av.VideoFrame) -> Generator[Frame, None, None]:
+    def _begin(
+        self, first: av.VideoFrame, open_decoder: Callable[..., Decoder]
+    ) -> tuple[av.VideoFrame, int]:
+        """Return the picture with which decoding begins, and how many are shown before it."""
+        time = min(math.floor((self.info.start + self._start) / self.info.time_base), _MAX_TICKS)
+        entry = self._decoder.find_entry(first, time) if self._start else None
+        if entry is None:
+            return first, 0
+        decoder: Decoder = open_decoder(entry=entry)
+        pictures = decoder.pictures()
+        picture = next(pictures, None)
+        if picture is None or picture.pts != entry.pts or decoder.losses.evident:
+            decoder.close()
+            return first, 0
+        self._decoder.close()
+        self._decoder, self._pictures = decoder, pictures
+        return picture, entry.index
+
+    def _deliver(self, first: av.VideoFrame, before: int) -> Generator[Frame, None, None]:
         try:
-            yield from itertools.islice(self._selected(first), self._limit)
+            yield from itertools.islice(self._selected(first, before), self._limit)
             self._report()
         finally:
             self._decoder.close()
 
-    def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
-        for index, time, picture in self._timed(first):
+    def _selected(self, first: av.VideoFrame, before: int) -> Iterator[Frame]:
+        for index, time, picture in self._timed(first, before):
             since = time - self.info.start
             if self._end is not None and since >= self._end:
                 return
@@ -171,14 +206,22 @@ class VideoReader:
             self._scaled.add((width, height))
         return resized(image, info.width, info.height)
 
-    def _timed(self, first: av.VideoFrame) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
+    def _timed(
+        self, first: av.VideoFrame, before: int
+    ) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
         period = 1 / self.info.rate
         clock = Clock(self.info.time_base, period)
-        for index, picture in enumerate(itertools.chain([first], self._pictures)):
+        for index, picture in enumerate(itertools.chain([first], self._pictures), before):
             time = clock.time(picture.pts)
             yield index, time, picture
         shown = max(period, picture.duration * self.info.time_base)
-        self._check_length(index + 1, time + shown - self.info.start)
+        self._length = time + shown - self.info.start
+        self._check_length(index + 1, self._length)
+        if self._end is not None and self._length + period < self._end:
+            self._faults.append(
+                f"ends at {float(self._length):.2f} s, before the end that was given "
+                f"({float(self._end):.2f} s)"
+            )
 
     def _check_length(self, frames: int, duration: Fraction) -> None:
         """Note a file that ends earlier than it declares."""

@@ -1,0 +1,129 @@
+"""A part of a video has the frames of the whole, wherever decoding begins."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from vdet.media import Frame, VideoReader
+from vdet.media.decoder import Decoder
+
+Writer = Callable[..., Path]
+GOPS: dict[str, Any] = {"options": {"g": "10", "bf": "2"}, "count": 60}
+OPEN = {"g": "10", "bf": "2", "x264-params": "open-gop=1"}
+FRAGMENTS = {"movflags": "+frag_keyframe+empty_moov"}
+MPEG = {"codec": "mpeg2video", "options": {"g": "10", "bf": "2", "q": "2"}}
+VP9 = {"codec": "libvpx-vp9", "options": {"deadline": "realtime", "g": "10"}}
+LATE = {"begin": Fraction(3600)}
+UNEVEN = [Fraction(number * number, 250) for number in range(60)]
+CLIPS: dict[str, tuple[str, dict[str, Any]]] = {
+    "mp4": ("mp4", {}),
+    "mp4 with sound": ("mp4", {"sounds": ["aac"]}),
+    "mov, open gops": ("mov", {"options": OPEN}),
+    "fragments, open gops": ("mp4", {"options": OPEN, **FRAGMENTS}),
+    "uneven times": ("mp4", {"times": UNEVEN}),
+    "no edit list": ("mp4", {"muxing": {"use_editlist": "0"}}),
+    "mkv, open gops": ("mkv", {"options": OPEN, "sounds": ["aac"], **LATE}),
+    "transport stream, open gops": ("ts", {"options": OPEN, "sounds": ["aac"]}),
+    "program stream": ("vob", {"sounds": ["mp2"], **MPEG}),
+    "vp9": ("webm", VP9),
+}
+NOT_SURE: dict[str, tuple[str, dict[str, Any]]] = {
+    "no times": ("h264", {}),
+    "hidden frames": ("webm", {"codec": "libvpx", "options": {"auto-alt-ref": "1", "g": "10"}}),
+    "interlaced": (
+        "mp4",
+        {"options": {"g": "10", "flags": "+ildct+ilme", "x264-params": "tff=1"}},
+    ),
+}
+
+
+@pytest.fixture
+def decoded(monkeypatch: pytest.MonkeyPatch) -> list[None]:
+    """Has an item for each packet that was decoded."""
+    calls: list[None] = []
+    attempt = Decoder._attempt
+
+    def counted(decoder: Decoder, packet: Any) -> Any:
+        calls.append(None)
+        return attempt(decoder, packet)
+
+    monkeypatch.setattr(Decoder, "_attempt", counted)
+    return calls
+
+
+def read(path: Path, start: Fraction | None = None) -> list[Frame]:
+    with VideoReader(path, start=start, threads=1) as reader:
+        return list(reader)
+
+
+def assert_part(part: list[Frame], whole: list[Frame], start: Fraction) -> None:
+    expected = [frame for frame in whole if frame.time - whole[0].time >= start]
+    assert [frame.index for frame in part] == [frame.index for frame in expected]
+    assert [frame.time for frame in part] == [frame.time for frame in expected]
+    for one, other in zip(part, expected, strict=True):
+        np.testing.assert_array_equal(one.image, other.image)
+
+
+@pytest.mark.parametrize("name", CLIPS)
+def test_a_part_is_that_of_the_whole_and_the_frames_before_are_not_decoded(
+    name: str, tmp_path: Path, write_clip: Writer, decoded: list[None]
+) -> None:
+    suffix, spec = CLIPS[name]
+    path = write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec)
+    whole = read(path)
+    for number in (1, 9, 10, 11, 38, 40, 55, 59):
+        start = whole[number].time - whole[0].time
+        decoded.clear()
+        assert_part(read(path, start), whole, start)
+        assert len(decoded) < 60 - number + 35
+
+
+@pytest.mark.parametrize("name", NOT_SURE)
+def test_where_frames_cannot_be_counted_all_are_decoded(
+    name: str, tmp_path: Path, write_clip: Writer, decoded: list[None]
+) -> None:
+    suffix, spec = NOT_SURE[name]
+    path = write_clip(tmp_path / f"clip.{suffix}", **GOPS | spec)
+    whole = read(path)
+    decoded.clear()
+    start = Fraction(2)
+    assert_part(read(path, start), whole, start)
+    assert len(decoded) >= 60
+
+
+def test_a_start_after_a_clock_that_restarts(
+    tmp_path: Path, write_clip: Writer, decoded: list[None]
+) -> None:
+    clip = write_clip(tmp_path / "clip.ts", sounds=["aac"], **GOPS)
+    path = tmp_path / "joined.ts"
+    path.write_bytes(clip.read_bytes() * 2)
+    whole = read(path)
+    decoded.clear()
+    assert_part(read(path, Fraction(4)), whole, Fraction(4))
+    assert len(decoded) < 60
+
+
+def test_an_mp4_is_not_read_before_the_part(tmp_path: Path, write_clip: Writer) -> None:
+    path = write_clip(tmp_path / "clip.mp4", **GOPS)
+    with av.open(str(path)) as container:
+        places = [packet.pos or 0 for packet in container.demux(video=0) if packet.size]
+    whole = read(path)
+    data = bytearray(path.read_bytes())
+    data[places[10] : places[50]] = bytes(places[50] - places[10])
+    path.write_bytes(data)
+    assert_part(read(path, Fraction(51, 25)), whole, Fraction(51, 25))
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_a_start_beyond_the_end_gives_no_frame_and_the_length(
+    suffix: str, tmp_path: Path, write_clip: Writer
+) -> None:
+    path = write_clip(tmp_path / f"clip.{suffix}", **GOPS)
+    with VideoReader(path, start=Fraction(10**13)) as reader:
+        assert list(reader) == []
+        assert reader.length == pytest.approx(Fraction(60, 25), abs=0.002)
