@@ -89,7 +89,7 @@ def test_a_video_cut_off_in_the_middle_gives_what_is_left(
 
 
 def test_a_part_without_frames(run: Run, clip_path: Path, out: Path) -> None:
-    assert "no frame lies in the times given" in _failure(run, clip_path, out, "--start", "1:00")
+    assert "60.00 s is beyond its end" in _failure(run, clip_path, out, "--start", "1:00")
 
 
 Damage = Callable[[Path, Path], None]

@@ -197,17 +197,25 @@ def test_tracks_of_no_frames_are_an_error_too(run: Run, clip_path: Path, tmp_pat
     options = ("--no-video", "--tracks", tracks, "--overwrite", "--start", "50")
     result = run("detect-video", clip_path, *options)
     assert result.code == 1
-    assert "no frame lies in the times given" in result.err
+    assert "50.00 s is beyond its end; it ends at " in result.err
     assert tracks.read_text() == "precious"
 
 
-def test_stages_of_a_time_after_the_end_give_a_warning(
-    run: Run, clip_path: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--at", "50"), "50.00 s is beyond its end; it ends at "),
+        (("--at", "0.2", "--frames", "2"), "no frame is read at 0.20 s or later; it ends at "),
+        (("--at", "0", "--start", "50"), "50.00 s is beyond its end; it ends at "),
+    ],
+)
+def test_stages_of_a_time_without_a_frame_are_an_error(
+    options: tuple[str, ...], words: str, run: Run, clip_path: Path, tmp_path: Path
 ) -> None:
-    options = ("--no-video", "--stages", tmp_path / "stages", "--at", "50", "--frames", "2")
-    result = run("detect-video", clip_path, *options)
-    assert result.code == 0
-    assert "no frame at or after --at; no stage pictures" in result.err
+    result = run("detect-video", clip_path, "--no-video", "--stages", tmp_path, *options)
+    assert result.code == 1
+    assert f"{clip_path}: {words}" in result.err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_earlier_stages_are_kept(run: Run, clip_path: Path, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ from vdet.config.schema import OutputSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.media import Frame, VideoWriter
-from vdet.media.images import Image
+from vdet.media.images import Image, read_image
 from vdet.media.pixels import to_bgr
 from vdet.pipeline.loop import FIRST_FRAMES, VideoJob, follow_frames, peek, run_video
 from vdet.pipeline.threads import map_ordered
@@ -257,6 +258,19 @@ class TestRun:
         run_red(VideoJob(red_clip, frames=20), progress=progress)
         assert calls[0] == 20
         assert sum(advance or 0 for advance in calls[1:]) == 20
+
+    def test_stages_alone_need_only_the_frames_before_their_moment(
+        self, red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("vdet.pipeline.loop.LEAD", Fraction(5, 25))
+        at = Fraction(30, 25)
+        whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
+        for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():
+            (tmp_path / name).mkdir()
+            summary = run_red(VideoJob(red_clip, wanted, at=at))
+            assert summary.frames == (6 if name == "alone" else COUNT)
+        one, other = (read_image(tmp_path / name / "3-hits.png") for name in ("alone", "whole"))
+        np.testing.assert_array_equal(one, other)
 
     def test_boxes_are_drawn_where_the_tracks_say(self, red_clip: Path, tmp_path: Path) -> None:
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")

@@ -5,7 +5,7 @@ import logging
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sinks, open_sink
+from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sinks, open_sink, sink_kind
 from vdet.pipeline.threads import (
     StalledError,
     map_ordered,
@@ -34,6 +34,9 @@ log = logging.getLogger("vdet")
 
 FIRST_FRAMES = 5
 """Number of frames that `DetectorModel.for_video` gets."""
+
+LEAD = Fraction(2)
+"""Seconds before a moment that are searched for it: detector and tracker remember so much."""
 
 IO_TIMEOUT = 120.0  # seconds
 
@@ -57,7 +60,8 @@ class VideoJob:
     frames
         Largest number of frames to search.
     at
-        Time of the stage pictures, seconds from the first frame.
+        Time of the stage pictures, seconds from the first frame. If no output needs more, only the
+        frames from 2 s before it are searched.
     lanes
         If it is given, the lane is found too, and everything is drawn on undistorted frames.
     overwrite
@@ -145,7 +149,10 @@ def run_video(
     """
     began = time.perf_counter()
     ids: set[int] = set()
-    frames = 0
+    frames, last = 0, None
+    only_at = _needs_only_at(job)
+    if only_at and job.frames is None:
+        job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
     timeout += float(job.start or 0)
     threads, codec_threads = threads or core_count(), codec_threads or core_count()
     with ExitStack() as stack:
@@ -154,10 +161,11 @@ def run_video(
         stack.enter_context(single_threaded_libraries())
         reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)
         info = reader.info
+        _check_times(job, reader.length)
         read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
         context = SinkContext(files, settings, info, job.is_part, job.at, codec_threads, timeout)
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
-        advance = progress(reader.expected)
+        advance = progress(None if only_at else reader.expected)
         results = _follow_job(read, job, model, settings, video=info, threads=threads)
         for result in stack.enter_context(closing(results)):
             for sink in sinks:
@@ -165,9 +173,48 @@ def run_video(
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
-        if not frames:
-            raise VideoError(f"{job.source}: no frame lies in the times given; check them")
+            last = result.frame.time - info.start
+            if only_at and last >= job.at:
+                break
+        _check_seen(job, last, reader.length)
     return Summary(info.width, info.height, frames, len(ids), time.perf_counter() - began)
+
+
+def _needs_only_at(job: VideoJob) -> bool:
+    """Return whether no output needs another frame than that at `job.at`."""
+    kinds = [sink_kind(output.sink) for output in job.outputs]
+    return bool(kinds) and all(kind.one_frame for kind in kinds)
+
+
+def _shows_at(job: VideoJob) -> bool:
+    return any(sink_kind(output.sink).one_frame for output in job.outputs)
+
+
+def _check_times(job: VideoJob, length: Fraction | None) -> None:
+    """Refuse times that lie beyond the end, where the file declares its length."""
+    if length is None:
+        return
+    latest = max(job.start or Fraction(0), job.at if _shows_at(job) else Fraction(0))
+    if latest >= length:
+        raise VideoError(f"{job.source}: {_seconds(latest)} is beyond its end{_at_end(length)}")
+
+
+def _check_seen(job: VideoJob, last: Fraction | None, length: Fraction | None) -> None:
+    """Refuse times at which there was no frame; `last` is the time of the last frame read."""
+    if last is None:
+        raise VideoError(f"{job.source}: no frame lies in the times given{_at_end(length)}")
+    if _shows_at(job) and last < job.at:
+        raise VideoError(
+            f"{job.source}: no frame is read at {_seconds(job.at)} or later{_at_end(length)}"
+        )
+
+
+def _at_end(length: Fraction | None) -> str:
+    return "; check them" if length is None else f"; it ends at {_seconds(length)}"
+
+
+def _seconds(time: Fraction) -> str:
+    return f"{float(time):.2f} s"
 
 
 def follow_frames(

@@ -13,6 +13,7 @@ from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
 _CAR = 3  # class number in MOTChallenge
+_CRF = 20  # of the video; it is material to be searched, so it is finer than what is shown
 
 
 def frames(scene: Scene) -> Iterator[Frame]:
@@ -40,7 +41,7 @@ def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     )
     with (
         staged(path, overwrite=overwrite, may_replace=may_replace_video) as temporary,
-        VideoWriter(temporary, info, OutputSettings(), name=path) as writer,
+        VideoWriter(temporary, info, OutputSettings(crf=_CRF), name=path) as writer,
     ):
         for frame in frames(scene):
             writer.write(frame)

@@ -92,6 +92,9 @@ class SinkKind:
         file, the folder is the output of an earlier run.
     writes_standard_output
         Whether the path `-` means standard output.
+    one_frame
+        Whether it takes only the frame at `SinkContext.at`. If all outputs of a run do, no other
+        frames are read than it needs.
     takes
         "videos" or "pictures" if the sink can take results of these only.
     may_replace
@@ -104,6 +107,7 @@ class SinkKind:
     what: str = "outputs"
     marker: str = ""
     writes_standard_output: bool = False
+    one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
     may_replace: MayReplace = any_file
 

@@ -1,8 +1,7 @@
 """The sink `stages`: a folder with a picture of every stage of one frame."""
 
-import logging
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 from vdet.draw.boxes import WHITE, draw_box, draw_label
 from vdet.files import make_folder
@@ -10,8 +9,6 @@ from vdet.media.images import Image, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.sinks.video import draw_tracks
-
-log = logging.getLogger("vdet")
 
 _BOXES = "boxes"
 
@@ -29,9 +26,8 @@ class StagesSink:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None and not self._is_done:
-            log.warning("%s: no frame at or after --at; no stage pictures", self._folder)
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: the pictures are whole, or there was no such frame."""
 
     def write(self, result: FrameResult) -> None:
         """Write the pictures if it is the frame."""
@@ -57,4 +53,4 @@ def _with_boxes(result: FrameResult) -> Image:
     return draw_tracks(picture, result.tracks, scores=True)
 
 
-STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png")
+STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png", one_frame=True)
