@@ -39,7 +39,12 @@ def orientation(picture: av.VideoFrame) -> Orientation | None:
 
 def _display_matrix(picture: av.VideoFrame) -> npt.NDArray[np.float64] | None:
     """Return what x and y become, as rows, of the display matrix (ISO/IEC 14496-12, 6.2.2)."""
-    side_data = cast(Mapping[str, bytes], picture.side_data)  # it is not typed as such
+    try:
+        side_data = cast(Mapping[str, bytes], picture.side_data)  # it is not typed as such
+    except ValueError:  # some of it is of a kind that PyAV does not know, as EXIF
+        angle = math.radians(picture.rotation)
+        cosine, sine = math.cos(angle), math.sin(angle)
+        return np.array([[cosine, -sine], [sine, cosine]])
     if "DISPLAYMATRIX" not in side_data:
         return None
     return np.frombuffer(bytes(side_data["DISPLAYMATRIX"]), np.int32).reshape(3, 3)[:2, :2] / 65_536
