@@ -4,6 +4,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import av
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from vdet.config.schema import OutputSettings
 from vdet.media import VideoReader, VideoWriter
+from vdet.media.restarts import continuous_packets
 
 Number = Callable[[NDArray[np.uint8]], int]
 Writer = Callable[..., Path]
@@ -132,3 +134,63 @@ def test_sound_without_times_of_its_own_is_left_out_with_a_warning(
     copy(repeated, read_number)
     (warning,) = warnings()
     assert "sound packets without a time of their own left out" in warning
+
+
+PICTURES, SOUND_STREAM = 0, 1
+
+
+def packet(stream: int, milliseconds: int) -> Any:
+    """Return what is read of a packet of 40 ms."""
+    return SimpleNamespace(
+        stream_index=stream,
+        pts=milliseconds,
+        dts=milliseconds,
+        duration=40,
+        time_base=Fraction(1, 1000),
+        is_corrupt=False,
+        size=1,
+    )
+
+
+def joined(packets: list[Any]) -> list[tuple[int, int]]:
+    """Return stream and time of each packet on the common time line."""
+    main: Any = SimpleNamespace(
+        index=PICTURES, guessed_rate=Fraction(25), time_base=Fraction(1, 1000), average_rate=None
+    )
+    container: Any = SimpleNamespace(
+        format=SimpleNamespace(flags=0x0200),
+        streams=SimpleNamespace(audio=[SimpleNamespace(index=SOUND_STREAM)]),
+        demux=lambda _: iter(packets),
+    )
+    return [(each.stream_index, each.pts or 0) for each in continuous_packets(container, main)]
+
+
+def part_of(begin: int, *, lead: int) -> list[Any]:
+    """Return two seconds; the sound comes `lead` packets before its pictures, or after them."""
+    found = []
+    for number in range(50):
+        order = [(number + max(0, -lead), PICTURES), (number + max(0, lead), SOUND_STREAM)]
+        found += [(place, packet(stream, begin + 40 * number)) for place, stream in order]
+    return [each for _, each in sorted(found, key=lambda item: item[0])]
+
+
+@pytest.mark.parametrize("lead", [-8, 0, 8])
+@pytest.mark.parametrize("begins", [[0, 0], [0, 90_000, 0], [7_000_000, 0, 0]])
+def test_sound_may_come_before_or_after_its_pictures(begins: list[int], lead: int) -> None:
+    parts = [part_of(begin, lead=lead) for begin in begins]
+    found = joined([each for part in parts for each in part])
+    for stream in (PICTURES, SOUND_STREAM):
+        times = [time - begins[0] for index, time in found if index == stream]
+        assert times == [40 * number for number in range(50 * len(begins))]
+
+
+def test_the_sound_of_a_part_may_begin_before_the_pictures_of_another_end() -> None:
+    first, second = part_of(0, lead=0), part_of(90_000, lead=0)
+    held = [each for each in first[-8:] if each.stream_index == PICTURES]
+    early = [each for each in second[:8] if each.stream_index == SOUND_STREAM]
+    before = [each for each in first if each not in held]
+    after = [each for each in second if each not in early]
+    found = joined([*before, *early, *held, *after])
+    for stream in (PICTURES, SOUND_STREAM):
+        times = [time for index, time in found if index == stream]
+        assert times == [40 * number for number in range(100)]

@@ -134,8 +134,13 @@ class _Joined:
         if is_picture:
             self._extend(begin, end)
             return _Entry(packet, begin, end, len(self._parts) - 1)
-        self._latest = max(end, self._latest)
+        if not self._parts or self._latest < end <= self._reach():
+            self._latest = end
         return _Entry(packet, begin, end)
+
+    def _reach(self) -> Fraction:
+        """Return the latest time that the clock of the last part may go on to."""
+        return max(self._parts[-1].end, self._latest) + _FORTH
 
     def _extend(self, begin: Fraction | None, end: Fraction) -> None:
         """Add a picture to the last part, or begin one."""
@@ -143,7 +148,7 @@ class _Joined:
             self._parts.append(_Part(begin or Fraction(0), end))
         elif begin is not None:
             last = self._parts[-1]
-            if last.end - _BACK <= begin <= max(last.end, self._latest) + _FORTH:
+            if last.end - _BACK <= begin <= self._reach():
                 last.end = max(last.end, end)
             else:
                 self._parts.append(_Part(begin, end))
