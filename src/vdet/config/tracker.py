@@ -27,6 +27,9 @@ class MotionTrackerSettings(TrackerSettings):
     smallest: Fraction = Field(
         0.028, description="narrower vehicles are not shown, share of the frame's width"
     )
+    least_score: Fraction = Field(
+        0.4, description="vehicles whose latest detections have a lower mean score are not shown"
+    )
     needed: Seconds = Field(
         0.1, description="evidence before a vehicle is shown: seconds of detections with score 1"
     )

@@ -139,9 +139,15 @@ class TestParts:
         found = split([exactly(LEFT, 0.6), exactly(self.BONNET, 1)])
         assert boxes(found) == [LEFT]
 
-    def test_a_box_far_stronger_than_the_one_around_it_is_a_vehicle(self) -> None:
-        found = split([exactly(LEFT, 0.4), exactly(self.BONNET, 1)])
-        assert boxes(found) == [self.BONNET, LEFT]
+    def test_a_box_far_stronger_than_the_one_around_it_is_the_vehicle(self) -> None:
+        found = split([exactly(LEFT, 0.2), exactly(self.BONNET, 1)])
+        assert boxes(found) == [self.BONNET]
+
+    def test_a_part_found_in_another_region_is_not_reported(self) -> None:
+        left, right = Box(100, 100, 60, 60), Box(160, 100, 20, 60)
+        part = Box(162, 110, 16, 30)
+        found = split([exactly(LEFT, 1), exactly(part, 0.5)], left, right)
+        assert boxes(found) == [LEFT]
 
     def test_votes_for_a_part_of_one_vehicle_do_not_count_for_another(self) -> None:
         part = Box(140, 110, 44, 40)  # in LEFT, except its end, which lies in RIGHT
@@ -169,6 +175,18 @@ class TestRegions:
         vote = exactly(Box(90, 90, 20, 20), 1)  # its middle is (100, 100)
         quarters = [Box(x, y, 100, 100) for x in (0, 100) for y in (0, 100)]
         assert boxes(split([vote], *quarters)) == [Box(90, 90, 20, 20)]
+
+    @pytest.mark.parametrize("aside", [(Box(130, 90, 100, 100),), (Box(400, 90, 9, 9), EVERYWHERE)])
+    def test_regions_that_overlap_do_not_count_a_vote_twice(self, aside: tuple[Box, ...]) -> None:
+        votes = around(LEFT)
+        (alone,) = split(votes)
+        assert split(votes, Box(90, 90, 100, 100), *aside) == [alone]
+
+    def test_regions_that_a_third_one_joins_are_split_as_one(self) -> None:
+        left, right = Box(0, 0, 130, 300), Box(150, 0, 100, 300)
+        votes = around(LEFT)
+        (alone,) = split(votes)
+        assert split(votes, left, right, Box(120, 0, 40, 300)) == [alone]
 
     def test_a_region_without_votes_has_no_vehicles(self) -> None:
         assert split([]) == []
@@ -227,7 +245,7 @@ class TestCollecting:
         rng = np.random.default_rng(0)
         weights = rng.permutation(MAX_VOTES + 100) / 1000
         votes = votes_of(*((i, 0, 10, 10, weight) for i, weight in enumerate(weights.tolist())))
-        kept = votes.within(EVERYWHERE)
+        kept = votes.within([EVERYWHERE])
         assert len(kept.position) == MAX_VOTES
         assert kept.position.min() == 0.1
         assert (np.diff(kept.boxes[:, 0]) > 0).all()

@@ -53,6 +53,13 @@ def test_a_single_clear_false_alarm_is_not_shown() -> None:
     assert ids(follow([[(CAR, CLEAR)], *[[]] * 20])) == set()
 
 
+def test_a_vehicle_that_is_hardly_likely_is_not_shown() -> None:
+    doubtful = (CAR, DEFAULTS.least_score - 0.01)
+    assert ids(follow([[doubtful]] * 100)) == set()
+    assert ids(follow([[doubtful]] * 100, least_score=0)) == {1}
+    assert ids(follow([[(CAR, DEFAULTS.least_score)]] * 100)) == {1}
+
+
 def test_a_vehicle_is_shown_once_it_is_wide_enough() -> None:
     least = DEFAULTS.smallest * WIDTH
     places = [Box(600 - n // 2, 400, 20 + n, 14 + n) for n in range(60)]
@@ -247,6 +254,14 @@ def test_the_next_vehicle_at_that_side_is_another_one() -> None:
 def test_a_region_inside_a_shown_vehicle_is_no_vehicle() -> None:
     part = Box(430, 405, 60, 40)
     assert ids(follow([*[[CAR]] * 6, *[[CAR, part]] * 30])) == {1}
+
+
+def test_a_vehicle_that_comes_to_lie_inside_another_one_is_not_shown() -> None:
+    parts = moving(Box(300, 410, 60, 40), dx=3, frames=50)
+    shown = follow([[CAR, part] for part in parts])
+    assert ids(shown) == {1, 2}
+    for tracks in shown[40:]:
+        assert [track.id for track in tracks] == [id_at(shown[10], CAR)]
 
 
 def test_two_boxes_that_overlap_and_stand_level_are_one_vehicle() -> None:

@@ -9,7 +9,7 @@ vote again. This is greedy non-maximum suppression that averages boxes instead o
 Viola & Jones merge detections ("Robust Real-Time Face Detection", 2004, section 5.6).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,10 @@ MAX_VOTES = 400
 
 _MAX_PROBABILITY = 1 - 2**-24
 """Higher ones are lowered to it, because the position weight of 1 is infinite."""
+
+
+_FAR_STRONGER = 4
+"""How many times the weight of the box around it makes a box the vehicle, and no part of one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +64,15 @@ class Votes:
         seen = (inside[:, 2:] >= 1).all(axis=1)
         return Votes(inside[seen], (probabilities * shares)[seen], position[seen])
 
-    def within(self, box: Box) -> "Votes":
-        """Return the votes whose centre lies in `box`; of too many, those of highest `position`."""
+    def within(self, boxes: Iterable[Box]) -> "Votes":
+        """Return the votes whose centre lies in one of `boxes`, each once.
+
+        Of too many, those of highest `position` are returned.
+        """
         x, y = (self.boxes[:, :2] + self.boxes[:, 2:] / 2).T
-        inside = (box.x <= x) & (x < box.right) & (box.y <= y) & (y < box.bottom)
+        inside = np.zeros(len(x), np.bool_)
+        for box in boxes:
+            inside |= (box.x <= x) & (x < box.right) & (box.y <= y) & (y < box.bottom)
         (indices,) = np.nonzero(inside)
         best = np.argsort(-self.position[indices], kind="stable")[:MAX_VOTES]
         indices = np.sort(indices[best])
@@ -81,17 +90,42 @@ class _VotedBox:
     position: float
     presence: float
 
+    @property
+    def area(self) -> float:
+        """Square pixels."""
+        return float(self.box[2] * self.box[3])
+
 
 def split_regions(
     regions: Sequence[HotRegion], votes: Votes, settings: VoteSettings
 ) -> list[HotRegion]:
-    """Replace each region by the vehicles that the votes in it agree on, strongest first."""
-    return [
-        vehicle for region in regions for vehicle in _vehicles(votes.within(region.box), settings)
+    """Return the vehicles that the votes in the regions agree on, strongest first in each region.
+
+    Regions whose boxes overlap are split as one, so that no vote counts twice.
+    """
+    found = [
+        vehicle
+        for group in _overlapping([region.box for region in regions])
+        for vehicle in _vehicles(votes.within(group), settings)
     ]
+    return [_region(each) for each in _one_for_each_vehicle(found, settings.inside)]
 
 
-def _vehicles(votes: Votes, settings: VoteSettings) -> list[HotRegion]:
+def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
+    """Group boxes: two that overlap, directly or by others, are in one group."""
+    groups: list[list[Box]] = []
+    for box in boxes:
+        joined, apart = [box], []
+        for group in groups:
+            if any(box.intersection(other).area for other in group):
+                joined = group + joined
+            else:
+                apart.append(group)
+        groups = [*apart, joined]
+    return groups
+
+
+def _vehicles(votes: Votes, settings: VoteSettings) -> list[_VotedBox]:
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
     found: list[_VotedBox] = []
@@ -108,7 +142,7 @@ def _vehicles(votes: Votes, settings: VoteSettings) -> list[HotRegion]:
             found.append(vehicle)
             used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > settings.inside
         presence[used] = position[used] = 0
-    return [_region(each) for each in found if not _is_part(each, found, settings.inside)]
+    return found
 
 
 def _average(
@@ -122,15 +156,26 @@ def _average(
     return np.asarray(shares @ boxes / total)
 
 
-def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox], inside: float) -> bool:
-    """Return whether it lies in a larger box that has more than half its `position` weight."""
-    box = vehicle.box
-    return any(
-        other.box[2] * other.box[3] > box[2] * box[3]
-        and coverage(box[np.newaxis], other.box[np.newaxis])[0, 0] > inside
-        and other.position > vehicle.position / 2
-        for other in others
-    )
+def _one_for_each_vehicle(found: Sequence[_VotedBox], inside: float) -> list[_VotedBox]:
+    """Drop one of two boxes where more than the share `inside` of the smaller lies in the larger.
+
+    The smaller box is a part of the vehicle, unless its `position` weight is `_FAR_STRONGER` times
+    that of the larger one. Then the larger one is a false alarm around it.
+    """
+    kept: list[_VotedBox] = []
+    for each in sorted(found, key=lambda voted: -voted.position):
+        nested = [other for other in kept if _is_nested(each, other, inside)]
+        if all(
+            each.area > other.area and _FAR_STRONGER * each.position > other.position
+            for other in nested
+        ):
+            kept = [other for other in kept if other not in nested] + [each]
+    return [each for each in found if each in kept]
+
+
+def _is_nested(one: _VotedBox, other: _VotedBox, inside: float) -> bool:
+    smaller, larger = sorted((one, other), key=lambda voted: voted.area)
+    return bool(coverage(smaller.box[np.newaxis], larger.box[np.newaxis])[0, 0] > inside)
 
 
 def _region(vehicle: _VotedBox) -> HotRegion:

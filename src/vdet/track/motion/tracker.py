@@ -10,7 +10,7 @@ from vdet.detect.detections import Detections
 from vdet.geometry import Box, Float64Array, visible
 from vdet.media.images import Image
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
-from vdet.track.motion.overlapping import are_hidden, around, shows_both, stretched
+from vdet.track.motion.overlapping import are_hidden, are_nested, around, shows_both, stretched
 from vdet.track.motion.vehicle import Observation, Vehicle
 from vdet.track.track import Track
 
@@ -151,17 +151,35 @@ class MotionTracker:
 
     def _tracks(self, seconds: float) -> list[Track]:
         boxes = self._boxes()
-        tracks = []
+        shown: list[tuple[Vehicle, Float64Array]] = []
         for vehicle, box, hidden in zip(self._vehicles, boxes, self._hidden(boxes), strict=True):
             predicted = vehicle.unseen > 0
             vehicle.hidden += seconds * (hidden and predicted)
-            wide_enough = box[2] >= self._settings.smallest * self._size[0]
-            gone = hidden and predicted
-            if vehicle.is_present(self._settings) and wide_enough and not gone:
-                vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
-                track = Track(vehicle.id, _rounded(box), vehicle.score, predicted, vehicle.class_id)
-                tracks.append(track)
+            if self._is_clear(vehicle, box) and not (hidden and predicted):
+                shown.append((vehicle, box))
+        tracks = []
+        for vehicle, box in self._without_nested(shown):
+            vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
+            predicted = vehicle.unseen > 0
+            track = Track(vehicle.id, _rounded(box), vehicle.score, predicted, vehicle.class_id)
+            tracks.append(track)
         return sorted(tracks, key=lambda track: track.id)
+
+    def _is_clear(self, vehicle: Vehicle, box: Float64Array) -> bool:
+        """Tell whether it is present, wide enough and likely enough to be shown."""
+        return (
+            vehicle.is_present(self._settings)
+            and box[2] >= self._settings.smallest * self._size[0]
+            and vehicle.detection_score >= self._settings.least_score
+        )
+
+    def _without_nested(
+        self, shown: Sequence[tuple[Vehicle, Float64Array]]
+    ) -> list[tuple[Vehicle, Float64Array]]:
+        boxes = np.reshape([box for _, box in shown], (-1, 4))
+        scores = np.array([vehicle.score for vehicle, _ in shown])
+        dropped = are_nested(boxes, scores)
+        return [each for each, drop in zip(shown, dropped, strict=True) if not drop]
 
 
 def _rounded(box: Float64Array) -> Box:

@@ -38,6 +38,23 @@ class Observation:
 
 
 @dataclass(eq=False, slots=True)
+class _RecentMean:
+    """A mean of values over the latest `SCORE_TIME`; older ones count less and less."""
+
+    _sum: float = 0.0
+    _weight: float = 0.0
+
+    @property
+    def value(self) -> float:
+        return self._sum / self._weight
+
+    def add(self, value: float, seconds: float) -> None:
+        kept = math.exp(-seconds / SCORE_TIME)
+        self._sum = kept * self._sum + (1 - kept) * value
+        self._weight = kept * self._weight + (1 - kept)
+
+
+@dataclass(eq=False, slots=True)
 class Vehicle:
     """What is remembered of a vehicle.
 
@@ -63,8 +80,8 @@ class Vehicle:
     id: int | None = None
     unseen: float = 0.0
     hidden: float = 0.0
-    _score_sum: float = 0.0
-    _score_weight: float = 0.0
+    _scores: _RecentMean = field(default_factory=_RecentMean)
+    _detection_scores: _RecentMean = field(default_factory=_RecentMean)
     _class_scores: dict[int, float] = field(default_factory=dict)
 
     @classmethod
@@ -82,7 +99,12 @@ class Vehicle:
     @property
     def score(self) -> float:
         """Mean score of the latest detections, 0 to 1; a frame without one counts as 0."""
-        return self._score_sum / self._score_weight
+        return self._scores.value
+
+    @property
+    def detection_score(self) -> float:
+        """The same, without the frames that have no detection."""
+        return self._detection_scores.value
 
     @property
     def class_id(self) -> int | None:
@@ -130,6 +152,7 @@ class Vehicle:
         self, observation: Observation, seconds: float, settings: MotionTrackerSettings
     ) -> None:
         self._weigh(observation.score, seconds, settings)
+        self._detection_scores.add(observation.score, seconds)
         if observation.class_id is not None:
             sums = self._class_scores
             sums[observation.class_id] = sums.get(observation.class_id, 0.0) + observation.score
@@ -138,9 +161,7 @@ class Vehicle:
         gained = (score - settings.leak) * min(seconds, LONGEST_LOOK)
         self.evidence = min(max(self.evidence + gained, 0.0), settings.needed)
         self.confirmed |= self.evidence >= settings.needed
-        kept = math.exp(-seconds / SCORE_TIME)
-        self._score_sum = kept * self._score_sum + (1 - kept) * score
-        self._score_weight = kept * self._score_weight + (1 - kept)
+        self._scores.add(score, seconds)
 
 
 def _noise(observation: Observation, settings: MotionTrackerSettings) -> float:
