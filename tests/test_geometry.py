@@ -1,10 +1,11 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.geometry import Box
+from vdet.geometry import Box, are_nested
 
 boxes = st.builds(
     Box,
@@ -97,3 +98,23 @@ def test_gap_is_the_distance_between_outlines(other: Box, gap: float) -> None:
 
 def test_a_diagonal_gap_is_euclidean() -> None:
     assert Box(0, 0, 1, 1).gap(Box(2, 2, 1, 1)) == pytest.approx(math.sqrt(2))
+
+
+WHOLE, INSIDE, BESIDE = (100, 100, 80, 60), (110, 110, 40, 30), (150, 100, 80, 60)
+
+
+@pytest.mark.parametrize(
+    ("scores", "nested"),
+    [((0.9, 0.8), [False, True]), ((0.5, 0.5), [False, True]), ((0.8, 0.9), [True, False])],
+)
+def test_of_two_boxes_in_one_another_the_one_with_the_lower_score_is_nested(
+    scores: tuple[float, float], nested: list[bool]
+) -> None:
+    boxes = np.array([WHOLE, INSIDE], np.float64)
+    assert are_nested(boxes, scores).tolist() == nested
+    assert are_nested(boxes[::-1], scores[::-1]).tolist() == nested[::-1]
+
+
+def test_boxes_that_only_overlap_are_not_nested() -> None:
+    assert are_nested(np.array([WHOLE, BESIDE], np.float64), (1, 2)).tolist() == [False, False]
+    assert are_nested(np.zeros((0, 4)), []).tolist() == []

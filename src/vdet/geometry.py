@@ -16,6 +16,9 @@ Int32Array = npt.NDArray[np.int32]
 Int64Array = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
+_NESTED = 0.8
+"""Share of a box that lies in another one, if it lies in it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Box:
@@ -116,6 +119,30 @@ def coverage(predicted: Float64Array, regions: Float64Array) -> Float64Array:
     float64 of shape `(n, m)`.
     """
     return _intersection(predicted, regions) / _area(predicted)[:, np.newaxis]
+
+
+def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
+    """Tell of each box whether it and a box with a higher score lie in one another.
+
+    So it is where nearly all of the smaller one lies in the larger: at most one of them shows a
+    vehicle.
+
+    Parameters
+    ----------
+    boxes
+        Shape `(n, 4)`, each with an area.
+    scores
+        Shape `(n,)`. Of equal scores, that of the larger box counts as higher.
+
+    Returns
+    -------
+    bool `(n,)`.
+    """
+    inside = coverage(boxes, boxes) > _NESTED
+    rank = np.empty(len(boxes), np.int64)
+    rank[np.lexsort((_area(boxes), np.asarray(scores)))] = np.arange(len(boxes))
+    higher = rank > rank[:, np.newaxis]
+    return np.asarray(((inside | inside.T) & higher).any(axis=1))
 
 
 def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:

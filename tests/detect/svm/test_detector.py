@@ -12,6 +12,7 @@ from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, 
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
 from vdet.detect.svm.detector import SvmModel, horizon_of
+from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
@@ -166,6 +167,16 @@ class TestDefaultSettings:
 
 class TestStillPictures:
     """A still picture equals the last of `heat.frames` equal frames of a video."""
+
+    @pytest.mark.parametrize(("strength", "shown"), [(2.0, CAR), (0.5, Box(104, 124, 30, 20))])
+    def test_of_boxes_in_one_another_the_strongest_is_shown(
+        self, monkeypatch: pytest.MonkeyPatch, strength: float, shown: Box
+    ) -> None:
+        part = Box(104, 124, 30, 20)
+        assert part.intersection(CAR) == part
+        regions = [HotRegion(CAR, CAR.center, strength), HotRegion(part, part.center, 1.0)]
+        monkeypatch.setattr("vdet.detect.svm.detector.split_regions", lambda *_: regions)
+        assert detect_still(road(CAR), DEFAULT).rounded == [shown]
 
     @pytest.mark.parametrize("frames", [1, 2, 5])
     def test_a_still_picture_is_as_hot_as_a_video_of_the_same_frame(self, frames: int) -> None:

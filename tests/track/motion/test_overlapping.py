@@ -2,14 +2,7 @@ import numpy as np
 import pytest
 
 from vdet.geometry import Float64Array
-from vdet.track.motion.overlapping import (
-    are_hidden,
-    are_nested,
-    is_part,
-    is_same,
-    shows_both,
-    stretched,
-)
+from vdet.track.motion.overlapping import are_hidden, is_part, is_same, shows_both, stretched
 
 
 def box(x: float, y: float, width: float, height: float) -> Float64Array:
@@ -43,25 +36,6 @@ def test_a_vehicle_that_is_not_there_hides_nothing() -> None:
 
 def test_without_vehicles_none_is_hidden() -> None:
     assert are_hidden(np.zeros((0, 4)), np.zeros(0, bool), 0.5) == []
-
-
-WHOLE, INSIDE = box(100, 100, 80, 60), box(110, 110, 40, 30)
-
-
-@pytest.mark.parametrize(
-    ("scores", "nested"),
-    [((0.9, 0.8), [False, True]), ((0.5, 0.5), [False, True]), ((0.8, 0.9), [True, False])],
-)
-def test_of_two_boxes_in_one_another_the_one_with_the_lower_score_goes(
-    scores: tuple[float, float], nested: list[bool]
-) -> None:
-    assert are_nested(boxes(WHOLE, INSIDE), np.array(scores)) == nested
-    assert are_nested(boxes(INSIDE, WHOLE), np.array(scores[::-1])) == nested[::-1]
-
-
-def test_boxes_that_overlap_less_are_not_nested() -> None:
-    assert are_nested(boxes(FAR, NEAR), np.ones(2)) == [False, False]
-    assert are_nested(np.zeros((0, 4)), np.zeros(0)) == []
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows, join_windows
+from vdet.geometry import are_nested
 from vdet.media.images import Image
 
 log = logging.getLogger("vdet")
@@ -112,7 +113,7 @@ class SvmDetector:
             self._recent.append(hits)
         regions = self._regions(heat)
         if candidates.is_still:
-            regions = [each for each in regions if self._is_shown(each, self._settings.stills)]
+            regions = self._shown_in_still(regions, self._settings.stills)
             hits = candidates.windows.hits(self._settings.search.probability)
         trace = Trace(candidates.windows, hits, heat, self._search.grids)
         return self._detections(regions, trace)
@@ -128,6 +129,15 @@ class SvmDetector:
             regions = split_regions(regions, votes, self._heat.votes)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
+
+    def _shown_in_still(
+        self, regions: Sequence[HotRegion], stills: StillSettings
+    ) -> list[HotRegion]:
+        shown = [each for each in regions if self._is_shown(each, stills)]
+        boxes = [(b.x, b.y, b.width, b.height) for b in (each.box for each in shown)]
+        strengths = [each.strength for each in shown]
+        dropped = are_nested(np.reshape(np.array(boxes, np.float64), (-1, 4)), strengths)
+        return [each for each, drop in zip(shown, dropped.tolist(), strict=True) if not drop]
 
     def _is_shown(self, region: HotRegion, stills: StillSettings) -> bool:
         width, height = self._size

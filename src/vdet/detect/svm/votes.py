@@ -27,7 +27,7 @@ _MAX_PROBABILITY = 1 - 2**-24
 
 
 _FAR_STRONGER = 4
-"""How many times the weight of the box around it makes a box the vehicle, and no part of one."""
+"""How many times the weight of the box around it a box needs, so that it is no part of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,14 +101,15 @@ def split_regions(
 ) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
 
-    Regions whose boxes overlap are split as one, so that no vote counts twice.
+    Regions whose boxes overlap are split as one, so that no vote counts twice. A box in another one
+    is left if it is far stronger: the tracker, or `SvmDetector` in a still picture, shows one.
     """
     found = [
         vehicle
         for group in _overlapping([region.box for region in regions])
         for vehicle in _vehicles(votes.within(group), settings)
     ]
-    return [_region(each) for each in _one_for_each_vehicle(found, settings.inside)]
+    return [_region(each) for each in found if not _is_part(each, found, settings.inside)]
 
 
 def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
@@ -156,26 +157,14 @@ def _average(
     return np.asarray(shares @ boxes / total)
 
 
-def _one_for_each_vehicle(found: Sequence[_VotedBox], inside: float) -> list[_VotedBox]:
-    """Drop one of two boxes where more than the share `inside` of the smaller lies in the larger.
-
-    The smaller box is a part of the vehicle, unless its `position` weight is `_FAR_STRONGER` times
-    that of the larger one. Then the larger one is a false alarm around it.
-    """
-    kept: list[_VotedBox] = []
-    for each in sorted(found, key=lambda voted: -voted.position):
-        nested = [other for other in kept if _is_nested(each, other, inside)]
-        if all(
-            each.area > other.area and _FAR_STRONGER * each.position > other.position
-            for other in nested
-        ):
-            kept = [other for other in kept if other not in nested] + [each]
-    return [each for each in found if each in kept]
-
-
-def _is_nested(one: _VotedBox, other: _VotedBox, inside: float) -> bool:
-    smaller, larger = sorted((one, other), key=lambda voted: voted.area)
-    return bool(coverage(smaller.box[np.newaxis], larger.box[np.newaxis])[0, 0] > inside)
+def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox], inside: float) -> bool:
+    """Return whether it lies in a larger box that has enough of its `position` weight."""
+    return any(
+        other.area > vehicle.area
+        and coverage(vehicle.box[np.newaxis], other.box[np.newaxis])[0, 0] > inside
+        and _FAR_STRONGER * other.position > vehicle.position
+        for other in others
+    )
 
 
 def _region(vehicle: _VotedBox) -> HotRegion:

@@ -19,9 +19,6 @@ _LEVEL_OVERLAP = 0.3
 _ALIKE = 0.5
 """Intersection over union from which on two boxes are of one vehicle, level or not."""
 
-_NESTED = 0.8
-"""Share of the smaller of two boxes that lies in the other, where one of them shows no vehicle."""
-
 
 def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float) -> list[bool]:
     """Tell of each box whether another one covers more than `share` of it and is not farther.
@@ -38,26 +35,6 @@ def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float
     hiding = (coverage(boxes, boxes) > share) & present & ~farther
     np.fill_diagonal(hiding, val=False)
     return [bool(row.any()) for row in hiding]
-
-
-def are_nested(boxes: Float64Array, scores: Float64Array) -> list[bool]:
-    """Tell of each box whether it and a box with a higher score lie in one another.
-
-    So it is where nearly all of the smaller one lies in the larger. Of equal scores, that of the
-    larger box counts as higher.
-
-    Parameters
-    ----------
-    boxes
-        Shape `(n, 4)`: x, y, width, height in pixels, each with an area.
-    scores
-        Shape `(n,)`.
-    """
-    inside = coverage(boxes, boxes) > _NESTED
-    rank = np.empty(len(boxes), np.int64)
-    rank[np.lexsort((boxes[:, 2] * boxes[:, 3], scores))] = np.arange(len(boxes))
-    higher = rank > rank[:, np.newaxis]
-    return [bool(row.any()) for row in (inside | inside.T) & higher]
 
 
 def is_same(box: Float64Array, others: Float64Array) -> bool:

@@ -7,10 +7,10 @@ import numpy as np
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.geometry import Box, Float64Array, visible
+from vdet.geometry import Box, Float64Array, are_nested, visible
 from vdet.media.images import Image
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
-from vdet.track.motion.overlapping import are_hidden, are_nested, around, shows_both, stretched
+from vdet.track.motion.overlapping import are_hidden, around, shows_both, stretched
 from vdet.track.motion.vehicle import Observation, Vehicle
 from vdet.track.track import Track
 
