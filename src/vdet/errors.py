@@ -10,6 +10,13 @@ SOME_FAILED = 3
 INTERRUPTED = 130
 
 
+def failure_code(failed: int, inputs: int) -> int:
+    """Return the exit code of a run over several inputs, of which some or all may have failed."""
+    if not failed:
+        return 0
+    return SOME_FAILED if failed < inputs else VdetError.exit_code
+
+
 class VdetError(Exception):
     """An error that the user can understand and act upon."""
 

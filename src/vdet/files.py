@@ -242,10 +242,13 @@ def staged(
 
 @contextlib.contextmanager
 def output_errors(path: Path) -> Iterator[None]:
-    """Turn an `OSError` of the block into an `OutputError` that names `path`."""
+    """Turn an `OSError` of the block into an `OutputError` that names `path`.
+
+    A `BrokenPipeError` passes: whoever read the output has ended, and so does the program.
+    """
     try:
         yield
-    except VdetError:
+    except (VdetError, BrokenPipeError):
         raise
     except OSError as error:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error

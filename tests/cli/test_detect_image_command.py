@@ -110,7 +110,7 @@ def test_one_bad_picture_does_not_stop_the_others(
     (picture.parent / "a.png").write_text("text")
     out = tmp_path / "out"
     result = run("detect-image", picture.parent, "-o", out, "--model", model_path, *FEW_WINDOWS)
-    assert result.code == 1
+    assert result.code == 3
     assert "a.png: is not a picture, or is damaged" in result.err
     assert [p.name for p in out.iterdir()] == ["road.png"]
 
@@ -183,3 +183,11 @@ def test_boxes_lie_in_the_picture_whatever_its_size(
     assert item["boxes"]
     assert all(box["x"] + box["width"] <= 318 for box in item["boxes"])
     assert all(box["y"] + box["height"] <= 179 for box in item["boxes"])
+
+
+def test_if_no_picture_works_the_exit_code_is_1(run: Run, tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        (tmp_path / name).write_bytes(b"text")
+    result = run("detect-image", tmp_path, "--json", "-")
+    assert result.code == 1
+    assert result.err.count("is not a picture") == 2

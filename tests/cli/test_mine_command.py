@@ -5,12 +5,14 @@ import zipfile
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from conftest import Run
+from vdet.config.schema import InputSettings
 from vdet.detect.svm.model import load_model
 from vdet.evaluate.truth import read_truth
 from vdet.learn.dataset import find_boxed, find_patches, read_patches
@@ -195,3 +197,22 @@ def test_truth_of_a_longer_video(
     assert result.code == 1
     assert "long.txt:1: the frame is number 40 of a video of 30" in result.err
     assert not (tmp_path / "mined.zip").exists()
+
+
+def test_input_settings_apply(
+    run: Run,
+    clip_path: Path,
+    options: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    given = []
+
+    def reader(*arguments: Any, settings: InputSettings, **others: Any) -> VideoReader:
+        given.append(settings)
+        return VideoReader(*arguments, settings=settings, **others)
+
+    monkeypatch.setattr("vdet.learn.mining.mining.VideoReader", reader)
+    tolerant = ("--set", "input.max_damaged=0.5")
+    assert run("mine", clip_path, "-o", tmp_path / "m.zip", *options, *tolerant).code == 0
+    assert [each.max_damaged for each in given] == [0.5]

@@ -252,7 +252,7 @@ class TestDetectImage:
             ("video=a.mp4", 1, "a.mp4: the sink video is for videos"),
             ("json=red.png", 1, "red.png: is the input itself"),
             ("json=old.json", 1, "old.json: is there already"),
-            ("tracks=-", 1, "-: tracks are written as .txt, .csv, .jsonl"),
+            ("picture=-", 1, "-: pictures are written as "),
         ],
     )
     def test_an_output_that_cannot_be_is_refused_before_any_work(

@@ -21,7 +21,7 @@ from vdet.cli.messages import files_bar, print_lines, print_message
 from vdet.cli.options import PATH, POSITIVE, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
-from vdet.errors import SOME_FAILED, VdetError
+from vdet.errors import failure_code
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import Output, sink_kind
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
@@ -83,13 +83,13 @@ def output_options(
     options: BatchOptions,
     *,
     no_video: bool,
-    tracks: Path | None,
+    tracks: Sequence[Path],
     sinks: Sequence[Output],
     overwrite: bool,
 ) -> OutputOptions:
     """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
     suffixes: dict[str, str | None] = {} if no_video else {"video": None}
-    for output in (*([Output("tracks", tracks)] if tracks else []), *sinks):
+    for output in (*(Output("tracks", path) for path in tracks), *sinks):
         if suffixes.get(output.sink) is not None:
             raise click.UsageError(f"{output.sink} is given two suffixes; keep one")
         suffixes[output.sink] = _suffix(output)
@@ -146,9 +146,7 @@ def process_batch(
     workers, search_threads = _workers(options, len(plan.jobs))
     work = Work(settings, model, threads or search_threads, digest)
     failed = _run(plan, work, origin, workers, quiet=quiet)
-    if not failed:
-        return 0
-    return SOME_FAILED if plan.skipped or len(failed) < len(plan.jobs) else VdetError.exit_code
+    return failure_code(len(failed), len(plan.jobs) + len(plan.skipped))
 
 
 def _plan_lines(plan: Plan) -> list[str]:

@@ -17,6 +17,7 @@ from vdet.cli.options import (
     sink_option,
 )
 from vdet.detect.factory import load_detector
+from vdet.errors import failure_code
 from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
 from vdet.pipeline.sinks.protocol import Output, check_sinks
 
@@ -58,7 +59,7 @@ def detect_image(
     config_name: str | None,
     assignments: tuple[str, ...],
     overwrite: bool,
-) -> None:
+) -> int:
     """Find vehicles in pictures.
 
     Each IMAGE is a file, or a folder of files.
@@ -75,8 +76,6 @@ def detect_image(
     check_sinks(shared, overwrite=overwrite, inputs=sources)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     failures = run_pictures(jobs, shared, model, settings, request, overwrite=overwrite)
-    if failures:
-        *others, last = failures
-        for failure in others:
-            log.error("%s", failure)
-        raise last
+    for failure in failures:
+        log.error("%s", failure)
+    return failure_code(len(failures), len(jobs))

@@ -1,6 +1,7 @@
 """`vdet detect-video`: find and follow vehicles in one video, or in many."""
 
 import shlex
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -34,9 +35,10 @@ from vdet.pipeline.sinks.protocol import Output
 @click.option(
     "--tracks",
     type=PATH,
+    multiple=True,
     metavar="FILE",
-    help="Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -d, give only "
-    "the suffix.",
+    help="Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -, they go to "
+    "standard output as .jsonl. With -d, give only the suffix. Can be repeated.",
 )
 @click.option("--start", type=TimeType(), help="Begin at this time: seconds, MM:SS or HH:MM:SS.")
 @click.option("--end", type=TimeType(), help="Stop before this time.")
@@ -67,7 +69,7 @@ def detect_video(
     *,
     clips: tuple[Path, ...],
     no_video: bool,
-    tracks: Path | None,
+    tracks: tuple[Path, ...],
     start: Fraction | None,
     end: Fraction | None,
     frames: int | None,
@@ -144,10 +146,10 @@ def _in_and_out(clips: tuple[Path, ...], batch: BatchOptions) -> tuple[Path, Pat
 
 
 def _outputs(
-    video: Path | None, tracks: Path | None, stages: Path | None, others: tuple[Output, ...]
+    video: Path | None, tracks: Sequence[Path], stages: Path | None, others: Sequence[Output]
 ) -> tuple[Output, ...]:
-    named = {"video": video, "tracks": tracks, "stages": stages}
-    return (*(Output(sink, path) for sink, path in named.items() if path is not None), *others)
+    named = [("video", video), *(("tracks", path) for path in tracks), ("stages", stages)]
+    return (*(Output(sink, path) for sink, path in named if path is not None), *others)
 
 
 def _check_usage(

@@ -114,7 +114,7 @@ def mine(
     searched, number = 0, 0
     counts: Counter[PatchKind] = Counter()
     with (
-        VideoReader(job.video, frames=last) as reader,
+        VideoReader(job.video, frames=last, settings=settings.input) as reader,
         patch_archive(job.output, overwrite=job.overwrite) as archive,
     ):
         advance = progress(last)

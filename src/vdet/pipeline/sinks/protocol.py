@@ -146,11 +146,11 @@ def check_sinks(
     seen: set[Path] = set()
     for output in outputs:
         kind, path = _kind_for(output), output.path
-        if kind.writes_standard_output and path == STANDARD_OUTPUT:
-            continue
         if path.resolve() in seen:
             raise OutputError(f"{path}: is given for two outputs; name another file for one")
         seen.add(path.resolve())
+        if _is_standard_output(output):
+            continue
         if kind.marker:
             make_folder(path)
             path = next(path.glob(kind.marker), path / kind.marker)
@@ -205,9 +205,15 @@ class _NamedSink:
             self._sink.write(result)
 
 
+def _is_standard_output(output: Output) -> bool:
+    return output.path == STANDARD_OUTPUT and sink_kind(output.sink).writes_standard_output
+
+
 def _kind_for(output: Output) -> SinkKind:
     """Return the kind of an output's sink; refuse a suffix that is not one of the sink's."""
     kind, path = sink_kind(output.sink), output.path
+    if _is_standard_output(output):
+        return kind
     if kind.suffixes and path.suffix.lower() not in kind.suffixes:
         names = ", ".join(kind.suffixes)
         raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")

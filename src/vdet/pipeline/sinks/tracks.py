@@ -7,6 +7,8 @@
 | `.jsonl` | a frame, even one  | `frame`, `time`, `tracks`: a list of objects with `id`, `x`, `y`,|
 |          | without a box      | `width`, `height`, `score`, `predicted`; with lanes also `lane`  |
 
+The path `-` stands for standard output, as `.jsonl`, frame by frame as they are done.
+
 In `.csv` and `.jsonl` frames count from 0 at the start of the video, `time` is in seconds, and
 `x, y` is the top-left pixel of the box, counted from 0. `.txt` has no heading; its frames and
 pixels count from 1, as in MOTChallenge (Milan et al., "MOT16", 2016). `score` is 0 to 1: the share
@@ -22,13 +24,14 @@ the undistorted frame counted from 0, the nearest point first.
 
 import csv
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self, TextIO
 
 from vdet.lanes.lane import lane_record
 from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
+from vdet.pipeline.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
 
 Write = Callable[[FrameResult], None]
 
@@ -99,18 +102,23 @@ class TrackSink:
     def __init__(self, path: Path, context: SinkContext) -> None:
         self._path = path
         self._files = context.files
+        self._file: TextIO | None = None
 
     def __enter__(self) -> Self:
-        self._file = self._files.stage(self._path).open("w", encoding="utf-8", newline="")
-        self._write = _FORMATS[self._path.suffix.lower()](self._file)
+        if self._path == STANDARD_OUTPUT:
+            self._write = _json_lines(sys.stdout)
+        else:
+            self._file = self._files.stage(self._path).open("w", encoding="utf-8", newline="")
+            self._write = _FORMATS[self._path.suffix.lower()](self._file)
         return self
 
     def __exit__(self, *raised: object) -> None:
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
     def write(self, result: FrameResult) -> None:
         """Add the tracks of a frame, and its lane if the format has it."""
         self._write(result)
 
 
-TRACKS = SinkKind(TrackSink, tuple(_FORMATS), "tracks")
+TRACKS = SinkKind(TrackSink, tuple(_FORMATS), "tracks", writes_standard_output=True)
