@@ -37,7 +37,7 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
 
     first = run(*arguments)
     assert first.code == 3
-    assert f"{clips}/a.mp4: 12 frames, 0 vehicles, " in first.err
+    assert f"{clips}/a.mp4: 12 frames, 0 tracks, " in first.err
     assert f"vdet: error: {clips}/bad.mp4: is not a video" in first.err
     assert first.err.count("bad.mp4") == 1, "an error is printed once"
     assert first.err.splitlines()[-1] == f"{out}/manifest.jsonl: 2 files done, 1 failed"
@@ -58,13 +58,13 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     write_drive(clips / "bad.mp4", 3)
     again = run(*arguments, "--skip-existing")
     assert again.code == 0, again.err
-    assert "1 files done, 2 there already, 0 failed" in again.err
+    assert "1 file done, 2 there already, 0 failed" in again.err
     assert (out / "a.mp4").stat().st_mtime_ns == before
     assert [Path(record["input"]).name for record in records_of(out)][-1] == "bad.mp4"
 
     nothing = run(*arguments, "--skip-existing")
     assert nothing.code == 0
-    assert nothing.err == "all of 3 files are there already\n"
+    assert nothing.err == f"{out}: 3 files there already\n"
     assert len(records_of(out)) == 4
 
 

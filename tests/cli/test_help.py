@@ -1,13 +1,17 @@
 """The help of every command reads for itself."""
 
 import re
+import shlex
 from collections.abc import Iterator
 
 import click
 import pytest
+from click.shell_completion import ShellComplete
 
 from conftest import Run
+from vdet.cli.command import Command
 from vdet.cli.main import cli
+from vdet.cli.options import TimeType
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.evaluate.clips.sweep import grid
@@ -55,6 +59,40 @@ def test_the_help_of_every_option_is_of_whole_sentences(
 
 
 @pytest.mark.parametrize("names", COMMANDS, ids=" ".join)
+def test_no_summary_is_cut_in_a_narrow_terminal(
+    run: Run, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    shown = " ".join(run(*names, "--help").out.split())
+    for command in getattr(COMMANDS[names], "commands", {}).values():
+        assert re.split(r"(?<=[.])\s", command.help.strip())[0] in shown
+
+
+@pytest.mark.parametrize(
+    "names", [n for n, c in COMMANDS.items() if isinstance(c, Command)], ids=" ".join
+)
+def test_every_option_stands_under_a_heading_and_examples_can_be_run(
+    run: Run, names: tuple[str, ...]
+) -> None:
+    command = COMMANDS[names]
+    assert isinstance(command, Command)
+    shown = run(*names, "--help").out
+    for parameter in command.params:
+        assert isinstance(parameter, click.Argument) or f"{parameter.opts[-1]} " in shown
+    assert command.examples
+    for example in command.examples:
+        words = shlex.split(example.partition(" > ")[0])
+        assert words[: 1 + len(names)] == ["vdet", *names]
+        command.make_context(example, words[1 + len(names) :], obj=False)
+        assert f"  {example}\n" in shown
+
+
+def test_every_time_says_its_form() -> None:
+    times = [o for c in COMMANDS.values() for o in c.params if isinstance(o.type, TimeType)]
+    assert {option.metavar for option in times} == {"[[HH:]MM:]SS"}
+
+
+@pytest.mark.parametrize("names", COMMANDS, ids=" ".join)
 def test_every_option_and_argument_has_a_name_for_its_value(names: tuple[str, ...]) -> None:
     speaking = ("time", "pattern", "choice")
     for parameter in COMMANDS[names].params:
@@ -83,3 +121,19 @@ def test_one_option_means_the_same_in_every_command() -> None:
     for _, option, text in OPTIONS:
         texts.setdefault(option, set()).add(re.sub(r"for example \S+", "", text))
     assert {option for option, helps in texts.items() if len(helps) > 1} <= own
+
+
+@pytest.mark.parametrize(
+    ("words", "incomplete", "found"),
+    [
+        (["config", "-c"], "se", {"seed", "se"}),  # the second stands for files
+        (["detect-video", "--set"], "tracker.need", {"tracker.needed="}),
+        (["train", "--set"], "training.augmentation.m", {"training.augmentation.mirror="}),
+        (["eval", "video", "--model"], "mod", {"mod"}),
+    ],
+)
+def test_the_shell_completes_configs_keys_and_files(
+    words: list[str], incomplete: str, found: set[str]
+) -> None:
+    completed = ShellComplete(cli, {}, "vdet", "_VDET_COMPLETE").get_completions(words, incomplete)
+    assert {item.value for item in completed} == found

@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from conftest import Run
 from running import write_drive
-from vdet.cli.messages import files_bar
+from vdet.cli.messages import counted, files_bar
 
 
 class Terminal(io.StringIO):
@@ -88,3 +88,8 @@ def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
     with files_bar(4, quiet=True) as advance:
         advance(200)
     assert terminal.getvalue() == ""
+
+
+@pytest.mark.parametrize(("number", "text"), [(0, "0 files"), (1, "1 file"), (2, "2 files")])
+def test_a_number_has_its_noun(number: int, text: str) -> None:
+    assert counted(number, "file") == text

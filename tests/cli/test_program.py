@@ -1,5 +1,6 @@
 """The program as a whole: help, versions, errors as text, exit codes."""
 
+import logging
 import os
 import subprocess
 import sys
@@ -74,3 +75,32 @@ def test_a_bug_is_one_line_too(run: Run, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_scikit_learn_is_not_loaded_by_detection() -> None:
     code = "import sys, vdet.cli; sys.exit('sklearn' in sys.modules or 'scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize("quiet", [("-q", "config"), ("config", "-q"), ("config", "--quiet")])
+def test_quiet_and_verbose_work_before_and_after_the_command(
+    run: Run, quiet: tuple[str, ...]
+) -> None:
+    assert run(*quiet).code == 0
+    assert logging.getLogger("vdet").level == logging.ERROR
+    assert run("config", "-v").code == 0
+    assert logging.getLogger("vdet").level == logging.DEBUG
+    assert run("-q", "config", "-v").code == 0
+    assert logging.getLogger("vdet").level == logging.ERROR
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--frames", 10**30), "'--frames'"),
+        (("--threads", 10**30), "'--threads'"),
+        (("--start", "999999999:00:00"), "is more than 10,000 hours"),
+        (("--end", "999999999:00:00"), "is more than 10,000 hours"),
+    ],
+)
+def test_numbers_that_are_too_large_are_wrong_usage(
+    run: Run, options: tuple[str, object], words: str
+) -> None:
+    result = run("detect-video", "in.mp4", "out.mp4", *map(str, options))
+    assert (result.code, words in result.err) == (2, True)
+    assert run("eval", "tracks", "a.txt", "b.txt", "--until", str(10**30)).code == 2

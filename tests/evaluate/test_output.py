@@ -71,3 +71,8 @@ def test_numbers_never_replace_an_input(tmp_path: Path) -> None:
 def test_numbers_go_to_standard_output_for_a_dash(capsys: pytest.CaptureFixture[str]) -> None:
     write_json({"recall": None}, "-")
     assert json.loads(capsys.readouterr().out) == {"recall": None}
+
+
+def test_a_report_can_name_a_file_whose_name_is_no_text(tmp_path: Path) -> None:
+    name = b"r\xff.mp4".decode(errors="surrogateescape")
+    assert write_page(f"<p>{name}", tmp_path).read_text() == "<p>r\\udcff.mp4"

@@ -45,7 +45,7 @@ class Record:
     width, height
         Size of the upright picture, pixels.
     frames, tracks
-        How many frames were read, and how many vehicles were followed.
+        How many frames were read, and how many tracks were shown.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
     digest

@@ -17,8 +17,8 @@ from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
-from vdet.cli.messages import files_bar, print_lines, print_message
-from vdet.cli.options import PATH, POSITIVE, scheduler_option
+from vdet.cli.messages import counted, files_bar, print_lines, print_message
+from vdet.cli.options import PATH, PROCESSES, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
 from vdet.errors import failure_code
@@ -61,7 +61,7 @@ def batch_options(command: F) -> F:
         ),
         click.option(
             "--jobs",
-            type=POSITIVE,
+            type=PROCESSES,
             metavar="N",
             show_default="one for each core",
             help="With -d: process N videos at once, each in its own process.",
@@ -141,7 +141,7 @@ def process_batch(
         print_lines(*_plan_lines(plan))
         return 0
     if not plan.jobs:
-        click.echo(f"all of {len(plan.skipped)} files are there already", err=True)
+        click.echo(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already", err=True)
         return 0
     workers, search_threads = _workers(options, len(plan.jobs))
     work = Work(settings, model, threads or search_threads, digest)
@@ -174,7 +174,9 @@ def _run(plan: Plan, work: Work, origin: Origin, workers: Workers, *, quiet: boo
     if not quiet:
         skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
         done = len(plan.jobs) - len(failed)
-        print_message(f"{plan.manifest}: {done} files done, {skipped}{len(failed)} failed")
+        print_message(
+            f"{plan.manifest}: {counted(done, 'file')} done, {skipped}{len(failed)} failed"
+        )
     return failed
 
 
@@ -201,5 +203,5 @@ def _print_result(job: VideoJob, record: Record, *, quiet: bool) -> None:
     if record.error:
         log.error("%s", record.error)
     elif not quiet:
-        found = f"{record.frames} frames, {record.tracks} vehicles"
+        found = f"{counted(record.frames, 'frame')}, {counted(record.tracks, 'track')}"
         print_message(f"{job.source}: {found}, {record.seconds:.1f} s")

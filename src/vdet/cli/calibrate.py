@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import print_lines
 from vdet.cli.options import PATH, overwrite_option
 from vdet.errors import OutputError
@@ -41,7 +42,13 @@ class PatternType(click.ParamType):  # type: ignore[type-arg]  # generic from cl
         return int(match[1]), int(match[2])
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet calibrate chessboards/ -o camera.yaml",
+        "vdet calibrate chessboards/ -o camera.yaml --pattern 9x6 --preview previews",
+    ),
+)
 @click.argument("photos", nargs=-1, required=True, type=PATH, metavar="PHOTO...")
 @click.option(
     "-o", "--output", required=True, type=PATH, metavar="FILE", help="Camera file to write, .yaml."

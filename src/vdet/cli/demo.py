@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import print_lines, print_message, progress_bar
 from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
 from vdet.config.schema import Settings
@@ -26,7 +27,13 @@ PATCHES = 1200
 """Of each class."""
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet demo",
+        "vdet demo folder --seed 2 --overwrite",
+    ),
+)
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
 @click.option(
     "--seed",

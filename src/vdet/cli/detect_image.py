@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.options import (
     PATH,
     lane_options,
@@ -24,7 +25,14 @@ from vdet.pipeline.sinks.protocol import Output, check_sinks
 log = logging.getLogger("vdet")
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet detect-image road.jpg -o found.jpg --json -",
+        "vdet detect-image pictures/ -o found/ --json boxes.json",
+        "vdet detect-image road.jpg --stages stages",
+    ),
+)
 @click.argument("images", nargs=-1, required=True, type=PATH, metavar="IMAGE...")
 @click.option(
     "-o",

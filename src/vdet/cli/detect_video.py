@@ -8,10 +8,13 @@ from pathlib import Path
 import click
 
 from vdet.cli.batch import BatchOptions, batch_options, output_options, process_batch
-from vdet.cli.messages import print_message, progress_bar
+from vdet.cli.command import Command
+from vdet.cli.messages import counted, print_message, progress_bar
 from vdet.cli.options import (
     PATH,
     POSITIVE,
+    PROCESSES,
+    TIME_FORM,
     TimeType,
     lane_options,
     model_option,
@@ -29,7 +32,15 @@ from vdet.pipeline.loop import VideoJob, check_job, run_video
 from vdet.pipeline.sinks.protocol import Output
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
+        "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
+        "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
+        "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
+    ),
+)
 @click.argument("clips", nargs=-1, required=True, type=PATH, metavar="IN [OUT] | CLIP...")
 @click.option("--no-video", is_flag=True, help="Write no video, only other outputs.")
 @click.option(
@@ -40,12 +51,17 @@ from vdet.pipeline.sinks.protocol import Output
     help="Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -, they go to "
     "standard output as .jsonl. With -d, give only the suffix. Can be repeated.",
 )
-@click.option("--start", type=TimeType(), help="Begin at this time: seconds, MM:SS or HH:MM:SS.")
-@click.option("--end", type=TimeType(), help="Stop before this time.")
+@click.option(
+    "--start",
+    type=TimeType(),
+    metavar=TIME_FORM,
+    help="Begin at this time, as in 90, 1:30 or 0:01:30.5.",
+)
+@click.option("--end", type=TimeType(), metavar=TIME_FORM, help="Stop before this time.")
 @click.option("--frames", type=POSITIVE, metavar="N", help="Process at most N frames.")
 @click.option(
     "--threads",
-    type=POSITIVE,
+    type=PROCESSES,
     metavar="N",
     show_default="one for each core, shared by --jobs",
     help="Search one video in N threads.",
@@ -56,7 +72,9 @@ from vdet.pipeline.sinks.protocol import Output
     metavar="DIR",
     help="Write a picture of every stage of one frame into DIR. Goes with --at.",
 )
-@click.option("--at", type=TimeType(), help="Show the frame at this time with --stages.")
+@click.option(
+    "--at", type=TimeType(), metavar=TIME_FORM, help="Show the frame at this time with --stages."
+)
 @sink_option
 @batch_options
 @lane_options
@@ -182,7 +200,5 @@ def _process_one(
         summary = run_video(job, model, settings, threads=threads, progress=progress)
     if not quiet:
         rate = summary.frames / summary.seconds
-        print_message(
-            f"{job.source}: {summary.frames} frames, {summary.tracks} vehicles, "
-            f"{summary.seconds:.1f} s, {rate:.1f} frames/s"
-        )
+        found = f"{counted(summary.frames, 'frame')}, {counted(summary.tracks, 'track')}"
+        print_message(f"{job.source}: {found}, {summary.seconds:.1f} s, {rate:.1f} frames/s")

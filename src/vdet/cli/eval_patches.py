@@ -4,10 +4,11 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
     PATH,
-    POSITIVE,
+    PROCESSES,
     print_results,
     read_settings,
     results_options,
@@ -19,7 +20,13 @@ from vdet.evaluate.output import check_outputs
 from vdet.learn.dataset import find_patches
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet eval patches vehicles.zip non-vehicles.zip --report report",
+        "vdet eval patches patches/ --model model.npz",
+    ),
+)
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
 @click.option(
     "--model",
@@ -41,7 +48,7 @@ from vdet.learn.dataset import find_patches
 @settings_options("training.C=1e-4")
 @click.option(
     "--jobs",
-    type=POSITIVE,
+    type=PROCESSES,
     metavar="N",
     show_default="one for each core",
     help="Work in N processes.",

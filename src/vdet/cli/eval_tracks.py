@@ -4,11 +4,15 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.options import PATH, POSITIVE, print_results, results_options
 from vdet.evaluate.output import check_outputs
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=("vdet eval tracks out.txt gt.txt --report report",),
+)
 @click.argument("prediction", type=PATH, metavar="PRED")
 @click.argument("truth", type=PATH, metavar="TRUTH")
 @click.option(

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
     PATH,
@@ -21,7 +22,13 @@ from vdet.evaluate.output import check_outputs
 from vdet.pipeline.sinks.protocol import check_sinks
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet eval video in.mp4 --truth gt.txt --report report",
+        "vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3",
+    ),
+)
 @click.argument("videos", nargs=-1, required=True, type=PATH, metavar="IN...")
 @click.option(
     "--truth",

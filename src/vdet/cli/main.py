@@ -10,6 +10,7 @@ import click
 
 import vdet
 from vdet.cli.calibrate import calibrate
+from vdet.cli.command import Command
 from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
@@ -36,12 +37,18 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     context.obj = quiet
 
 
-@cli.group("eval")
+@cli.group("eval", short_help="Measure detection, tracking or the classifier.")
 def evaluate() -> None:
     """Measure detection, tracking or the classifier."""
 
 
-@cli.command()
+@cli.command(
+    cls=Command,
+    examples=(
+        "vdet config > my.yaml",
+        "vdet config -c seed --set output.crf=18",
+    ),
+)
 @settings_options("tracker.method=rules")
 def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     """Print the effective settings as commented YAML.

@@ -26,6 +26,11 @@ def print_message(line: str) -> None:
         print_lines(line, err=True)
 
 
+def counted(number: int | None, noun: str) -> str:
+    """Write a number with its noun: 1 file, 2 files."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 class _LogHandler(logging.Handler):
     """Prints log records as messages, with the level of warnings and errors."""
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.messages import print_lines, progress_bar
+from vdet.cli.command import Command
+from vdet.cli.messages import counted, print_lines, progress_bar
 from vdet.cli.options import (
     PATH,
     POSITIVE,
@@ -18,7 +19,10 @@ from vdet.errors import OutputError
 from vdet.files import check_output
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=("vdet mine in.mp4 --truth gt.txt -o mined.zip",),
+)
 @click.argument("video", type=PATH, metavar="VIDEO")
 @click.option(
     "--truth",
@@ -93,5 +97,5 @@ def mine(
     print_lines(
         f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "
         f"{mined.false_alarms} false alarms, {mined.parts} more on parts of vehicles; "
-        f"from {mined.frames} frames"
+        f"from {counted(mined.frames, 'frame')}"
     )

@@ -2,15 +2,16 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from vdet.cli.messages import print_lines
-from vdet.config.loading import find_config, load_settings
+from vdet.config.loading import find_config, load_settings, shipped_configs
 from vdet.config.schema import Settings
 from vdet.evaluate.output import write_page
 from vdet.files import write_json
@@ -20,12 +21,16 @@ from vdet.pipeline.sinks.protocol import Output
 
 PATH = click.Path(path_type=Path)
 """A path; whether something is there is checked later."""
-POSITIVE = click.IntRange(min=1)
+POSITIVE = click.IntRange(1, 1_000_000_000)
+PROCESSES = click.IntRange(1, 256)
+"""How many threads or processes."""
+TIME_FORM = "[[HH:]MM:]SS"
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 log = logging.getLogger("vdet")
 
+_LONGEST = 10_000 * 3600  # seconds
 _TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
 
 
@@ -47,6 +52,8 @@ class TimeType(click.ParamType):  # type: ignore[type-arg]  # generic from click
         seconds = Fraction(0)
         for part in str(value).split(":"):
             seconds = seconds * 60 + Fraction(part)
+        if seconds > _LONGEST:
+            self.fail(f"{value!r} is more than {_LONGEST // 3600:,} hours", param, context)
         return seconds
 
 
@@ -62,6 +69,7 @@ def settings_options(example: str) -> Callable[[F], F]:
             "assignments",
             multiple=True,
             metavar="KEY=VALUE",
+            shell_complete=_complete_keys,
             help=f"Change one setting, for example {example}. Can be repeated.",
         )(command)
         return click.option(
@@ -69,10 +77,31 @@ def settings_options(example: str) -> Callable[[F], F]:
             "--config",
             "config_name",
             metavar="FILE",
+            shell_complete=_complete_configs,
             help="Read settings from a YAML file, or from a shipped one: default or seed.",
         )(command)
 
     return add
+
+
+def _complete_configs(
+    _: click.Context, __: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    names = [name for name in shipped_configs() if name.startswith(incomplete)]
+    return [*map(CompletionItem, names), CompletionItem(incomplete, type="file")]
+
+
+def _complete_keys(_: click.Context, __: click.Parameter, incomplete: str) -> list[str]:
+    keys = _keys(Settings().model_dump(mode="json"))
+    return [f"{key}=" for key in keys if key.startswith(incomplete)]
+
+
+def _keys(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _keys(value, f"{before}{name}.")
+        else:
+            yield f"{before}{name}"
 
 
 def read_settings(config_name: str | None, assignments: tuple[str, ...]) -> Settings:

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import print_lines, progress_bar
 from vdet.cli.options import (
     PATH,
-    POSITIVE,
+    PROCESSES,
     overwrite_option,
     read_settings,
     scheduler_option,
@@ -19,7 +20,13 @@ from vdet.files import check_output
 from vdet.learn.dataset import find_boxed, find_patches
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz",
+        "vdet train patches/ -o model.npz --set training.C=1e-3",
+    ),
+)
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
 @click.option(
     "-o", "--output", required=True, type=PATH, metavar="FILE", help="Model file to write, .npz."
@@ -27,7 +34,7 @@ from vdet.learn.dataset import find_boxed, find_patches
 @settings_options("training.C=1e-4")
 @click.option(
     "--jobs",
-    type=POSITIVE,
+    type=PROCESSES,
     metavar="N",
     show_default="one for each core",
     help="Work in N processes.",

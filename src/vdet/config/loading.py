@@ -42,10 +42,15 @@ def find_config(name: str) -> Path:
     path = Path(name)
     if path.is_file():
         return path
-    shipped = {file.stem: file for folder in _CONFIGS for file in sorted(folder.glob("*.yaml"))}
+    shipped = shipped_configs()
     if name in shipped:
         return shipped[name]
     raise ConfigError(f"{name}: no such file; shipped configs are: {', '.join(shipped)}")
+
+
+def shipped_configs() -> dict[str, Path]:
+    """Return the shipped config files by name."""
+    return {file.stem: file for folder in _CONFIGS for file in sorted(folder.glob("*.yaml"))}
 
 
 def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> Settings:

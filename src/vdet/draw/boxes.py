@@ -2,6 +2,7 @@
 
 import colorsys
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -64,6 +65,29 @@ def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -
     The corner is `(x, y)` in pixels. The tag is moved so that it lies in the image. A text that is
     wider than the image becomes smaller; if it still does not fit, its end is cut off.
     """
+    label = _lay_out(image, text, corner)
+    _fill(image, label.tag, color)
+    ink = text_color(color)
+    cv2.putText(image, text, label.origin, _FONT, label.scale, ink, label.stroke, cv2.LINE_AA)
+    return label.tag
+
+
+def label_tag(image: Image, text: str, corner: tuple[int, int]) -> Box:
+    """Return the tag that `draw_label` would draw."""
+    return _lay_out(image, text, corner).tag
+
+
+@dataclass(frozen=True, slots=True)
+class _Label:
+    """Where a label's tag is, and how its text is written; `origin` is its lower left corner."""
+
+    tag: Box
+    origin: tuple[int, int]
+    scale: float
+    stroke: int
+
+
+def _lay_out(image: Image, text: str, corner: tuple[int, int]) -> _Label:
     rows, columns = image.shape[:2]
     scale = _text_scale(image, text)
     stroke = max(1, round(1.5 * scale))
@@ -73,10 +97,7 @@ def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -
     x = max(0, min(corner[0], columns - tag_width))
     y = max(0, min(corner[1], rows) - tag_height)
     tag = Box(x, y, tag_width, tag_height)
-    _fill(image, tag, color)
-    origin = (x + margin, y + margin + height)
-    cv2.putText(image, text, origin, _FONT, scale, text_color(color), stroke, cv2.LINE_AA)
-    return tag
+    return _Label(tag, (x + margin, y + margin + height), scale, stroke)
 
 
 def text_color(background: Color) -> Color:

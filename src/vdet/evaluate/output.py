@@ -68,7 +68,8 @@ def check_outputs(
 def write_page(html: str, folder: Path, *, overwrite: bool = False) -> Path:
     """Write a report into its folder and return the file. Raises `OutputError`."""
     with staged(folder / PAGE, overwrite=overwrite) as temporary:
-        temporary.write_text(html, encoding="utf-8")
+        # The name of a file may be no valid text.
+        temporary.write_text(html, encoding="utf-8", errors="backslashreplace")
     return folder / PAGE
 
 

@@ -92,7 +92,7 @@ class Summary:
     width, height
         Size of the upright frames, pixels.
     frames, tracks
-        Number of frames searched, and of vehicles shown (ids).
+        Number of frames searched, and of tracks shown (ids).
     seconds
         Wall time.
     """

@@ -165,6 +165,15 @@ class TestDefaultSettings:
         assert len(detect_still(road(), DEFAULT)) == 0
 
 
+@pytest.mark.parametrize(("settings", "told"), [(ROWS, False), (DEFAULT, True)])
+def test_the_horizon_is_told_where_windows_depend_on_it(
+    settings: SvmSettings, told: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    with caplog.at_level("INFO", "vdet"):
+        SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, [road()])
+    assert ("horizon" in caplog.text) == told
+
+
 class TestStillPictures:
     """A still picture equals the last of `heat.frames` equal frames of a video."""
 

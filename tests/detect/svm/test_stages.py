@@ -8,12 +8,14 @@ from vdet.config.schema import FeatureSettings, SvmSettings, WindowSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.stages import Trace, blend_heat, stage_pictures
-from vdet.draw.boxes import color_of
+from vdet.detect.svm.windows import Windows
+from vdet.draw.boxes import GREEN, color_of, draw_box, draw_label
 from vdet.geometry import Box
 from vdet.media.images import Image
 
 NAMES = ["patches", "windows", "hits", "heat"]
 ROWS = SETTINGS.svm
+HOG = red_finder().features
 SMALLER_SET = WindowSettings(size=24, overlap=0.5, top=100, bottom=160)
 OUTSIDE = WindowSettings(size=240, overlap=0.5, top=120, bottom=360)
 
@@ -69,6 +71,21 @@ def test_hits_are_drawn_around_the_car_alone() -> None:
     rows, columns = np.nonzero(changed)
     assert CAR.x - 32 <= columns.min() < columns.max() < CAR.right + 40
     assert CAR.y - 32 <= rows.min() < rows.max() < CAR.bottom + 40
+
+
+def test_labels_of_hits_do_not_cover_one_another() -> None:
+    boxes = np.array([[40, 60, 60, 60], [44, 62, 60, 60], [160, 60, 60, 60]], np.int32)
+    probabilities = np.array([0.6, 0.9, 0.7], np.float32)
+    hits = Windows(boxes, probabilities, np.ones(3, np.float32), boxes.astype(np.float32))
+    drawn = stage_pictures(
+        road(), Trace(hits, hits, Heat(np.zeros((HEIGHT, WIDTH), np.float32)), ()), HOG
+    )
+    expected = road()
+    for box in boxes.tolist():
+        draw_box(expected, Box(*box), GREEN)
+    for text, box in (("0.90", boxes[1]), ("0.70", boxes[2])):
+        draw_label(expected, text, (int(box[0]), int(box[1] + box[3])), GREEN)
+    np.testing.assert_array_equal(drawn["hits"], expected)
 
 
 def test_heat_is_brightest_on_the_car() -> None:

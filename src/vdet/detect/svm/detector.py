@@ -48,7 +48,8 @@ class SvmModel:
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
         """Return a detector for frames of one size; `images` show where the horizon is."""
         horizon = horizon_of(self._settings, images)
-        log.info("the horizon lies at %.2f of the height", horizon)
+        if self._settings.search.perspective.sizes:
+            log.info("the horizon lies at %.2f of the height", horizon)
         return SvmDetector(self._model, self._settings, width, height, horizon=horizon)
 
 

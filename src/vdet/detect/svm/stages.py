@@ -11,7 +11,7 @@ from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.patch_sheet import patch_sheet
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, Windows
-from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label
+from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, label_tag
 from vdet.geometry import Box
 from vdet.media.images import Image
 
@@ -75,11 +75,17 @@ def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
 
 
 def _draw_hits(image: Image, hits: Windows) -> Image:
+    """Draw all hits, and the probability of each whose label covers no label of a likelier one."""
     picture = image.copy()
-    for i in np.argsort(hits.probabilities, kind="stable").tolist():
+    for box in hits.boxes.tolist():
+        draw_box(picture, Box(*box), GREEN)
+    tags: list[Box] = []
+    for i in np.argsort(-hits.probabilities, kind="stable").tolist():
         box = Box(*hits.boxes[i].tolist())
-        draw_box(picture, box, GREEN)
-        draw_label(picture, f"{hits.probabilities[i]:.2f}", (box.x, box.bottom), GREEN)
+        text, corner = f"{hits.probabilities[i]:.2f}", (box.x, box.bottom)
+        tag = label_tag(picture, text, corner)
+        if not any(tag.intersection(other).area for other in tags):
+            tags.append(draw_label(picture, text, corner, GREEN))
     return picture
 
 

@@ -1,0 +1,82 @@
+"""Commands whose help groups its options, ends with examples, and which take -q and -v."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import click
+
+from vdet.cli.messages import set_up_logs
+
+HEADINGS: Mapping[str, Sequence[str]] = {
+    "Outputs": (
+        *("--output", "--no-video", "--tracks", "--json", "--report", "--preview", "--stages"),
+        *("--at", "--sink", "--overwrite"),
+    ),
+    "What is processed": (
+        *("--truth", "--start", "--end", "--frames", "--every", "--from", "--until", "--rate"),
+        *("--seed", "--split", "--sweep", "--pattern"),
+    ),
+    "Several videos": ("--directory", "--skip-existing", "--dry-run"),
+    "Lanes": ("--lanes", "--camera"),
+    "Model and settings": ("--model", "--config", "--set"),
+    "Parallel work": ("--jobs", "--threads", "--scheduler"),
+    "General": ("--quiet", "--verbose", "--version", "--help"),
+}
+"""Under which heading of the help an option stands, and in which order."""
+
+
+class Command(click.Command):
+    """A command of the program.
+
+    Parameters
+    ----------
+    examples
+        Command lines that the help shows.
+    """
+
+    def __init__(self, *arguments: Any, examples: Sequence[str] = (), **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.examples = examples
+        self.params += [_verbosity_option("quiet"), _verbosity_option("verbose")]
+        # click cuts only summaries that are not given.
+        self.short_help = re.split(r"(?<=\.)\s", (self.help or "").strip())[0]
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options under their headings, and the examples."""
+        records = {
+            parameter.opts[-1]: record
+            for parameter in self.get_params(context)
+            if (record := parameter.get_help_record(context))
+        }
+        for heading, names in HEADINGS.items():
+            rows = [records[name] for name in names if name in records]
+            if rows:
+                with formatter.section(heading):
+                    formatter.write_dl(rows)
+        if self.examples:
+            with formatter.section("Examples"):
+                for line in self.examples:
+                    formatter.write(f"{'':{formatter.current_indent}}{line}\n")
+
+
+def _verbosity_option(name: str) -> click.Option:
+    """Return `--quiet` or `--verbose`, which mean the same as before the command."""
+
+    def apply(context: click.Context, _: click.Parameter, given: bool) -> None:
+        if given and name == "quiet":
+            context.obj = True
+        if given:
+            set_up_logs(verbose=name == "verbose", quiet=bool(context.obj))
+
+    helps = {
+        "quiet": "Print no progress and no warnings, only errors.",
+        "verbose": "Print more about what is done.",
+    }
+    return click.Option(
+        [f"-{name[0]}", f"--{name}"],
+        is_flag=True,
+        expose_value=False,
+        callback=apply,
+        help=helps[name],
+    )
