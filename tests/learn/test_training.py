@@ -352,7 +352,8 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
         groups = np.array([file.group for file in files])
         held = hold_out(groups, name, settings.training.test_fraction, settings.training.seed)
         for row in np.flatnonzero(held):
-            write_image(spoilt / files[row].name, np.full((SIZE, SIZE, 3), row, np.uint8))
+            flat = np.full((SIZE, SIZE, 3), row, np.uint8)
+            write_image(spoilt / files[row].name, flat, overwrite=True)
     one, _ = train(lists[0], settings, boxed=lists[1], jobs=1)
     files, boxed = find_patches([spoilt]), find_boxed([spoilt])
     other, report = train(files, settings, boxed=boxed, jobs=1)

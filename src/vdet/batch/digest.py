@@ -13,8 +13,8 @@ _NO_EFFECT = {"training", "mining"}  # sections that detection does not read
 
 def work_digest(origin: Origin, settings: Settings, job: VideoJob) -> str:
     """Return a digest of program, model and settings, and of the part and lanes that are wanted."""
-    part = (job.start, job.end, job.frames, job.lanes)
-    return _digest(repr(origin), settings.model_dump_json(exclude=_NO_EFFECT), repr(part))
+    wanted = (origin.program, origin.model_sha256, job.start, job.end, job.frames, job.lanes)
+    return _digest(repr(wanted), settings.model_dump_json(exclude=_NO_EFFECT))
 
 
 def result_digest(work: str, source: Path) -> str:

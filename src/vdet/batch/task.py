@@ -46,6 +46,7 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
     """
     began, started = time.perf_counter(), _now()
     summary, error = None, None
+    sizes: dict[str, int] = {}
     digest = result_digest(work.digest, job.source)
     threads = work.threads
     with _collected_warnings(job) as warnings:
@@ -54,15 +55,16 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
                 make_folder(output.path.parent)
             model = load_detector(work.settings.detector, work.model)
             summary = run_video(job, model, work.settings, threads=threads, codec_threads=threads)
+            paths = [output.path.absolute() for output in job.outputs]
+            sizes = {str(path): path.stat().st_size for path in paths}
         except Exception as failure:
             error = in_one_line(failure)
             if os.environ.get("VDET_DEBUG") == "1":
                 traceback.print_exc()
     seconds = time.perf_counter() - began
     record = _record(job, started, seconds, warnings=tuple(warnings), error=error)
-    if summary is None:
+    if summary is None or error:
         return record
-    paths = [output.path.absolute() for output in job.outputs]
     return replace(
         record,
         width=summary.width,
@@ -70,7 +72,7 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
         frames=summary.frames,
         tracks=summary.tracks,
         digest=digest,
-        sizes={str(path): path.stat().st_size for path in paths},
+        sizes=sizes,
     )
 
 

@@ -57,7 +57,7 @@ def test_each_split_is_tested_in_the_order_given(bright_and_dark: Path) -> None:
 def test_mistakes_have_the_right_names_beside_a_broken_patch(bright_and_dark: Path) -> None:
     (bright_and_dark / "non-vehicles" / "a" / "3.png").write_bytes(b"broken")
     light = np.full((16, 16, 3), 180, np.uint8)
-    write_image(bright_and_dark / "non-vehicles" / "b" / "7.png", light)
+    write_image(bright_and_dark / "non-vehicles" / "b" / "7.png", light, overwrite=True)
     tolerant = SETTINGS.model_copy(
         update={"training": SETTINGS.training.model_copy(update={"max_broken": 0.1})}
     )
