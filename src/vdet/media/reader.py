@@ -98,6 +98,8 @@ class VideoReader:
             self.info: VideoInfo = describe(
                 path, self._decoder.container, self._decoder.stream, first
             )
+            if not restarts_clock(self._decoder.container):
+                self._length = stated_duration(self._decoder.stream, self.info.start)
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
             self._note_what_is_left_out(first)
@@ -117,8 +119,6 @@ class VideoReader:
 
         Before all frames were read it is what the file declares.
         """
-        if self._length is None and not restarts_clock(self._decoder.container):
-            return stated_duration(self._decoder.stream, self.info.start)
         return self._length
 
     @property
