@@ -17,7 +17,7 @@ SINKS = "vdet.sinks"
 
 _NOUNS = {DETECTORS: "detector", TRACKERS: "tracker", SINKS: "sink"}
 _BUILT_IN = {
-    DETECTORS: {"svm": "vdet.detect.svm.kind:SVM"},
+    DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.kind:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {
         "video": "vdet.pipeline.sinks.video:VIDEO",

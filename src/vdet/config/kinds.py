@@ -2,7 +2,12 @@
 
 from dataclasses import dataclass
 
-from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, SvmSettings
+from vdet.config.schema import (
+    MotionTrackerSettings,
+    NetworkSettings,
+    RulesTrackerSettings,
+    SvmSettings,
+)
 from vdet.config.section import Section
 from vdet.errors import ConfigError
 from vdet.plugins import DETECTORS, TRACKERS, load_plugin, plugin_names
@@ -56,7 +61,7 @@ class SectionKinds:
 
 
 SECTIONS_WITH_KINDS = {
-    "detector": SectionKinds("kind", DETECTORS, {"svm": SvmSettings}),
+    "detector": SectionKinds("kind", DETECTORS, {"svm": SvmSettings, "net": NetworkSettings}),
     "tracker": SectionKinds(
         "method", TRACKERS, {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings}
     ),

@@ -5,7 +5,13 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from pydantic import SerializeAsAny
 
-from vdet.config.detector import DetectorSettings, ScoreSettings, StillSettings, SvmSettings
+from vdet.config.detector import (
+    DetectorSettings,
+    NetworkSettings,
+    ScoreSettings,
+    StillSettings,
+    SvmSettings,
+)
 from vdet.config.features import (
     ColorSpace,
     FeatureSettings,
@@ -17,6 +23,7 @@ from vdet.config.heat import HeatSettings, VoteSettings
 from vdet.config.input import InputSettings
 from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
+from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
@@ -43,6 +50,8 @@ __all__ = [
     "LaneSettings",
     "MiningSettings",
     "MotionTrackerSettings",
+    "NetworkSettings",
+    "NetworkTrainingSettings",
     "OutputSettings",
     "PerspectiveSettings",
     "RulesTrackerSettings",
@@ -68,6 +77,7 @@ class Settings(Section):
     lanes: LaneSettings = LaneSettings()
     training: TrainingSettings = TrainingSettings()
     mining: MiningSettings = MiningSettings()
+    network: NetworkTrainingSettings = NetworkTrainingSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
 

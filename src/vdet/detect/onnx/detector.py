@@ -1,0 +1,119 @@
+"""A network in an ONNX file as a detector."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.schema import NetworkSettings
+from vdet.detect.detections import Detections
+from vdet.detect.onnx.classes import our_classes
+from vdet.detect.onnx.layouts import RawBoxes
+from vdet.detect.onnx.preparation import Placement
+from vdet.detect.onnx.recognition import Recognized, recognize
+from vdet.detect.onnx.session import Session
+from vdet.detect.onnx.suppression import suppress
+from vdet.draw.boxes import GREEN, draw_box
+from vdet.errors import ModelError
+from vdet.geometry import Box, Int32Array
+from vdet.media.images import Image
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """The vehicles that the network finds, before suppression, in pixels of the frame."""
+
+    raw: RawBoxes
+    is_still: bool
+
+
+class NetworkModel:
+    """A network with its settings: a `DetectorModel`."""
+
+    def __init__(self, path: Path, settings: NetworkSettings) -> None:
+        self._path = path
+        self._settings = settings
+        self._session = Session(path)
+
+    def for_video(
+        self,
+        width: int,
+        height: int,
+        images: Sequence[Image],  # noqa: ARG002 - its size is enough
+    ) -> "NetworkDetector":
+        """Return a detector for frames of one size."""
+        recognized = recognize(self._session, self._path, (width, height), self._settings.names)
+        numbers = np.array(our_classes(recognized.names, self._settings.classes), np.int32)
+        if (numbers < 0).all():
+            raise ModelError(
+                f"{self._path}: knows none of detector.classes "
+                f"({', '.join(self._settings.classes)}); it knows {', '.join(recognized.names)}"
+            )
+        return NetworkDetector(self._session, recognized, numbers, self._settings)
+
+
+class NetworkDetector:
+    """Finds vehicles in frames of one size: a `VideoDetector`; it remembers nothing.
+
+    Parameters
+    ----------
+    numbers
+        int32: for each class of the network its number in `detector.classes`, -1 for others.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        recognized: Recognized,
+        numbers: Int32Array,
+        settings: NetworkSettings,
+    ) -> None:
+        self._session = session
+        self._recognized = recognized
+        self._numbers = numbers
+        self._settings = settings
+
+    def search(self, image: Image, index: int | None) -> Candidates:
+        """Run the network on a frame; several threads may call this at once."""
+        values, place = self._recognized.form.prepare(image)
+        outputs = self._session.run(self._recognized.feed(self._session, values))
+        raw = self._recognized.layout.decode(outputs, self._settings.least)
+        return Candidates(
+            self._wanted(raw, place, image.shape[1], image.shape[0]), is_still=index is None
+        )
+
+    def detect(self, candidates: Candidates) -> Detections:
+        """Return one box for each vehicle."""
+        raw = candidates.raw
+        rows = suppress(raw.boxes, raw.scores, self._settings.overlap)
+        if candidates.is_still:
+            rows = rows[raw.scores[rows] >= self._settings.still_score]
+        return Detections(
+            raw.boxes[rows],
+            raw.scores[rows],
+            classes=raw.classes[rows],
+            names=self._settings.classes,
+            trace=raw,
+        )
+
+    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+        """Return what the network sees, and its boxes before suppression."""
+        values, _ = self._recognized.form.prepare(image)
+        boxes = image.copy()
+        raw: RawBoxes = detections.trace
+        for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
+            left, top, right, bottom = box
+            draw_box(boxes, Box(left, top, right - left, bottom - top), GREEN, f"{score:.2f}")
+        return {"input": self._recognized.form.picture(values), "candidates": boxes}
+
+    def _wanted(self, raw: RawBoxes, place: Placement, width: int, height: int) -> RawBoxes:
+        """Return the boxes of vehicles in the frame's pixels, as far as they lie in it."""
+        boxes = np.clip(place.to_frame(raw.boxes), 0, [width, height, width, height])
+        sides = boxes[:, 2:] - boxes[:, :2]
+        is_known = (raw.classes >= 0) & (raw.classes < len(self._numbers))
+        numbers = np.where(is_known, self._numbers[np.where(is_known, raw.classes, 0)], -1)
+        keep = (sides >= 1).all(axis=1) & (numbers >= 0) & np.isfinite(boxes).all(axis=1)
+        return RawBoxes(
+            boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep].astype(np.int32)
+        )

@@ -1,0 +1,308 @@
+"""What kind of network an ONNX file holds: by its metadata, then its names, then its shapes."""
+
+import ast
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from vdet.detect.onnx.classes import COCO
+from vdet.detect.onnx.header import HEADER_KEY, Header
+from vdet.detect.onnx.layouts import (
+    CenterRows,
+    FinalRows,
+    Layout,
+    NamedColumns,
+    OurCells,
+    cell_count,
+)
+from vdet.detect.onnx.preparation import InputForm, size_of_area
+from vdet.detect.onnx.session import Array, InputSlot, Session
+from vdet.errors import ModelError
+
+_MULTIPLE = 32
+_MOST_FINAL_ROWS = 1000
+_DEFAULT_SIDE = 640  # of the usual exports with an input of any size
+_SIZES = "orig_target_sizes"
+
+
+@dataclass(frozen=True, slots=True)
+class Recognized:
+    """What an ONNX file holds.
+
+    Attributes
+    ----------
+    name
+        Name of the form, for people.
+    reasons
+        Why it was taken for this form.
+    names
+        Names of the classes, as the network counts them.
+    form
+        What the network wants to see.
+    layout
+        Turns its outputs into boxes.
+    has_sizes
+        Whether it has a second input for the size of the picture.
+    """
+
+    name: str
+    reasons: tuple[str, ...]
+    names: tuple[str, ...]
+    form: InputForm
+    layout: Layout
+    has_sizes: bool = False
+
+    def feed(self, session: Session, values: Array) -> dict[str, Array]:
+        """Return all inputs by name, for the input `values` of a picture."""
+        feed = {_picture_slot(session).name: values}
+        if self.has_sizes:
+            slot = next(each for each in session.inputs if each.name == _SIZES)
+            size = [[self.form.width, self.form.height]]
+            feed[_SIZES] = np.array(size, slot.dtype)
+        return feed
+
+
+def recognize(
+    session: Session, path: Path, size: tuple[int, int], names: Sequence[str] = ()
+) -> Recognized:
+    """Find out what a network wants and gives.
+
+    Parameters
+    ----------
+    path
+        Its file, for messages.
+    size
+        Width and height of the frames; our own networks are fitted to it.
+    names
+        Names of its classes, where the file does not tell them.
+
+    Raises
+    ------
+    ModelError
+        The network is of no known form; the message says what was seen.
+    """
+    if HEADER_KEY in session.metadata:
+        return _ours(session, path, size)
+    if any(slot.name == _SIZES for slot in session.inputs):
+        return _rt_detr(session, path, names)
+    if len(session.inputs) != 1:
+        raise _unknown(path, f"it has {len(session.inputs)} inputs")
+    return _by_shape(session, path, names)
+
+
+def header_of(session: Session, path: Path) -> Header:
+    """Return the header of a network of ours. Raises `ModelError`."""
+    try:
+        return Header.model_validate(json.loads(session.metadata[HEADER_KEY]))
+    except (ValueError, ValidationError) as error:
+        raise ModelError(f"{path}: its header is damaged or from a newer vdet") from error
+
+
+def _ours(session: Session, path: Path, size: tuple[int, int]) -> Recognized:
+    header = header_of(session, path)
+    width, height = size_of_area(*size, header.pixels, _MULTIPLE)
+    form = InputForm(width, height, rows_first=True, dtype=np.uint8)
+    calibration = header.calibration
+    layout = OurCells(width, height, calibration.slope, calibration.offset)
+    recognized = Recognized("vdet", ("it has a header of vdet",), header.classes, form, layout)
+    shapes = _output_shapes(session, path, recognized)
+    wanted = (1, cell_count(width, height), 5 + len(header.classes))
+    if shapes != [wanted]:
+        raise _unknown(path, f"it has a header of vdet, but gives {_listed(shapes)}")
+    return recognized
+
+
+def _rt_detr(session: Session, path: Path, names: Sequence[str]) -> Recognized:
+    places = {name: place for place, name in enumerate(session.output_names)}
+    if not {"labels", "boxes", "scores"} <= set(places):
+        raise _unknown(path, f"it has an input {_SIZES}, but outputs {', '.join(places)}")
+    width, height = _size_of(session, None)
+    form = InputForm(width, height, is_rgb=True, factor=1 / 255, dtype=_picture_slot(session).dtype)
+    layout = NamedColumns((places["labels"], places["boxes"], places["scores"]))
+    reasons = (f"it has an input {_SIZES}", "its outputs are labels, boxes and scores")
+    return Recognized("RT-DETR", reasons, tuple(names) or COCO, form, layout, has_sizes=True)
+
+
+def _by_shape(session: Session, path: Path, names: Sequence[str]) -> Recognized:
+    metadata = _ultralytics_metadata(session.metadata, path)
+    known = tuple(names) or metadata.names
+    width, height = _size_of(session, metadata.size)
+    slot = _picture_slot(session)
+    if len(slot.shape) != 4 or slot.shape[1] not in (3, None):
+        raise _unknown(path, f"its input is {_listed([slot.shape])}, not (1, 3, height, width)")
+    form = InputForm(
+        width, height, "center", is_rgb=True, factor=1 / 255, dtype=slot.dtype
+    )
+    guess = Recognized("", (), known, form, FinalRows())
+    shapes = _output_shapes(session, path, guess)
+    shape = shapes[0]
+    if len(shape) != 3 or shape[0] != 1:
+        raise _unknown(path, f"its output is {_listed(shapes)}")
+    for rule in (_final_rows, _ultralytics, _ultralytics_v5, _yolox):
+        found = rule(guess, shape, metadata)
+        if found is not None:
+            break
+    else:
+        raise _unknown(path, f"for an input of {width}×{height} it gives {_listed(shapes)}")
+    if found.name == "YOLOX" and _is_raw(session, found):
+        layout = CenterRows(has_objectness=True, grid=(width, height))
+        reasons = (*found.reasons, "its middles are offsets from cells")
+        found = replace(found, layout=layout, reasons=reasons)
+    return _with_names(found, shape, path)
+
+
+@dataclass(frozen=True, slots=True)
+class _Metadata:
+    """What Ultralytics writes into the metadata; nothing where another program wrote the file."""
+
+    names: tuple[str, ...] = ()
+    size: tuple[int, int] | None = None
+    is_final: bool = False
+
+    def __bool__(self) -> bool:
+        return bool(self.names)
+
+
+def _ultralytics_metadata(metadata: Mapping[str, str], path: Path) -> _Metadata:
+    try:
+        values = {
+            key: ast.literal_eval(metadata[key]) if key in metadata else None
+            for key in ("names", "imgsz", "args")
+        }
+        names = values["names"] or {}
+        listed = tuple(names.values()) if isinstance(names, dict) else tuple(names)
+        side = values["imgsz"]
+        size = (int(side[1]), int(side[0])) if side else None
+        args = values["args"] or {}
+    except (ValueError, SyntaxError, TypeError, IndexError, KeyError) as error:
+        raise _unknown(path, "its metadata cannot be read") from error
+    task = metadata.get("task", "detect")
+    if task != "detect":
+        raise _unknown(path, f"its task is {task}, not detect")
+    is_final = bool(args.get("nms")) or metadata.get("end2end", "False") == "True"
+    return _Metadata(tuple(str(each) for each in listed), size, is_final)
+
+
+_Rule = Callable[[Recognized, tuple[int, ...], _Metadata], Recognized | None]
+
+
+def _final_rows(
+    guess: Recognized, shape: tuple[int, ...], metadata: _Metadata
+) -> Recognized | None:
+    if shape[2] != 6 or not (metadata.is_final or shape[1] <= _MOST_FINAL_ROWS):
+        return None
+    return replace(
+        guess,
+        name="boxes after suppression",
+        reasons=(f"its output is {shape}: rows of box, score and class",),
+        layout=FinalRows(),
+    )
+
+
+def _ultralytics(
+    guess: Recognized, shape: tuple[int, ...], metadata: _Metadata
+) -> Recognized | None:
+    count = cell_count(guess.form.width, guess.form.height)
+    if shape[2] != count or (metadata and shape[1] != 4 + len(metadata.names)):
+        return None
+    return replace(
+        guess,
+        name="Ultralytics v8 or later",
+        reasons=(*_seen(metadata), f"its output is {shape}: columns of box and class scores"),
+        layout=CenterRows(has_objectness=False, is_turned=True),
+    )
+
+
+def _ultralytics_v5(
+    guess: Recognized, shape: tuple[int, ...], metadata: _Metadata
+) -> Recognized | None:
+    count = 3 * cell_count(guess.form.width, guess.form.height)
+    if shape[1] != count or (metadata and shape[2] != 5 + len(metadata.names)):
+        return None
+    return replace(
+        guess,
+        name="Ultralytics v5",
+        reasons=(*_seen(metadata), f"its output is {shape}: three boxes a cell"),
+        layout=CenterRows(has_objectness=True),
+    )
+
+
+def _yolox(guess: Recognized, shape: tuple[int, ...], metadata: _Metadata) -> Recognized | None:
+    count = cell_count(guess.form.width, guess.form.height)
+    if shape[1] != count or shape[2] < 6 or metadata:
+        return None
+    return replace(
+        guess,
+        name="YOLOX",
+        reasons=(f"its output is {shape}: one box a cell, and no metadata",),
+        form=replace(guess.form, fit="corner", is_rgb=False, factor=1.0),
+        layout=CenterRows(has_objectness=True),
+    )
+
+
+def _is_raw(session: Session, found: Recognized) -> bool:
+    """Tell whether middles are offsets from cells: then they do not spread over the input."""
+    values = np.full((found.form.height, found.form.width, 3), 114, np.uint8)
+    table = session.run(found.feed(session, found.form.prepare(values)[0]))[0][0]
+    return bool(np.ptp(table[:, 0]) < found.form.width / 2)
+
+
+def _with_names(found: Recognized, shape: tuple[int, ...], path: Path) -> Recognized:
+    if isinstance(found.layout, FinalRows):
+        return replace(found, names=found.names or COCO)
+    assert isinstance(found.layout, CenterRows)
+    rest = shape[1] if found.layout.is_turned else shape[2]
+    count = rest - (5 if found.layout.has_objectness else 4)
+    if len(found.names) == count:
+        return found
+    if found.names:
+        raise ModelError(f"{path}: has {count} classes, not {len(found.names)}; name them all")
+    if count == len(COCO):
+        return replace(found, names=COCO)
+    if count == 1:
+        return replace(found, names=("vehicle",))
+    raise ModelError(f"{path}: does not name its {count} classes; give detector.names")
+
+
+def _seen(metadata: _Metadata) -> tuple[str, ...]:
+    return ("its metadata has the keys of Ultralytics",) if metadata else ()
+
+
+def _picture_slot(session: Session) -> InputSlot:
+    return next(slot for slot in session.inputs if slot.name != _SIZES)
+
+
+def _size_of(session: Session, told: tuple[int, int] | None) -> tuple[int, int]:
+    """Return width and height of the input: fixed, or told, or the usual."""
+    shape = _picture_slot(session).shape
+    height, width = shape[2:4] if len(shape) == 4 else (None, None)
+    usual = told or (_DEFAULT_SIDE, _DEFAULT_SIDE)
+    return width or usual[0], height or usual[1]
+
+
+def _output_shapes(session: Session, path: Path, guess: Recognized) -> list[tuple[int, ...]]:
+    """Return the shapes of the outputs for a grey picture."""
+    grey = np.full((guess.form.height, guess.form.width, 3), 114, np.uint8)
+    try:
+        outputs = session.run(guess.feed(session, guess.form.prepare(grey)[0]))
+    except Exception as error:  # onnxruntime raises kinds of its own
+        first_line = (str(error).splitlines() or [""])[0]
+        raise _unknown(path, f"it does not run on a picture ({first_line:.120})") from error
+    return [output.shape for output in outputs]
+
+
+def _listed(shapes: Sequence[tuple[int | None, ...]]) -> str:
+    return " and ".join(
+        "(" + ", ".join("any" if side is None else str(side) for side in shape) + ")"
+        for shape in shapes
+    )
+
+
+def _unknown(path: Path, seen: str) -> ModelError:
+    return ModelError(
+        f"{path}: is of no form that vdet knows: {seen}; docs/networks.md lists the forms"
+    )

@@ -1,0 +1,82 @@
+"""An ONNX file as it is loaded by onnxruntime, with what it says of itself."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vdet.errors import ModelError
+from vdet.files import read_whole
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+Array = npt.NDArray[Any]
+
+MAX_BYTES = 1_000_000_000
+"""Largest ONNX file that is read."""
+
+_TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(uint8)": np.uint8}
+_WHOLE_TYPES = {"tensor(int64)": np.int64, "tensor(int32)": np.int32}
+_WARNINGS_OFF = 3  # errors only
+
+
+@dataclass(frozen=True, slots=True)
+class InputSlot:
+    """An input of a network: its name, its shape (None: any length), and its type."""
+
+    name: str
+    shape: tuple[int | None, ...]
+    dtype: type[np.generic]
+
+
+class Session:
+    """A network that is ready to run; threads may share it.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read or is no ONNX file that onnxruntime can run, or onnxruntime is not
+        installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._session = _load(path)
+        self.inputs = tuple(_slot(path, each) for each in self._session.get_inputs())
+        self.output_names: Sequence[str] = [each.name for each in self._session.get_outputs()]
+        self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
+
+    def run(self, inputs: Mapping[str, Array]) -> list[Array]:
+        """Return all outputs."""
+        return [np.asarray(each) for each in self._session.run(None, dict(inputs))]
+
+
+def _load(path: Path) -> "onnxruntime.InferenceSession":
+    data = read_whole(path, most=MAX_BYTES, what="model", error=ModelError)
+    try:
+        import onnxruntime
+    except ImportError as error:
+        raise ModelError(
+            f"{path}: needs the package onnxruntime; pip install 'vdet[net]'"
+        ) from error
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1  # frames run in parallel
+    options.log_severity_level = _WARNINGS_OFF
+    try:
+        return onnxruntime.InferenceSession(
+            data, options, providers=["CPUExecutionProvider"]
+        )
+    except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
+        first_line = (str(error).splitlines() or [""])[0]
+        raise ModelError(f"{path}: cannot be loaded by onnxruntime: {first_line:.200}") from error
+
+
+def _slot(path: Path, value: Any) -> InputSlot:
+    known = {**_TYPES, **_WHOLE_TYPES}
+    if value.type not in known:
+        raise ModelError(f"{path}: its input {value.name} is a {value.type}; give a detector")
+    shape = tuple(each if isinstance(each, int) and each > 0 else None for each in value.shape)
+    return InputSlot(value.name, shape, known[value.type])
