@@ -92,27 +92,27 @@ class NetworkSettings(DetectorSettings):
     """The detector: a network in an ONNX file, our own or another."""
 
     kind: Literal["net"] = Field("net", description="kind of detector; net: a network")
-    least: float = Field(
-        0.1, gt=0, lt=1, description="boxes with a lower score are not looked at"
-    )
+    least: float = Field(0.1, gt=0, lt=1, description="boxes with a lower score are not looked at")
     overlap: Fraction = Field(
         0.55,
         description="a box with more intersection over union with a better one is removed",
     )
     still_score: Fraction = Field(
-        0.4, description="least score of a vehicle in a still picture; in video, the tracker decides"
+        0.4,
+        description="least score of a vehicle in a still picture; in video, the tracker decides",
     )
     classes: tuple[str, ...] = Field(
         ("car", "truck", "bus", "vehicle"),
         min_length=1,
         max_length=100,
-        description="classes that count: car, truck, bus, motorcycle, vehicle (of unknown kind), or "
-        "any other that the network knows",
+        description="classes that count: car, truck, bus, motorcycle, vehicle (of unknown kind), "
+        "or any other that the network knows",
     )
     names: tuple[str, ...] = Field(
         (),
         max_length=10_000,
-        description="names of the classes in the network's order, where its file does not tell them",
+        description="names of the classes in the network's order, where its file does not tell "
+        "them",
     )
 
     @property

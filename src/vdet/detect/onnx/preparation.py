@@ -55,7 +55,7 @@ class InputForm:
             canvas[top : top + place.size[1], left : left + place.size[0]] = scaled
             scaled = canvas
         if self.is_rgb:
-            scaled = cv2.cvtColor(scaled, cv2.COLOR_BGR2RGB)
+            scaled = scaled[..., ::-1]
         values = scaled if self.rows_first else scaled.transpose(2, 0, 1)
         if self.dtype is not np.uint8:
             values = np.multiply(values, self.factor, dtype=np.float32).astype(self.dtype)
@@ -104,10 +104,10 @@ def scaled_to(image: Image, width: int, height: int) -> Image:
     """
     while image.shape[1] >= 2 * width and image.shape[0] >= 2 * height:
         half = max(width, image.shape[1] // 2), max(height, image.shape[0] // 2)
-        image = cv2.resize(image, half, interpolation=cv2.INTER_AREA)
+        image = np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
         if half == (width, height):
             return image
-    return cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.resize(image, (width, height)), np.uint8)
 
 
 def size_of_area(width: int, height: int, pixels: int, multiple: int) -> tuple[int, int]:

@@ -134,9 +134,7 @@ def _by_shape(session: Session, path: Path, names: Sequence[str]) -> Recognized:
     slot = _picture_slot(session)
     if len(slot.shape) != 4 or slot.shape[1] not in (3, None):
         raise _unknown(path, f"its input is {_listed([slot.shape])}, not (1, 3, height, width)")
-    form = InputForm(
-        width, height, "center", is_rgb=True, factor=1 / 255, dtype=slot.dtype
-    )
+    form = InputForm(width, height, "center", is_rgb=True, factor=1 / 255, dtype=slot.dtype)
     guess = Recognized("", (), known, form, FinalRows())
     shapes = _output_shapes(session, path, guess)
     shape = shapes[0]

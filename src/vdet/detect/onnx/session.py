@@ -19,8 +19,13 @@ Array = npt.NDArray[Any]
 MAX_BYTES = 1_000_000_000
 """Largest ONNX file that is read."""
 
-_TYPES = {"tensor(float)": np.float32, "tensor(float16)": np.float16, "tensor(uint8)": np.uint8}
-_WHOLE_TYPES = {"tensor(int64)": np.int64, "tensor(int32)": np.int32}
+_TYPES: dict[str, type[np.generic]] = {
+    "tensor(float)": np.float32,
+    "tensor(float16)": np.float16,
+    "tensor(uint8)": np.uint8,
+    "tensor(int64)": np.int64,
+    "tensor(int32)": np.int32,
+}
 _WARNINGS_OFF = 3  # errors only
 
 
@@ -66,17 +71,14 @@ def _load(path: Path) -> "onnxruntime.InferenceSession":
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # frames run in parallel
     options.log_severity_level = _WARNINGS_OFF
     try:
-        return onnxruntime.InferenceSession(
-            data, options, providers=["CPUExecutionProvider"]
-        )
+        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
         first_line = (str(error).splitlines() or [""])[0]
         raise ModelError(f"{path}: cannot be loaded by onnxruntime: {first_line:.200}") from error
 
 
 def _slot(path: Path, value: Any) -> InputSlot:
-    known = {**_TYPES, **_WHOLE_TYPES}
-    if value.type not in known:
+    if value.type not in _TYPES:
         raise ModelError(f"{path}: its input {value.name} is a {value.type}; give a detector")
     shape = tuple(each if isinstance(each, int) and each > 0 else None for each in value.shape)
-    return InputSlot(value.name, shape, known[value.type])
+    return InputSlot(value.name, shape, _TYPES[value.type])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from vdet.config.network import NetworkTrainingSettings
 from vdet.geometry import Float32Array
@@ -63,8 +64,8 @@ class SampleDrawer:
         )
 
     def _pick(self, rng: np.random.Generator) -> Sample:
-        source = self._sources[rng.choice(len(self._sources), p=self._shares)]
-        return source.samples[rng.integers(len(source.samples))]
+        source = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
+        return source.samples[int(rng.integers(len(source.samples)))]
 
     def _mosaic(self, rng: np.random.Generator, drawing: Drawing) -> Sample:
         """Return four pictures that meet in a random point."""
@@ -89,9 +90,7 @@ class SampleDrawer:
         return join(parts, image)
 
 
-def _place(
-    rng: np.random.Generator, sample: Sample, size: tuple[int, int], scale: float
-) -> Sample:
+def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scale: float) -> Sample:
     """Return a part of a picture of `size`; at scale 1 its width fits."""
     width, height = size
     rows, columns = sample.image.shape[:2]
@@ -103,7 +102,7 @@ def _place(
     image = sample.image
     step = 1
     while min(x_factor, y_factor) * step < 0.5:  # the warp below reads four pixels only
-        image = cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+        image = _image(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
         step *= 2
     kept_x, kept_y = columns / image.shape[1], rows / image.shape[0]
     a, b = x_factor * kept_x, y_factor * kept_y
@@ -118,7 +117,9 @@ def _place(
     )
     factors = np.array([x_factor, y_factor] * 2, np.float32)
     offset = np.array([left, top] * 2, np.float32)
-    return _cropped(Sample(warped, sample.boxes * factors + offset, sample.classes, sample.ignored))
+    return _cropped(
+        Sample(_image(warped), sample.boxes * factors + offset, sample.classes, sample.ignored)
+    )
 
 
 def _cropped(sample: Sample) -> Sample:
@@ -155,26 +156,30 @@ def _recolored(rng: np.random.Generator, image: Image) -> Image:
     table = np.arange(256)[:, np.newaxis] * gain + offset
     if rng.random() < 0.3:
         table = 255 * (np.clip(table, 0, 255) / 255) ** np.exp(rng.uniform(-0.4, 0.4))
-    image = cv2.LUT(image, np.clip(table, 0, 255).astype(np.uint8)[np.newaxis])
+    image = _image(cv2.LUT(image, np.clip(table, 0, 255).astype(np.uint8)[np.newaxis]))
     if rng.random() < 0.3:
         saturation = rng.uniform(0, 1.6)
         grey = cv2.cvtColor(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
-        image = cv2.addWeighted(image, saturation, grey, 1 - saturation, 0)
+        image = _image(cv2.addWeighted(image, saturation, grey, 1 - saturation, 0))
     return image
 
 
 def _with_noise(rng: np.random.Generator, image: Image) -> Image:
     """Sometimes blur a picture, sometimes compress it, sometimes add noise."""
     if rng.random() < 0.15:
-        image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 1.5))
+        image = _image(cv2.GaussianBlur(image, (0, 0), rng.uniform(0.4, 1.5)))
     if rng.random() < 0.15:
         quality = int(rng.integers(25, 80))
         coded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
-        image = cv2.imdecode(coded, cv2.IMREAD_COLOR)
+        image = _image(np.asarray(cv2.imdecode(coded, cv2.IMREAD_COLOR)))
     if rng.random() < 0.15:
         noise = rng.normal(0, rng.uniform(2, 12), image.shape[:2]).astype(np.int16)
         image = np.clip(image + noise[..., np.newaxis], 0, 255).astype(np.uint8)
     return image
+
+
+def _image(values: npt.ArrayLike) -> Image:
+    return np.asarray(values, np.uint8)
 
 
 def _areas(boxes: Float32Array) -> Float32Array:

@@ -5,10 +5,12 @@ cells, float32 `(1, cells, 5 + classes)`. Batch normalisation is part of the con
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import onnx
 import torch
 from onnx import TensorProto, helper, numpy_helper
@@ -66,13 +68,13 @@ class _Graph:
         self._nodes: list[onnx.NodeProto] = []
         self._constants: list[onnx.TensorProto] = []
 
-    def add(self, kind: str, *inputs: str, **attributes: object) -> str:
+    def add(self, kind: str, *inputs: str, **attributes: Any) -> str:
         """Add a node and return the name of its output."""
         name = f"{kind.lower()}{len(self._nodes)}"
         self._nodes.append(helper.make_node(kind, list(inputs), [name], **attributes))
         return name
 
-    def constant(self, values: np.ndarray) -> str:
+    def constant(self, values: npt.NDArray[Any]) -> str:
         name = f"constant{len(self._constants)}"
         self._constants.append(numpy_helper.from_array(values, name))
         return name
@@ -107,9 +109,9 @@ class _Graph:
             group=layer.groups,
         )
 
-    def sequence(self, values: str, layers: "nn.Module | Sequence[nn.Module]") -> str:
+    def sequence(self, values: str, layers: Iterable[nn.Module]) -> str:
         """Add blocks, and convolutions that are followed by a normalisation and ReLU."""
-        parts = list(layers)  # type: ignore[arg-type]
+        parts = list(layers)
         while parts:
             layer = parts.pop(0)
             if isinstance(layer, Block):
@@ -151,6 +153,6 @@ def _folded(layer: nn.Conv2d, norm: nn.Module | None) -> tuple[Tensor, Tensor]:
     return layer.weight * scale[:, None, None, None], norm.bias - norm.running_mean * scale
 
 
-def _flushed(values: Tensor) -> np.ndarray:
+def _flushed(values: Tensor) -> npt.NDArray[np.float32]:
     array = values.detach().numpy().astype(np.float32)
     return np.where(np.abs(array) < _LEAST_WEIGHT, np.float32(0), array)

@@ -44,7 +44,7 @@ class Sample:
         if factor >= 1:
             return self
         size = round(width * factor), round(height * factor)
-        image = cv2.resize(self.image, size, interpolation=cv2.INTER_AREA)
+        image = np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA), np.uint8)
         scale = np.array([size[0] / width, size[1] / height] * 2, np.float32)
         return Sample(image, self.boxes * scale, self.classes, self.ignored)
 

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
-from torch.utils.data import DataLoader, Dataset
 
 from vdet.config.network import NetworkTrainingSettings
 from vdet.errors import DataError
@@ -28,6 +26,7 @@ from vdet.learn.network.losses import (
     quality_focal_loss,
 )
 from vdet.learn.network.samples import UNKNOWN, Sample, Source
+from vdet.pipeline.threads import prefetch, single_threaded_libraries
 
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
 
@@ -57,31 +56,26 @@ class Batch:
     ignored_boxes: Tensor
 
 
-class _Batches(Dataset[Batch]):
-    """The batch of each step; it depends on the step and the seed alone."""
-
-    def __init__(
-        self, sources: Sequence[Source], settings: NetworkTrainingSettings, first: int
-    ) -> None:
-        self._drawer = SampleDrawer(sources, settings)
-        self._settings = settings
-        self._first = first
-
-    def __len__(self) -> int:
-        return self._settings.steps - self._first
-
-    def __getitem__(self, index: int) -> Batch:
-        settings, step = self._settings, self._first + index
+def _batches(
+    sources: Sequence[Source], settings: NetworkTrainingSettings, first: int
+) -> Iterator[Batch]:
+    """Yield the batches from step `first` on; each depends on the step and the seed alone."""
+    drawer = SampleDrawer(sources, settings)
+    for step in range(first, settings.steps):
         rng = np.random.default_rng((settings.seed, step))
-        is_small = step < settings.small * settings.steps
-        is_plain = step >= (1 - settings.plain) * settings.steps
-        drawing = Drawing(
-            width=settings.width // 2 if is_small else settings.width,
-            height=settings.height // 64 * 32 if is_small else settings.height,
-            magnified=_MAGNIFIED if is_small else 1.0,
-            mosaics=0.0 if is_plain else settings.mosaics,
-        )
-        return _to_batch([self._drawer.draw(rng, drawing) for _ in range(settings.batch)])
+        drawing = _drawing(settings, step)
+        yield _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
+
+
+def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
+    is_small = step < settings.small * settings.steps
+    is_plain = step >= (1 - settings.plain) * settings.steps
+    return Drawing(
+        width=settings.width // 2 if is_small else settings.width,
+        height=settings.height // 64 * 32 if is_small else settings.height,
+        magnified=_MAGNIFIED if is_small else 1.0,
+        mosaics=0.0 if is_plain else settings.mosaics,
+    )
 
 
 def train_network(
@@ -115,31 +109,14 @@ def train_network(
     if checkpoint.exists():
         run.restore(checkpoint)
     began, first = time.monotonic(), run.step
-    for batch in _batches(sources, settings, run.step):
-        loss = run.learn(batch)
-        left = (time.monotonic() - began) / (run.step - first) * (settings.steps - run.step)
-        progress(Progress(run.step, settings.steps, loss, run.rate, left))
-        if run.step % settings.checkpoint == 0 or run.step == settings.steps:
-            run.save(checkpoint)
+    with single_threaded_libraries(), prefetch(_batches(sources, settings, first)) as batches:
+        for batch in batches:
+            loss = run.learn(batch)
+            left = (time.monotonic() - began) / (run.step - first) * (settings.steps - run.step)
+            progress(Progress(run.step, settings.steps, loss, run.rate, left))
+            if run.step % settings.checkpoint == 0 or run.step == settings.steps:
+                run.save(checkpoint)
     return run.averaged.eval()
-
-
-def _batches(
-    sources: Sequence[Source], settings: NetworkTrainingSettings, first: int
-) -> Iterator[Batch]:
-    """Yield the batches from step `first` on, made ahead by another process."""
-    loader = DataLoader(
-        _Batches(sources, settings, first),
-        batch_size=None,
-        num_workers=1,
-        prefetch_factor=4,
-        worker_init_fn=_one_thread,
-    )
-    yield from loader
-
-
-def _one_thread(_: int) -> None:
-    cv2.setNumThreads(1)
 
 
 class _Run:
@@ -236,9 +213,7 @@ def _loss(network: Network, batch: Batch) -> Tensor:
     counted[found.picture, found.cell] = 1
     whole = found.iou.sum().clamp(min=1)
     score_loss = (quality_focal_loss(scores, targets) * counted).sum() / whole
-    overlap = giou(
-        boxes[found.picture, found.cell], batch.vehicles.boxes[found.vehicle]
-    )
+    overlap = giou(boxes[found.picture, found.cell], batch.vehicles.boxes[found.vehicle])
     box_loss = ((1 - overlap) * found.iou).sum() / whole
     class_loss = functional.cross_entropy(
         raw[found.picture, found.cell, 5:],

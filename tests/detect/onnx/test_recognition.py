@@ -1,0 +1,193 @@
+"""Networks of the usual tools: recognised without a setting, and their boxes are right."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from detect.onnx.graphs import (
+    Form,
+    RedBox,
+    final,
+    ultralytics,
+    ultralytics_v5,
+    write_network,
+    write_rt_detr,
+    yolox,
+)
+from vdet.config.schema import NetworkSettings
+from vdet.detect.detections import Detections
+from vdet.detect.onnx.classes import COCO
+from vdet.detect.onnx.detector import NetworkModel
+from vdet.detect.onnx.recognition import recognize
+from vdet.detect.onnx.session import Session
+from vdet.errors import ModelError
+from vdet.media.images import Image
+
+SIZE = 128, 64
+FRAME = 256, 256
+"""Frames are square, inputs are not: letterboxes leave grey at the sides."""
+
+BOX = RedBox(x=64, y=32, width=16, height=8, class_id=2)
+CAR, BUS = COCO.index("car"), COCO.index("bus")
+ULTRALYTICS = {
+    "task": "detect",
+    "names": str(dict(enumerate(COCO))),
+    "imgsz": "[64, 128]",
+    "stride": "32",
+    "args": "{'nms': False}",
+}
+FINAL = {**ULTRALYTICS, "args": "{'nms': True}"}
+
+
+def frame_with_red(x: int, y: int) -> Image:
+    """Return a grey frame with a red square around a point."""
+    image = np.full((FRAME[1], FRAME[0], 3), 60, np.uint8)
+    image[y - 8 : y + 8, x - 8 : x + 8] = 0, 0, 255
+    return image
+
+
+def detect(path: Path, image: Image, **settings: object) -> Detections:
+    model = NetworkModel(path, NetworkSettings.model_validate(settings))
+    detector = model.for_video(image.shape[1], image.shape[0], [image])
+    return detector.detect(detector.search(image, 0))
+
+
+def class_names(found: Detections) -> list[str]:
+    assert found.classes is not None
+    return [found.names[number] for number in found.classes.tolist()]
+
+
+@pytest.mark.parametrize(
+    ("form", "metadata", "name"),
+    [
+        (ultralytics(SIZE, BOX, 80), ULTRALYTICS, "Ultralytics v8 or later"),
+        (ultralytics(SIZE, BOX, 80), None, "Ultralytics v8 or later"),
+        (ultralytics_v5(SIZE, BOX, 80), ULTRALYTICS, "Ultralytics v5"),
+        (ultralytics_v5(SIZE, BOX, 80), None, "Ultralytics v5"),
+        (final(BOX), FINAL, "boxes after suppression"),
+        (final(BOX, rows=100), None, "boxes after suppression"),
+    ],
+    ids=["v8", "v8 bare", "v5", "v5 bare", "end to end", "end to end bare"],
+)
+def test_a_centred_letterbox_in_rgb(
+    form: Form, metadata: Mapping[str, str] | None, name: str, tmp_path: Path
+) -> None:
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
+    # The frame of 256 × 256 is shrunk to 64 × 64, and lies 32 pixels from the left.
+    found = detect(path, frame_with_red(128, 128))
+    assert found.boxes == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
+    assert found.scores == pytest.approx([1.0], abs=0.01)
+    assert class_names(found) == ["car"]
+    assert len(detect(path, frame_with_red(64, 64))) == 1  # the dark grey of 60 has 0.24
+    assert detect(path, frame_with_red(64, 64)).scores == pytest.approx([60 / 255], abs=0.01)
+    assert recognize(Session(path), path, FRAME).name == name
+
+
+def test_the_metadata_tell_the_size_of_an_input_of_any_size(tmp_path: Path) -> None:
+    form = ultralytics(SIZE, BOX, 80)
+    path = write_network(
+        tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=ULTRALYTICS, dynamic=True
+    )
+    found = detect(path, frame_with_red(128, 128))
+    assert found.boxes == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
+
+
+@pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
+def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(raw: bool, tmp_path: Path) -> None:
+    form = yolox(SIZE, BOX, 80, raw=raw)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (40, 32))
+    found = detect(path, frame_with_red(160, 128))
+    # 64 of the 128 columns are the frame: the part beyond it does not count.
+    assert found.boxes == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
+    assert found.scores == pytest.approx([1.0], abs=0.01)
+    assert recognize(Session(path), path, FRAME).name == "YOLOX"
+
+
+def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:
+    path = write_rt_detr(tmp_path / "net.onnx", BOX, SIZE, (64, 32))
+    found = detect(path, frame_with_red(128, 128))
+    assert found.boxes == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
+    assert found.scores == pytest.approx([1.0], abs=0.01)
+    assert recognize(Session(path), path, FRAME).name == "RT-DETR"
+
+
+def test_only_the_classes_that_are_asked_for_count(tmp_path: Path) -> None:
+    image = frame_with_red(128, 128)
+    for class_id, classes, expected in (
+        (CAR, ["car"], ["car"]),
+        (BUS, ["car"], []),
+        (BUS, ["bus", "car"], ["bus"]),
+        (COCO.index("person"), ["car", "bus", "truck", "motorcycle", "vehicle"], []),
+        (COCO.index("person"), ["person"], ["person"]),
+        (COCO.index("motorcycle"), ["car"], []),
+        (COCO.index("motorcycle"), ["motorcycle"], ["motorcycle"]),
+    ):
+        box = RedBox(64, 32, 16, 8, class_id)
+        path = write_network(tmp_path / "net.onnx", final(box), SIZE, (64, 32), metadata=FINAL)
+        found = detect(path, image, classes=classes)
+        assert class_names(found) == expected
+
+
+def test_names_are_read_with_small_letters_and_their_synonyms(tmp_path: Path) -> None:
+    metadata = {**ULTRALYTICS, "names": "{0: 'Lorry', 1: 'Van', 2: 'Motorbike'}"}
+    box = RedBox(64, 32, 16, 8, class_id=0)
+    form = ultralytics(SIZE, box, 3)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
+    found = detect(path, frame_with_red(128, 128))
+    assert class_names(found) == ["truck"]
+
+
+def test_a_network_of_one_class_without_a_name_finds_vehicles(tmp_path: Path) -> None:
+    form = ultralytics(SIZE, RedBox(64, 32, 16, 8), 1)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
+    found = detect(path, frame_with_red(128, 128))
+    assert class_names(found) == ["vehicle"]
+
+
+def test_names_can_be_given(tmp_path: Path) -> None:
+    form = ultralytics(SIZE, RedBox(64, 32, 16, 8, 1), 2)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))
+    with pytest.raises(ModelError, match=r"does not name its 2 classes; give detector\.names"):
+        detect(path, frame_with_red(128, 128))
+    found = detect(path, frame_with_red(128, 128), names=["tree", "bus"])
+    assert class_names(found) == ["bus"]
+    with pytest.raises(ModelError, match=r"has 2 classes, not 1"):
+        detect(path, frame_with_red(128, 128), names=["bus"])
+
+
+def test_a_network_without_a_wanted_class_is_refused(tmp_path: Path) -> None:
+    form = ultralytics(SIZE, RedBox(64, 32, 16, 8), 1)
+    metadata = {**ULTRALYTICS, "names": "{0: 'face'}"}
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
+    with pytest.raises(ModelError, match=r"knows none of detector\.classes .*; it knows face"):
+        detect(path, frame_with_red(128, 128))
+
+
+@pytest.mark.parametrize(
+    ("table", "metadata", "seen"),
+    [
+        (np.zeros((10, 9)), None, r"for an input of 128×64 it gives \(1, 10, 9\)"),
+        (np.zeros((84, 168)), {**ULTRALYTICS, "task": "segment"}, "its task is segment"),
+        (np.zeros((84, 168)), {**ULTRALYTICS, "names": "{0:"}, "its metadata cannot be read"),
+        (np.zeros((7, 168)), ULTRALYTICS, r"it gives \(1, 7, 168\)"),
+    ],
+)
+def test_what_is_not_known_is_refused_with_what_was_seen(
+    table: npt.NDArray[np.float64], metadata: Mapping[str, str] | None, seen: str, tmp_path: Path
+) -> None:
+    form = Form(table.astype(np.float32), 0, 0)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (0, 0), metadata=metadata)
+    with pytest.raises(ModelError, match=seen):
+        detect(path, frame_with_red(128, 128))
+
+
+def test_a_file_that_is_no_network_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "net.onnx"
+    path.write_bytes(b"no network")
+    with pytest.raises(ModelError, match=r"net\.onnx: cannot be loaded by onnxruntime"):
+        NetworkModel(path, NetworkSettings())
+    with pytest.raises(ModelError, match=r"none\.onnx"):
+        NetworkModel(tmp_path / "none.onnx", NetworkSettings())
