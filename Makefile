@@ -8,7 +8,7 @@ TRUTH ?= $(DATA)/project_video_0001-0880.txt
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types tests bench soak folds data model picture clean
+.PHONY: help demo test lint types tests nettest bench soak folds data model picture clean
 
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -27,6 +27,10 @@ types: $(READY)  ## check types
 
 tests: $(READY)  ## run all tests
 	$(BIN)/pytest -n 2 --dist worksteal
+
+nettest: $(READY)  ## install torch, and run the tests of training networks
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
+	$(BIN)/pytest tests/learn/network
 
 bench: $(READY)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks

@@ -4,12 +4,16 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING
 
 import click
 from tqdm import tqdm
 
 from vdet.files import escaped
 from vdet.pipeline.loop import Advance, Progress
+
+if TYPE_CHECKING:
+    from vdet.learn.network.training import TrainingState
 
 
 def print_lines(*lines: str, err: bool = False) -> None:
@@ -75,6 +79,20 @@ def files_bar(total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
             rate = frames / (time.perf_counter() - began)
             bar.set_postfix_str(f"{rate:.1f} frames/s", refresh=False)
             bar.update()
+
+        yield advance
+
+
+@contextmanager
+def steps_bar(total: int, *, quiet: bool) -> Iterator[Callable[["TrainingState"], None]]:
+    """Give a function that shows how far a training is, its loss and its learning rate."""
+    with tqdm(total=total, unit=" steps", disable=_disable(quiet), dynamic_ncols=True) as bar:
+
+        def advance(state: "TrainingState") -> None:
+            if bar.n == 0:  # a training that goes on is not as fast as its first step seems
+                bar.initial = state.step - 1
+            bar.set_postfix_str(f"loss {state.loss:.3f}, rate {state.rate:.1e}", refresh=False)
+            bar.update(state.step - bar.n)
 
         yield advance
 

@@ -5,6 +5,16 @@ from pydantic import Field, model_validator
 from vdet.config.section import Fraction, Section
 
 
+class NetworkScoreSettings(Section):
+    """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
+
+    Fitted on cameras that were left out of the training; written into the network's header.
+    """
+
+    slope: float = Field(1.0, gt=0, le=100, description="how steeply the score rises with x")
+    offset: float = Field(0.0, ge=-100, le=100, description="added to x times slope")
+
+
 class NetworkTrainingSettings(Section):
     """How `vdet train-net` trains the network."""
 
@@ -37,8 +47,10 @@ class NetworkTrainingSettings(Section):
         le=1000,
         description="vehicles whose longer side is shorter, in pixels, are ignored",
     )
+    every: int = Field(8, ge=1, description="every n-th frame of a labelled video is learnt")
     checkpoint: int = Field(500, ge=1, description="steps between two checkpoints")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="seed of the weights and the pictures")
+    score: NetworkScoreSettings = NetworkScoreSettings()
 
     @model_validator(mode="after")
     def _scales_ascend(self) -> "NetworkTrainingSettings":

@@ -1,4 +1,4 @@
-"""Pictures of coloured blocks on noise, with their boxes: a task that a network learns in seconds."""
+"""Pictures of coloured blocks on noise, with their boxes: a network learns them in seconds."""
 
 import cv2
 import numpy as np

@@ -26,7 +26,7 @@ from vdet.learn.network.assignment import Assignment, Vehicles, assign  # noqa: 
 from vdet.learn.network.export import export_network  # noqa: E402
 from vdet.learn.network.losses import giou, paired_iou, quality_focal_loss  # noqa: E402
 from vdet.learn.network.samples import Source  # noqa: E402
-from vdet.learn.network.training import Progress, train_network  # noqa: E402
+from vdet.learn.network.training import TrainingState, train_network  # noqa: E402
 from vdet.testing import check_detector  # noqa: E402
 
 QUICK = NetworkTrainingSettings(
@@ -93,8 +93,8 @@ def test_training_and_runtime_number_the_cells_alike() -> None:
 
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Network, list[Progress]]:
-    reports: list[Progress] = []
+def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Network, list[TrainingState]]:
+    reports: list[TrainingState] = []
     checkpoint = tmp_path_factory.mktemp("trained") / "net.ckpt"
     network = train_network(
         [block_source()], len(CLASSES), QUICK, checkpoint, progress=reports.append
@@ -102,7 +102,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Network, list[Pro
     return network, reports
 
 
-def test_a_training_says_how_far_it_is(trained: tuple[Network, list[Progress]]) -> None:
+def test_a_training_says_how_far_it_is(trained: tuple[Network, list[TrainingState]]) -> None:
     _, reports = trained
     assert [report.step for report in reports] == list(range(1, 121))
     assert reports[0].rate < reports[20].rate
@@ -113,7 +113,7 @@ def test_a_training_says_how_far_it_is(trained: tuple[Network, list[Progress]]) 
 
 
 def test_the_exported_network_gives_what_the_trained_one_gives(
-    trained: tuple[Network, list[Progress]], tmp_path: Path
+    trained: tuple[Network, list[TrainingState]], tmp_path: Path
 ) -> None:
     import onnxruntime
 
@@ -128,7 +128,7 @@ def test_the_exported_network_gives_what_the_trained_one_gives(
 
 
 def test_what_was_learnt_is_found_again(
-    trained: tuple[Network, list[Progress]], tmp_path: Path
+    trained: tuple[Network, list[TrainingState]], tmp_path: Path
 ) -> None:
     network, _ = trained
     path = tmp_path / "net.onnx"
@@ -161,7 +161,7 @@ def test_a_stopped_training_goes_on_and_ends_the_same(tmp_path: Path) -> None:
     class Stopped(Exception):  # noqa: N818
         pass
 
-    def stop(progress: Progress) -> None:
+    def stop(progress: TrainingState) -> None:
         if progress.step == 6:
             raise Stopped
 

@@ -32,7 +32,7 @@ _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too sma
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class TrainingState:
     """What a training says of itself: the steps done of all, loss, rate and seconds left."""
 
     step: int
@@ -84,7 +84,7 @@ def train_network(
     settings: NetworkTrainingSettings,
     checkpoint: Path,
     *,
-    progress: Callable[[Progress], object] = lambda _: None,
+    progress: Callable[[TrainingState], object] = lambda _: None,
 ) -> Network:
     """Train a network and return it with the moving average of its weights.
 
@@ -113,7 +113,7 @@ def train_network(
         for batch in batches:
             loss = run.learn(batch)
             left = (time.monotonic() - began) / (run.step - first) * (settings.steps - run.step)
-            progress(Progress(run.step, settings.steps, loss, run.rate, left))
+            progress(TrainingState(run.step, settings.steps, loss, run.rate, left))
             if run.step % settings.checkpoint == 0 or run.step == settings.steps:
                 run.save(checkpoint)
     return run.averaged.eval()

@@ -1,0 +1,68 @@
+"""`vdet train-net`: from labelled pictures to a network."""
+
+from pathlib import Path
+
+import click
+
+from vdet.cli.messages import steps_bar
+from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
+from vdet.errors import DataError, OutputError
+from vdet.files import check_output
+
+
+@click.command("train-net")
+@click.argument("data", nargs=-1, type=PATH, metavar="[DATA]...")
+@click.option(
+    "-o", "--output", required=True, type=PATH, metavar="FILE", help="Network to write, .onnx."
+)
+@click.option(
+    "--video",
+    "clips",
+    nargs=2,
+    multiple=True,
+    type=PATH,
+    metavar="CLIP TRUTH",
+    help="Learn from a labelled video too; network.every says of which frames. May be repeated.",
+)
+@settings_options("network.steps=4000")
+@overwrite_option
+@click.pass_obj
+def train_net(
+    quiet: bool,
+    *,
+    data: tuple[Path, ...],
+    output: Path,
+    clips: tuple[tuple[Path, Path], ...],
+    config_name: str | None,
+    assignments: tuple[str, ...],
+    overwrite: bool,
+) -> None:
+    """Train a network on labelled pictures.
+
+    Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The state of the
+    training is kept beside the network, as .ckpt; a training that was stopped goes on from there
+    when the same command is given again. A report is written beside the network as JSON.
+    Needs torch: pip install 'vdet[train]'.
+    """
+    if not data and not clips:
+        raise click.UsageError("nothing to learn from; give DATA or --video")
+    if output.suffix.lower() != ".onnx":
+        raise OutputError(f"{output}: networks are written as .onnx; name it so")
+    settings = read_settings(config_name, assignments).network
+    report_path, checkpoint = output.with_suffix(".json"), output.with_suffix(".ckpt")
+    inputs = [*data, *(path for clip in clips for path in clip)]
+    for path in (output, report_path):
+        check_output(path, overwrite=overwrite, inputs=inputs)
+    try:
+        import torch  # noqa: F401
+    except ImportError as error:
+        raise DataError("torch is not installed; pip install 'vdet[train]'") from error
+    from vdet.learn.network.run import NetworkJob, train_to_file
+    from vdet.learn.network.sources import LabelledClip
+
+    labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
+    job = NetworkJob(data, labelled, output, report_path, checkpoint)
+    with steps_bar(settings.steps, quiet=quiet) as advance:
+        report = train_to_file(job, settings, progress=advance)
+    click.echo("\n".join(report.lines()))
+    click.echo(f"\n{output}: the network; {report_path}: the report")

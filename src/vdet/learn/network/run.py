@@ -1,0 +1,124 @@
+"""A training from files to files: labelled pictures and videos → network and report."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import vdet
+from vdet.config.network import NetworkTrainingSettings
+from vdet.detect.onnx.header import Header, ScoreCalibration
+from vdet.evaluate.images.reading import read_images
+from vdet.evaluate.output import write_json
+from vdet.learn.network.export import export_network
+from vdet.learn.network.samples import Source
+from vdet.learn.network.sources import (
+    CLASSES,
+    LabelledClip,
+    SourceReport,
+    clip_source,
+    image_source,
+)
+from vdet.learn.network.training import TrainingState, train_network
+
+_AVERAGED = 100  # last steps whose mean loss is reported
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkJob:
+    """What a training reads and writes.
+
+    Attributes
+    ----------
+    pictures
+        Sets of labelled pictures.
+    clips
+        Labelled videos.
+    output, report, checkpoint
+        The files of the network, of the report, and of the training's state.
+    """
+
+    pictures: tuple[Path, ...]
+    clips: tuple[LabelledClip, ...]
+    output: Path
+    report: Path
+    checkpoint: Path
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkReport:
+    """The report of a training: its sources, how long it took, and the mean loss at its end.
+
+    `seconds` are those since the training was started or went on.
+    """
+
+    sources: tuple[SourceReport, ...]
+    steps: int
+    parameters: int
+    seconds: float
+    loss: float
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report as lines of text."""
+        for source in self.sources:
+            yield f"{source.name:<28}{source.pictures:6d} pictures {source.vehicles:8d} vehicles"
+        yield (
+            f"{self.parameters:,} parameters after {self.steps:,} steps, "
+            f"{self.seconds / 60:.1f} minutes; loss at the end {self.loss:.3f}"
+        )
+
+
+def train_to_file(
+    job: NetworkJob,
+    settings: NetworkTrainingSettings,
+    *,
+    progress: Callable[[TrainingState], object] = lambda _: None,
+) -> NetworkReport:
+    """Train a network, write it with its report, and remove the checkpoint.
+
+    Raises
+    ------
+    TruthError, ImageError, VideoError
+        Pictures, videos or their labels cannot be read.
+    DataError
+        There is no vehicle to learn, or the checkpoint is that of another training.
+    OutputError
+        A file cannot be written.
+    """
+    began = time.monotonic()
+    sources, reports = _read(job)
+    recent: list[float] = []
+
+    def note(state: TrainingState) -> None:
+        recent.append(state.loss)
+        del recent[:-_AVERAGED]
+        progress(state)
+
+    network = train_network(sources, len(CLASSES), settings, job.checkpoint, progress=note)
+    report = NetworkReport(
+        sources=reports,
+        steps=settings.steps,
+        parameters=sum(each.numel() for each in network.parameters()),
+        seconds=round(time.monotonic() - began, 1),
+        loss=round(sum(recent) / max(len(recent), 1), 4),
+    )
+    header = Header(
+        classes=CLASSES,
+        pixels=settings.width * settings.height,
+        calibration=ScoreCalibration(slope=settings.score.slope, offset=settings.score.offset),
+        provenance={
+            "program": f"vdet {vdet.__version__}",
+            "training": settings.model_dump(mode="json"),
+            "report": asdict(report),
+        },
+    )
+    export_network(network, header, job.output)
+    write_json(asdict(report), str(job.report))
+    job.checkpoint.unlink(missing_ok=True)
+    return report
+
+
+def _read(job: NetworkJob) -> tuple[list[Source], tuple[SourceReport, ...]]:
+    read = [image_source(read_images(path)) for path in job.pictures]
+    read += [clip_source(clip) for clip in job.clips]
+    return [source for source, _ in read], tuple(report for _, report in read)
