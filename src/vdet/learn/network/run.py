@@ -8,7 +8,7 @@ from pathlib import Path
 import vdet
 from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.header import Header, ScoreCalibration
-from vdet.evaluate.images.reading import read_images
+from vdet.evaluate.images.reading import read_labelled_images
 from vdet.evaluate.output import write_json
 from vdet.learn.network.export import export_network
 from vdet.learn.network.samples import Source
@@ -119,6 +119,6 @@ def train_to_file(
 
 
 def _read(job: NetworkJob) -> tuple[list[Source], tuple[SourceReport, ...]]:
-    read = [image_source(read_images(path)) for path in job.pictures]
+    read = [image_source(read_labelled_images(path)) for path in job.pictures]
     read += [clip_source(clip) for clip in job.clips]
     return [source for source, _ in read], tuple(report for _, report in read)
