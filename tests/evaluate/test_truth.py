@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from vdet.errors import TruthError
 from vdet.evaluate.labelled_video import LabelledVideo, Row
-from vdet.evaluate.truth import Role, cvat_rows, kitti_rows, read_truth, role_of
+from vdet.evaluate.truth import cvat_rows, kitti_rows, read_truth
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 KITTI = "".join(
@@ -230,23 +230,3 @@ def test_other_xml_than_cvat_video_is_refused_with_its_line(text: str, message: 
         cvat_rows(CVAT_FILE, text)
     assert str(caught.value).startswith(f"annotations.xml:{message}")
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("label", ["Car", "van", "TRUCK", "bus", "vehicle"])
-def test_labels_of_vehicles(label: str) -> None:
-    assert role_of(label) is Role.VEHICLE
-
-
-@pytest.mark.parametrize("label", ["DontCare", "dont_care", "ignore", "Ignore region", "Misc"])
-def test_labels_of_ignore_regions_in_any_spelling(label: str) -> None:
-    assert role_of(label) is Role.IGNORED
-
-
-@pytest.mark.parametrize("label", ["Pedestrian", "Person_sitting", "Cyclist"])
-def test_labels_of_people(label: str) -> None:
-    assert role_of(label) is Role.OTHER
-
-
-def test_an_unknown_label_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"label 'cow' is unknown; use one of: car, van, .*rider"):
-        role_of("cow")

@@ -13,7 +13,8 @@ from vdet.errors import TruthError
 from vdet.evaluate import labelled_video
 from vdet.evaluate.comparison import MAX_IDS, MAX_IN_FRAME, compare
 from vdet.evaluate.predictions import read_predictions
-from vdet.evaluate.truth import MAX_DEPTH, read_truth
+from vdet.evaluate.truth import read_truth
+from vdet.evaluate.xml_reader import MAX_DEPTH
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
 GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)

@@ -1,20 +1,17 @@
-"""The truth of a video: MOTChallenge, KITTI tracking or CVAT files, and the labels in them."""
+"""The truth of a video: MOTChallenge, KITTI tracking or CVAT files."""
 
 from collections.abc import Callable, Iterable, Iterator
-from enum import Enum
 from pathlib import Path
-from xml.parsers import expat
 
 from vdet.errors import TruthError
 from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video, line_error
+from vdet.evaluate.labels import Role, role_of
 from vdet.evaluate.mot import truth_rows
 from vdet.evaluate.parsing import numbered_lines, parse_number, parse_whole, read_text
+from vdet.evaluate.xml_reader import XmlReader, attribute
 
 _FORMATS = "MOTChallenge gt.txt, KITTI tracking labels or CVAT for video 1.1"
 _KITTI_COLUMNS = 17
-
-MAX_DEPTH = 32
-"""Most nested XML elements; CVAT has 4."""
 
 
 def read_truth(path: Path, *, frame_count: int | None = None) -> LabelledVideo:
@@ -43,46 +40,6 @@ def _reader(path: Path, text: str) -> Callable[[Path, str], Iterable[Row]]:
     if first.startswith("<"):
         return cvat_rows
     return truth_rows if "," in first else kitti_rows
-
-
-class Role(Enum):
-    """How a labelled box is scored."""
-
-    VEHICLE = "a vehicle to be found"
-    IGNORED = "an ignore region: a prediction in it is neither right nor wrong"
-    OTHER = "not a vehicle: the box is skipped, and a prediction on it is wrong"
-
-
-_WORDS = {
-    Role.VEHICLE: ("car", "van", "truck", "lorry", "bus", "pickup", "suv", "taxi", "vehicle"),
-    Role.IGNORED: (
-        *("ignore", "ignored", "ignore region", "dont care"),
-        *("tram", "misc", "motorcycle", "motorbike", "trailer"),
-    ),
-    Role.OTHER: ("pedestrian", "person", "person sitting", "cyclist", "bicycle", "rider"),
-}
-
-
-def _letters(label: str) -> str:
-    return "".join(letter for letter in label.casefold() if letter.isalpha())
-
-
-_ROLES = {_letters(word): role for role, words in _WORDS.items() for word in words}
-
-
-def role_of(label: str) -> Role:
-    """Return the role of a label; case, spaces and punctuation do not matter.
-
-    Raises
-    ------
-    ValueError
-        The label is not one of the known words.
-    """
-    role = _ROLES.get(_letters(label))
-    if role is None:
-        known = "; ".join(", ".join(words) for words in _WORDS.values())
-        raise ValueError(f"label {label!r:.40} is unknown; use one of: {known}")
-    return role
 
 
 def kitti_rows(path: Path, text: str) -> Iterator[Row]:
@@ -137,40 +94,25 @@ def cvat_rows(path: Path, text: str) -> list[Row]:
         another format.
     """
     reader = _CvatReader()
-    try:
-        reader.parser.Parse(text, True)
-    except expat.ExpatError as error:
-        what = f"broken XML: {expat.ErrorString(error.code)}"
-        raise line_error(path, error.lineno, what) from error
-    except ValueError as error:
-        raise line_error(path, reader.parser.CurrentLineNumber, str(error)) from error
+    reader.read(path, text)
     return reader.rows
 
 
-class _CvatReader:
-    """Collects rows while expat parses the text; a ValueError says what is wrong."""
+class _CvatReader(XmlReader):
+    """Collects the rows of a CVAT file."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.rows: list[Row] = []
-        self.parser = expat.ParserCreate()
-        self.parser.StartDoctypeDeclHandler = self._refuse_doctype
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self._open: list[str] = []
         self._track = 0
         self._role = Role.OTHER
 
-    def _refuse_doctype(self, *_: object) -> None:
-        raise ValueError("the XML declares a document type, which truth does not need; remove it")
-
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        if len(self._open) == MAX_DEPTH:
-            raise ValueError(f"more than {MAX_DEPTH} nested elements")
-        self._open.append(name)
-        match self._open:
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        """Take a track or a box."""
+        match self.open:
             case ["annotations", "track"]:
-                self._track = parse_whole(_get(name, attributes, "id"))
-                self._role = role_of(_get(name, attributes, "label"))
+                self._track = parse_whole(attribute(name, attributes, "id"))
+                self._role = role_of(attribute(name, attributes, "label"))
             case ["annotations", "track", "box"]:
                 self._box(attributes)
             case ["annotations", "track", _]:
@@ -180,23 +122,14 @@ class _CvatReader:
             case [root] if root != "annotations":
                 raise ValueError(f"<{name:.40}> where CVAT for video 1.1 has <annotations>")
 
-    def _end(self, _: str) -> None:
-        self._open.pop()
-
     def _box(self, attributes: dict[str, str]) -> None:
         if parse_number(attributes.get("rotation", "0")):
             raise ValueError("the box is rotated; only upright boxes can be scored")
-        frame = parse_whole(_get("box", attributes, "frame"))
+        frame = parse_whole(attribute("box", attributes, "frame"))
         corners = [
-            parse_number(_get("box", attributes, side)) for side in ("xtl", "ytl", "xbr", "ybr")
+            parse_number(attribute("box", attributes, side))
+            for side in ("xtl", "ytl", "xbr", "ybr")
         ]
-        if self._role is Role.OTHER or parse_whole(_get("box", attributes, "outside")):
+        if self._role is Role.OTHER or parse_whole(attribute("box", attributes, "outside")):
             return
-        line = self.parser.CurrentLineNumber
-        self.rows.append(_row(line, frame, self._track, corners, self._role))
-
-
-def _get(element: str, attributes: dict[str, str], name: str) -> str:
-    if name not in attributes:
-        raise ValueError(f"<{element}> without its '{name}'")
-    return attributes[name]
+        self.rows.append(_row(self.line, frame, self._track, corners, self._role))

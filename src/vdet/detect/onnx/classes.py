@@ -1,9 +1,8 @@
-"""Names of classes, and which of them are vehicles."""
+"""Names of classes, and which of them are wanted."""
 
 from collections.abc import Sequence
 
-OUR_NAMES = ("car", "truck", "bus", "motorcycle", "vehicle")
-"""What vehicles are called in all outputs; a vehicle is one of which no more is known."""
+from vdet.detect.classes import our_name
 
 # fmt: off
 COCO = (
@@ -21,18 +20,8 @@ COCO = (
 # fmt: on
 """The 80 classes of the COCO data set in the order that detectors number them."""
 
-_OTHER_NAMES = {
-    "lorry": "truck",
-    "motorbike": "motorcycle",
-    "van": "car",
-    "pickup": "truck",
-    "trailer": "truck",
-    "coach": "bus",
-}
-
 
 def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     """Return for each class of a network its number in `wanted`, -1 where it is not wanted."""
     numbers = {name: number for number, name in enumerate(wanted)}
-    lower = [name.strip().lower() for name in names]
-    return [numbers.get(_OTHER_NAMES.get(name, name), -1) for name in lower]
+    return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]

@@ -1,0 +1,26 @@
+"""What vehicles are called: the names in all outputs, and the words of others for them."""
+
+OUR_NAMES = ("car", "truck", "bus", "motorcycle", "vehicle")
+"""What vehicles are called in all outputs; a vehicle is one of which no more is known."""
+
+WORDS = {
+    "car": ("car", "van", "suv", "taxi"),
+    "truck": ("truck", "lorry", "pickup", "pickup truck"),
+    "bus": ("bus", "coach"),
+    "motorcycle": ("motorcycle", "motorbike", "motor"),
+    "vehicle": ("vehicle",),
+}
+"""For each of `OUR_NAMES` the words that label files and networks use."""
+
+
+def letters(label: str) -> str:
+    """Return the letters of a label: case, spaces and punctuation do not matter."""
+    return "".join(letter for letter in label.casefold() if letter.isalpha())
+
+
+_NAMES = {letters(word): name for name, words in WORDS.items() for word in words}
+
+
+def our_name(label: str) -> str | None:
+    """Return which of `OUR_NAMES` a label means; None where it means none of them."""
+    return _NAMES.get(letters(label))
