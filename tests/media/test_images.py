@@ -15,7 +15,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import ImageError, OutputError, in_one_line
-from vdet.media.images import Image, capture_stderr, decode_image, read_image, write_image
+from vdet.media.images import (
+    Image,
+    capture_stderr,
+    decode_image,
+    read_image,
+    read_size,
+    write_image,
+)
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (24, 32, 3), dtype=np.uint8)
 
@@ -137,6 +144,33 @@ def test_a_photograph_is_turned_upright_as_its_exif_data_say(orientation: int, t
     image = decode_image(turned_jpeg(smooth(), orientation))
     assert image is not None
     np.testing.assert_allclose(image, np.rot90(smooth(), turns), atol=12)
+
+
+@pytest.mark.parametrize("orientation", [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 1000])
+def test_the_size_alone_is_that_of_the_picture_upright(tmp_path: Path, orientation: int) -> None:
+    path = tmp_path / "a.jpg"
+    path.write_bytes(turned_jpeg(smooth(), orientation))
+    height, width = read_image(path).shape[:2]
+    assert read_size(path) == (width, height)
+
+
+@pytest.mark.parametrize(
+    "exif", [b"", b"MM\0*", b"II*\0\xff\xff\xff\xff", b"MM\0*\0\0\0\x08\xff\xff"]
+)
+def test_damaged_exif_data_do_not_turn_the_size(tmp_path: Path, exif: bytes) -> None:
+    segment = b"Exif\0\0" + exif
+    jpeg = encoded(".jpg", smooth())
+    path = tmp_path / "a.jpg"
+    path.write_bytes(
+        jpeg[:2] + b"\xff\xe1" + struct.pack(">H", len(segment) + 2) + segment + jpeg[2:]
+    )
+    assert read_size(path) == (64, 48)
+
+
+def test_the_size_of_what_is_no_picture_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.jpg").write_bytes(b"junk")
+    with pytest.raises(ImageError, match=r"a\.jpg: is not a picture"):
+        read_size(tmp_path / "a.jpg")
 
 
 def test_a_picture_of_one_pixel_is_read() -> None:

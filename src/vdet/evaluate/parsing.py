@@ -4,6 +4,9 @@ import io
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.files import read_whole
@@ -13,6 +16,9 @@ LIMIT = 10_000_000
 
 MAX_BYTES = 64_000_000
 """Largest size of a file of boxes."""
+
+JsonNumber = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False, strict=True)]
+"""A number in JSON."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -71,3 +77,10 @@ def parse_whole(text: str) -> int:
     if not value.is_integer():
         raise ValueError(f"{text.strip()!r:.40} is not a whole number")
     return int(value)
+
+
+def first_mistake(error: ValidationError) -> str:
+    """Say in a line what is wrong in a JSON text, and where."""
+    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+    place = ".".join(str(part) for part in first["loc"])
+    return f"{place}: {first['msg']}" if place else first["msg"]

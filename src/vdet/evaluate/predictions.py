@@ -11,7 +11,15 @@ from pydantic import BaseModel, Field, ValidationError
 from vdet.errors import TruthError
 from vdet.evaluate.labelled_video import MAX_ROWS, LabelledVideo, Row, checked_video, line_error
 from vdet.evaluate.mot import result_rows
-from vdet.evaluate.parsing import LIMIT, numbered_lines, parse_number, parse_whole, read_text
+from vdet.evaluate.parsing import (
+    LIMIT,
+    JsonNumber,
+    first_mistake,
+    numbered_lines,
+    parse_number,
+    parse_whole,
+    read_text,
+)
 
 MAX_RECORDS = MAX_ROWS
 """Most records in a `.jsonl` file."""
@@ -116,7 +124,6 @@ def _csv_row(line: int, header: list[str], cells: list[str]) -> tuple[Row, float
 
 
 _Whole = Annotated[int, Field(ge=0, le=LIMIT, strict=True)]
-_Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False, strict=True)]
 _Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False, strict=True)]
 
 
@@ -124,10 +131,10 @@ class TrackRecord(BaseModel, frozen=True):
     """A track in one frame: id; x, y, width, height in full-frame pixels from 0; score 0 to 1."""
 
     id: _Whole
-    x: _Number
-    y: _Number
-    width: _Number
-    height: _Number
+    x: JsonNumber
+    y: JsonNumber
+    width: JsonNumber
+    height: JsonNumber
     score: _Share = 1.0
 
 
@@ -135,7 +142,7 @@ class FrameRecord(BaseModel, frozen=True):
     """A frame, counted from 0, its time in seconds, and its tracks."""
 
     frame: _Whole
-    time: _Number
+    time: JsonNumber
     tracks: tuple[TrackRecord, ...]
 
 
@@ -148,14 +155,8 @@ def _json_records(path: Path, text: str) -> Iterator[tuple[int, FrameRecord]]:
         try:
             record = FrameRecord.model_validate_json(content)
         except ValidationError as error:
-            raise line_error(path, line, _first_mistake(error)) from error
+            raise line_error(path, line, first_mistake(error)) from error
         if record.frame <= last:
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         last = record.frame
         yield line, record
-
-
-def _first_mistake(error: ValidationError) -> str:
-    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-    place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}" if place else first["msg"]

@@ -63,6 +63,20 @@ def read_image(path: Path) -> Image:
     return image
 
 
+def read_size(path: Path) -> tuple[int, int]:
+    """Return the width and height of a picture upright, in pixels, from its header alone.
+
+    Raises
+    ------
+    ImageError
+        The file cannot be read, or is no picture.
+    """
+    size = picture_size(read_whole(path, most=MAX_BYTES, what="picture", error=ImageError))
+    if size is None:
+        raise ImageError(f"{path}: {_NO_PICTURE}")
+    return size
+
+
 def decode_image(data: bytes) -> Image | None:
     """Decode an encoded picture as `read_image` does; None where that is impossible."""
     try:

@@ -4,19 +4,23 @@ A decompression bomb is a file of a few kilobytes that claims gigabytes of pixel
 memory aside for what a header claims, so it is read here first, in the way that they read it.
 """
 
+import contextlib
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Set
 
 _MAX_TIFF_TAGS = 4096  # as in libtiff
-_TIFF_WIDTH, _TIFF_HEIGHT = 256, 257
+_TIFF_WIDTH, _TIFF_HEIGHT, _TIFF_ORIENTATION = 256, 257, 274
 _TIFF_INTEGERS = {1: "B", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 16: "Q", 17: "q"}
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _JPEG_WITHOUT_LENGTH = frozenset({0x00, 0x01, *range(0xD0, 0xD8)})
+_JPEG_EXIF, _EXIF = 0xE1, b"Exif\0\0"
+_TURNED = range(5, 9)  # the orientations that are turned by a quarter
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
     """Return the width and height in pixels that a PNG, JPEG, BMP, TIFF or WebP file claims.
 
+    They are those of the picture upright, as far as the EXIF data of a JPEG file turn it.
     None where the file is none of these, or its header is damaged.
     """
     for signature, parse in _FORMATS.items():
@@ -37,7 +41,7 @@ def _png(data: bytes) -> tuple[int, int]:
 
 def _jpeg(data: bytes) -> tuple[int, int]:
     """Find the first start of a frame (ITU-T T.81, annex B), past the segments before it."""
-    position = 2
+    position, is_turned = 2, False
     while True:
         position = data.index(b"\xff", position)
         while data[position] == 0xFF:
@@ -46,10 +50,20 @@ def _jpeg(data: bytes) -> tuple[int, int]:
         position += 1
         if marker in _JPEG_FRAMES:
             height, width = struct.unpack_from(">HH", data, position + 3)
-            return width, height
+            return (height, width) if is_turned else (width, height)
         if marker not in _JPEG_WITHOUT_LENGTH:
             (length,) = struct.unpack_from(">H", data, position)
+            segment = data[position + 2 : position + length]
+            if marker == _JPEG_EXIF and segment.startswith(_EXIF):
+                is_turned = _is_turned(segment[len(_EXIF) :])
             position += max(2, length)
+
+
+def _is_turned(exif: bytes) -> bool:
+    """Tell whether EXIF data, which are a TIFF file, turn the picture by a quarter."""
+    with contextlib.suppress(struct.error, LookupError, ValueError):
+        return _tiff_tags(exif, {_TIFF_ORIENTATION})[_TIFF_ORIENTATION] in _TURNED
+    return False
 
 
 def _bmp(data: bytes) -> tuple[int, int]:
@@ -75,7 +89,12 @@ def _webp(data: bytes) -> tuple[int, int]:
 
 
 def _tiff(data: bytes) -> tuple[int, int]:
-    """Read the first directory of a TIFF 6.0 or BigTIFF file."""
+    sizes = _tiff_tags(data, {_TIFF_WIDTH, _TIFF_HEIGHT})
+    return sizes[_TIFF_WIDTH], sizes[_TIFF_HEIGHT]
+
+
+def _tiff_tags(data: bytes, wanted: Set[int]) -> dict[int, int]:
+    """Read whole numbers in the first directory of a TIFF 6.0 or BigTIFF file."""
     order = "<" if data.startswith(b"II") else ">"
     big = 43 in data[2:4]
     (offset,) = struct.unpack_from(order + ("Q" if big else "I"), data, 8 if big else 4)
@@ -83,12 +102,12 @@ def _tiff(data: bytes) -> tuple[int, int]:
     if count > _MAX_TIFF_TAGS:
         raise ValueError
     first, step, value = (offset + 8, 20, 12) if big else (offset + 2, 12, 8)
-    sizes: dict[int, int] = {}
+    found: dict[int, int] = {}
     for entry in range(first, first + count * step, step):
         tag, kind = struct.unpack_from(order + "HH", data, entry)
-        if tag in (_TIFF_WIDTH, _TIFF_HEIGHT) and tag not in sizes:
-            (sizes[tag],) = struct.unpack_from(order + _TIFF_INTEGERS[kind], data, entry + value)
-    return sizes[_TIFF_WIDTH], sizes[_TIFF_HEIGHT]
+        if tag in wanted and tag not in found:
+            (found[tag],) = struct.unpack_from(order + _TIFF_INTEGERS[kind], data, entry + value)
+    return found
 
 
 _FORMATS: dict[bytes, Callable[[bytes], tuple[int, int]]] = {

@@ -1,0 +1,1 @@
+"""Labelled pictures: read from the usual forms, searched and scored."""

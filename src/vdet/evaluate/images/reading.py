@@ -1,0 +1,54 @@
+"""A set of labelled pictures, read from whichever form lies in a folder."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from vdet.errors import TruthError
+from vdet.evaluate.images.coco import coco_labels
+from vdet.evaluate.images.kitti import kitti_labels
+from vdet.evaluate.images.labelled import ImageLabels, LabelledImages, checked_images
+from vdet.evaluate.images.voc import voc_labels
+from vdet.evaluate.images.yolo import yolo_labels
+
+_FOLDERS: dict[tuple[str, str], Callable[[Path], Iterable[ImageLabels]]] = {
+    ("image_2", "label_2"): kitti_labels,
+    ("images", "labels"): yolo_labels,
+    ("JPEGImages", "Annotations"): voc_labels,
+}
+_LOOKED_FOR = (
+    "one .json file (COCO), image_2 and label_2 (KITTI), images and labels (YOLO), JPEGImages and "
+    "Annotations (Pascal VOC)"
+)
+
+
+def read_labelled_images(path: Path) -> LabelledImages:
+    """Read labelled pictures: COCO, KITTI, YOLO or Pascal VOC.
+
+    Parameters
+    ----------
+    path
+        A COCO file, or a folder; what lies in it tells the form.
+
+    Raises
+    ------
+    TruthError
+        There is no labelled set, or it has a mistake; the message names the place of the first.
+    """
+    return checked_images(str(path), _labels(path))
+
+
+def _labels(path: Path) -> Iterable[ImageLabels]:
+    if not path.is_dir():
+        if path.suffix.lower() != ".json":
+            raise TruthError(f"{path}: is no folder and no .json file; give labelled pictures")
+        return coco_labels(path)
+    for folders, read in _FOLDERS.items():
+        if all((path / name).is_dir() for name in folders):
+            return read(path)
+    files = sorted([*path.glob("*.json"), *path.glob("annotations/*.json")])
+    if len(files) == 1:
+        return coco_labels(files[0])
+    if files:
+        names = ", ".join(str(file.relative_to(path)) for file in files[:5])
+        raise TruthError(f"{path}: holds several .json files ({names}); give the one with labels")
+    raise TruthError(f"{path}: holds no labelled pictures; looked for {_LOOKED_FOR}")

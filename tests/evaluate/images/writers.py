@@ -1,0 +1,129 @@
+"""Labelled pictures written in the four forms, for the tests that read them."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vdet.media.images import encode_image
+
+NAMES = ("car", "truck", "bus", "ignore", "person")
+
+
+@dataclass(frozen=True)
+class Boxed:
+    """A labelled box: x, y, width, height in pixels from 0."""
+
+    name: str
+    box: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """The size of a picture, and its boxes."""
+
+    width: int
+    height: int
+    boxes: tuple[Boxed, ...] = ()
+
+
+Pictures = Mapping[str, Labelled]
+"""By name, without a suffix."""
+
+
+def write_pictures(folder: Path, pictures: Pictures) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, each in pictures.items():
+        path = folder / f"{name}.png"
+        path.write_bytes(encode_image(np.zeros((each.height, each.width, 3), np.uint8), path))
+
+
+def write_coco(folder: Path, pictures: Pictures) -> Path:
+    write_pictures(folder, pictures)
+    images = [
+        {"id": number, "file_name": f"{name}.png", "width": each.width, "height": each.height}
+        for number, (name, each) in enumerate(pictures.items())
+    ]
+    annotations = [
+        {
+            "id": 1,
+            "image_id": number,
+            "category_id": NAMES.index(boxed.name) + 1,
+            "bbox": boxed.box,
+            "segmentation": [[1, 2, 3]],
+            "iscrowd": int(boxed.name == "ignore"),
+        }
+        for number, each in enumerate(pictures.values())
+        for boxed in each.boxes
+    ]
+    categories = [
+        {"id": number, "name": "vehicle" if name == "ignore" else name}
+        for number, name in enumerate(NAMES, start=1)
+    ]
+    document = {
+        "info": {},
+        "images": images,
+        "annotations": annotations,
+        "categories": categories,
+    }
+    path = folder / "annotations.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def write_kitti(folder: Path, pictures: Pictures) -> Path:
+    write_pictures(folder / "image_2", pictures)
+    (folder / "label_2").mkdir(exist_ok=True)
+    types = dict(zip(NAMES, ("Car", "Truck", "Bus", "DontCare", "Pedestrian"), strict=True))
+    for name, each in pictures.items():
+        lines = [
+            f"{types[boxed.name]} 0.00 0 -1.57 {x} {y} {x + w} {y + h} 1 1 4 2 1 20 -1.6\n"
+            for boxed in each.boxes
+            for x, y, w, h in [boxed.box]
+        ]
+        (folder / "label_2" / f"{name}.txt").write_text("".join(lines), encoding="utf-8")
+    return folder / "label_2" / f"{min(pictures)}.txt"
+
+
+def write_yolo(folder: Path, pictures: Pictures) -> Path:
+    write_pictures(folder / "images", pictures)
+    (folder / "labels").mkdir(exist_ok=True)
+    (folder / "data.yaml").write_text(f"train: images\nnames: [{', '.join(NAMES)}]\n", "utf-8")
+    for name, each in pictures.items():
+        lines = [
+            f"{NAMES.index(boxed.name)} {(x + w / 2) / each.width} {(y + h / 2) / each.height} "
+            f"{w / each.width} {h / each.height}\n"
+            for boxed in each.boxes
+            for x, y, w, h in [boxed.box]
+        ]
+        if lines:
+            (folder / "labels" / f"{name}.txt").write_text("".join(lines), encoding="utf-8")
+    return folder / "labels" / f"{min(pictures)}.txt"
+
+
+def write_voc(folder: Path, pictures: Pictures) -> Path:
+    write_pictures(folder / "JPEGImages", pictures)
+    (folder / "Annotations").mkdir(exist_ok=True)
+    for name, each in pictures.items():
+        objects = "".join(
+            f"<object>\n<name>{'car' if boxed.name == 'ignore' else boxed.name}</name>\n"
+            f"<difficult>{int(boxed.name == 'ignore')}</difficult><bndbox><xmin>{x + 1}</xmin>"
+            f"<ymin>{y + 1}</ymin><xmax>{x + w}</xmax><ymax>{y + h}</ymax></bndbox></object>\n"
+            for boxed in each.boxes
+            for x, y, w, h in [boxed.box]
+        )
+        size = f"<size><width>{each.width}</width><height>{each.height}</height></size>\n"
+        text = f"<annotation>\n<filename>{name}.png</filename>{size}{objects}</annotation>\n"
+        (folder / "Annotations" / f"{name}.xml").write_text(text, encoding="utf-8")
+    return folder / "Annotations" / f"{min(pictures)}.xml"
+
+
+WRITERS: dict[str, Callable[[Path, Pictures], Path]] = {
+    "COCO": write_coco,
+    "KITTI": write_kitti,
+    "YOLO": write_yolo,
+    "VOC": write_voc,
+}
+"""By the name of the form; each returns the label file of the first picture by name."""
