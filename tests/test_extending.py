@@ -11,6 +11,7 @@ from types import ModuleType
 
 import pytest
 
+from evaluate.images.writers import Boxed, Labelled, write_coco
 from pages import blocks
 from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
@@ -120,6 +121,18 @@ def test_all_three_run_through_eval_video(package: Path, clip: Path, tmp_path: P
     total = json.loads(done.stdout)["total"]
     assert (total["f1"], total["ap50"], total["id_switches"]) == (1, pytest.approx(1), 0)
     assert len(counts.read_text().splitlines()) == FRAMES
+
+
+def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) -> None:
+    car = car_at(0)
+    boxes = (Boxed("car", (car.x, car.y, car.width, car.height)),)
+    write_coco(tmp_path, {"a": Labelled(WIDTH, HEIGHT, boxes)})
+    (frame,) = drive(1)
+    write_image(tmp_path / "a.png", frame.image)
+    done = vdet(package, "eval", "images", tmp_path, "--set", "detector.kind=red", "--json", "-")
+    assert done.returncode == 0, done.stderr
+    values = json.loads(done.stdout)
+    assert (values["detector"], values["score"], values["mean"]["f1"]) == ("red", 0, 1)
 
 
 def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 
@@ -45,6 +45,11 @@ def test_a_prediction_that_finds_a_vehicle_in_a_region_is_kept() -> None:
 def test_of_two_predictions_on_a_vehicle_in_a_region_the_worse_one_is_dropped() -> None:
     found = video([box(5, 320), box(6, 300)])
     assert kept_tracks(found, video([box(1, 300), region(250, 500)])) == [6]
+
+
+def test_an_ignored_prediction_counts_only_if_it_finds_a_vehicle() -> None:
+    found = [replace(box(id_, x), ignored=True) for id_, x in ((5, 0), (6, 300))]
+    assert kept_tracks(video(found), video([box(1, 10)])) == [5]
 
 
 def test_a_region_of_another_frame_does_not_count() -> None:

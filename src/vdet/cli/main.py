@@ -14,6 +14,7 @@ from vdet.cli.command import Command
 from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
+from vdet.cli.eval_images import images
 from vdet.cli.eval_patches import patches
 from vdet.cli.eval_tracks import tracks
 from vdet.cli.eval_video import video
@@ -60,7 +61,7 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
 
 for _command in (calibrate, demo, detect_image, detect_video, mine, train):
     cli.add_command(_command)
-for _command in (patches, tracks, video):
+for _command in (images, patches, tracks, video):
     evaluate.add_command(_command)
 
 

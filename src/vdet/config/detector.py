@@ -1,7 +1,8 @@
 """The section `detector`: which detector finds vehicles, and its settings."""
 
+import math
 from collections.abc import Hashable
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -23,6 +24,20 @@ class DetectorSettings(Section):
         Detectors whose settings have the same key, and that read the same model file, find the
         same candidates in a frame.
         """
+        return self
+
+    @property
+    def vehicle_classes(self) -> tuple[str, ...]:
+        """The classes that the detector looks for, of `vdet.detect.classes.OUR_NAMES`."""
+        return "car", "truck", "bus", "vehicle"
+
+    @property
+    def shown_score(self) -> float:
+        """Least score of a detection that is shown in a still picture."""
+        return 0.0
+
+    def showing_all(self) -> Self:
+        """Return settings with which a still picture shows detections of every score."""
         return self
 
 
@@ -56,6 +71,13 @@ class ScoreSettings(Section):
         3.5, gt=0, le=100, description="how steeply the score rises with the evidence"
     )
 
+    def of(self, evidence: float) -> float:
+        """Return the score, 0 to 1, of a box with this evidence."""
+        if not evidence:
+            return 0.0
+        relative = math.log(evidence) - math.log(self.middle)
+        return (1 + math.tanh(self.slope * relative / 2)) / 2
+
 
 class SvmSettings(DetectorSettings):
     """The detector: a linear SVM on HOG and colour features, sliding windows and a heatmap."""
@@ -80,6 +102,15 @@ class SvmSettings(DetectorSettings):
     def search_key(self) -> Hashable:
         """What the search of a frame depends on: all but heat, score and still pictures."""
         return self.kind, self.reference_height, self.features, self.search
+
+    @property
+    def shown_score(self) -> float:
+        """Least score of a detection that is shown in a still picture."""
+        return self.score.of(self.stills.strength)
+
+    def showing_all(self) -> "SvmSettings":
+        """Return settings without `stills.strength`; the least size stays."""
+        return self.model_copy(update={"stills": self.stills.model_copy(update={"strength": 0.0})})
 
     @model_validator(mode="after")
     def _heat_sees_every_set(self) -> "SvmSettings":
@@ -119,3 +150,17 @@ class NetworkSettings(DetectorSettings):
     def search_key(self) -> Hashable:
         """What the search of a frame depends on."""
         return self.kind, self.least, self.classes, self.names
+
+    @property
+    def vehicle_classes(self) -> tuple[str, ...]:
+        """The classes that the detector looks for."""
+        return self.classes
+
+    @property
+    def shown_score(self) -> float:
+        """Least score of a detection that is shown in a still picture."""
+        return self.still_score
+
+    def showing_all(self) -> "NetworkSettings":
+        """Return settings without `still_score`; `least` stays."""
+        return self.model_copy(update={"still_score": 0.0})

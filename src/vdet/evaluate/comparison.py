@@ -3,7 +3,8 @@
 Ignore regions are applied here, by one rule for all metrics. In every frame the predictions are
 first paired with the vehicles that count (IoU at least 0.5, largest sum of IoU). A prediction that
 is left over and has at least half of its own area in a single ignore region is dropped: it is
-neither right nor wrong. The ignore regions are dropped too: they need not be found.
+neither right nor wrong; so is a prediction that is left over and `ignored` itself. The ignore
+regions are dropped too: they need not be found.
 Source: how the KITTI tracking benchmark treats DontCare, and COCO treats crowds at IoU 0.5.
 """
 
@@ -215,5 +216,6 @@ def _apply_regions(
     iou = iou_matrix(vehicles.boxes, tracks.boxes)
     _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
     covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_SHARE)
-    covered[paired] = False
-    return vehicles, tracks.where(~np.asarray(covered.any(axis=1)))
+    dropped = np.asarray(covered.any(axis=1) | tracks.ignored)
+    dropped[paired] = False
+    return vehicles, tracks.where(~dropped)

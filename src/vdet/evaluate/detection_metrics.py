@@ -57,39 +57,69 @@ def ratio(part: float, whole: float) -> float:
     return float(part / whole) if whole else 0.0
 
 
-def average_precisions(comparison: Comparison) -> Float64Array:
-    """Return the average precision at each of `IOU_THRESHOLDS`, float64 `(10,)`, 0 to 1.
+@dataclass(frozen=True, slots=True, eq=False)
+class RankedPredictions:
+    """All predictions by descending score, and which of them are right.
 
-    At each threshold the predictions are taken by descending score. Each finds the vehicle of its
-    frame that it overlaps most among those not found yet. The precision at the 101 recalls
-    0, 0.01 … 1 is averaged. Predictions of equal score are taken in the order of the frames, so
-    that without scores AP describes a single operating point. 0 if there are no vehicles.
+    Each finds the vehicle of its frame that it overlaps most among those that no prediction before
+    it has found. Those of equal score are taken in the order of the frames, so that without scores
+    they describe a single operating point.
     Source: the COCO detection evaluation (pycocotools).
+
+    Attributes
+    ----------
+    scores
+        float64 `(n,)`, descending.
+    right
+        bool `(10, n)`: whether each finds a vehicle, at each of `IOU_THRESHOLDS`.
+    vehicles
+        Number of true boxes.
     """
-    vehicles = int(comparison.vehicle_lengths().sum())
-    if not vehicles or not len(comparison.track_ids):
-        return np.zeros(len(IOU_THRESHOLDS))
-    scores = np.concatenate([np.sort(-frame.scores) for frame in comparison.frames])
-    right = np.concatenate([_right_predictions(frame) for frame in comparison.frames], axis=1)
+
+    scores: Float64Array
+    right: BoolArray
+    vehicles: int
+
+    def average_precisions(self) -> Float64Array:
+        """Return the average precision at each of `IOU_THRESHOLDS`, float64 `(10,)`, 0 to 1.
+
+        It is the mean of the precision at the 101 recalls 0, 0.01 … 1; 0 if there are no vehicles.
+        """
+        if not self.vehicles or not len(self.scores):
+            return np.zeros(len(IOU_THRESHOLDS))
+        return np.array([_average_precision(row, self.vehicles) for row in self.right])
+
+
+def rank_predictions(comparison: Comparison) -> RankedPredictions:
+    """Take the predictions by descending score, and tell which of them are right."""
+    none = np.zeros((len(IOU_THRESHOLDS), 0), np.bool_)
+    frames = comparison.frames
+    scores = np.concatenate([np.empty(0), *(np.sort(-frame.scores) for frame in frames)])
+    right = np.concatenate([none, *map(_right_predictions, frames)], axis=1)
     order = np.argsort(scores, kind="stable")
-    return np.array([_average_precision(row[order], vehicles) for row in right])
+    vehicles = int(comparison.vehicle_lengths().sum())
+    return RankedPredictions(-scores[order], right[:, order], vehicles)
+
+
+def average_precisions(comparison: Comparison) -> Float64Array:
+    """Return the average precision at each of `IOU_THRESHOLDS`, float64 `(10,)`, 0 to 1."""
+    return rank_predictions(comparison).average_precisions()
 
 
 def _right_predictions(frame: ComparedFrame) -> BoolArray:
     """Return whether each prediction finds a vehicle, `(10, m)`: by threshold and score."""
     order = np.argsort(-frame.scores, kind="stable")
     right = np.zeros((len(IOU_THRESHOLDS), len(order)), np.bool_)
+    overlaps = frame.iou[:, order]
     for row, threshold in zip(right, IOU_THRESHOLDS, strict=True):
-        free = frame.iou[:, order].copy()
-        for column in range(len(order)):
+        free = overlaps.copy()
+        for column in np.flatnonzero(overlaps.max(axis=0, initial=0) >= threshold).tolist():
             row[column] = _take(free, column, threshold)
     return right
 
 
 def _take(free: Float64Array, column: int, threshold: float) -> bool:
     """Take the best free vehicle for a prediction, if one overlaps enough."""
-    if not len(free):
-        return False
     best = len(free) - 1 - int(np.argmax(free[::-1, column]))  # the last of equals, as in COCO
     if free[best, column] < threshold:
         return False

@@ -50,7 +50,8 @@ class LabelledVideo:
     scores
         float64 `(n,)`: confidence of a prediction, higher is better; 1 for truth.
     ignored
-        bool `(n,)`: the row is an ignore region, not a vehicle to be found.
+        bool `(n,)`: of truth, the row is an ignore region, not a vehicle to be found; of
+        predictions, it counts only if it finds a vehicle.
     frame_count
         Number of frames of the video, None if the file does not say.
     rate

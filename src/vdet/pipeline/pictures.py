@@ -1,7 +1,8 @@
 """Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
+import contextlib
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,7 +12,7 @@ import numpy as np
 
 from vdet.config.schema import Settings
 from vdet.detect.detections import Detections
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
@@ -176,16 +177,34 @@ def detect_picture(
     ImageError
         The picture cannot be searched.
     """
-    height, width = image.shape[:2]
-    try:
-        with single_threaded_libraries():
-            detector = model.for_video(width, height, [image])
-            detections = detector.detect(detector.search(image, None))
+    with single_threaded_libraries():
+        detector, detections = search_picture(source, image, model)
+    with _named(source):
         road = _road(image, settings, lanes) if lanes else None
-    except (ConfigError, ImageError) as error:
-        raise ImageError(f"{source}: {error}") from error
     frame = Frame(0, Fraction(0), image)
     return FrameResult(source, frame, detections, _tracks(detections), road, detector)
+
+
+def search_picture(
+    source: Path, image: Image, model: DetectorModel
+) -> tuple[VideoDetector, Detections]:
+    """Return what a picture shows, and the detector that found it; threads may call this at once.
+
+    Arguments and errors as in `detect_picture`.
+    """
+    height, width = image.shape[:2]
+    with _named(source):
+        detector = model.for_video(width, height, [image])
+        return detector, detector.detect(detector.search(image, None))
+
+
+@contextlib.contextmanager
+def _named(source: Path) -> Iterator[None]:
+    """Put the name of the picture before what is wrong with it."""
+    try:
+        yield
+    except (ConfigError, ImageError) as error:
+        raise ImageError(f"{source}: {error}") from error
 
 
 def _tracks(detections: Detections) -> tuple[Track, ...]:

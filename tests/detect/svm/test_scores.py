@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from vdet.config.schema import StillSettings, SvmSettings
 from vdet.detect.svm.scores import detection_scores
 
 
@@ -24,3 +25,13 @@ def test_more_strength_never_has_a_lower_score_nor_one_above_1() -> None:
 
 def test_no_detections_have_no_scores() -> None:
     assert detection_scores([], 0.3, 2.0).shape == (0,)
+
+
+@pytest.mark.parametrize("strength", [0, 1e-300, 0.05, 0.272, 0.42, 3.0, 1e300])
+def test_the_least_score_of_a_still_picture_is_that_of_its_least_strength(strength: float) -> None:
+    settings = SvmSettings(stills=StillSettings(strength=strength))
+    score = settings.score
+    expected = detection_scores([strength], score.middle, score.slope)[0]
+    assert settings.shown_score == pytest.approx(expected, abs=1e-6)
+    assert settings.showing_all().shown_score == 0
+    assert settings.showing_all().search_key == settings.search_key

@@ -1,0 +1,90 @@
+"""`vdet eval images`: measure detection in labelled pictures."""
+
+import os
+from pathlib import Path
+
+import click
+
+from vdet.cli.messages import progress_bar
+from vdet.cli.options import (
+    PATH,
+    model_option,
+    print_results,
+    read_settings,
+    results_options,
+    settings_options,
+)
+from vdet.detect.factory import load_detector, model_file
+from vdet.evaluate.output import check_outputs
+
+SHARE = click.FloatRange(0, 1)
+
+
+@click.command()
+@click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
+@click.option(
+    "--score",
+    type=SHARE,
+    metavar="SCORE",
+    show_default="what vdet detect-image shows",
+    help="Count boxes with at least this score, 0 to 1.",
+)
+@click.option(
+    "--least-width",
+    type=SHARE,
+    metavar="SHARE",
+    default=0.0,
+    show_default=True,
+    help="Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
+)
+@model_option
+@settings_options("detector.kind=net")
+@results_options
+@click.pass_obj
+def images(
+    quiet: bool,
+    *,
+    data: tuple[Path, ...],
+    score: float | None,
+    least_width: float,
+    model_path: Path | None,
+    config_name: str | None,
+    assignments: tuple[str, ...],
+    json_target: str | None,
+    report: Path | None,
+    overwrite: bool,
+) -> None:
+    """Measure detection in labelled pictures.
+
+    Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC form, or a COCO file. Each picture is
+    searched for itself, and compared with its labels.
+    """
+    from vdet.evaluate.images.evaluate import evaluate_images
+    from vdet.evaluate.images.reading import read_labelled_images
+    from vdet.evaluate.images.scores import Counting
+    from vdet.evaluate.images.text import RunName, lines, plain
+    from vdet.evaluate.report.images_page import images_page
+
+    detector = read_settings(config_name, assignments).detector
+    model = load_detector(detector.showing_all(), model_path)
+    file = model_file(detector, model_path)
+    check_outputs(
+        json_target, report, overwrite=overwrite, inputs=[*data, *([file] if file else [])]
+    )
+    sets = [read_labelled_images(path) for path in data]
+    counting = Counting(
+        score=detector.shown_score if score is None else score,
+        least_width=least_width,
+        classes=detector.vehicle_classes,
+    )
+    with progress_bar(" pictures", quiet=quiet) as progress:
+        threads = os.cpu_count() or 1
+        result = evaluate_images(sets, model, counting, threads=threads, progress=progress)
+    run = RunName(detector.kind, file, config_name, assignments)
+    print_results(
+        lines(result, run),
+        plain(result, run),
+        lambda: images_page(result, run),
+        json_target=json_target,
+        report=report,
+    )

@@ -1,0 +1,284 @@
+"""How well vehicles are found in pictures: at one score, at every score, and by size."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vdet.evaluate.comparison import Comparison, compare, pool
+from vdet.evaluate.detection_metrics import (
+    RankedPredictions,
+    detection_metrics,
+    rank_predictions,
+    ratio,
+)
+from vdet.evaluate.images.search import SearchedImage
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.matching import MatchedFrame, match
+from vdet.geometry import BoolArray, Float64Array, Int64Array
+
+SIZES = (0.03, 0.06, 0.12)
+"""Where the classes of width begin and end, shares of the picture's width."""
+SIZE_NAMES = ("<3 %", "3–6 %", "6–12 %", ">12 %")
+
+_ANY_KIND = ("car", "truck", "bus", "vehicle")  # what "vehicle" among the classes stands for
+
+
+@dataclass(frozen=True, slots=True)
+class Counting:
+    """What counts.
+
+    Attributes
+    ----------
+    score
+        Detections with at least this score count.
+    least_width
+        Vehicles narrower than this share of the picture's width are ignore regions, and narrower
+        detections count only if they find a vehicle.
+    classes
+        Vehicles of other classes are ignore regions. Of unknown kind ("vehicle") stands for cars,
+        trucks and buses too.
+    """
+
+    score: float
+    least_width: float
+    classes: tuple[str, ...]
+
+    def counts(self, name: str) -> bool:
+        """Tell whether a vehicle of this class counts."""
+        return name in self.classes or ("vehicle" in self.classes and name in _ANY_KIND)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredImage:
+    """A searched picture as a video of one frame: its vehicles, and detections of every score."""
+
+    searched: SearchedImage
+    truth: LabelledVideo
+    found: LabelledVideo
+
+    @staticmethod
+    def of(searched: SearchedImage, counting: Counting) -> "MeasuredImage":
+        """Mark what is an ignore region, and which detections need not find anything."""
+        image = searched.image
+        counts = np.array([counting.counts(name) for name in image.classes], np.bool_)
+        least = counting.least_width * searched.width
+        regions = image.ignored | ~counts | (image.boxes[:, 2] < least)
+        return MeasuredImage(
+            searched,
+            _one_frame(image.boxes, np.ones(len(regions)), regions),
+            _one_frame(searched.boxes, searched.scores, searched.boxes[:, 2] < least),
+        )
+
+    def compare(self, score: float) -> Comparison:
+        """Compare the detections of at least this score with the vehicles."""
+        return compare(self.found.where(self.found.scores >= score), self.truth)
+
+
+@dataclass(frozen=True, slots=True)
+class SizeScores:
+    """Of the vehicles of one size: counts and ratios; a ratio is None without vehicles.
+
+    A false positive has the size of its own box.
+    """
+
+    vehicles: int
+    matches: int
+    false_positives: int
+    recall: float | None
+    f1: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ImageScores:
+    """The scores of one source, or their mean over sources.
+
+    The mean has the sums of all counts, and the means of the ratios over the sources with vehicles.
+    Ratios are None where there are no vehicles.
+
+    Attributes
+    ----------
+    images, vehicles, matches, false_positives
+        Counts, at the score that is shown.
+    precision, recall, f1, mean_iou
+        At that score and IoU 0.5.
+    ap50, ap50_95
+        Average precision over all scores.
+    best_f1, best_score
+        The highest F1 that any score gives, and that score; of the mean, one score for all.
+    sizes
+        In the order of `SIZE_NAMES`.
+    """
+
+    images: int
+    vehicles: int
+    matches: int
+    false_positives: int
+    precision: float | None
+    recall: float | None
+    f1: float | None
+    mean_iou: float | None
+    ap50: float | None
+    ap50_95: float | None
+    best_f1: float | None
+    best_score: float | None
+    sizes: tuple[SizeScores, ...]
+
+
+RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
+"""The ratios of `ImageScores` of which there is a mean."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class F1Curve:
+    """F1 at every score: scores descending, float64 `(n,)`, and F1, float64 `(n,)`.
+
+    Detections are taken by descending score, as for the average precision.
+    """
+
+    scores: Float64Array
+    f1: Float64Array
+
+    @staticmethod
+    def of(ranked: RankedPredictions) -> "F1Curve":
+        """Return the curve; without a point where there are no vehicles."""
+        scores, count = ranked.scores, len(ranked.scores)
+        f1 = 2 * np.cumsum(ranked.right[0]) / (np.arange(1, count + 1) + ranked.vehicles)
+        last = np.append(scores[1:] != scores[:-1], True)[:count]  # of each score
+        last &= ranked.vehicles > 0
+        return F1Curve(scores[last], f1[last])
+
+    def at(self, scores: Float64Array) -> Float64Array:
+        """Return F1 where detections with at least each of these scores count."""
+        rows = np.searchsorted(-self.scores, -scores, side="right")
+        return np.concatenate([[0.0], self.f1])[rows]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """The measured pictures of one source, their curve and their scores."""
+
+    images: tuple[MeasuredImage, ...]
+    curve: F1Curve
+    scores: ImageScores
+
+
+def score_source(images: Sequence[MeasuredImage], counting: Counting) -> Source:
+    """Return the scores of one source."""
+    shown = [image.compare(counting.score) for image in images]
+    matched = [match(comparison) for comparison in shown]
+    metrics = detection_metrics(pool(shown), [frame for frames in matched for frame in frames])
+    ranked = rank_predictions(pool([image.compare(0) for image in images]))
+    precisions = ranked.average_precisions()
+    curve = F1Curve.of(ranked)
+    best_f1, best_score = _best([images], [curve], counting.score)
+    scores = ImageScores(
+        images=len(images),
+        vehicles=ranked.vehicles,
+        matches=metrics.matches,
+        false_positives=metrics.false_positives,
+        precision=metrics.precision,
+        recall=metrics.recall,
+        f1=metrics.f1,
+        mean_iou=metrics.mean_iou,
+        ap50=float(precisions[0]),
+        ap50_95=float(precisions.mean()),
+        best_f1=best_f1,
+        best_score=best_score,
+        sizes=_by_size(images, matched),
+    )
+    if not ranked.vehicles:
+        scores = replace(scores, **dict.fromkeys(RATIOS))  # type: ignore[arg-type]
+    return Source(tuple(images), curve, scores)
+
+
+def mean_scores(sources: Sequence[Source], counting: Counting) -> ImageScores:
+    """Return the mean over sources."""
+    scores = [source.scores for source in sources]
+    counted = [source for source in sources if source.scores.vehicles]
+    best_f1, best_score = _best(
+        [source.images for source in counted], [source.curve for source in counted], counting.score
+    )
+    return ImageScores(
+        images=sum(each.images for each in scores),
+        vehicles=sum(each.vehicles for each in scores),
+        matches=sum(each.matches for each in scores),
+        false_positives=sum(each.false_positives for each in scores),
+        best_f1=best_f1,
+        best_score=best_score,
+        sizes=tuple(map(_mean_size, zip(*(each.sizes for each in scores), strict=True))),
+        **{name: _mean([getattr(each, name) for each in scores]) for name in RATIOS},
+    )
+
+
+def _best(
+    sources: Sequence[Sequence[MeasuredImage]], curves: Sequence[F1Curve], shown: float
+) -> tuple[float | None, float | None]:
+    """Return the highest mean F1 at any one score, and that score; None without vehicles.
+
+    The curves choose the score. F1 there is measured as at the score `shown`, which is taken if it
+    is better: a curve can differ a little where vehicles overlap.
+    """
+    scores = np.unique(np.concatenate([np.empty(0), *(curve.scores for curve in curves)]))[::-1]
+    if not len(scores):
+        return None, None
+    means = np.mean([curve.at(scores) for curve in curves], axis=0)
+    chosen = float(scores[np.argmax(means)])
+    exact = {
+        score: np.mean([_f1(images, score) for images in sources]) for score in (chosen, shown)
+    }
+    best = max(exact, key=lambda score: exact[score])
+    return float(exact[best]), best
+
+
+def _f1(images: Sequence[MeasuredImage], score: float) -> float:
+    comparisons = [image.compare(score) for image in images]
+    matches = sum(len(pairs) for each in comparisons for pairs in match(each))
+    boxes = sum(each.vehicle_lengths().sum() + each.track_lengths().sum() for each in comparisons)
+    return ratio(2 * matches, boxes)
+
+
+def _one_frame(boxes: Float64Array, scores: Float64Array, ignored: BoolArray) -> LabelledVideo:
+    count = len(boxes)
+    return LabelledVideo(np.ones(count, np.int64), np.arange(count), boxes, scores, ignored, 1)
+
+
+def _by_size(
+    images: Sequence[MeasuredImage], matched: Sequence[Sequence[MatchedFrame]]
+) -> tuple[SizeScores, ...]:
+    counts = np.zeros((3, len(SIZE_NAMES)), np.int64)  # vehicles, matches, false positives
+    for image, frames in zip(images, matched, strict=True):
+        width = image.searched.width
+        for pairs in frames:
+            vehicles = _sizes(pairs.frame.vehicle_boxes, width)
+            wrong = np.delete(pairs.frame.track_boxes, pairs.track_rows, axis=0)
+            groups = (vehicles, vehicles[pairs.vehicle_rows], _sizes(wrong, width))
+            counts += [np.bincount(sizes, minlength=len(SIZE_NAMES)) for sizes in groups]
+    return tuple(_size_scores(*column) for column in counts.T.tolist())
+
+
+def _sizes(boxes: Float64Array, width: int) -> Int64Array:
+    """Return the index into `SIZE_NAMES` of each box."""
+    return np.searchsorted(SIZES, boxes[:, 2] / width, side="right").astype(np.int64)
+
+
+def _size_scores(vehicles: int, matches: int, wrong: int) -> SizeScores:
+    if not vehicles:
+        return SizeScores(0, 0, wrong, None, None)
+    f1 = ratio(2 * matches, matches + wrong + vehicles)
+    return SizeScores(vehicles, matches, wrong, ratio(matches, vehicles), f1)
+
+
+def _mean_size(sizes: Sequence[SizeScores]) -> SizeScores:
+    return SizeScores(
+        sum(each.vehicles for each in sizes),
+        sum(each.matches for each in sizes),
+        sum(each.false_positives for each in sizes),
+        _mean([each.recall for each in sizes]),
+        _mean([each.f1 for each in sizes]),
+    )
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if known else None

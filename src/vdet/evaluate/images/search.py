@@ -1,0 +1,74 @@
+"""Labelled pictures searched one by one, in parallel."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vdet.detect.detections import Detections
+from vdet.detect.protocol import DetectorModel
+from vdet.evaluate.comparison import MAX_IN_FRAME
+from vdet.evaluate.images.labelled import LabelledImage
+from vdet.geometry import Float64Array
+from vdet.pipeline.pictures import search_picture
+from vdet.pipeline.threads import map_ordered, single_threaded_libraries
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SearchedImage:
+    """A labelled picture and what a detector finds in it.
+
+    Attributes
+    ----------
+    width
+        Width of the picture, pixels.
+    boxes
+        float64 `(n, 4)`: x, y, width, height of the detections, pixels, by descending score.
+    scores
+        float64 `(n,)`: their scores.
+    """
+
+    image: LabelledImage
+    width: int
+    boxes: Float64Array
+    scores: Float64Array
+
+
+def search_images(
+    images: Sequence[LabelledImage],
+    model: DetectorModel,
+    *,
+    threads: int = 1,
+    advance: Callable[[int], object] = lambda _: None,
+) -> list[SearchedImage]:
+    """Search pictures, each for itself.
+
+    Parameters
+    ----------
+    advance
+        Called with 1 after each picture.
+
+    Raises
+    ------
+    ImageError
+        A picture cannot be read or searched; the message names it.
+    """
+
+    def search(image: LabelledImage) -> SearchedImage:
+        picture = image.read()
+        _, found = search_picture(image.path, picture, model)
+        return _searched(image, picture.shape[1], found)
+
+    searched = []
+    with single_threaded_libraries(), map_ordered(search, images, threads) as results:
+        for _, result in results:
+            searched.append(result)
+            advance(1)
+    return searched
+
+
+def _searched(image: LabelledImage, width: int, found: Detections) -> SearchedImage:
+    best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
+    corners = found.boxes[best].astype(np.float64)
+    boxes = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+    return SearchedImage(image, width, boxes, found.scores[best].astype(np.float64))

@@ -1,0 +1,136 @@
+"""`vdet eval images`."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from evaluate.images.writers import WRITERS, Boxed, Labelled
+from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
+from vdet.config.rendering import render
+from vdet.detect.svm.model import save_model
+from vdet.media.images import write_image
+
+CAR_BOX = (CAR.x, CAR.y, CAR.width, CAR.height)
+
+
+@pytest.fixture
+def red(tmp_path: Path) -> tuple[str | Path, ...]:
+    """The options for the detector of red cars."""
+    save_model(red_finder(), tmp_path / "red.npz")
+    (tmp_path / "red.yaml").write_text(render(PERSPECTIVE), encoding="utf-8")
+    return "-c", tmp_path / "red.yaml", "--model", tmp_path / "red.npz"
+
+
+def write_set(folder: Path, form: str = "COCO", truth: str = "car") -> Path:
+    """Write a picture with a red car and one without; both have a box, so one is missed."""
+    boxes = (Boxed(truth, CAR_BOX), Boxed("person", (0, 0, 9, 9)))
+    WRITERS[form](
+        folder, {"a": Labelled(WIDTH, HEIGHT, boxes), "b": Labelled(WIDTH, HEIGHT, boxes)}
+    )
+    write_image(
+        next(folder.rglob("a.png")),
+        road(CAR),
+    )
+    write_image(next(folder.rglob("b.png")), road())
+    return folder
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_a_set_of_each_form_has_the_same_scores(
+    run: Run, tmp_path: Path, red: tuple[str | Path, ...], form: str
+) -> None:
+    folder = write_set(tmp_path / "set", form)
+    result = run("eval", "images", folder, *red, "--json", "-")
+    assert result.code == 0, result.err
+    values = json.loads(result.out)
+    (source,) = values["sources"]
+    assert (source["vehicles"], source["matches"], source["false_positives"]) == (2, 1, 0)
+    assert (source["precision"], source["recall"]) == (1, 0.5)
+    assert sum(source["not_vehicles"].values()) == 2
+    assert source["sizes"][3] == {
+        "width": ">12 %",
+        "vehicles": 2,
+        "matches": 1,
+        "false_positives": 0,
+        "recall": 0.5,
+        "f1": pytest.approx(2 / 3),
+    }
+
+
+def test_the_boxes_that_count_are_those_that_detect_image_shows(
+    run: Run, tmp_path: Path, red: tuple[str | Path, ...]
+) -> None:
+    folder = write_set(tmp_path / "set")
+    shown = run("detect-image", folder / "a.png", folder / "b.png", "--json", "-", *red)
+    boxes = [box for picture in json.loads(shown.out) for box in picture["boxes"]]
+    measured = json.loads(run("eval", "images", folder, *red, "--json", "-").out)
+    assert measured["mean"]["matches"] + measured["mean"]["false_positives"] == len(boxes) == 1
+    assert boxes[0]["score"] >= measured["score"] == pytest.approx(PERSPECTIVE.svm.shown_score)
+    options = (*red, "--score", "0.9999", "--json", "-")
+    assert json.loads(run("eval", "images", folder, *options).out)["mean"]["matches"] == 0
+
+
+def test_several_sets_a_table_and_a_report(
+    run: Run, tmp_path: Path, red: tuple[str | Path, ...]
+) -> None:
+    sets = [write_set(tmp_path / "one"), write_set(tmp_path / "two", "YOLO")]
+    folder = tmp_path / "report"
+    options = ("--report", folder, "--set", "detector.search.probability=0.6")
+    result = run("eval", "images", *sets, *red, *options)
+    assert result.code == 0, result.err
+    first, second, *_ = result.out.splitlines()
+    assert first.startswith("detector svm, model red.npz, settings ")
+    assert first.endswith("red.yaml detector.search.probability=0.6")
+    assert second == f"boxes from score {PERSPECTIVE.svm.shown_score:.2f}"
+    for words in (str(sets[0]), str(sets[1]), "mean of 2", "recall / F1 by width", "person (2)"):
+        assert words in result.out
+    assert "data:image/jpeg" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_narrow_vehicles_are_left_out(
+    run: Run, tmp_path: Path, red: tuple[str | Path, ...]
+) -> None:
+    folder = write_set(tmp_path / "set")
+    options = ("--least-width", "0.25", "--json", "-", *red)
+    result = run("eval", "images", folder, *options)
+    assert result.code == 0, result.err
+    mean = json.loads(result.out)["mean"]
+    assert (mean["vehicles"], mean["false_positives"], mean["f1"]) == (0, 0, None)
+    assert "vehicles from 25.0% of the width" in result.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        ((), 2, "Missing argument 'DATA...'"),
+        (("none",), 1, "none: is no folder and no .json file"),
+        (("set", "--score", "2"), 2, "2.0 is not in the range"),
+        (("set", "--report", "set/a.png"), 1, "cannot be made a folder"),
+        (("set", "--set", "detector.kind=sonar"), 1, "sonar: is no detector"),
+    ],
+)
+def test_what_cannot_be_is_said_before_any_work(
+    run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    code: int,
+    words: str,
+) -> None:
+    write_set(tmp_path / "set")
+    monkeypatch.chdir(tmp_path)
+    result = run("eval", "images", *arguments)
+    assert (result.code, result.out) == (code, "")
+    assert words in result.err
+
+
+def test_a_picture_that_cannot_be_read_ends_it_with_its_name(
+    run: Run, tmp_path: Path, red: tuple[str | Path, ...]
+) -> None:
+    folder = write_set(tmp_path / "set")
+    (folder / "b.png").write_bytes(b"no picture")
+    result = run("eval", "images", folder, *red)
+    assert (result.code, result.out) == (1, "")
+    assert "b.png: is not a picture" in result.err

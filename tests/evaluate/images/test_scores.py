@@ -1,0 +1,217 @@
+"""Scores of pictures, with boxes whose matches are known by eye."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vdet.evaluate.images.labelled import LabelledImage
+from vdet.evaluate.images.scores import (
+    Counting,
+    ImageScores,
+    MeasuredImage,
+    Source,
+    mean_scores,
+    score_source,
+)
+from vdet.evaluate.images.search import SearchedImage
+
+ALL = ("car", "truck", "bus", "vehicle")
+PLAIN = Counting(score=0.5, least_width=0, classes=ALL)
+WIDTH = 1000
+
+
+def at(x: float, width: float = 100) -> tuple[float, float, float, float]:
+    return x, 0, width, 100
+
+
+def searched(
+    true: list[tuple[float, float, float, float]],
+    found: list[tuple[float, tuple[float, float, float, float]]],
+    *,
+    classes: tuple[str, ...] | None = None,
+    ignored: tuple[int, ...] = (),
+) -> SearchedImage:
+    """Return a picture; `found` are scores and boxes, `ignored` the rows of ignore regions."""
+    image = LabelledImage(
+        Path("a.png"),
+        np.array(true, np.float64).reshape(-1, 4),
+        classes or ("car",) * len(true),
+        np.array([row in ignored for row in range(len(true))], np.bool_),
+    )
+    ranked = sorted(found, reverse=True)
+    return SearchedImage(
+        image,
+        WIDTH,
+        np.array([box for _, box in ranked], np.float64).reshape(-1, 4),
+        np.array([score for score, _ in ranked], np.float64),
+    )
+
+
+def source(*pictures: SearchedImage, counting: Counting = PLAIN) -> Source:
+    return score_source([MeasuredImage.of(each, counting) for each in pictures], counting)
+
+
+def scores(*pictures: SearchedImage, counting: Counting = PLAIN) -> ImageScores:
+    return source(*pictures, counting=counting).scores
+
+
+def test_all_found() -> None:
+    found = scores(searched([at(0), at(300)], [(0.9, at(0)), (0.6, at(300))]), searched([], []))
+    assert (found.images, found.vehicles, found.matches, found.false_positives) == (2, 2, 2, 0)
+    ratios = (found.precision, found.recall, found.f1, found.mean_iou, found.ap50, found.ap50_95)
+    assert ratios == pytest.approx((1, 1, 1, 1, 1, 1))
+
+
+def test_the_same_places_in_two_pictures_are_not_the_same_vehicles() -> None:
+    """In video, a pair of the frame before stays together; pictures know no frame before."""
+    first = searched([at(0), at(300)], [(0.9, at(0)), (0.8, at(300))])
+    second = searched([at(300), at(0)], [(0.9, at(300)), (0.8, at(0)), (0.7, at(20))])
+    assert scores(first, second).mean_iou == pytest.approx(1)
+
+
+def test_only_boxes_of_the_score_and_above_count() -> None:
+    found = scores(searched([at(0), at(300)], [(0.5, at(0)), (0.49, at(300))]))
+    assert (found.matches, found.recall, found.precision) == (1, 0.5, 1)
+    assert found.ap50 == pytest.approx(1), "the average precision takes all scores"
+
+
+def test_a_wrong_box_in_an_ignore_region_does_not_count() -> None:
+    found = [(0.9, at(0)), (0.8, at(350)), (0.7, at(600))]
+    result = scores(searched([at(0), at(300, 200)], found, ignored=(1,)))
+    assert (result.vehicles, result.matches, result.false_positives) == (1, 1, 1)
+
+
+class TestClasses:
+    @pytest.mark.parametrize(
+        ("classes", "vehicles"),
+        [
+            (ALL, 3),
+            ((*ALL, "motorcycle"), 4),
+            (("car",), 1),
+            (("vehicle",), 3),
+            (("truck", "motorcycle"), 2),
+        ],
+    )
+    def test_vehicles_that_are_not_looked_for_are_ignore_regions(
+        self, classes: tuple[str, ...], vehicles: int
+    ) -> None:
+        boxes = [at(200 * number) for number in range(4)]
+        picture = searched(
+            boxes,
+            [(0.9, box) for box in boxes],
+            classes=("car", "truck", "vehicle", "motorcycle"),
+        )
+        result = scores(picture, counting=Counting(0.5, 0, classes))
+        assert (result.vehicles, result.matches, result.false_positives) == (vehicles, vehicles, 0)
+
+
+class TestLeastWidth:
+    COUNTING = Counting(score=0.5, least_width=0.05, classes=ALL)
+
+    def test_a_narrower_vehicle_need_not_be_found(self) -> None:
+        result = scores(searched([at(0), at(300, 49)], []), counting=self.COUNTING)
+        assert result.vehicles == 1
+
+    def test_a_vehicle_of_the_least_width_must_be_found(self) -> None:
+        assert scores(searched([at(300, 50)], []), counting=self.COUNTING).vehicles == 1
+
+    def test_a_narrower_box_is_not_wrong(self) -> None:
+        found = [(0.9, at(0)), (0.8, at(300, 49)), (0.7, at(600, 50))]
+        result = scores(searched([at(0)], found), counting=self.COUNTING)
+        assert (result.matches, result.false_positives) == (1, 1)
+
+    def test_a_narrower_box_may_find_a_wider_vehicle(self) -> None:
+        result = scores(searched([at(0, 60)], [(0.9, at(0, 45))]), counting=self.COUNTING)
+        assert (result.matches, result.false_positives) == (1, 0)
+
+    def test_a_wider_box_on_a_narrower_vehicle_is_in_its_ignore_region(self) -> None:
+        result = scores(searched([at(0, 45)], [(0.9, at(0, 55))]), counting=self.COUNTING)
+        assert (result.vehicles, result.false_positives) == (0, 0)
+
+
+class TestSizes:
+    def test_each_vehicle_and_each_wrong_box_has_a_size(self) -> None:
+        true = [at(0, 29), at(100, 30), at(200, 59), at(300, 60), at(500, 119), at(700, 120)]
+        found = [(0.9, at(100, 30)), (0.9, at(200, 59)), (0.9, at(700, 120)), (0.8, at(400, 61))]
+        sizes = scores(searched(true, found)).sizes
+        assert [size.vehicles for size in sizes] == [1, 2, 2, 1]
+        assert [size.matches for size in sizes] == [0, 2, 0, 1]
+        assert [size.false_positives for size in sizes] == [0, 0, 1, 0]
+        assert [size.recall for size in sizes] == [0, 1, 0, 1]
+        assert [size.f1 for size in sizes] == [0, 1, 0, 1]
+
+    def test_the_size_of_a_match_is_that_of_the_vehicle(self) -> None:
+        sizes = scores(searched([at(0, 50)], [(0.9, at(0, 70))])).sizes
+        assert [size.matches for size in sizes] == [0, 1, 0, 0]
+
+    def test_without_vehicles_of_a_size_there_is_no_ratio(self) -> None:
+        sizes = scores(searched([at(0, 50)], [])).sizes
+        assert [size.recall for size in sizes] == [None, 0, None, None]
+
+
+class TestBestF1:
+    def test_it_is_at_the_score_that_parts_right_from_wrong(self) -> None:
+        found = [(0.4, at(0)), (0.3, at(300)), (0.2, at(600)), (0.1, at(800))]
+        result = scores(searched([at(0), at(300)], found))
+        assert (result.f1, result.best_f1, result.best_score) == (0, 1, 0.3)
+
+    def test_equal_scores_count_together(self) -> None:
+        found = [(0.6, at(0)), (0.6, at(600)), (0.6, at(800))]
+        result = scores(searched([at(0)], found))
+        assert (result.best_f1, result.best_score) == (0.5, 0.6)
+
+    def test_without_vehicles_or_boxes_there_is_none(self) -> None:
+        assert scores(searched([], [(0.9, at(0))])).best_f1 is None
+        assert scores(searched([at(0)], [])).best_f1 is None
+
+    lists = st.lists(
+        st.tuples(
+            st.sampled_from([0.2, 0.4, 0.5, 0.6, 0.8]),
+            st.builds(at, st.integers(0, 20).map(lambda step: 25.0 * step)),
+        ),
+        max_size=6,
+    )
+
+    @settings(max_examples=50)
+    @given(st.lists(lists, min_size=1, max_size=3))
+    def test_it_is_the_f1_at_its_score_and_none_shown_is_better(
+        self, pictures: list[list[tuple[float, tuple[float, float, float, float]]]]
+    ) -> None:
+        searched_ones = [searched([at(0), at(130), at(300)], found) for found in pictures]
+        result = scores(*searched_ones)
+        if result.best_score is None:
+            assert not any(pictures)
+            return
+        again = scores(*searched_ones, counting=Counting(result.best_score, 0, ALL))
+        assert again.f1 == pytest.approx(result.best_f1)
+        assert result.f1 is not None
+        assert result.best_f1 is not None
+        assert result.best_f1 >= result.f1
+
+
+class TestMean:
+    def test_ratios_are_means_of_the_sources_with_vehicles_and_counts_are_sums(self) -> None:
+        good = source(searched([at(0)], [(0.9, at(0))]))
+        bad = source(searched([at(0), at(300), at(600)], []))
+        empty = source(searched([], [(0.9, at(0))]))
+        assert empty.scores.f1 is None
+        assert empty.scores.false_positives == 1
+        mean = mean_scores([good, bad, empty], PLAIN)
+        assert (mean.images, mean.vehicles, mean.matches, mean.false_positives) == (3, 4, 1, 1)
+        assert (mean.recall, mean.f1) == (0.5, 0.5)
+        assert mean.sizes[2].recall == 0.5
+
+    def test_the_best_f1_is_at_one_score_for_all(self) -> None:
+        low = source(searched([at(0)], [(0.3, at(0)), (0.1, at(500))]))
+        high = source(searched([at(0)], [(0.8, at(0)), (0.6, at(500)), (0.5, at(700))]))
+        assert (low.scores.best_score, high.scores.best_score) == (0.3, 0.8)
+        mean = mean_scores([low, high], PLAIN)
+        assert mean.best_score == 0.3
+        assert mean.best_f1 == pytest.approx((1 + 0.5) / 2)
+
+    def test_without_vehicles_there_is_none(self) -> None:
+        mean = mean_scores([source(searched([], [])), source(searched([], []))], PLAIN)
+        assert (mean.f1, mean.best_f1, mean.sizes[0].recall) == (None, None, None)

@@ -1,0 +1,91 @@
+"""Labelled pictures searched: red cars on grey, which the model is sure of."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evaluate.images.writers import Boxed, Labelled, write_coco
+from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
+from vdet.detect.svm.detector import SvmModel
+from vdet.errors import ImageError
+from vdet.evaluate.images.evaluate import evaluate_images
+from vdet.evaluate.images.labelled import LabelledImages
+from vdet.evaluate.images.reading import read_labelled_images
+from vdet.evaluate.images.scores import Counting
+from vdet.evaluate.images.search import search_images
+from vdet.geometry import Box
+from vdet.media.images import write_image
+
+DETECTOR = PERSPECTIVE.svm
+COUNTING = Counting(DETECTOR.shown_score, 0, DETECTOR.vehicle_classes)
+
+
+@pytest.fixture
+def model() -> SvmModel:
+    return SvmModel(red_finder(), DETECTOR.showing_all())
+
+
+@pytest.fixture
+def red_set(tmp_path: Path) -> LabelledImages:
+    """Five pictures with a car in other places, and one without."""
+    cars = {f"{n}": CAR.moved_to(30 + 40 * n, CAR.y) for n in range(5)}
+    return write_set(tmp_path / "red", cars | {"9": None})
+
+
+def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledImages:
+    pictures = {
+        name: Labelled(
+            WIDTH,
+            HEIGHT,
+            () if car is None else (Boxed("car", (car.x, car.y, car.width, car.height)),),
+        )
+        for name, car in cars.items()
+    }
+    path = write_coco(folder, pictures)
+    for name, car in cars.items():
+        write_image(folder / f"{name}.png", road(*([car] if car else [])))
+    return read_labelled_images(path)
+
+
+def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmModel) -> None:
+    done: list[int] = []
+    alone = search_images(red_set.images, model, advance=done.append)
+    together = search_images(red_set.images, model, threads=3)
+    assert done == [1] * 6
+    for one, other, image in zip(alone, together, red_set.images, strict=True):
+        assert one.image is image is other.image
+        assert one.width == WIDTH
+        assert np.array_equal(one.boxes, other.boxes)
+        assert np.array_equal(one.scores, other.scores)
+        assert np.array_equal(one.scores, np.sort(one.scores)[::-1])
+
+
+def test_each_set_is_scored_and_progress_counts_all_pictures(
+    red_set: LabelledImages, model: SvmModel, tmp_path: Path
+) -> None:
+    empty = write_set(tmp_path / "empty", {"a": None})
+    totals: list[int | None] = []
+
+    def progress(total: int | None) -> object:
+        totals.append(total)
+        return lambda _: None
+
+    result = evaluate_images([red_set, empty], model, COUNTING, progress=progress)  # type: ignore[arg-type]
+    assert totals == [7]
+    assert [source.scores.vehicles for source in result.sources] == [5, 0]
+    assert result.sources[0].scores.f1 == 1
+    assert result.mean.f1 == 1
+    assert [name for name, _ in result.named] == [red_set.name, empty.name, "mean of 1"]
+
+
+def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledImages, model: SvmModel) -> None:
+    red_set.images[2].path.write_bytes(b"no picture")
+    with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
+        search_images(red_set.images, model, threads=2)
+
+
+def test_a_picture_that_is_too_small_is_named(tmp_path: Path, model: SvmModel) -> None:
+    path = write_coco(tmp_path, {"small": Labelled(8, 8)})
+    with pytest.raises(ImageError, match=r"small\.png: "):
+        search_images(read_labelled_images(path).images, model)

@@ -1,0 +1,59 @@
+"""The report on pictures: its contents, not its looks."""
+
+from pathlib import Path
+
+import numpy as np
+
+from evaluate.images.writers import Boxed, Labelled, write_coco
+from vdet.evaluate.images.evaluate import ImagesResult
+from vdet.evaluate.images.reading import read_labelled_images
+from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, score_source
+from vdet.evaluate.images.search import SearchedImage
+from vdet.evaluate.images.text import RunName
+from vdet.evaluate.report.images_page import images_page, worst_pictures
+from vdet.evaluate.report.video_page import FOUND_COLOR, TRUE_COLOR
+
+COUNTING = Counting(0.5, 0.0, ("car",))
+CAR = Boxed("car", (20, 10, 40, 30))
+
+
+def result_of(folder: Path, *found: tuple[float, float, float, float]) -> ImagesResult:
+    """Return the result where these boxes are found in each of two pictures, one without a car."""
+    pictures = {
+        "a": Labelled(100, 60, (CAR, Boxed("person", (0, 0, 5, 5)))),
+        "b": Labelled(100, 60),
+    }
+    labelled = read_labelled_images(write_coco(folder, pictures))
+    boxes = np.array(found, np.float64).reshape(-1, 4)
+    searched = [
+        SearchedImage(each, 100, boxes, np.full(len(found), 0.9)) for each in labelled.images
+    ]
+    source = score_source([MeasuredImage.of(each, COUNTING) for each in searched], COUNTING)
+    return ImagesResult(COUNTING, (labelled,), (source,), mean_scores([source], COUNTING))
+
+
+def test_the_page_names_detector_source_and_labels_left_out(tmp_path: Path) -> None:
+    folder = tmp_path / "a_$x_{$ set"
+    html = images_page(result_of(folder, CAR.box), RunName("net", Path("x/my.onnx"), "net", ()))
+    assert "detector net, model my.onnx, settings net; boxes from score 0.50" in html
+    assert "not vehicles in" in html
+    assert "person (1)" in html
+
+
+def test_a_page_where_nothing_is_found_can_be_made(tmp_path: Path) -> None:
+    assert "<svg" not in images_page(result_of(tmp_path), RunName("svm", None, None, ()))  # encoded
+
+
+def test_pictures_with_mistakes_are_shown_with_their_boxes(tmp_path: Path) -> None:
+    result = result_of(tmp_path, (70, 10, 20, 30))
+    first, second = worst_pictures(result.sources[0], 0.5)
+    assert (first.title, first.caption) == ("a.png", "1 missed, 1 false alarms")
+    assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarms")
+    for color in (TRUE_COLOR, FOUND_COLOR):
+        assert np.any((first.image == color).all(axis=2))
+
+
+def test_pictures_without_mistakes_are_not_shown(tmp_path: Path) -> None:
+    result = result_of(tmp_path, CAR.box)
+    assert [each.title for each in worst_pictures(result.sources[0], 0.5)] == ["b.png"]
+    assert worst_pictures(result.sources[0], 0.95) != []
