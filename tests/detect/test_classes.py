@@ -1,0 +1,19 @@
+"""The classes of networks, and which of them are wanted."""
+
+from vdet.detect.onnx.classes import COCO, our_classes
+
+WANTED = ("car", "truck", "bus", "vehicle")
+
+
+def test_names_of_others_are_taken_for_ours() -> None:
+    names = ("Van", "lorry", "coach", "person", "vehicle", "trailer", "motorbike")
+    assert our_classes(names, WANTED) == [0, 1, 2, -1, 3, -1, -1]
+    assert our_classes(names, (*WANTED, "motorcycle"))[-1] == 4
+
+
+def test_any_class_that_the_network_knows_may_be_wanted() -> None:
+    numbers = our_classes(COCO, ("traffic light", "car"))
+    assert {name: number for name, number in zip(COCO, numbers, strict=True) if number >= 0} == {
+        "traffic light": 0,
+        "car": 1,
+    }
