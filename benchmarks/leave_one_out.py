@@ -144,10 +144,7 @@ def _line(result: GroupResult) -> str:
 
 
 def _summary(results: Sequence[GroupResult]) -> str:
-    means = [
-        float(np.mean([f1 for f1 in result.f1 if f1 is not None]))
-        for result in results
-    ]
+    means = [float(np.mean([f1 for f1 in result.f1 if f1 is not None])) for result in results]
     logits = np.array([each for result in results for each in result.logits])
     right = np.array([each for result in results for each in result.right])
     slope, offset = fit_calibration(logits, right)

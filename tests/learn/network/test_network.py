@@ -9,6 +9,8 @@ torch = pytest.importorskip(
     "torch", reason="torch is not installed; `make nettest` installs it and runs these tests"
 )
 
+from torch import Tensor  # noqa: E402
+
 from learn.network.blocks import block_picture, block_source  # noqa: E402
 from vdet.config.network import NetworkTrainingSettings  # noqa: E402
 from vdet.config.schema import NetworkSettings  # noqa: E402
@@ -36,7 +38,7 @@ QUICK = NetworkTrainingSettings(
 CLASSES = ("car", "bus")
 
 
-def box(*sides: float) -> "torch.Tensor":
+def box(*sides: float) -> Tensor:
     return torch.tensor([sides], dtype=torch.float32)
 
 
@@ -65,7 +67,10 @@ class TestAssignment:
         )
         cells = len(self.CENTERS)
         guesses = decode(torch.zeros(1, cells, 4), self.CENTERS, self.STRIDES)
-        return assign(torch.zeros(1, cells), guesses, vehicles, self.CENTERS, self.STRIDES)
+        found: Assignment = assign(
+            torch.zeros(1, cells), guesses, vehicles, self.CENTERS, self.STRIDES
+        )
+        return found
 
     def test_a_vehicle_gets_cells_inside_it(self) -> None:
         found = self.assigned((40, 40, 100, 90))

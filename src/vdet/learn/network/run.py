@@ -9,7 +9,7 @@ import vdet
 from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.header import Header, ScoreCalibration
 from vdet.evaluate.images.reading import read_labelled_images
-from vdet.evaluate.output import write_json
+from vdet.files import write_json
 from vdet.learn.network.export import export_network
 from vdet.learn.network.samples import Source
 from vdet.learn.network.sources import (

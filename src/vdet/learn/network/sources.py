@@ -76,9 +76,7 @@ def _frames(clip: LabelledClip, truth: LabelledVideo) -> Iterator[Sample]:
                 yield _sample(frame.image, rows.boxes, names, rows.ignored)
 
 
-def _sample(
-    image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray
-) -> Sample:
+def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray) -> Sample:
     corners = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
     classes = [CLASSES.index(name) if name in CLASSES else UNKNOWN for name in names]
     is_other = np.array([name not in (*CLASSES, _VEHICLE) for name in names], np.bool_)
@@ -92,7 +90,7 @@ def _source(name: str, samples: Iterable[Sample]) -> tuple[Source, SourceReport]
     kept = []
     for sample in samples:
         for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
-            digest.update(np.ascontiguousarray(part))
+            digest.update(part.tobytes())
         kept.append(sample)
     vehicles = sum(int(np.count_nonzero(~sample.ignored)) for sample in kept)
     return Source(name, kept), SourceReport(name, len(kept), vehicles, digest.hexdigest())
