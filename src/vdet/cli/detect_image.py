@@ -78,7 +78,7 @@ def detect_image(
     if not (output or stages or shared):
         raise click.UsageError("nothing would be written; give -o, --json, --stages or --sink")
     request = read_lanes(lanes, camera_path)
-    settings = read_settings(config_name, assignments)
+    settings = read_settings(config_name, assignments, model_path)
     model = load_detector(settings.detector, model_path)
     sources = find_images(images)
     check_sinks(shared, overwrite=overwrite, inputs=sources)

@@ -132,7 +132,7 @@ def detect_video(
             batch, no_video=no_video, tracks=tracks, sinks=others, overwrite=overwrite
         )
     request = read_lanes(lanes, camera_path)
-    settings = read_settings(config_name, assignments)
+    settings = read_settings(config_name, assignments, model_path)
     job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request, overwrite)
     if batch_outputs is not None:
         load_detector(settings.detector, model_path)  # an error is raised before any work

@@ -1,6 +1,5 @@
 """`vdet eval images`: measure detection in labelled pictures."""
 
-import os
 from pathlib import Path
 
 import click
@@ -16,6 +15,7 @@ from vdet.cli.options import (
 )
 from vdet.detect.factory import load_detector, model_file
 from vdet.evaluate.output import check_outputs
+from vdet.workers import core_count
 
 SHARE = click.FloatRange(0, 1)
 
@@ -65,7 +65,7 @@ def images(
     from vdet.evaluate.images.text import RunName, lines, plain
     from vdet.evaluate.report.images_page import images_page
 
-    detector = read_settings(config_name, assignments).detector
+    detector = read_settings(config_name, assignments, model_path).detector
     model = load_detector(detector.showing_all(), model_path)
     file = model_file(detector, model_path)
     check_outputs(
@@ -78,7 +78,7 @@ def images(
         classes=detector.vehicle_classes,
     )
     with progress_bar(" pictures", quiet=quiet) as progress:
-        threads = os.cpu_count() or 1
+        threads = core_count()
         result = evaluate_images(sets, model, counting, threads=threads, progress=progress)
     run = RunName(detector.kind, file, config_name, assignments)
     print_results(
@@ -87,4 +87,5 @@ def images(
         lambda: images_page(result, run),
         json_target=json_target,
         report=report,
+        overwrite=overwrite,
     )

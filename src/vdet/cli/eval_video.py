@@ -93,7 +93,7 @@ def video(
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
     variants = []
     for extra in swept:
-        settings = read_settings(config_name, (*assignments, *extra))
+        settings = read_settings(config_name, (*assignments, *extra), model_path)
         variants.append(Variant(settings, load_detector(settings.detector, model_path), extra))
     detectors = [variant.settings.detector for variant in variants]
     files = [path for each in detectors if (path := model_file(each, model_path))]

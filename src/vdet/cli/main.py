@@ -18,10 +18,12 @@ from vdet.cli.eval_images import images
 from vdet.cli.eval_patches import patches
 from vdet.cli.eval_tracks import tracks
 from vdet.cli.eval_video import video
+from vdet.cli.info import info
 from vdet.cli.messages import print_lines, set_up_logs
 from vdet.cli.mine import mine
 from vdet.cli.options import read_settings, settings_options
 from vdet.cli.train import train
+from vdet.cli.train_net import train_net
 from vdet.config.rendering import render
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
@@ -59,7 +61,7 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     click.echo(render(read_settings(config_name, assignments)), nl=False)
 
 
-for _command in (calibrate, demo, detect_image, detect_video, mine, train):
+for _command in (calibrate, demo, detect_image, detect_video, info, mine, train, train_net):
     cli.add_command(_command)
 for _command in (images, patches, tracks, video):
     evaluate.add_command(_command)

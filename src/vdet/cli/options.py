@@ -104,8 +104,12 @@ def _keys(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
             yield f"{before}{name}"
 
 
-def read_settings(config_name: str | None, assignments: tuple[str, ...]) -> Settings:
-    """Read the settings that `settings_options` ask for."""
+def read_settings(
+    config_name: str | None, assignments: tuple[str, ...], model_path: Path | None = None
+) -> Settings:
+    """Read the settings that `settings_options` ask for; a model in ONNX form is a network."""
+    if config_name is None and model_path is not None and model_path.suffix.lower() == ".onnx":
+        config_name = "net"
     return load_settings(find_config(config_name) if config_name else None, assignments)
 
 

@@ -61,7 +61,7 @@ def train_net(
     from vdet.learn.network.sources import LabelledClip
 
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
-    job = NetworkJob(data, labelled, output, report_path, checkpoint)
+    job = NetworkJob(data, labelled, output, report_path, checkpoint, overwrite)
     with steps_bar(settings.steps, quiet=quiet) as advance:
         report = train_to_file(job, settings, progress=advance)
     click.echo("\n".join(report.lines()))

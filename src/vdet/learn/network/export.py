@@ -17,7 +17,7 @@ from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 
 from vdet.detect.onnx.header import HEADER_KEY, Header
-from vdet.files import OutputFiles
+from vdet.files import staged
 from vdet.learn.network.architecture import Block, Network
 
 _OPSET = 17
@@ -25,14 +25,16 @@ _IR_VERSION = 8  # of 2021, which every onnxruntime in use reads
 _LEAST_WEIGHT = 1e-12  # smaller ones lead to denormal numbers, which are slow
 
 
-def export_network(network: Network, header: Header, path: Path) -> None:
+def export_network(
+    network: Network, header: Header, path: Path, *, overwrite: bool = False
+) -> None:
     """Write a network with its header. Raises `OutputError`."""
     graph = _Graph()
     model = graph.model(_add_network(graph, network))
     helper.set_model_props(model, {HEADER_KEY: json.dumps(header.model_dump(mode="json"))})
     onnx.checker.check_model(model)
-    with OutputFiles() as files:
-        files.stage(path).write_bytes(model.SerializeToString())
+    with staged(path, overwrite=overwrite) as temporary:
+        temporary.write_bytes(model.SerializeToString())
 
 
 def _add_network(graph: "_Graph", network: Network) -> str:

@@ -36,6 +36,8 @@ class NetworkJob:
         Labelled videos.
     output, report, checkpoint
         The files of the network, of the report, and of the training's state.
+    overwrite
+        Replace an earlier network and its report.
     """
 
     pictures: tuple[Path, ...]
@@ -43,6 +45,7 @@ class NetworkJob:
     output: Path
     report: Path
     checkpoint: Path
+    overwrite: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +115,8 @@ def train_to_file(
             "report": asdict(report),
         },
     )
-    export_network(network, header, job.output)
-    write_json(asdict(report), str(job.report))
+    export_network(network, header, job.output, overwrite=job.overwrite)
+    write_json(asdict(report), str(job.report), overwrite=job.overwrite)
     job.checkpoint.unlink(missing_ok=True)
     return report
 

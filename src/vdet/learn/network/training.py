@@ -180,7 +180,7 @@ class _Run:
             "averaged": self.averaged.state_dict(),
             "optimizer": self._optimizer.state_dict(),
         }
-        with OutputFiles() as files:
+        with OutputFiles(overwrite=True) as files:
             torch.save(state, files.stage(path))
 
     def restore(self, path: Path) -> None:
