@@ -4,14 +4,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 DATA ?= $(or $(VDET_DATA),data)
+ROADS ?= $(DATA)/roads
 TRUTH ?= $(DATA)/project_video_0001-0880.txt
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types tests nettest bench soak folds data model picture clean
+.PHONY: help demo test lint types tests nettest bench net leave-one-out soak folds data model picture clean
 
 help:  ## print this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 demo: $(READY)  ## draw patches and a road, train, detect, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
@@ -56,6 +57,17 @@ model: $(READY)  ## train the shipped models again: patches and video in DATA, t
 	$(BIN)/vdet train $(PATCHES) build/model/mined.zip -o build/model/default.npz --overwrite
 	$(BIN)/vdet train $(PATCHES) -c seed -o build/model/seed.npz --overwrite
 	cp build/model/default.npz build/model/seed.npz src/vdet/models/
+
+net: $(READY)  ## train the shipped network again (hours): sets of pictures in ROADS, video in DATA
+	mkdir -p build/net
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
+	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
+		-c net --video $(DATA)/project_video.mp4 $(TRUTH)
+	cp build/net/net.onnx src/vdet/models/
+
+leave-one-out: $(READY)  ## measure the network on cameras that it has not seen (hours)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
+	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH)
 
 picture: $(READY)  ## draw the picture of the README
 	$(BIN)/python -m docs.picture

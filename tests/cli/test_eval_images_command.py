@@ -29,11 +29,8 @@ def write_set(folder: Path, form: str = "COCO", truth: str = "car") -> Path:
     WRITERS[form](
         folder, {"a": Labelled(WIDTH, HEIGHT, boxes), "b": Labelled(WIDTH, HEIGHT, boxes)}
     )
-    write_image(
-        next(folder.rglob("a.png")),
-        road(CAR),
-    )
-    write_image(next(folder.rglob("b.png")), road())
+    write_image(next(folder.rglob("a.png")), road(CAR), overwrite=True)
+    write_image(next(folder.rglob("b.png")), road(), overwrite=True)
     return folder
 
 

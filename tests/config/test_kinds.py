@@ -237,7 +237,7 @@ class TestOtherPackages:
 
     def test_all_names_are_known_those_of_vdet_first(self) -> None:
         with pytest.raises(
-            ConfigError, match=r"known are svm, (onnx, )?broken, fake, missing, nameless, odd$"
+            ConfigError, match=r"known are svm, net, broken, fake, missing, nameless, odd$"
         ):
             load_settings(None, ["detector.kind=best"])
 

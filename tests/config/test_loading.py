@@ -378,4 +378,4 @@ class TestFindConfig:
     def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:
         with pytest.raises(ConfigError) as error:
             find_config(name)
-        assert str(error.value) == f"{name}: no such file; shipped configs are: default, seed"
+        assert str(error.value) == f"{name}: no such file; shipped configs are: default, net, seed"

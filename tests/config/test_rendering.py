@@ -19,6 +19,7 @@ from vdet.config.schema import (
     HistogramSettings,
     HogSettings,
     MotionTrackerSettings,
+    NetworkSettings,
     RulesTrackerSettings,
     SearchSettings,
     Section,
@@ -131,8 +132,13 @@ def test_the_seed_config_is_printed_but_for_its_first_line() -> None:
     assert rest == render(load_settings(path)).splitlines()[1:]
 
 
+def test_the_config_net_is_the_default_with_a_network() -> None:
+    assert load_settings(CONFIGS / "net.yaml") == Settings(detector=NetworkSettings())
+
+
 def test_no_other_config_ships() -> None:
-    assert sorted(path.name for path in CONFIGS.iterdir()) == ["default.yaml", "seed.yaml"]
+    names = sorted(path.name for path in CONFIGS.iterdir())
+    assert names == ["default.yaml", "net.yaml", "seed.yaml"]
 
 
 @pytest.mark.parametrize("settings", [Settings(), SEED, RULES], ids=["default", "seed", "rules"])

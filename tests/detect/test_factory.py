@@ -139,7 +139,7 @@ class TestAnotherPackage:
         assert model_file(settings.detector, path) == path
 
     def test_another_detector_is_named_among_the_known_ones(self) -> None:
-        with pytest.raises(ConfigError, match=r"known are svm, broken, corner$"):
+        with pytest.raises(ConfigError, match=r"known are svm, net, broken, corner$"):
             load_detector(DetectorSettings(kind="sonar"))
 
     def test_a_detector_that_cannot_be_loaded_is_named(self) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
     PATH,
@@ -20,7 +21,13 @@ from vdet.workers import core_count
 SHARE = click.FloatRange(0, 1)
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet eval images pictures/ -c net",
+        "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
+    ),
+)
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
 @click.option(
     "--score",

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.options import PATH
 from vdet.detect.classes import our_name
 from vdet.detect.onnx.header import HEADER_KEY
@@ -22,7 +23,7 @@ _FITS = {
 }
 
 
-@click.command()
+@click.command(cls=Command, examples=("vdet info model.npz", "vdet info yolox_nano.onnx"))
 @click.argument("model", type=PATH, metavar="MODEL")
 def info(model: Path) -> None:
     """Say what a model file is: what it wants, what it finds, what it was trained on.

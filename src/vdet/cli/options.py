@@ -78,7 +78,7 @@ def settings_options(example: str) -> Callable[[F], F]:
             "config_name",
             metavar="FILE",
             shell_complete=_complete_configs,
-            help="Read settings from a YAML file, or from a shipped one: default or seed.",
+            help="Read settings from a YAML file, or from a shipped one: default, seed or net.",
         )(command)
 
     return add

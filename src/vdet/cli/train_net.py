@@ -4,13 +4,21 @@ from pathlib import Path
 
 import click
 
+from vdet.cli.command import Command
 from vdet.cli.messages import steps_bar
 from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
 from vdet.errors import DataError, OutputError
 from vdet.files import check_output
 
 
-@click.command("train-net")
+@click.command(
+    "train-net",
+    cls=Command,
+    examples=(
+        "vdet train-net pictures/city pictures/motorway -o mine.onnx",
+        "vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt",
+    ),
+)
 @click.argument("data", nargs=-1, type=PATH, metavar="[DATA]...")
 @click.option(
     "-o", "--output", required=True, type=PATH, metavar="FILE", help="Network to write, .onnx."
@@ -22,7 +30,7 @@ from vdet.files import check_output
     multiple=True,
     type=PATH,
     metavar="CLIP TRUTH",
-    help="Learn from a labelled video too; network.every says of which frames. May be repeated.",
+    help="Learn from every n-th frame of a labelled video too (network.every). Can be repeated.",
 )
 @settings_options("network.steps=4000")
 @overwrite_option

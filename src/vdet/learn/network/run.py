@@ -50,7 +50,7 @@ class NetworkJob:
 
 @dataclass(frozen=True, slots=True)
 class NetworkReport:
-    """The report of a training: its sources, how long it took, and the mean loss at its end.
+    """The report of a training: its sources, how long it took, and the mean loss of its last steps.
 
     `seconds` are those since the training was started or went on.
     """
@@ -59,15 +59,16 @@ class NetworkReport:
     steps: int
     parameters: int
     seconds: float
-    loss: float
+    loss: float | None
 
     def lines(self) -> Iterator[str]:
         """Yield the report as lines of text."""
         for source in self.sources:
             yield f"{source.name:<28}{source.pictures:6d} pictures {source.vehicles:8d} vehicles"
+        loss = "" if self.loss is None else f"; loss at the end {self.loss:.3f}"
         yield (
             f"{self.parameters:,} parameters after {self.steps:,} steps, "
-            f"{self.seconds / 60:.1f} minutes; loss at the end {self.loss:.3f}"
+            f"{self.seconds / 60:.1f} minutes{loss}"
         )
 
 
@@ -103,7 +104,7 @@ def train_to_file(
         steps=settings.steps,
         parameters=sum(each.numel() for each in network.parameters()),
         seconds=round(time.monotonic() - began, 1),
-        loss=round(sum(recent) / max(len(recent), 1), 4),
+        loss=round(sum(recent) / len(recent), 4) if recent else None,
     )
     header = Header(
         classes=CLASSES,
