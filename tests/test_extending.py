@@ -128,7 +128,7 @@ def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) ->
     boxes = (Boxed("car", (car.x, car.y, car.width, car.height)),)
     write_coco(tmp_path, {"a": Labelled(WIDTH, HEIGHT, boxes)})
     (frame,) = drive(1)
-    write_image(tmp_path / "a.png", frame.image)
+    write_image(tmp_path / "a.png", frame.image, overwrite=True)
     done = vdet(package, "eval", "images", tmp_path, "--set", "detector.kind=red", "--json", "-")
     assert done.returncode == 0, done.stderr
     values = json.loads(done.stdout)
