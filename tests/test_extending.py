@@ -11,7 +11,7 @@ from types import ModuleType
 
 import pytest
 
-from evaluate.images.writers import Boxed, Labelled, write_coco
+from evaluate.images.writers import Boxed, Labelled, show, write_coco
 from pages import blocks
 from red_cars import HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
@@ -128,7 +128,7 @@ def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) ->
     boxes = (Boxed("car", (car.x, car.y, car.width, car.height)),)
     write_coco(tmp_path, {"a": Labelled(WIDTH, HEIGHT, boxes)})
     (frame,) = drive(1)
-    write_image(tmp_path / "a.png", frame.image, overwrite=True)
+    show(tmp_path / "a.png", frame.image)
     done = vdet(package, "eval", "images", tmp_path, "--set", "detector.kind=red", "--json", "-")
     assert done.returncode == 0, done.stderr
     values = json.loads(done.stdout)

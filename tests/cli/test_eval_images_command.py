@@ -6,11 +6,10 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from evaluate.images.writers import WRITERS, Boxed, Labelled
+from evaluate.images.writers import WRITERS, Boxed, Labelled, show
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.config.rendering import render
 from vdet.detect.svm.model import save_model
-from vdet.media.images import write_image
 
 CAR_BOX = (CAR.x, CAR.y, CAR.width, CAR.height)
 
@@ -29,8 +28,11 @@ def write_set(folder: Path, form: str = "COCO", truth: str = "car") -> Path:
     WRITERS[form](
         folder, {"a": Labelled(WIDTH, HEIGHT, boxes), "b": Labelled(WIDTH, HEIGHT, boxes)}
     )
-    write_image(next(folder.rglob("a.png")), road(CAR), overwrite=True)
-    write_image(next(folder.rglob("b.png")), road(), overwrite=True)
+    show(
+        next(folder.rglob("a.png")),
+        road(CAR),
+    )
+    show(next(folder.rglob("b.png")), road())
     return folder
 
 

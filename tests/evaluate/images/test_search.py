@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evaluate.images.writers import Boxed, Labelled, write_coco
+from evaluate.images.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.detect.svm.detector import SvmModel
 from vdet.errors import ImageError
@@ -15,7 +15,6 @@ from vdet.evaluate.images.reading import read_labelled_images
 from vdet.evaluate.images.scores import Counting
 from vdet.evaluate.images.search import search_images
 from vdet.geometry import Box
-from vdet.media.images import write_image
 
 DETECTOR = PERSPECTIVE.svm
 COUNTING = Counting(DETECTOR.shown_score, 0, DETECTOR.vehicle_classes)
@@ -44,7 +43,7 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledImages:
     }
     path = write_coco(folder, pictures)
     for name, car in cars.items():
-        write_image(folder / f"{name}.png", road(*([car] if car else [])))
+        show(folder / f"{name}.png", road(*([car] if car else [])))
     return read_labelled_images(path)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.media.images import encode_image
+from vdet.media.images import Image, encode_image
 
 NAMES = ("car", "truck", "bus", "ignore", "person")
 
@@ -36,8 +36,12 @@ Pictures = Mapping[str, Labelled]
 def write_pictures(folder: Path, pictures: Pictures) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, each in pictures.items():
-        path = folder / f"{name}.png"
-        path.write_bytes(encode_image(np.zeros((each.height, each.width, 3), np.uint8), path))
+        show(folder / f"{name}.png", np.zeros((each.height, each.width, 3), np.uint8))
+
+
+def show(path: Path, image: Image) -> None:
+    """Write a picture, also where one is already."""
+    path.write_bytes(encode_image(image, path))
 
 
 def write_coco(folder: Path, pictures: Pictures) -> Path:
