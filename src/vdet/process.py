@@ -39,9 +39,11 @@ class LossyFile(io.FileIO):
     """A file that drops what cannot be written: the disk is full, or its reader has ended."""
 
     def write(self, data: Any) -> int:
-        """Write the bytes, or drop them, and return their number."""
+        """Write all bytes, or drop them, and return their number."""
+        rest = memoryview(data).cast("B")
         with contextlib.suppress(OSError):
-            return super().write(data) or len(data)
+            while rest:
+                rest = rest[super().write(rest) or len(rest) :]
         return len(data)
 
 
@@ -58,9 +60,10 @@ def prepare_streams() -> None:
             os.set_inheritable(number, True)
     if sys.stdout is None:
         sys.stdout = open(_STDOUT, "w", encoding="utf-8", closefd=False)  # noqa: SIM115
-    file = io.BufferedWriter(LossyFile(_STDERR, "w", closefd=False))
     encoding = sys.stderr.encoding if sys.stderr else "utf-8"
-    sys.stderr = io.TextIOWrapper(file, encoding, "backslashreplace", line_buffering=True)
+    # Without a buffer below it, which would write a line twice if a signal comes as it is written.
+    file: Any = LossyFile(_STDERR, "w", closefd=False)
+    sys.stderr = io.TextIOWrapper(file, encoding, "backslashreplace", write_through=True)
 
 
 def check_memory() -> None:

@@ -133,8 +133,8 @@ def test_other_settings_another_model_or_a_newer_input_are_not_there_already(
     again = run(*arguments, "--skip-existing")
     assert again.code == 0, again.err
     assert "a.mp4: 8 frames" in again.err
-    assert "1 files done, 1 there already" in again.err
-    assert "all of 2 files" in run(*arguments, "--skip-existing").err
+    assert "1 file done, 1 there already" in again.err
+    assert "2 files there already" in run(*arguments, "--skip-existing").err
 
 
 @pytest.mark.parametrize(

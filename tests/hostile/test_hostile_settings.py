@@ -175,7 +175,7 @@ HOSTILE = {
         "detector:\n search:\n  windows:\n" + "  - 1\n" * 15_000,
         "should be a section",
     ),
-    "control characters": (r'"a\n\e[2J": 1', r"'a\\n\\x1b\[2J': is no setting"),
+    "control characters": (r'"a\n\e[2J": 1', r"a\\n\\x1b\[2J: is no setting"),
     "a long key": ("k" * 90_000 + ": 1", "mapping values are not allowed here"),
     "a long quoted key": ('? "' + "k" * 90_000 + '"\n: 1', "k…: is no setting"),
     "too large": ("#" * (MAX_BYTES + 1), "is larger than 100,000 bytes; that is no settings file"),

@@ -33,7 +33,7 @@ def refusal(path: Path, **changes: object) -> str:
 
 
 def test_a_camera_is_read_as_it_was_written(path: Path, wide_camera: CalibratedCamera) -> None:
-    save_camera(wide_camera, path)
+    save_camera(wide_camera, path, overwrite=True)
     assert load_camera(path) == wide_camera
 
 
@@ -55,12 +55,12 @@ def test_every_camera_is_read_with_all_its_digits(
     rms: float,
 ) -> None:
     camera = CalibratedCamera(640, 480, focal, center, distortion, rms)
-    save_camera(camera, path)
+    save_camera(camera, path, overwrite=True)
     assert load_camera(path) == camera
 
 
 def test_the_file_explains_its_values(path: Path, wide_camera: CalibratedCamera) -> None:
-    save_camera(wide_camera, path)
+    save_camera(wide_camera, path, overwrite=True)
     text = path.read_text(encoding="utf-8")
     for words in ("# frame size, pixels", "width: 640", "[[fx, 0, cx]", "k1, k2, p1, p2, k3"):
         assert words in text

@@ -333,7 +333,7 @@ class TestPictures:
         write_image(other, read_image(files.plain)[:400])
         out = tmp_path / "out"
         result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
-        assert result.code == 1
+        assert result.code == 3
         assert "other.png: the camera was calibrated for 640×480" in result.err
         assert [path.name for path in out.iterdir()] == ["frame.png"]
 

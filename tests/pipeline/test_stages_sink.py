@@ -31,7 +31,10 @@ def result_of(image: Image, *tracks: Track) -> FrameResult:
 def written(folder: Path, result: FrameResult) -> dict[str, Image]:
     """Write the stages of a frame and read them again; name → picture."""
     folder.mkdir(parents=True, exist_ok=True)
-    with OutputFiles() as files, StagesSink(folder, SinkContext(files, SETTINGS)) as sink:
+    with (
+        OutputFiles(overwrite=True) as files,
+        StagesSink(folder, SinkContext(files, SETTINGS)) as sink,
+    ):
         sink.write(result)
     return {path.name: read_image(path) for path in sorted(folder.iterdir())}
 
