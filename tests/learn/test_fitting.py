@@ -1,5 +1,6 @@
 import logging
 import tracemalloc
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +16,14 @@ from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
     HogSettings,
+    Settings,
+    SvmSettings,
     TrainingSettings,
 )
 from vdet.errors import DataError
 from vdet.geometry import Float32Array
-from vdet.learn.fitting import fit
+from vdet.learn.extraction import LabelledVectors, SampleVectors
+from vdet.learn.fitting import fit, fit_patches
 from vdet.learn.linear_svm import LinearSvm
 
 COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
@@ -158,7 +162,8 @@ def test_the_svm_has_the_loss_of_scikit_learn_or_less(penalty: float) -> None:
     vectors, vehicle = clouds()
     scaled = StandardScaler().fit_transform(vectors)
     reference = LinearSVC(C=penalty, random_state=0).fit(scaled, vehicle)
-    found = LinearSvm(C=penalty).fit(scaled, vehicle)
+    rows = np.arange(len(scaled))
+    found = LinearSvm(scaled, C=penalty).fit(rows, vehicle)
 
     def loss(svm: LinearSVC | LinearSvm) -> float:
         distances = scaled.astype(np.float64) @ svm.coef_[0] + svm.intercept_[0]
@@ -167,14 +172,35 @@ def test_the_svm_has_the_loss_of_scikit_learn_or_less(penalty: float) -> None:
         return float(penalties / 2 + penalty * np.square(errors).sum())
 
     assert loss(found) <= loss(reference) * (1 + 1e-5)
-    assert (found.predict(scaled) == reference.predict(scaled)).mean() > 0.99
+    assert (found.predict(rows) == reference.predict(scaled)).mean() > 0.99
+
+
+def peak_memory(call: Callable[[], object]) -> int:
+    """Return the bytes that `call` had at once."""
+    tracemalloc.start()
+    call()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak
 
 
 def test_the_svm_copies_no_data() -> None:
-    vectors = np.random.default_rng(0).normal(size=(2000, 500)).astype(np.float32)
+    vectors = np.random.default_rng(0).normal(size=(4000, 500)).astype(np.float32)
     vehicle = vectors[:, 0] > 0
-    tracemalloc.start()
-    LinearSvm(C=0.01).fit(vectors, vehicle)
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < vectors.nbytes / 2
+    svm = LinearSvm(vectors, C=0.01)
+    assert peak_memory(lambda: svm.fit(np.arange(4000), vehicle)) < vectors.nbytes / 2
+
+
+def test_a_fit_has_the_training_part_in_memory_once() -> None:
+    rng = np.random.default_rng(0)
+    vectors, more = (rng.normal(size=(n, 768)).astype(np.float32) for n in (3000, 4500))
+    origins = rng.integers(0, 3000, 4500)
+    vehicle = vectors[:, 0] > 0
+    samples = SampleVectors(more, vehicle[origins], np.zeros((4500, 4), np.float32), origins)
+    data = LabelledVectors(vectors, vehicle, np.full(3000, "a"), "", 0, augmented=samples)
+    features = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=256))
+    settings = Settings(
+        detector=SvmSettings(features=features), training=training(ensemble=False, max_iterations=5)
+    )
+    peak = peak_memory(lambda: fit_patches(data, np.ones(3000, bool), settings))
+    assert peak < 1.5 * (vectors.nbytes + more.nbytes)

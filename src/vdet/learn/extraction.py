@@ -4,7 +4,7 @@ import hashlib
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -42,16 +42,6 @@ class SampleVectors:
     vehicle: BoolArray
     sides: Float32Array
     origins: RowNumbers
-
-    @staticmethod
-    def joined(parts: Sequence["SampleVectors"]) -> "SampleVectors":
-        """Return the rows of all parts, in their order."""
-        return SampleVectors(
-            np.concatenate([part.vectors for part in parts]),
-            np.concatenate([part.vehicle for part in parts]),
-            np.concatenate([part.sides for part in parts]),
-            np.concatenate([part.origins for part in parts]),
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,14 +115,16 @@ def extract(
     good = np.concatenate([part.good for part in parts])
     _check_broken([file for file, ok in zip(files, good, strict=True) if not ok], files, max_broken)
     kept = [file for file, ok in zip(files, good, strict=True) if ok]
+    digest = _digest(files, [checksum for part in parts for checksum in part.checksums])
+    vectors, augmented = _joined(parts)
     return LabelledVectors(
-        np.concatenate([part.vectors for part in parts]),
+        vectors,
         np.array([file.vehicle for file in kept], bool),
         np.array([file.group for file in kept], str),
-        _digest(files, [checksum for part in parts for checksum in part.checksums]),
+        digest,
         len(files) - len(kept),
         np.array([file.sides or UNKNOWN_SIDES for file in kept], np.float32),
-        _all_augmented(parts),
+        augmented,
     )
 
 
@@ -198,15 +190,30 @@ def _sample(file: PatchFile, image: Image) -> Sample:
     return Sample(image, file.vehicle, np.array(file.sides or UNKNOWN_SIDES, np.float32))
 
 
-def _all_augmented(chunks: Sequence[_Chunk]) -> SampleVectors:
-    """Join the augmented samples; their origins then count over the patches of all chunks."""
+def _joined(chunks: list[_Chunk]) -> tuple[Float32Array, SampleVectors]:
+    """Join the vectors of all patches, and their samples; origins then count over all patches.
+
+    `chunks` is emptied on the way, so that the vectors are in memory once.
+    """
+    made = [chunk.augmented for chunk in chunks]
     starts = np.cumsum([0, *(len(chunk.vectors) for chunk in chunks[:-1])])
-    return SampleVectors.joined(
-        [
-            replace(chunk.augmented, origins=chunk.augmented.origins + start)
-            for chunk, start in zip(chunks, starts, strict=True)
-        ]
-    )
+    vehicle = np.concatenate([each.vehicle for each in made])
+    sides = np.concatenate([each.sides for each in made])
+    origins = np.concatenate([each.origins + at for each, at in zip(made, starts, strict=True)])
+    width = chunks[0].vectors.shape[1]
+    vectors = np.empty((sum(len(chunk.vectors) for chunk in chunks), width), np.float32)
+    augmented = np.empty((len(vehicle), width), np.float32)
+    del made
+    end, augmented_end = len(vectors), len(augmented)
+    while chunks:
+        chunk = chunks.pop()
+        end -= len(chunk.vectors)
+        augmented_end -= len(chunk.augmented.vectors)
+        vectors[end : end + len(chunk.vectors)] = chunk.vectors
+        augmented[augmented_end : augmented_end + len(chunk.augmented.vectors)] = (
+            chunk.augmented.vectors
+        )
+    return vectors, SampleVectors(augmented, vehicle, sides, origins)
 
 
 def _check_broken(

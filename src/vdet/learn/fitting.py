@@ -16,6 +16,9 @@ from vdet.learn.training_set import training_set
 
 log = logging.getLogger("vdet")
 
+_BLOCK = 1024
+"""Rows whose mean and variance are computed at a time."""
+
 
 def fit_patches(data: LabelledVectors, kept: BoolArray, settings: Settings) -> LinearModel:
     """Fit on the kept patches, bool `(n,)`, and the samples made of these; errors as of `fit`."""
@@ -75,9 +78,11 @@ def fit(
             "give more patches"
         )
     scaler = StandardScaler(copy=copy)
-    scaled = scaler.fit_transform(vectors)
+    for start in range(0, len(vectors), _BLOCK):  # as a whole, it needs twice their memory
+        scaler.partial_fit(vectors[start : start + _BLOCK])
+    scaled = scaler.transform(vectors)
     calibrated = CalibratedClassifierCV(
-        LinearSvm(C=settings.C, max_iter=settings.max_iterations),
+        LinearSvm(scaled, C=settings.C, max_iter=settings.max_iterations),
         method="sigmoid",
         cv=list(_folds(vehicle[patches], patches, origins, settings)),
         ensemble=settings.calibration.ensemble,
@@ -85,7 +90,7 @@ def fit(
     with warnings.catch_warnings(record=True) as caught:
         warnings.filterwarnings("ignore", "Since .* does not appear to accept sample_weight")
         warnings.simplefilter("always", ConvergenceWarning)
-        calibrated.fit(scaled, vehicle, _weights(patches, len(vehicle)))
+        calibrated.fit(np.arange(len(vehicle)), vehicle, _weights(patches, len(vehicle)))
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
     return _to_model(calibrated.calibrated_classifiers_, scaler, features)

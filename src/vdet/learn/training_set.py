@@ -1,11 +1,12 @@
 """Which patches are learned from, with their augmented samples, and which are held out."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import BoolArray
+from vdet.geometry import BoolArray, Float32Array
 from vdet.learn.extraction import LabelledVectors, SampleVectors
 
 SplitName = Literal["random", "tail"]
@@ -15,15 +16,29 @@ def training_set(data: LabelledVectors, kept: BoolArray) -> SampleVectors:
     """Return the kept patches, bool `(n,)`, followed by the samples made of these."""
     sides = np.full((len(kept), 4), np.nan, np.float32) if data.sides is None else data.sides
     rows = np.cumsum(kept) - 1  # in the training set
-    patches = SampleVectors(data.vectors[kept], data.vehicle[kept], sides[kept], rows[kept])
-    if data.augmented is None:
-        return patches
     made = data.augmented
+    if made is None:
+        return SampleVectors(data.vectors[kept], data.vehicle[kept], sides[kept], rows[kept])
     used = kept[made.origins]
-    augmented = SampleVectors(
-        made.vectors[used], made.vehicle[used], made.sides[used], rows[made.origins[used]]
+    return SampleVectors(
+        _chosen([data.vectors, made.vectors], [kept, used]),
+        np.concatenate([data.vehicle[kept], made.vehicle[used]]),
+        np.concatenate([sides[kept], made.sides[used]]),
+        np.concatenate([rows[kept], rows[made.origins[used]]]),
     )
-    return SampleVectors.joined([patches, augmented])
+
+
+def _chosen(parts: Sequence[Float32Array], chosen: Sequence[BoolArray]) -> Float32Array:
+    """Join the chosen rows of all parts, without any other copy of them."""
+    rows = [np.flatnonzero(each) for each in chosen]
+    joined = np.empty((sum(map(len, rows)), parts[0].shape[1]), np.float32)
+    start = 0
+    for part, some in zip(parts, rows, strict=True):
+        end = start + len(some)
+        # With another mode, take makes a copy first.
+        np.take(part, some, axis=0, out=joined[start:end], mode="clip")
+        start = end
+    return joined
 
 
 def hold_out(
