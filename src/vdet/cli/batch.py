@@ -141,7 +141,7 @@ def process_batch(
         print_lines(*_plan_lines(plan))
         return 0
     if not plan.jobs:
-        click.echo(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already", err=True)
+        print_message(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already")
         return 0
     workers, search_threads = _workers(options, len(plan.jobs))
     work = Work(settings, model, threads or search_threads, digest)
