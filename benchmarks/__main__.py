@@ -84,6 +84,12 @@ def _search_rows(times: dict[str, float]) -> list[Measurement]:
             "dense / decoding a frame", beside / times["decoding"], "≤ 2.5", "1",
             f"{1000 * beside:.1f} and {1000 * times['decoding']:.1f} ms",
         ),
+        Measurement(
+            "network / default, detection of a frame",
+            times["network detection"] / times["default detection"], "≤ 1.2", "0.8",
+            f"{1000 * times['network detection']:.1f} and "
+            f"{1000 * times['default detection']:.1f} ms",
+        ),
     ]  # fmt: skip
 
 
@@ -98,6 +104,10 @@ def _run_rows(times: dict[str, float], played: float) -> list[Measurement]:
         Measurement(
             "detect-video --lanes --camera / without", lanes / detect, "≤ 1.35", "–",
             f"{lanes:.2f} and {detect:.2f} s",
+        ),
+        Measurement(
+            "detect-video -c net / detect-video", times["detect with network"] / detect, "≤ 1.1",
+            "1", f"{times['detect with network']:.2f} and {detect:.2f} s",
         ),
         Measurement(
             "video's length / detect-video --no-video", played / only, "≥ 3", "6",

@@ -6,6 +6,9 @@ from pathlib import Path
 
 from benchmarks.material import ShippedConfig
 from benchmarks.rounds import Task, measure
+from vdet.config.schema import NetworkSettings
+from vdet.detect.factory import load_detector
+from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader, VideoWriter
@@ -22,10 +25,11 @@ def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> 
     """Return the seconds that the first `FRAMES` frames take.
 
     Keys: `pass through` (read and written), `detect` (vehicles detected, drawn and written),
-    `detect with lanes`, `detect only` (nothing written).
+    `detect with lanes`, `detect with network`, `detect only` (nothing written).
     """
     out = folder / "out.mp4"
     model = default.detector
+    network = load_detector(NetworkSettings())
 
     def pass_through() -> None:
         with (
@@ -37,12 +41,16 @@ def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> 
             for frame in frames:
                 encode(frame)
 
-    def detect(lanes: LaneRequest | None = None) -> None:
-        job = VideoJob(path, (Output("video", out),), frames=FRAMES, lanes=lanes)
-        run_video(job, model, default.settings)
+    def detect(detector: DetectorModel = model, lanes: LaneRequest | None = None) -> None:
+        outputs = (Output("video", out),)
+        job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True)
+        run_video(job, detector, default.settings)
 
     def detect_with_lanes() -> None:
-        detect(LaneRequest(CAMERA))
+        detect(lanes=LaneRequest(CAMERA))
+
+    def detect_with_network() -> None:
+        detect(network)
 
     def detect_only() -> None:
         run_video(VideoJob(path, frames=FRAMES), model, default.settings)
@@ -51,6 +59,7 @@ def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> 
         "pass through": pass_through,
         "detect": detect,
         "detect with lanes": detect_with_lanes,
+        "detect with network": detect_with_network,
         "detect only": detect_only,
     }
     return measure(tasks, rounds)

@@ -9,6 +9,8 @@ import numpy as np
 
 from benchmarks.material import ShippedConfig
 from benchmarks.rounds import Task, measure
+from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
+from vdet.detect.factory import load_detector
 from vdet.detect.svm.search import FrameSearch
 from vdet.media.images import Image
 
@@ -25,6 +27,8 @@ def search_times(
         "seed patch": _search(seed, "patch", images),
         "seed dense": _search(seed, "dense", images),
         "detectMultiScale": _detect_multi_scale(images),
+        "default detection": _detection(SvmSettings(), images),
+        "network detection": _detection(NetworkSettings(), images),
     }
     times = measure(searches, rounds)
     per_frame = {name: seconds / len(images) for name, seconds in times.items()}
@@ -39,6 +43,18 @@ def _search(config: ShippedConfig, engine: str, images: Sequence[Image]) -> Task
     def run() -> None:
         for index, image in enumerate(images):
             search.search(image, search.sets_of(index))
+
+    return run
+
+
+def _detection(settings: DetectorSettings, images: Sequence[Image]) -> Task:
+    """Search the images as frames of a video, and make detections of what is found."""
+    height, width = images[0].shape[:2]
+    detector = load_detector(settings).for_video(width, height, images[:1])
+
+    def run() -> None:
+        for index, image in enumerate(images):
+            detector.detect(detector.search(image, index))
 
     return run
 

@@ -1,0 +1,44 @@
+"""The shipped network: it loads, fits the limits on size, and finds drawn vehicles."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vdet.config.loading import find_config, load_settings
+from vdet.config.schema import NetworkSettings
+from vdet.detect.factory import load_detector, model_file
+from vdet.detect.onnx.kind import SHIPPED
+from vdet.errors import ModelError
+from vdet.testing import check_detector
+
+MOST_BYTES = 1_500_000
+SIZES = [(1280, 720), (640, 480), (1242, 375), (270, 480), (64, 64)]
+
+
+def test_it_is_small() -> None:
+    assert SHIPPED.stat().st_size <= MOST_BYTES
+
+
+def test_the_config_net_loads_it() -> None:
+    settings = load_settings(find_config("net"))
+    assert model_file(settings.detector) == SHIPPED
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_it_passes_the_checks_of_detectors_in_frames_of_any_shape(width: int, height: int) -> None:
+    rng = np.random.default_rng(0)
+    images = [rng.integers(0, 256, (height, width, 3), np.uint8) for _ in range(2)]
+    check_detector(load_detector(NetworkSettings()), images)
+
+
+def test_without_onnxruntime_one_line_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        ModelError, match=r"needs the package onnxruntime; pip install 'vdet\[net\]'"
+    ):
+        load_detector(NetworkSettings())
