@@ -97,3 +97,9 @@ def test_the_report_is_written_as_json(tmp_path: Path) -> None:
 def test_the_report_is_not_written_into_a_missing_folder(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="cannot be written"):
         report().write(tmp_path / "no" / "report.json")
+
+
+def test_a_model_of_patches_alone_is_told_what_it_lacks() -> None:
+    words = "no patch came from vdet mine: in video, such a model finds far fewer vehicles"
+    assert words in "\n".join(replace(report(), boxed=0).lines())
+    assert words not in "\n".join(report().lines())

@@ -103,6 +103,12 @@ class TrainingReport:
             yield from _split_lines(split)
         yield ""
         yield f"one prediction: {self.milliseconds_per_prediction:.2f} ms, features included"
+        if not self.boxed:
+            yield ""
+            yield (
+                "no patch came from vdet mine: in video, such a model finds far fewer vehicles; "
+                "docs/training.md says how to mine labelled video"
+            )
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the report as JSON. Raises `OutputError`."""
