@@ -51,7 +51,7 @@ def image_source(labelled: LabelledImages) -> tuple[Source, SourceReport]:
     samples = (
         _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.images
     )
-    return _source(labelled.name, samples)
+    return _source(Path(labelled.name).resolve().name, samples)
 
 
 def clip_source(clip: LabelledClip) -> tuple[Source, SourceReport]:
