@@ -9,10 +9,10 @@ TRUTH ?= $(DATA)/project_video_0001-0880.txt
 PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint types tests nettest bench net leave-one-out soak folds data model picture clean
+.PHONY: help demo test lint types tests nettest bench net unseen soak folds data model picture clean
 
 help:  ## print this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 demo: $(READY)  ## draw patches and a road, train, detect, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
@@ -65,7 +65,7 @@ net: $(READY)  ## train the shipped network again (hours): sets of pictures in R
 		-c net --video $(DATA)/project_video.mp4 $(TRUTH)
 	cp build/net/net.onnx src/vdet/models/
 
-leave-one-out: $(READY)  ## measure the network on cameras that it has not seen (hours)
+unseen: $(READY)  ## measure the network on cameras that it has not seen (hours)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH)
 

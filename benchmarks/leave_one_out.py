@@ -1,4 +1,4 @@
-"""How well the network finds vehicles of cameras that it has not seen: `make leave-one-out`.
+"""How well the network finds vehicles of cameras that it has not seen: `make unseen`.
 
 Each group of sets is left out of a training in turn, and searched by the network that was trained
 without it. The scores of all groups together give the calibration of the shipped network's scores.
