@@ -137,6 +137,12 @@ def loaded_by_cli() -> set[str]:
     return set(done.stdout.split())
 
 
+def test_what_is_printed_goes_through_one_function() -> None:
+    """`print_lines` escapes the names in it; `vdet config` prints text of vdet's own."""
+    printing = [name for name, path in NAMES.items() if "click.echo(" in path.read_text("utf-8")]
+    assert sorted(printing) == ["cli.main", "cli.messages"]
+
+
 def test_cores_are_counted_in_one_place() -> None:
     """`os.cpu_count` does not know how many a control group allows."""
     counting = [name for name, path in NAMES.items() if "cpu_count" in path.read_text("utf-8")]

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from vdet.cli.command import Command
+from vdet.cli.messages import print_lines
 from vdet.cli.options import PATH
 from vdet.detect.classes import our_name
 from vdet.detect.onnx.header import HEADER_KEY
@@ -31,8 +32,7 @@ def info(model: Path) -> None:
     MODEL is a linear model (.npz), or a network (.onnx) of vdet or of another tool.
     """
     lines = _network_lines(model) if model.suffix.lower() == ".onnx" else _linear_lines(model)
-    for line in lines:
-        click.echo(line)
+    print_lines(*lines)
 
 
 def _linear_lines(path: Path) -> Iterator[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import steps_bar
+from vdet.cli.messages import print_lines, steps_bar
 from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
 from vdet.errors import DataError, OutputError
 from vdet.files import check_output
@@ -72,5 +72,4 @@ def train_net(
     job = NetworkJob(data, labelled, output, report_path, checkpoint, overwrite)
     with steps_bar(settings.steps, quiet=quiet) as advance:
         report = train_to_file(job, settings, progress=advance)
-    click.echo("\n".join(report.lines()))
-    click.echo(f"\n{output}: the network; {report_path}: the report")
+    print_lines(*report.lines(), "", f"{output}: the network; {report_path}: the report")
