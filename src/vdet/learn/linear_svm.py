@@ -8,7 +8,6 @@ Optimization", 1989.
 """
 
 import warnings
-from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
@@ -19,17 +18,17 @@ from vdet.geometry import BoolArray, Float32Array, Float64Array
 from vdet.learn.extraction import RowNumbers
 
 _CORRECTIONS = 20  # of L-BFGS
-_BLOCK = 256  # rows that are copied at a time; they fit into the cache
+_BLOCK = 1024  # rows whose distances are computed at a time
 _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 
 
 class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
     """A two-class linear SVM as a scikit-learn estimator.
 
-    `vectors` is float32 `(n, features)`. The methods take row numbers of it, `(m,)`, so that a
-    cross-validation copies no vectors. `C` is the penalty of the errors, `max_iter` the most
-    iterations of the solver. `fit` warns with `ConvergenceWarning` if they are not enough. It
-    takes no sample weights.
+    `vectors` is float32 `(n, features)`. The methods take numbers of its rows, ascending, so that a
+    cross-validation copies only the vectors that it fits on. `C` is the penalty of the errors,
+    `max_iter` the most iterations of the solver. `fit` warns with `ConvergenceWarning` if they are
+    not enough. It takes no sample weights.
     """
 
     def __init__(self, vectors: Float32Array, C: float = 1.0, max_iter: int = 1000) -> None:
@@ -41,20 +40,17 @@ class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit
         return LinearSvm(self.vectors, self.C, self.max_iter)
 
     def fit(self, rows: RowNumbers, y: BoolArray) -> "LinearSvm":
-        """Fit to the rows, with labels `y`, bool `(m,)`."""
+        """Fit to some rows, with labels `y`, bool `(m,)`."""
         signs = np.where(y, 1, -1).astype(np.float32)
+        x = self.vectors if len(rows) == len(self.vectors) else self.vectors[rows]
         scale = 1 / (self.C * len(y))  # the loss of zero weights becomes 1
 
         def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
             weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
-            gradient, squares = parameters.copy(), 0.0
-            for block in _blocks(len(rows)):
-                x = self.vectors[rows[block]]
-                errors = np.maximum(0, 1 - signs[block] * (x @ weights + bias))
-                slopes = -2 * self.C * (errors * signs[block])
-                gradient[:-1] += slopes @ x
-                gradient[-1] += slopes.sum()
-                squares += float(np.square(errors, dtype=np.float64).sum())
+            errors = np.maximum(0, 1 - signs * (x @ weights + bias))
+            slopes = -2 * self.C * (errors * signs)
+            gradient = parameters + np.append(slopes @ x, slopes.sum())
+            squares = float(np.square(errors, dtype=np.float64).sum())
             value = 0.5 * float(parameters @ parameters) + self.C * squares
             return scale * value, scale * gradient
 
@@ -81,14 +77,11 @@ class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit
     def decision_function(self, rows: RowNumbers) -> Float32Array:
         """Return the signed distances, float32 `(m,)`: positive for the second class."""
         weights = self.coef_[0].astype(np.float32)
-        parts = [self.vectors[rows[block]] @ weights for block in _blocks(len(rows))]
+        blocks = (rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK))
+        parts = [self.vectors[block] @ weights for block in blocks]
         distances: Float32Array = np.concatenate([np.zeros(0, np.float32), *parts])
         return distances + np.float32(self.intercept_[0])
 
     def predict(self, rows: RowNumbers) -> BoolArray:
         """Return the classes, bool `(m,)`."""
         return self.decision_function(rows) > 0
-
-
-def _blocks(count: int) -> Iterator[slice]:
-    return (slice(start, start + _BLOCK) for start in range(0, count, _BLOCK))
