@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import vdet
 from conftest import Run
 
 
@@ -41,12 +42,10 @@ def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
     assert values["losses"][0]["last"] == 2
 
 
-def test_boxes_after_the_last_true_frame_give_a_warning(run: Run, found: Path, truth: Path) -> None:
+def test_boxes_after_the_last_true_frame_are_left_out(run: Run, found: Path, truth: Path) -> None:
     result = run("eval", "tracks", found, truth)
-    assert result.code == 0
-    assert result.err.count("\n") == 1
-    assert "count" in result.err
-    assert "--until 10" in result.err
+    assert (result.code, result.err) == (0, "")
+    assert "frames 1–10 compared; left out: 2 boxes found in later ones" in result.out
 
 
 def test_writes_a_report(run: Run, found: Path, truth: Path, tmp_path: Path) -> None:
@@ -55,6 +54,7 @@ def test_writes_a_report(run: Run, found: Path, truth: Path, tmp_path: Path) -> 
     html = (tmp_path / "report" / "report.html").read_text()
     for words in ("Vehicle by vehicle", "Largest losses", "vehicle 1 missed", "data:image/svg+xml"):
         assert words in html
+    assert f"compared with {truth} by vdet {vdet.__version__}" in html
 
 
 def test_without_matplotlib_a_report_is_an_error_of_one_line(

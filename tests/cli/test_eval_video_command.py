@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import vdet
 from conftest import Run
 from quick import QUICK_OPTIONS
 
@@ -36,15 +37,15 @@ def test_several_videos_and_a_sweep(
     run: Run, clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
     videos = (clip_path, clip_path, "--truth", truth_path, "--truth", truth_path, "--until", "4")
-    sweeps = ("--sweep", "detector.heat.threshold=1,5000", "--sweep", "tracker.history=5,10")
+    sweeps = ("--sweep", "detector.heat.threshold=0.1,5000", "--sweep", "tracker.history=5,10")
     target, folder = tmp_path / "s.json", tmp_path / "report"
     results = ("--json", target, "--report", folder)
     result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     runs = json.loads(target.read_text())["sweep"]
     assert [each["settings"]["detector.heat.threshold"] for each in runs] == [
-        "1",
-        "1",
+        "0.1",
+        "0.1",
         "5000",
         "5000",
     ]
@@ -52,7 +53,10 @@ def test_several_videos_and_a_sweep(
     assert runs[2]["total"]["track_boxes"] == 0, "nothing is as hot as that"
     assert "detector.heat.threshold=5000 tracker.history=10" in result.out
     assert "best F1: " in result.out
-    assert "Settings compared" in (folder / "report.html").read_text()
+    html = (folder / "report.html").read_text()
+    assert "Settings compared" in html
+    for text in (result.out, html):
+        assert f"vdet {vdet.__version__}, detector svm, model {model_path.name}, settings " in text
 
 
 @pytest.mark.parametrize(

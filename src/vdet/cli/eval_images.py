@@ -15,7 +15,7 @@ from vdet.cli.options import (
     settings_options,
 )
 from vdet.detect.factory import load_detector, model_file
-from vdet.evaluate.output import check_outputs
+from vdet.evaluate.output import RunName, check_outputs
 from vdet.workers import core_count
 
 SHARE = click.FloatRange(0, 1)
@@ -69,7 +69,7 @@ def images(
     from vdet.evaluate.images.evaluate import evaluate_images
     from vdet.evaluate.images.reading import read_labelled_images
     from vdet.evaluate.images.scores import Counting
-    from vdet.evaluate.images.text import RunName, lines, plain
+    from vdet.evaluate.images.text import lines, plain
     from vdet.evaluate.report.images_page import images_page
 
     detector = read_settings(config_name, assignments, model_path).detector

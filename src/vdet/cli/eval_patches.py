@@ -16,7 +16,7 @@ from vdet.cli.options import (
 )
 from vdet.detect.svm.kind import requested_features
 from vdet.detect.svm.model import load_model
-from vdet.evaluate.output import check_outputs
+from vdet.evaluate.output import RunName, check_outputs, plain_run, run_line
 from vdet.learn.dataset import find_patches
 
 
@@ -89,10 +89,11 @@ def patches(
             result = evaluate_splits(files, settings, chosen, jobs=jobs, progress=progress)
         else:
             result = evaluate_model(files, model, settings, jobs=jobs, progress=progress)
+    name = RunName("svm", model_path, config_name, assignments)
     print_results(
-        lines(result),
-        plain(result),
-        lambda: patch_page(result),
+        [run_line(name), *lines(result)],
+        plain_run(name) | plain(result),
+        lambda: patch_page(result, name),
         json_target=json_target,
         report=report,
         overwrite=overwrite,

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import click
 
+import vdet
 from vdet.cli.command import Command
 from vdet.cli.options import PATH, POSITIVE, print_results, results_options
 from vdet.evaluate.output import check_outputs
@@ -19,7 +20,7 @@ from vdet.evaluate.output import check_outputs
     "--until",
     type=POSITIVE,
     metavar="FRAME",
-    show_default="the last one of both files",
+    show_default="the last one in the truth",
     help="End with this frame, counted from 1.",
 )
 @click.option(
@@ -54,7 +55,7 @@ def tracks(
     print_results(
         run_lines([run]),
         plain_clip(run.clips[0]),
-        lambda: video_page([run]),
+        lambda: video_page([run], f"compared with {truth} by vdet {vdet.__version__}"),
         json_target=json_target,
         report=report,
         overwrite=overwrite,

@@ -18,7 +18,7 @@ from vdet.cli.options import (
     sink_option,
 )
 from vdet.detect.factory import load_detector, model_file
-from vdet.evaluate.output import check_outputs
+from vdet.evaluate.output import RunName, check_outputs, run_line
 from vdet.pipeline.sinks.protocol import check_sinks
 
 
@@ -81,13 +81,14 @@ def video(
     """
     from vdet.evaluate.clips.clip import Variant, open_clip
     from vdet.evaluate.clips.evaluate import evaluate_clips
-    from vdet.evaluate.clips.sweep import grid
+    from vdet.evaluate.clips.sweep import grid, with_values_in_force
     from vdet.evaluate.clips.text import plain, run_lines
     from vdet.evaluate.report.video_page import video_page
 
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
-    swept = grid(sweeps)
+    base = read_settings(config_name, assignments, model_path)
+    swept = grid(with_values_in_force(sweeps, base))
     outputs = read_sinks(sinks)
     if outputs and (len(swept) > 1 or len(videos) > 1):
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
@@ -103,10 +104,12 @@ def video(
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:
         runs = evaluate_clips(clips, variants, progress, outputs=outputs, overwrite=overwrite)
+    first = variants[0].settings.detector
+    name = RunName(first.kind, model_file(first, model_path), config_name, assignments)
     print_results(
-        run_lines(runs),
-        plain(runs),
-        lambda: video_page(runs),
+        [run_line(name), *run_lines(runs)],
+        plain(runs, name),
+        lambda: video_page(runs, run_line(name)),
         json_target=json_target,
         report=report,
         overwrite=overwrite,

@@ -3,13 +3,44 @@
 import contextlib
 import importlib
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import vdet
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder, staged
 
 PAGE = "report.html"
 ABSENT = "–"
+
+
+@dataclass(frozen=True, slots=True)
+class RunName:
+    """Which detector was measured: its kind, model file, file of settings and changes to them."""
+
+    kind: str
+    model: Path | None
+    config: str | None
+    assignments: tuple[str, ...]
+
+
+def run_line(run: RunName) -> str:
+    """Return which detector was measured."""
+    model = f", model {run.model.name}" if run.model else ""
+    settings = " ".join([run.config or "default", *run.assignments])
+    return f"vdet {vdet.__version__}, detector {run.kind}{model}, settings {settings}"
+
+
+def plain_run(run: RunName) -> dict[str, Any]:
+    """Return which detector was measured as values for JSON."""
+    return {
+        "program": f"vdet {vdet.__version__}",
+        "detector": run.kind,
+        "model": str(run.model) if run.model else None,
+        "config": run.config or "default",
+        "set": list(run.assignments),
+    }
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -1,13 +1,13 @@
-import logging
 from pathlib import Path
-
-import pytest
 
 from vdet.evaluate.clips.evaluate import RunResult, best, score_files, score_video, total
 from vdet.evaluate.clips.text import plain, run_lines, sweep_rows
 from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
+from vdet.evaluate.output import RunName
+from vdet.evaluate.report.video_page import video_page
 
 TEN = range(1, 11)
+NAME = RunName("svm", None, None, ("b=1",))
 
 
 def video(frames: range, x: float = 0) -> LabelledVideo:
@@ -48,23 +48,25 @@ def test_a_sweep_has_a_row_for_each_setting_and_names_the_best() -> None:
 
 
 def test_plain_values_of_one_run_and_of_a_sweep() -> None:
-    one = plain([run((), TEN)])
+    one = plain([run((), TEN)], NAME)
+    assert (one["detector"], one["set"]) == ("svm", ["b=1"])
     assert one["total"]["f1"] == one["videos"][0]["f1"] == 1
-    two = plain([run(("a=1",), TEN), run(("a=[x=1]",), TEN)])
+    two = plain([run(("a=1",), TEN), run(("a=[x=1]",), TEN)], NAME)
     assert [each["settings"] for each in two["sweep"]] == [{"a": "1"}, {"a": "[x=1]"}]
 
 
-def test_predictions_beyond_the_truth_are_warned_of(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_only_frames_that_the_truth_covers_are_compared_and_the_others_are_told(
+    tmp_path: Path,
 ) -> None:
     found = write(tmp_path / "found.txt", range(1, 21), "1,-1,-1,-1")
     truth = write(tmp_path / "gt.txt", TEN, "1,3,1")
-    with caplog.at_level(logging.WARNING, logger="vdet"):
-        assert score_files(found, truth).total.false_positives == 10
-    assert "has boxes up to frame 20, the truth ends with frame 10" in caplog.text
-    caplog.clear()
-    assert score_files(found, truth, until=10).total.false_positives == 0
-    assert not caplog.text
+    covered = score_files(found, truth)
+    assert (covered.total.false_positives, covered.clips[0].left_out) == (0, 10)
+    told = f"{found}: frames 1–10 compared; left out: 10 boxes found in later ones"
+    assert told in run_lines([covered])
+    assert told in video_page([covered], "")
+    longer = score_files(found, truth, until=15)
+    assert (longer.total.false_positives, longer.clips[0].left_out) == (5, 5)
 
 
 def test_until_cuts_the_truth_too(tmp_path: Path) -> None:

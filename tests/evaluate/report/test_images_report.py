@@ -9,7 +9,7 @@ from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.reading import read_labelled_images
 from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, score_source
 from vdet.evaluate.images.search import SearchedImage
-from vdet.evaluate.images.text import RunName
+from vdet.evaluate.output import RunName
 from vdet.evaluate.report.images_page import images_page, worst_pictures
 from vdet.evaluate.report.video_page import FOUND_COLOR, TRUE_COLOR
 

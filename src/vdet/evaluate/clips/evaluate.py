@@ -1,8 +1,7 @@
 """Scores of labelled videos under one or several settings."""
 
-import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vdet.evaluate.clips.clip import Clip, Variant, find_tracks
@@ -17,14 +16,13 @@ from vdet.evaluate.truth import read_truth
 from vdet.pipeline.loop import Progress, no_progress
 from vdet.pipeline.sinks.protocol import Output
 
-log = logging.getLogger("vdet")
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClipResult:
     """The scores of one video under one of the settings.
 
-    `name` stands in tables; `video` is the file, None where a file of tracks is scored.
+    `name` stands in tables; `video` is the file, None where a file of tracks is scored. The frames
+    up to `until`, counted from 1, are compared. `left_out` boxes were found in later ones.
     """
 
     name: str
@@ -33,6 +31,8 @@ class ClipResult:
     scores: Scores
     losses: tuple[Loss, ...]
     timelines: tuple[Timeline, ...]
+    until: int
+    left_out: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +99,7 @@ def score_video(
         score_comparison(comparison),
         tuple(losses(comparison, matched)),
         tuple(timelines(comparison, matched)),
+        max(prediction.last_frame, truth.last_frame),
     )
 
 
@@ -115,8 +116,7 @@ def score_files(
     Parameters
     ----------
     until
-        Number of the last frame to use, from 1. If it is None, predictions beyond the last true
-        frame are false alarms; a warning says so.
+        Number of the last frame to use, from 1; None: the last that the truth covers.
     rate
         As `compare` takes it.
 
@@ -126,15 +126,10 @@ def score_files(
         A file cannot be used.
     """
     found, true = read_predictions(prediction), read_truth(truth)
-    if until is not None:
-        found, true = found.until(until), true.until(until)
-    elif len(found) and found.frames[-1] > true.last_frame:
-        log.warning(
-            "%s: has boxes up to frame %d, the truth ends with frame %d; boxes after it "
-            "count as false alarms unless you give --until %d",
-            *(prediction, found.frames[-1], true.last_frame, true.last_frame),
-        )
-    result = score_video(str(prediction), found, true, rate=rate)
+    last = until or true.last_frame
+    compared = found.until(last)
+    result = score_video(str(prediction), compared, true.until(last), rate=rate)
+    result = replace(result, until=last, left_out=len(found) - len(compared))
     return RunResult((), (result,), result.scores)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
 from vdet.evaluate.clips.losses import Loss
-from vdet.evaluate.output import ABSENT, share, table
+from vdet.evaluate.output import ABSENT, RunName, plain_run, share, table
 from vdet.evaluate.scores import Scores
 
 LARGEST = 10
@@ -34,9 +34,16 @@ def run_lines(runs: Sequence[RunResult]) -> Iterator[str]:
     (run,) = runs
     yield from table(("video", *HEADINGS), list(clip_rows(run)))
     yield ""
+    yield from map(frames_line, run.clips)
     yield from detail_lines(run.total)
     for clip in run.clips:
         yield from loss_lines(clip)
+
+
+def frames_line(clip: ClipResult) -> str:
+    """Return which frames of a video were compared."""
+    left_out = f"; left out: {clip.left_out} boxes found in later ones" if clip.left_out else ""
+    return f"{clip.name}: frames 1–{clip.until} compared{left_out}"
 
 
 def clip_rows(run: RunResult) -> Iterator[list[str]]:
@@ -114,22 +121,24 @@ def loss_name(loss: Loss) -> str:
     return f"vehicle {loss.id} missed" if loss.kind == "missed" else f"false alarm, track {loss.id}"
 
 
-def plain(runs: Sequence[RunResult]) -> dict[str, Any]:
+def plain(runs: Sequence[RunResult], name: RunName) -> dict[str, Any]:
     """Return runs as values for JSON.
 
-    One run has `total` and `videos`; several have these each, with their `settings`, in `sweep`.
+    Beside the detector, one run has `total` and `videos`; several have these each, with their
+    `settings`, in `sweep`.
     """
     if len(runs) == 1:
-        return _plain_run(runs[0])
+        return plain_run(name) | _plain_result(runs[0])
     return {
+        **plain_run(name),
         "sweep": [
-            {"settings": dict(text.split("=", 1) for text in run.assignments), **_plain_run(run)}
+            {"settings": dict(text.split("=", 1) for text in run.assignments), **_plain_result(run)}
             for run in runs
-        ]
+        ],
     }
 
 
-def _plain_run(run: RunResult) -> dict[str, Any]:
+def _plain_result(run: RunResult) -> dict[str, Any]:
     videos = [{"video": clip.name, **plain_clip(clip)} for clip in run.clips]
     return {"total": asdict(run.total), "videos": videos}
 
@@ -137,4 +146,5 @@ def _plain_run(run: RunResult) -> dict[str, Any]:
 def plain_clip(clip: ClipResult) -> dict[str, Any]:
     """Return the scores of a video and its losses as values for JSON."""
     lost = [{**asdict(loss), "boxes": loss.boxes} for loss in clip.losses]
-    return {**asdict(clip.scores), "losses": lost}
+    frames = {"until": clip.until, "left_out": clip.left_out}
+    return {**asdict(clip.scores), **frames, "losses": lost}

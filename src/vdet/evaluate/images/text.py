@@ -1,14 +1,13 @@
 """Scores of pictures as lines of text, and as plain JSON values."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict
 from typing import Any
 
 from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.labelled import LabelledImages
 from vdet.evaluate.images.scores import SIZE_NAMES, ImageScores, SizeScores
-from vdet.evaluate.output import ABSENT, share, table
+from vdet.evaluate.output import ABSENT, RunName, plain_run, run_line, share, table
 from vdet.files import printable
 
 HEADINGS = (
@@ -18,16 +17,6 @@ HEADINGS = (
 SIZE_HEADINGS = ("recall / F1 by width", *SIZE_NAMES)
 
 _MOST_OTHERS = 8  # labels that are named
-
-
-@dataclass(frozen=True, slots=True)
-class RunName:
-    """Which detector was measured: its kind, model file, file of settings and changes to them."""
-
-    kind: str
-    model: Path | None
-    config: str | None
-    assignments: tuple[str, ...]
 
 
 def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
@@ -41,13 +30,6 @@ def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
     if others := others_lines(result):
         yield ""
         yield from others
-
-
-def run_line(run: RunName) -> str:
-    """Return which detector was measured."""
-    model = f", model {run.model.name}" if run.model else ""
-    settings = " ".join([run.config or "default", *run.assignments])
-    return f"detector {run.kind}{model}, settings {settings}"
 
 
 def counting_line(result: ImagesResult) -> str:
@@ -84,10 +66,7 @@ def _others_line(labelled: LabelledImages) -> str:
 def plain(result: ImagesResult, run: RunName) -> dict[str, Any]:
     """Return all numbers, and what was measured, as values for JSON."""
     return {
-        "detector": run.kind,
-        "model": str(run.model) if run.model else None,
-        "config": run.config or "default",
-        "set": list(run.assignments),
+        **plain_run(run),
         **asdict(result.counting),
         "mean": _plain_scores(result.mean),
         "sources": [

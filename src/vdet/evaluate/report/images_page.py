@@ -15,15 +15,13 @@ from vdet.evaluate.images.scores import SIZE_NAMES, MeasuredImage, Source
 from vdet.evaluate.images.text import (
     HEADINGS,
     SIZE_HEADINGS,
-    RunName,
     counting_line,
     others_lines,
     rows,
-    run_line,
     size_rows,
 )
 from vdet.evaluate.matching import match
-from vdet.evaluate.output import share
+from vdet.evaluate.output import RunName, run_line, share
 from vdet.evaluate.report.page import (
     COLORS,
     SOFT,

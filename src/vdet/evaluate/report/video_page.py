@@ -17,6 +17,7 @@ from vdet.evaluate.clips.text import (
     clip_rows,
     detail_lines,
     frame_span,
+    frames_line,
     loss_name,
     loss_row,
     setting_name,
@@ -50,22 +51,24 @@ _MOST_PICTURES = 12  # of each kind of loss
 _CROP_SCALE = 2.4  # size of the crop, in sizes of the box
 
 
-def video_page(runs: Sequence[RunResult]) -> str:
+def video_page(runs: Sequence[RunResult], what: str) -> str:
     """Return the report as HTML; of a sweep, only the best setting is shown in full.
 
-    Needs matplotlib. Raises `VideoError` if a video can no longer be read for its pictures.
+    `what` says what was measured. Needs matplotlib. Raises `VideoError` if a video can no longer be
+    read for its pictures.
     """
     top = best(runs)
-    return page("vdet: vehicles in video", _subtitle(top, len(runs)), _sections(runs, top))
+    subtitle = _subtitle(top, len(runs), what)
+    return page("vdet: vehicles in video", subtitle, _sections(runs, top))
 
 
-def _subtitle(top: RunResult, settings: int) -> str:
-    names = ", ".join(clip.name for clip in top.clips)
-    return f"{names}; best of {settings} settings: {setting_name(top)}" if settings > 1 else names
+def _subtitle(top: RunResult, settings: int, what: str) -> str:
+    best_of = f"; best of {settings} settings: {setting_name(top)}" if settings > 1 else ""
+    return f"{', '.join(clip.name for clip in top.clips)}; {what}{best_of}"
 
 
 def _sections(runs: Sequence[RunResult], top: RunResult) -> Iterator[str]:
-    details = map(paragraph, detail_lines(top.total))
+    details = map(paragraph, [*map(frames_line, top.clips), *detail_lines(top.total)])
     rows = html_table(("video", *HEADINGS), clip_rows(top))
     yield section("In short", cards(_key_figures(top.total)), rows, *details)
     if len(runs) > 1:
