@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import vdet
 from conftest import Run
 from evaluate.images.writers import WRITERS, Boxed, Labelled, show
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
@@ -80,7 +81,7 @@ def test_several_sets_a_table_and_a_report(
     result = run("eval", "images", *sets, *red, *options)
     assert result.code == 0, result.err
     first, second, *_ = result.out.splitlines()
-    assert first.startswith("detector svm, model red.npz, settings ")
+    assert first.startswith(f"vdet {vdet.__version__}, detector svm, model red.npz, ")
     assert first.endswith("red.yaml detector.search.probability=0.6")
     assert second == f"boxes from score {PERSPECTIVE.svm.shown_score:.2f}"
     for words in (str(sets[0]), str(sets[1]), "mean of 2", "recall / F1 by width", "person (2)"):
