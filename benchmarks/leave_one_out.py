@@ -24,6 +24,7 @@ from vdet.evaluate.matching import match
 from vdet.geometry import BoolArray, Float64Array
 from vdet.learn.network.run import NetworkJob, train_to_file
 from vdet.learn.network.sources import LabelledClip
+from vdet.workers import core_count
 
 GROUPS = (
     ("idd",),
@@ -59,21 +60,16 @@ def run_group(
 ) -> GroupResult:
     """Train without a group and search it."""
     names = sorted(path.name for path in roads.iterdir() if path.is_dir())
-    stem = work / f"without_{group[0]}"
-    output = stem.with_suffix(".onnx")
+    output = work / f"without_{group[0]}.onnx"
     if not output.exists():
-        job = NetworkJob(
-            tuple(roads / name for name in names if name not in group),
-            (clip,),
-            output,
-            stem.with_suffix(".json"),
-            stem.with_suffix(".ckpt"),
-        )
+        learnt = tuple(roads / name for name in names if name not in group)
+        job = NetworkJob(learnt, (clip,), output)
         train_to_file(job, settings.network, progress=lambda state: _print_step(group, state.step))
-    detector = NetworkSettings(least=_LEAST_SCORE, still_score=_LEAST_SCORE)
+    detector = NetworkSettings(least=_LEAST_SCORE).showing_all()
     counting = Counting(_LEAST_SCORE, LEAST_WIDTH, detector.classes)
     sets = [read_labelled_images(roads / name) for name in group]
-    result = evaluate_images(sets, load_detector(detector, output), counting, threads=2)
+    model = load_detector(detector, output)
+    result = evaluate_images(sets, model, counting, threads=core_count())
     scores = [source.scores for source in result.sources]
     logits, right = _detections(result)
     return GroupResult(

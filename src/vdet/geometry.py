@@ -6,6 +6,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -143,6 +144,13 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
     rank[np.lexsort((_area(boxes), np.asarray(scores)))] = np.arange(len(boxes))
     higher = rank > rank[:, np.newaxis]
     return np.asarray(((inside | inside.T) & higher).any(axis=1))
+
+
+def to_sides(corners: npt.NDArray[np.floating[Any]]) -> Float64Array:
+    """Return boxes `(n, 4)` given by x1, y1, x2, y2 as x, y, width, height."""
+    boxes = corners.astype(np.float64)
+    boxes[:, 2:] -= boxes[:, :2]
+    return boxes
 
 
 def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:

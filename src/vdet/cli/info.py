@@ -11,8 +11,7 @@ from vdet.cli.command import Command
 from vdet.cli.messages import print_lines
 from vdet.cli.options import PATH
 from vdet.detect.classes import our_name
-from vdet.detect.onnx.header import HEADER_KEY
-from vdet.detect.onnx.recognition import header_of, recognize
+from vdet.detect.onnx.recognition import recognize
 from vdet.detect.onnx.session import Session
 from vdet.detect.svm.model import load_model
 from vdet.files import printable
@@ -44,8 +43,7 @@ def _linear_lines(path: Path) -> Iterator[str]:
 
 
 def _network_lines(path: Path) -> Iterator[str]:
-    session = Session(path)
-    found = recognize(session, path, (1280, 720))
+    found = recognize(Session(path), path).for_frames(1280, 720)
     yield f"{path}: a network of the form {found.name}"
     for reason in found.reasons:
         yield f"  {reason}"
@@ -63,8 +61,8 @@ def _network_lines(path: Path) -> Iterator[str]:
     others = [printable(name) for name, ours in known.items() if ours is None]
     yield f"vehicles: {', '.join(vehicles) or 'none'}"
     yield f"other classes: {', '.join(others) or 'none'}"
-    if HEADER_KEY in session.metadata:
-        yield from _provenance(header_of(session, path).provenance)
+    if found.header is not None:
+        yield from _provenance(found.header.provenance)
 
 
 def _provenance(provenance: dict[str, Any]) -> Iterator[str]:

@@ -57,10 +57,6 @@ def train_net(
     if output.suffix.lower() != ".onnx":
         raise OutputError(f"{output}: networks are written as .onnx; name it so")
     settings = read_settings(config_name, assignments).network
-    report_path, checkpoint = output.with_suffix(".json"), output.with_suffix(".ckpt")
-    inputs = [*data, *(path for clip in clips for path in clip)]
-    for path in (output, report_path):
-        check_output(path, overwrite=overwrite, inputs=inputs)
     try:
         import torch  # noqa: F401
     except ImportError as error:
@@ -69,7 +65,10 @@ def train_net(
     from vdet.learn.network.sources import LabelledClip
 
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
-    job = NetworkJob(data, labelled, output, report_path, checkpoint, overwrite)
+    job = NetworkJob(data, labelled, output, overwrite)
+    inputs = [*data, *(path for clip in clips for path in clip)]
+    for path in (job.output, job.report):
+        check_output(path, overwrite=overwrite, inputs=inputs)
     with steps_bar(settings.steps, quiet=quiet) as advance:
         report = train_to_file(job, settings, progress=advance)
-    print_lines(*report.lines(), "", f"{output}: the network; {report_path}: the report")
+    print_lines(*report.lines(), "", f"{output}: the network; {job.report}: the report")

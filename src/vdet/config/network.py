@@ -8,7 +8,8 @@ from vdet.config.section import Fraction, Section
 class NetworkScoreSettings(Section):
     """Score of a box: sigmoid(slope · x + offset), where x is the output of the network.
 
-    Fitted on cameras that were left out of the training; written into the network's header.
+    It is the share of boxes with such an output that show a vehicle, fitted on cameras that were
+    left out of the training; written into the network's header.
     """
 
     slope: float = Field(1.0, gt=0, le=100, description="how steeply the score rises with x")

@@ -2,6 +2,7 @@
 
 import contextlib
 import importlib
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -112,6 +113,8 @@ def load_matplotlib() -> None:
     OutputError
         It is not installed.
     """
+    if sys.modules.get("matplotlib"):
+        return
     try:
         with contextlib.chdir(Path(__file__).parent):  # there is no other way to keep it from that
             importlib.import_module("matplotlib")

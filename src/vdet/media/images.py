@@ -63,6 +63,11 @@ def read_image(path: Path) -> Image:
     return image
 
 
+def is_picture_name(path: Path) -> bool:
+    """Return whether a file is named as a picture, and is not hidden."""
+    return path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".")
+
+
 def read_size(path: Path) -> tuple[int, int]:
     """Return the width and height of a picture upright, in pixels, from its header alone.
 

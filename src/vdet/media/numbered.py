@@ -11,7 +11,7 @@ from pathlib import Path
 
 from vdet.errors import VideoError
 from vdet.files import printable
-from vdet.media.images import PICTURE_SUFFIXES
+from vdet.media.images import is_picture_name
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _NUMBERED = re.compile(r"(.*?)(\d+)(\D*\.\w+)", re.ASCII | re.DOTALL)  # by its last number
@@ -98,7 +98,7 @@ def _patterns(names: list[str]) -> list[str]:
     groups: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for name in names:
         match = _NUMBERED.fullmatch(name)
-        if match and Path(name).suffix.lower() in PICTURE_SUFFIXES and not name.startswith("."):
+        if match and is_picture_name(Path(name)):
             before, number, after = match.groups()
             groups[before, after].append(number)
     ordered = sorted(groups.items(), key=lambda item: (-len(item[1]), item[0]))

@@ -17,7 +17,7 @@ from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
-from vdet.media.images import PICTURE_SUFFIXES, Image, read_image
+from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
@@ -45,7 +45,7 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if _is_picture(p))
+            inside = sorted(p for p in path.iterdir() if is_picture_name(p) and p.is_file())
             if not inside:
                 names = ", ".join(sorted(PICTURE_SUFFIXES))
                 raise ImageError(f"{path}: holds no pictures ({names})")
@@ -55,12 +55,6 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
         else:
             raise ImageError(f"{path}: no such file or folder")
     return list(dict.fromkeys(found))
-
-
-def _is_picture(path: Path) -> bool:
-    return (
-        path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".") and path.is_file()
-    )
 
 
 def plan_pictures(

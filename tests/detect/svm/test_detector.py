@@ -66,7 +66,7 @@ def test_the_score_follows_from_the_strength_by_the_settings() -> None:
     *_, detections = detect_video(road(CAR), road(CAR), settings=settings)
     assert len(detections) == 1
     np.testing.assert_array_equal(
-        detections.scores, detection_scores(detections.strengths, middle=1.7, slope=3.0)
+        detections.scores, detection_scores(detections.strengths, settings.score)
     )
 
 
@@ -324,7 +324,8 @@ slopes = st.floats(0.01, 100)
 
 
 def scores_of(*strengths: float, middle: float = 0.3, slope: float = 2) -> Float32Array:
-    return detection_scores(np.array(strengths, np.float32), middle, slope)
+    settings = ScoreSettings(middle=middle, slope=slope)
+    return detection_scores(np.array(strengths, np.float32), settings)
 
 
 class TestScores:

@@ -29,12 +29,25 @@ class Candidates:
 
 
 class NetworkModel:
-    """A network with its settings: a `DetectorModel`."""
+    """A network with its settings: a `DetectorModel`.
+
+    Raises
+    ------
+    ModelError
+        The file cannot be used, or knows none of the classes in the settings.
+    """
 
     def __init__(self, path: Path, settings: NetworkSettings) -> None:
-        self._path = path
         self._settings = settings
         self._session = Session(path)
+        self._recognized = recognize(self._session, path, settings.names)
+        names, wanted = self._recognized.names, settings.classes
+        self._numbers = np.array(our_classes(names, wanted), np.int32)
+        if (self._numbers < 0).all():
+            raise ModelError(
+                f"{path}: knows none of detector.classes ({', '.join(wanted)}); it knows "
+                f"{', '.join(names)}"
+            )
 
     def for_video(
         self,
@@ -43,14 +56,8 @@ class NetworkModel:
         images: Sequence[Image],  # noqa: ARG002 - its size is enough
     ) -> "NetworkDetector":
         """Return a detector for frames of one size."""
-        recognized = recognize(self._session, self._path, (width, height), self._settings.names)
-        numbers = np.array(our_classes(recognized.names, self._settings.classes), np.int32)
-        if (numbers < 0).all():
-            raise ModelError(
-                f"{self._path}: knows none of detector.classes "
-                f"({', '.join(self._settings.classes)}); it knows {', '.join(recognized.names)}"
-            )
-        return NetworkDetector(self._session, recognized, numbers, self._settings)
+        recognized = self._recognized.for_frames(width, height)
+        return NetworkDetector(self._session, recognized, self._numbers, self._settings)
 
 
 class NetworkDetector:

@@ -6,11 +6,15 @@ from typing import Protocol
 
 import numpy as np
 
+from vdet.config.network import NetworkScoreSettings
 from vdet.detect.onnx.session import Array
 from vdet.geometry import Float32Array, Int32Array
 
 STRIDES = (8, 16, 32)
 """Pixels of the input between the cells of each level, of our networks and of YOLOX."""
+
+Cells = tuple[Float32Array, Float32Array]
+"""The middle `(cells, 2)`, x and y in pixels of the input, and the stride `(cells,)` of cells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,42 +37,40 @@ class Layout(Protocol):
         """Return the boxes with scores of at least `least`."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class OurCells:
     """Our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.network.architecture`.
 
-    The score is sigmoid(slope · x + offset).
+    `cells` are those of the input, from `cell_centers`.
     """
 
-    width: int
-    height: int
-    slope: float
-    offset: float
+    cells: Cells
+    score: NetworkScoreSettings
 
     def decode(self, outputs: list[Array], least: float) -> RawBoxes:
         """Return the boxes with scores of at least `least`."""
-        cells = outputs[0][0]
-        logits = self.slope * cells[:, 0] + self.offset
+        table = outputs[0][0]
+        logits = self.score.slope * table[:, 0] + self.score.offset
         rows = np.flatnonzero(logits >= math.log(least / (1 - least)))
-        centers, strides = cell_centers(self.width, self.height)
-        lengths = np.logaddexp(0, cells[rows, 1:5] + 1) * strides[rows, np.newaxis]
+        centers, strides = self.cells
+        lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
         middle = centers[rows]
         boxes = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
         scores = 1 / (1 + np.exp(-logits[rows]))
-        return _raw(boxes, scores, cells[rows, 5:].argmax(axis=1))
+        return _raw(boxes, scores, table[rows, 5:].argmax(axis=1))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class CenterRows:
     """Rows of middle, size, and a score for each class: `(1, n, 4 + nc)`, or with objectness.
 
     Ultralytics v5 and YOLOX give `(1, n, 5 + nc)`, v8 and v11 `(1, 4 + nc, n)` (`is_turned`).
-    `grid` is the size of the input where middles and sizes are relative to the cells of YOLOX.
+    `grid` are the cells of the input where middles and sizes are relative to those, as in YOLOX.
     """
 
     has_objectness: bool
     is_turned: bool = False
-    grid: tuple[int, int] | None = None
+    grid: Cells | None = None
 
     def decode(self, outputs: list[Array], least: float) -> RawBoxes:
         """Return the boxes with scores of at least `least`."""
@@ -81,7 +83,7 @@ class CenterRows:
         rows = np.flatnonzero(scores >= least)
         middle, size = table[rows, :2], table[rows, 2:4]
         if self.grid is not None:
-            centers, strides = cell_centers(*self.grid)
+            centers, strides = self.grid
             stride = strides[rows, np.newaxis]
             middle = centers[rows] + (middle - 0.5) * stride  # offsets from the cell's corner
             size = np.exp(np.minimum(size, 20)) * stride
@@ -118,8 +120,8 @@ def cell_count(width: int, height: int) -> int:
     return sum((width // stride) * (height // stride) for stride in STRIDES)
 
 
-def cell_centers(width: int, height: int) -> tuple[Float32Array, Float32Array]:
-    """Return the middle `(cells, 2)`, x and y in pixels, and the stride `(cells,)` of all cells."""
+def cell_centers(width: int, height: int) -> Cells:
+    """Return the middle and the stride of all cells of an input."""
     centers, strides = [], []
     for stride in STRIDES:
         y, x = np.mgrid[: height // stride, : width // stride]

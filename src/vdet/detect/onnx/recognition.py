@@ -1,7 +1,6 @@
 """What kind of network an ONNX file holds: by its metadata, then its names, then its shapes."""
 
 import ast
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,10 +16,11 @@ from vdet.detect.onnx.layouts import (
     Layout,
     NamedColumns,
     OurCells,
+    cell_centers,
     cell_count,
 )
-from vdet.detect.onnx.preparation import InputForm, size_of_area
-from vdet.detect.onnx.session import Array, InputSlot, Session
+from vdet.detect.onnx.preparation import GREY, InputForm, size_of_area
+from vdet.detect.onnx.session import Array, InputSlot, Session, first_line
 from vdet.errors import ModelError
 
 _MULTIPLE = 32
@@ -47,6 +47,8 @@ class Recognized:
         Turns its outputs into boxes.
     has_sizes
         Whether it has a second input for the size of the picture.
+    header
+        The header of a network of ours; None for others.
     """
 
     name: str
@@ -55,6 +57,14 @@ class Recognized:
     form: InputForm
     layout: Layout
     has_sizes: bool = False
+    header: Header | None = None
+
+    def for_frames(self, width: int, height: int) -> "Recognized":
+        """Return the network for frames of one size; the input of our own is fitted to it."""
+        if self.header is None:
+            return self
+        form, layout = _our_form(self.header, width, height)
+        return replace(self, form=form, layout=layout)
 
     def feed(self, session: Session, values: Array) -> dict[str, Array]:
         """Return all inputs by name, for the input `values` of a picture."""
@@ -66,17 +76,13 @@ class Recognized:
         return feed
 
 
-def recognize(
-    session: Session, path: Path, size: tuple[int, int], names: Sequence[str] = ()
-) -> Recognized:
+def recognize(session: Session, path: Path, names: Sequence[str] = ()) -> Recognized:
     """Find out what a network wants and gives.
 
     Parameters
     ----------
     path
         Its file, for messages.
-    size
-        Width and height of the frames; our own networks are fitted to it.
     names
         Names of its classes, where the file does not tell them.
 
@@ -86,7 +92,7 @@ def recognize(
         The network is of no known form; the message says what was seen.
     """
     if HEADER_KEY in session.metadata:
-        return _ours(session, path, size)
+        return _ours(session, path)
     if any(slot.name == _SIZES for slot in session.inputs):
         return _rt_detr(session, path, names)
     if len(session.inputs) != 1:
@@ -94,26 +100,26 @@ def recognize(
     return _by_shape(session, path, names)
 
 
-def header_of(session: Session, path: Path) -> Header:
-    """Return the header of a network of ours. Raises `ModelError`."""
+def _ours(session: Session, path: Path) -> Recognized:
     try:
-        return Header.model_validate(json.loads(session.metadata[HEADER_KEY]))
-    except (ValueError, ValidationError) as error:
+        header = Header.model_validate_json(session.metadata[HEADER_KEY])
+    except ValidationError as error:
         raise ModelError(f"{path}: its header is damaged or from a newer vdet") from error
-
-
-def _ours(session: Session, path: Path, size: tuple[int, int]) -> Recognized:
-    header = header_of(session, path)
-    width, height = size_of_area(*size, header.pixels, _MULTIPLE)
-    form = InputForm(width, height, rows_first=True, dtype=np.uint8)
-    calibration = header.calibration
-    layout = OurCells(width, height, calibration.slope, calibration.offset)
-    recognized = Recognized("vdet", ("it has a header of vdet",), header.classes, form, layout)
-    shapes = _output_shapes(session, path, recognized)
-    wanted = (1, cell_count(width, height), 5 + len(header.classes))
+    form, layout = _our_form(header, 1, 1)
+    reasons = ("it has a header of vdet",)
+    found = Recognized("vdet", reasons, header.classes, form, layout, header=header)
+    shapes = [output.shape for output in _outputs_for_grey(session, path, found)]
+    wanted = (1, cell_count(form.width, form.height), 5 + len(header.classes))
     if shapes != [wanted]:
         raise _unknown(path, f"it has a header of vdet, but gives {_listed(shapes)}")
-    return recognized
+    return found
+
+
+def _our_form(header: Header, width: int, height: int) -> tuple[InputForm, OurCells]:
+    """Return what a network of ours wants to see of frames of one size, and what it gives."""
+    size = size_of_area(width, height, header.pixels, _MULTIPLE)
+    form = InputForm(*size, rows_first=True, dtype=np.uint8)
+    return form, OurCells(cell_centers(*size), header.calibration)
 
 
 def _rt_detr(session: Session, path: Path, names: Sequence[str]) -> Recognized:
@@ -136,7 +142,7 @@ def _by_shape(session: Session, path: Path, names: Sequence[str]) -> Recognized:
         raise _unknown(path, f"its input is {_listed([slot.shape])}, not (1, 3, height, width)")
     form = InputForm(width, height, "center", is_rgb=True, factor=1 / 255, dtype=slot.dtype)
     guess = Recognized("", (), known, form, FinalRows())
-    shapes = _output_shapes(session, path, guess)
+    shapes = [output.shape for output in _outputs_for_grey(session, path, guess)]
     shape = shapes[0]
     if len(shape) != 3 or shape[0] != 1:
         raise _unknown(path, f"its output is {_listed(shapes)}")
@@ -146,8 +152,8 @@ def _by_shape(session: Session, path: Path, names: Sequence[str]) -> Recognized:
             break
     else:
         raise _unknown(path, f"for an input of {width}×{height} it gives {_listed(shapes)}")
-    if found.name == "YOLOX" and _is_raw(session, found):
-        layout = CenterRows(has_objectness=True, grid=(width, height))
+    if found.name == "YOLOX" and _is_raw(_outputs_for_grey(session, path, found)[0][0], width):
+        layout = CenterRows(has_objectness=True, grid=cell_centers(width, height))
         reasons = (*found.reasons, "its middles are offsets from cells")
         found = replace(found, layout=layout, reasons=reasons)
     return _with_names(found, shape, path)
@@ -242,11 +248,9 @@ def _yolox(guess: Recognized, shape: tuple[int, ...], metadata: _Metadata) -> Re
     )
 
 
-def _is_raw(session: Session, found: Recognized) -> bool:
+def _is_raw(table: Array, width: int) -> bool:
     """Tell whether middles are offsets from cells: then they do not spread over the input."""
-    values = np.full((found.form.height, found.form.width, 3), 114, np.uint8)
-    table = session.run(found.feed(session, found.form.prepare(values)[0]))[0][0]
-    return bool(np.ptp(table[:, 0]) < found.form.width / 2)
+    return bool(np.ptp(table[:, 0]) < width / 2)
 
 
 def _with_names(found: Recognized, shape: tuple[int, ...], path: Path) -> Recognized:
@@ -282,15 +286,14 @@ def _size_of(session: Session, told: tuple[int, int] | None) -> tuple[int, int]:
     return width or usual[0], height or usual[1]
 
 
-def _output_shapes(session: Session, path: Path, guess: Recognized) -> list[tuple[int, ...]]:
-    """Return the shapes of the outputs for a grey picture."""
-    grey = np.full((guess.form.height, guess.form.width, 3), 114, np.uint8)
+def _outputs_for_grey(session: Session, path: Path, guess: Recognized) -> list[Array]:
+    """Return the outputs for a grey picture."""
+    grey = np.full((guess.form.height, guess.form.width, 3), GREY, np.uint8)
     try:
-        outputs = session.run(guess.feed(session, guess.form.prepare(grey)[0]))
+        return session.run(guess.feed(session, guess.form.prepare(grey)[0]))
     except Exception as error:  # onnxruntime raises kinds of its own
-        first_line = (str(error).splitlines() or [""])[0]
-        raise _unknown(path, f"it does not run on a picture ({first_line:.120})") from error
-    return [output.shape for output in outputs]
+        seen = f"it does not run on a picture ({first_line(error):.120})"
+        raise _unknown(path, seen) from error
 
 
 def _listed(shapes: Sequence[tuple[int | None, ...]]) -> str:

@@ -73,8 +73,13 @@ def _load(path: Path) -> "onnxruntime.InferenceSession":
     try:
         return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
-        first_line = (str(error).splitlines() or [""])[0]
-        raise ModelError(f"{path}: cannot be loaded by onnxruntime: {first_line:.200}") from error
+        reason = first_line(error)
+        raise ModelError(f"{path}: cannot be loaded by onnxruntime: {reason:.200}") from error
+
+
+def first_line(error: Exception) -> str:
+    """Return the first line of what onnxruntime says of an error."""
+    return (str(error).splitlines() or [""])[0]
 
 
 def _slot(path: Path, value: Any) -> InputSlot:

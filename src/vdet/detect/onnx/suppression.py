@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.geometry import Float32Array, Int64Array
+from vdet.geometry import Float32Array, Int64Array, to_sides
 
 
 def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64Array:
@@ -18,6 +18,5 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
     overlap
         A box with more intersection over union with a better one is removed.
     """
-    sides = np.concatenate([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]], axis=1)
-    kept = cv2.dnn.NMSBoxes(sides.tolist(), scores.tolist(), 0.0, overlap)
+    kept = cv2.dnn.NMSBoxes(to_sides(boxes).tolist(), scores.tolist(), 0.0, overlap)
     return np.asarray(kept, np.int64).reshape(-1)

@@ -178,10 +178,9 @@ class SvmDetector:
     def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Detections:
         strengths = np.array([region.strength for region in regions], np.float32)
         boxes = [(b.x, b.y, b.right, b.bottom) for b in (region.box for region in regions)]
-        score = self._settings.score
         return Detections(
             np.reshape(boxes, (-1, 4)),
-            detection_scores(strengths, score.middle, score.slope),
+            detection_scores(strengths, self._settings.score),
             centroids=np.reshape([region.centroid for region in regions], (-1, 2)),
             strengths=strengths,
             trace=trace,

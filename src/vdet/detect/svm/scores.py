@@ -22,26 +22,21 @@ Source: Platt, "Probabilistic Outputs for Support Vector Machines", 1999.
 import numpy as np
 import numpy.typing as npt
 
+from vdet.config.schema import ScoreSettings
 from vdet.geometry import Float32Array
 
 
-def detection_scores(strengths: npt.ArrayLike, middle: float, slope: float) -> Float32Array:
+def detection_scores(strengths: npt.ArrayLike, settings: ScoreSettings) -> Float32Array:
     """Return the score, 0 to 1, of each detection.
 
     Parameters
     ----------
     strengths
         Shape `(n,)`, not negative: weight of the votes, or peak of the heat.
-    middle
-        Strength with score 0.5, above 0.
-    slope
-        How fast the score rises with the logarithm of the strength, above 0.
 
     Returns
     -------
     float32 `(n,)`.
     """
-    relative = np.asarray(strengths, np.float64) / middle
-    with np.errstate(over="ignore"):  # infinite odds are a score of 1
-        odds = relative**slope
-    return np.asarray(1 - 1 / (1 + odds), np.float32)
+    evidence = np.asarray(strengths, np.float64).tolist()
+    return np.array([settings.of(each) for each in evidence], np.float32)

@@ -5,16 +5,12 @@ from pathlib import Path
 
 from vdet.errors import TruthError
 from vdet.files import printable
-from vdet.media.images import PICTURE_SUFFIXES
+from vdet.media.images import is_picture_name
 
 
 def pictures_below(folder: Path) -> list[Path]:
     """Return the pictures in a folder and in those below it, in order; hidden files are none."""
-    return sorted(
-        path
-        for path in folder.rglob("*")
-        if path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".")
-    )
+    return sorted(filter(is_picture_name, folder.rglob("*")))
 
 
 def labelled_pairs(labels: Path, suffix: str, pictures: Path) -> Iterator[tuple[Path, Path]]:

@@ -9,7 +9,7 @@ from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.comparison import MAX_IN_FRAME
 from vdet.evaluate.images.labelled import LabelledImage
-from vdet.geometry import Float64Array
+from vdet.geometry import Float64Array, to_sides
 from vdet.pipeline.pictures import search_picture
 from vdet.pipeline.threads import map_ordered, single_threaded_libraries
 
@@ -69,6 +69,5 @@ def search_images(
 
 def _searched(image: LabelledImage, width: int, found: Detections) -> SearchedImage:
     best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
-    corners = found.boxes[best].astype(np.float64)
-    boxes = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+    boxes = to_sides(found.boxes[best])
     return SearchedImage(image, width, boxes, found.scores[best].astype(np.float64))

@@ -19,7 +19,7 @@ from vdet.detect.svm.windows import Windows
 from vdet.errors import DataError, FrameSizeError, ImageError, TruthError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.truth import read_truth
-from vdet.geometry import Int32Array
+from vdet.geometry import Int32Array, to_sides
 from vdet.learn.dataset import PatchArchive, patch_archive
 from vdet.learn.mining.choosing import (
     ChosenWindow,
@@ -192,8 +192,7 @@ def score_windows(boxes: Int32Array, detections: Detections, frame_width: int) -
     """
     scores = np.zeros(len(boxes), np.float32)
     squares = boxes.astype(np.float64)
-    corners = detections.boxes.astype(np.float64)
-    found = np.concatenate([corners[:, :2], corners[:, 2:] - corners[:, :2]], axis=1)
+    found = to_sides(detections.boxes)
     for box, score in zip(found, detections.scores.tolist(), strict=True):
         fits = compare_windows(squares, box, frame_width).fits
         scores[fits] = np.maximum(scores[fits], score)

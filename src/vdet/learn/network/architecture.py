@@ -11,8 +11,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-STRIDES = (8, 16, 32)
-"""Pixels of the input between the cells of each level."""
+from vdet.detect.onnx import layouts
+from vdet.detect.onnx.layouts import STRIDES
 
 STEM = 16
 TRUNK = ((32, 1), (64, 3), (96, 4), (128, 3))
@@ -112,14 +112,8 @@ class Network(nn.Module):
 
 def cell_centers(height: int, width: int) -> tuple[Tensor, Tensor]:
     """Return the middle `(cells, 2)`, x and y in pixels, and the stride `(cells,)` of all cells."""
-    centers, strides = [], []
-    for stride in STRIDES:
-        y, x = torch.meshgrid(
-            torch.arange(height // stride), torch.arange(width // stride), indexing="ij"
-        )
-        centers.append((torch.stack([x, y], -1).reshape(-1, 2) + 0.5) * stride)
-        strides.append(torch.full((len(centers[-1]),), float(stride)))
-    return torch.cat(centers), torch.cat(strides)
+    centers, strides = layouts.cell_centers(width, height)
+    return torch.from_numpy(centers), torch.from_numpy(strides)
 
 
 def flatten(levels: Sequence[Tensor]) -> Tensor:

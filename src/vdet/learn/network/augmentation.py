@@ -1,19 +1,17 @@
 """Training pictures for the network: places, scales, mosaics and colours changed at random."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from vdet.config.network import NetworkTrainingSettings
+from vdet.detect.onnx.preparation import GREY
 from vdet.geometry import Float32Array
 from vdet.learn.network.samples import Sample, Source, join
 from vdet.media.images import Image
-
-BACKGROUND = 114
-"""Grey of the pixels beyond the picture, as at run time."""
 
 _LEAST_VISIBLE = 0.25  # share of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
@@ -59,9 +57,7 @@ class SampleDrawer:
         if rng.random() < 0.5:
             sample = _mirrored(sample)
         image = _with_noise(rng, _recolored(rng, sample.image))
-        return _cleaned(
-            Sample(image, sample.boxes, sample.classes, sample.ignored), settings.least_side
-        )
+        return _cleaned(replace(sample, image=image), settings.least_side)
 
     def _pick(self, rng: np.random.Generator) -> Sample:
         source = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
@@ -86,7 +82,7 @@ class SampleDrawer:
             part = _place(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)
             image[top:bottom, left:right] = part.image
             moved = part.boxes + np.array([left, top, left, top], np.float32)
-            parts.append(Sample(part.image, moved, part.classes, part.ignored))
+            parts.append(replace(part, boxes=moved))
         return join(parts, image)
 
 
@@ -113,7 +109,7 @@ def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scal
         size,
         flags=cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_CONSTANT,
-        borderValue=(BACKGROUND,) * 3,
+        borderValue=(GREY,) * 3,
     )
     factors = np.array([x_factor, y_factor] * 2, np.float32)
     offset = np.array([left, top] * 2, np.float32)
@@ -137,14 +133,14 @@ def _cleaned(sample: Sample, least_side: float) -> Sample:
     """Ignore vehicles that are too small to be found."""
     sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
     small = (sides.max(1, initial=0) < least_side) | (sides.min(1, initial=1e9) < least_side / 2)
-    return Sample(sample.image, sample.boxes, sample.classes, sample.ignored | small)
+    return replace(sample, ignored=sample.ignored | small)
 
 
 def _mirrored(sample: Sample) -> Sample:
     width = sample.image.shape[1]
     boxes = sample.boxes.copy()
     boxes[:, [0, 2]] = width - sample.boxes[:, [2, 0]]
-    return Sample(sample.image[:, ::-1], boxes, sample.classes, sample.ignored)
+    return replace(sample, image=sample.image[:, ::-1], boxes=boxes)
 
 
 def _recolored(rng: np.random.Generator, image: Image) -> Image:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import vdet
 from vdet.config.network import NetworkTrainingSettings
-from vdet.detect.onnx.header import Header, ScoreCalibration
+from vdet.detect.onnx.header import Header
 from vdet.evaluate.images.reading import read_labelled_images
 from vdet.files import write_json
 from vdet.learn.network.export import export_network
@@ -34,8 +34,8 @@ class NetworkJob:
         Sets of labelled pictures.
     clips
         Labelled videos.
-    output, report, checkpoint
-        The files of the network, of the report, and of the training's state.
+    output
+        The file of the network; report and checkpoint, the training's state, lie beside it.
     overwrite
         Replace an earlier network and its report.
     """
@@ -43,9 +43,17 @@ class NetworkJob:
     pictures: tuple[Path, ...]
     clips: tuple[LabelledClip, ...]
     output: Path
-    report: Path
-    checkpoint: Path
     overwrite: bool = False
+
+    @property
+    def report(self) -> Path:
+        """The file of the report."""
+        return self.output.with_suffix(".json")
+
+    @property
+    def checkpoint(self) -> Path:
+        """The file of the training's state."""
+        return self.output.with_suffix(".ckpt")
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +117,7 @@ def train_to_file(
     header = Header(
         classes=CLASSES,
         pixels=settings.width * settings.height,
-        calibration=ScoreCalibration(slope=settings.score.slope, offset=settings.score.offset),
+        calibration=settings.score,
         provenance={
             "program": f"vdet {vdet.__version__}",
             "training": settings.model_dump(mode="json"),

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.geometry import Box, Float64Array, are_nested, visible
+from vdet.geometry import Box, Float64Array, are_nested, to_sides, visible
 from vdet.media.images import Image
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
 from vdet.track.motion.overlapping import are_hidden, around, shows_both, stretched
@@ -74,8 +74,7 @@ class MotionTracker:
         return step
 
     def _observations(self, detections: Detections) -> list[Observation]:
-        corners = detections.boxes.astype(np.float64)
-        boxes = visible(np.hstack([corners[:, :2], corners[:, 2:] - corners[:, :2]]), self._size)
+        boxes = visible(to_sides(detections.boxes), self._size)
         classes = [None] * len(boxes) if detections.classes is None else detections.classes.tolist()
         return [
             Observation(box, score, class_id)
