@@ -104,7 +104,7 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
         augmenter=partial(augment, settings=training.augmentation),
         seed=training.seed,
     )
-    boxes = extract_box_patches(files, boxed, settings, workers=workers, progress=lambda _: None)
+    boxes = extract_box_patches(files, boxed, settings, workers=workers)
     assert boxes is not None
     boxed_data = boxes.boxed
     assert boxed_data is not None

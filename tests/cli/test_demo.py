@@ -34,7 +34,7 @@ class Demo:
     files: DemoFiles
     result: DemoResult
     steps: list[str]
-    totals: list[int | None]
+    totals: list[tuple[str, int | None]]
 
 
 @pytest.fixture(scope="module")
@@ -42,17 +42,17 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Demo:
     """A demo with few patches and a short clip."""
     files = DemoFiles(tmp_path_factory.mktemp("demo") / "new" / "demo")
     steps: list[str] = []
-    totals: list[int | None] = []
+    totals: list[tuple[str, int | None]] = []
 
-    def progress(total: int | None) -> Callable[[int], object]:
-        totals.append(total)
+    def start(what: str, total: int | None) -> Callable[[int], object]:
+        totals.append((what, total))
         return lambda _: None
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("vdet.cli.demo.PATCHES", PATCHES)
         patch.setattr("vdet.cli.demo.demo_scene", short_clip)
         settings = load_settings(None, QUICK)
-        result = run_demo(files, settings, report_step=steps.append, progress=progress)
+        result = run_demo(files, settings, report_step=steps.append, steps=start)
     return Demo(files, result, steps, totals)
 
 
@@ -103,7 +103,15 @@ def test_tracks_and_truth_can_be_scored_again(done: Demo) -> None:
 def test_each_step_is_reported(done: Demo) -> None:
     assert [line[:3] for line in done.steps] == ["1/4", "2/4", "3/4", "4/4"]
     assert f"{2 * PATCHES} patches" in done.steps[0]
-    assert done.totals == [2 * PATCHES, FRAMES]
+    assert [what for what, _ in done.totals] == [
+        "drawing",
+        "describing patches",
+        "fitting the classifier, random split",
+        "fitting the classifier, tail split",
+        "timing the classifier",
+        "frames",
+    ]
+    assert [total for _, total in done.totals if total] == [2 * PATCHES, FRAMES]
 
 
 @pytest.mark.parametrize(

@@ -1,15 +1,15 @@
 """Lines, log records and progress bars on standard error."""
 
-import functools
 import io
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tqdm import tqdm
 
 from conftest import Run
-from running import write_drive
-from vdet.cli.messages import counted, files_bar
+from running import until, write_drive
+from vdet.cli.messages import batch_bar, counted, progress_steps
 
 
 class Terminal(io.StringIO):
@@ -22,24 +22,44 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     terminal = Terminal()
-    bar = functools.partial(tqdm, file=terminal, mininterval=0)
-    monkeypatch.setattr("vdet.cli.messages.tqdm", bar)
+
+    class Bar(tqdm):  # type: ignore[type-arg]
+        def __init__(self, **options: Any) -> None:
+            super().__init__(file=terminal, mininterval=0, **options)
+
+    monkeypatch.setattr("vdet.cli.messages.tqdm", Bar)
     return terminal
 
 
-def test_a_batch_has_a_bar_over_files_with_the_rate_of_all_frames_and_the_time_left(
+def test_the_bar_of_a_batch_names_the_running_files_and_counts_frames(terminal: Terminal) -> None:
+    sources = [Path("a.mp4"), Path("b\x1b.mp4"), Path("c.mp4")]
+    with batch_bar(sources, by_size=False, quiet=False) as counts:
+        assert counts is not None
+        counts.progress_of(0)(100)(100)
+        counts.end(0, 100)
+        counts.progress_of(1)(50)(25)
+    last = terminal.getvalue().rstrip("\n").rpartition("\r")[2]
+    assert " 125/225 frames [" in last  # the third file is as long as the mean of the others
+    assert " left, " in last
+    assert "1 of 3 files, b\\x1b.mp4 50%]" in last
+
+
+def test_a_bar_shows_that_the_program_is_at_work(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    seconds = iter([100.0, 104.0, 110.0])
-    monkeypatch.setattr("time.perf_counter", lambda: next(seconds))
-    with files_bar(4, quiet=False) as advance:
-        advance(200)
-        assert "50.0 frames/s" in terminal.getvalue()
-        advance(400)
-        last = terminal.getvalue().rpartition("\r")[2]
-    assert "2/4" in last
-    assert "60.0 frames/s" in last
-    assert "<" in last  # tqdm's mark before the time that is left
+    monkeypatch.setattr("vdet.cli.messages.REFRESH_INTERVAL", 0.01)
+    with progress_steps("", quiet=False) as steps:
+        steps("fitting", None)
+        until(lambda: terminal.getvalue().count("fitting [00:0") >= 3)
+
+
+def test_each_step_ends_the_bar_of_the_one_before(terminal: Terminal) -> None:
+    with progress_steps(" patches", quiet=False) as steps:
+        steps("fitting", None)
+        steps("describing", 3)(3)
+    assert "fitting" not in terminal.getvalue().rpartition("\r")[2]
+    assert "describing: 100%" in terminal.getvalue()
+    assert "3/3" in terminal.getvalue()
 
 
 FORGED = "a\x1b]0;title\x07\nvdet: all is well\u202e.mp4"
@@ -85,8 +105,10 @@ class TestNamesThatControlATerminal:
 
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
-    with files_bar(4, quiet=True) as advance:
-        advance(200)
+    with batch_bar([Path("a.mp4")], by_size=True, quiet=True) as counts:
+        assert counts is None
+    with progress_steps("", quiet=True) as steps:
+        steps("fitting", None)
     assert terminal.getvalue() == ""
 
 

@@ -7,9 +7,10 @@ from typing import TypeVar
 
 from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import Plan
+from vdet.batch.progress import FrameCounts
 from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import make_folder, remove_stale
-from vdet.pipeline.loop import VideoJob
+from vdet.pipeline.loop import VideoJob, no_progress
 from vdet.workers import WorkerKilledError, Workers
 
 T = TypeVar("T")
@@ -17,11 +18,21 @@ R = TypeVar("R")
 
 
 def run_batch(
-    plan: Plan, work: Work, origin: Origin, *, workers: Workers
+    plan: Plan,
+    work: Work,
+    origin: Origin,
+    *,
+    workers: Workers,
+    counts: FrameCounts | None = None,
 ) -> Generator[tuple[VideoJob, Record]]:
     """Process the files of a plan; yield each when it has ended, with its record in the manifest.
 
     At the end, temporary files of killed worker processes are removed.
+
+    Parameters
+    ----------
+    counts
+        They get the frames of each job of the plan, by its number.
 
     Raises
     ------
@@ -31,19 +42,29 @@ def run_batch(
         The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)
-    function = partial(process_file, work=work)
+    function = partial(_process_numbered, work=work, counts=counts)
     try:
         with (
             open_manifest(plan.manifest, origin) as add,
-            closing(each_once(function, plan.jobs, workers)) as results,
+            closing(each_once(function, list(enumerate(plan.jobs)), workers)) as results,
         ):
-            for job, result in results:
+            for (number, job), result in results:
                 record = result or record_of_killed(job)
                 add(record)
+                if counts:
+                    counts.end(number, record.frames)
                 yield job, record
     finally:
         for folder in {output.path.parent for job in plan.jobs for output in job.outputs}:
             remove_stale(folder)
+
+
+def _process_numbered(
+    numbered: tuple[int, VideoJob], *, work: Work, counts: FrameCounts | None
+) -> Record:
+    number, job = numbered
+    progress = counts.progress_of(number) if counts else no_progress
+    return process_file(job, work=work, progress=progress)
 
 
 def each_once(

@@ -16,7 +16,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import in_one_line
 from vdet.files import make_folder
-from vdet.pipeline.loop import VideoJob, run_video
+from vdet.pipeline.loop import Progress, VideoJob, no_progress, run_video
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +39,10 @@ class Work:
     digest: str = ""
 
 
-def process_file(job: VideoJob, *, work: Work) -> Record:
+def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress) -> Record:
     """Make the folders of a job's outputs, run it, and return its record.
 
-    Errors are recorded, and not raised.
+    Errors are recorded, and not raised. `progress` is as `run_video` takes it.
     """
     began, started = time.perf_counter(), _now()
     summary, error = None, None
@@ -54,7 +54,12 @@ def process_file(job: VideoJob, *, work: Work) -> Record:
             for output in job.outputs:
                 make_folder(output.path.parent)
             model = load_detector(work.settings.detector, work.model)
-            summary = run_video(job, model, work.settings, threads=threads, codec_threads=threads)
+            summary = run_video(
+                *(job, model, work.settings),
+                threads=threads,
+                codec_threads=threads,
+                progress=progress,
+            )
             paths = [output.path.absolute() for output in job.outputs]
             sizes = {str(path): path.stat().st_size for path in paths}
         except Exception as failure:

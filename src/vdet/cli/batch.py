@@ -17,7 +17,7 @@ from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
-from vdet.cli.messages import counted, files_bar, print_lines, print_message
+from vdet.cli.messages import batch_bar, counted, print_lines, print_message
 from vdet.cli.options import PATH, PROCESSES, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
@@ -163,12 +163,14 @@ def _output_names(job: VideoJob) -> str:
 
 def _run(plan: Plan, work: Work, origin: Origin, workers: Workers, *, quiet: bool) -> list[Record]:
     """Run the batch, print the result of each file, and return the records of those that failed."""
-    results = run_batch(plan, work, origin, workers=workers)
     failed = []
-    with files_bar(len(plan.jobs), quiet=quiet) as advance, closing(results):
+    sources = [job.source for job in plan.jobs]
+    with (
+        batch_bar(sources, by_size=not _is_limited(plan), quiet=quiet) as counts,
+        closing(run_batch(plan, work, origin, workers=workers, counts=counts)) as results,
+    ):
         for job, record in results:
             _print_result(job, record, quiet=quiet)
-            advance(record.frames or 0)
             if record.error:
                 failed.append(record)
     if not quiet:
@@ -178,6 +180,11 @@ def _run(plan: Plan, work: Work, origin: Origin, workers: Workers, *, quiet: boo
             f"{plan.manifest}: {counted(done, 'file')} done, {skipped}{len(failed)} failed"
         )
     return failed
+
+
+def _is_limited(plan: Plan) -> bool:
+    """Return whether about as many frames are read of a long video as of a short one."""
+    return any(job.frames is not None or job.end is not None for job in plan.jobs)
 
 
 def _origin(settings: Settings, model: Path | None) -> Origin:

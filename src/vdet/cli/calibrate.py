@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import print_lines
+from vdet.cli.messages import counted, print_lines, progress_steps
 from vdet.cli.options import PATH, overwrite_option
 from vdet.errors import OutputError
 from vdet.files import check_output
@@ -67,7 +67,9 @@ class PatternType(click.ParamType):  # type: ignore[type-arg]  # generic from cl
     help="Write every photograph into DIR, with its corners, and undistorted.",
 )
 @overwrite_option
+@click.pass_obj
 def calibrate(
+    quiet: bool,
     *,
     photos: tuple[Path, ...],
     output: Path,
@@ -86,7 +88,9 @@ def calibrate(
     check_output(output, overwrite=overwrite, inputs=found)
     if preview:
         check_previews(preview, found, overwrite=overwrite)
-    calibration = fit_camera(found, pattern)
+    with progress_steps("", quiet=quiet) as steps:
+        steps(f"searching {counted(len(found), 'photograph')}", None)
+        calibration = fit_camera(found, pattern)
     for skip in calibration.skipped:
         log.warning("%s: not used: %s", skip.path, skip.reason)
     save_camera(calibration.camera, output, overwrite=overwrite)

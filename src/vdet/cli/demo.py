@@ -2,20 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import print_lines, print_message, progress_bar
+from vdet.cli.messages import print_lines, print_message, progress_steps
 from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.files import check_output, make_folder
 from vdet.media.writer import may_replace_video
-from vdet.pipeline.loop import Progress, VideoJob, check_job, no_progress, run_video
+from vdet.pipeline.loop import Steps, VideoJob, check_job, no_steps, run_video
 from vdet.pipeline.sinks.protocol import Output
 from vdet.synthetic import demo_scene, write_clip, write_patches, write_truth
 
@@ -63,14 +64,14 @@ def demo(
     settings = read_settings(config_name, assignments)
     files = DemoFiles(folder)
     check_demo(files, overwrite=overwrite)
-    with progress_bar("", quiet=quiet) as progress:
+    with progress_steps("", quiet=quiet) as steps:
         result = run_demo(
             files,
             settings,
             seed=seed,
             overwrite=overwrite,
             report_step=(lambda _: None) if quiet else print_message,
-            progress=progress,
+            steps=steps,
         )
     for split in result.training.splits:
         print_lines(f"patches, {split.split} split: test accuracy {split.test_accuracy:.3f}")
@@ -170,7 +171,7 @@ def run_demo(
     seed: int = 1,
     overwrite: bool = False,
     report_step: Callable[[str], object] = lambda _: None,
-    progress: Progress = no_progress,
+    steps: Steps = no_steps,
 ) -> DemoResult:
     """Draw the data, train on them, detect in the clip, and compare with the truth.
 
@@ -182,8 +183,8 @@ def run_demo(
         Replace the files of an earlier demo.
     report_step
         Called with a line before each step.
-    progress
-        As `run_video` takes it, for the longer steps.
+    steps
+        Called at the start of each longer step.
     """
     from vdet.evaluate.predictions import read_predictions
     from vdet.evaluate.scores import score
@@ -192,6 +193,7 @@ def run_demo(
     from vdet.learn.training import train
 
     report_step(f"1/4 drawing {2 * PATCHES} patches and a road with vehicles …")
+    steps("drawing", None)
     write_patches(
         files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES, overwrite=overwrite
     )
@@ -200,13 +202,13 @@ def run_demo(
     write_truth(files.truth, scene, overwrite=overwrite)
     report_step("2/4 training …")
     patches = find_patches([files.patches])
-    model, report = train(patches, settings, progress=progress(len(patches)))
+    model, report = train(patches, settings, steps=steps)
     save_model(model, files.model, overwrite=overwrite)
     report.write(files.report, overwrite=overwrite)
     report_step("3/4 finding the vehicles …")
     job = replace(files.job, at=scene.frames / scene.rate / 2, overwrite=overwrite)
     detector = load_detector(settings.detector, files.model)
-    summary = run_video(job, detector, settings, progress=progress)
+    summary = run_video(job, detector, settings, progress=partial(steps, "frames"))
     report_step("4/4 comparing with the truth …")
     scores = score(read_predictions(files.tracks), read_truth(files.truth), rate=float(scene.rate))
     return DemoResult(report, scores, summary.frames, summary.seconds)

@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.command import Command
+from vdet.cli.messages import progress_bar
 from vdet.cli.options import (
     PATH,
     lane_options,
@@ -54,7 +55,9 @@ log = logging.getLogger("vdet")
 @model_option
 @settings_options("detector.stills.strength=0.2")
 @overwrite_option
+@click.pass_obj
 def detect_image(
+    quiet: bool,
     *,
     images: tuple[Path, ...],
     output: Path | None,
@@ -83,7 +86,10 @@ def detect_image(
     sources = find_images(images)
     check_sinks(shared, overwrite=overwrite, inputs=sources)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
-    failures = run_pictures(jobs, shared, model, settings, request, overwrite=overwrite)
+    with progress_bar(" pictures", quiet=quiet) as progress:
+        failures = run_pictures(
+            jobs, shared, model, settings, request, overwrite=overwrite, progress=progress
+        )
     for failure in failures:
         log.error("%s", failure)
     return failure_code(len(failures), len(jobs))

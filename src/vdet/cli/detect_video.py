@@ -3,13 +3,14 @@
 import shlex
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import click
 
 from vdet.cli.batch import BatchOptions, batch_options, output_options, process_batch
 from vdet.cli.command import Command
-from vdet.cli.messages import counted, print_message, progress_bar
+from vdet.cli.messages import counted, print_message, progress_steps
 from vdet.cli.options import (
     PATH,
     POSITIVE,
@@ -196,7 +197,9 @@ def _process_one(
 ) -> None:
     model = load_detector(settings.detector, model_path)
     check_job(job)
-    with progress_bar(" frames", quiet=quiet) as progress:
+    with progress_steps(" frames", quiet=quiet) as steps:
+        steps("opening", None)
+        progress = partial(steps, "")
         summary = run_video(job, model, settings, threads=threads, progress=progress)
     if not quiet:
         rate = summary.frames / summary.seconds

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import progress_bar
+from vdet.cli.messages import progress_steps
 from vdet.cli.options import (
     PATH,
     PROCESSES,
@@ -83,12 +83,12 @@ def patches(
     inputs = [*data, *([model_path] if model_path else [])]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
     files = find_patches(data)
-    with progress_bar("", quiet=quiet) as progress:
+    with progress_steps("", quiet=quiet) as steps:
         if model is None:
             chosen = [split for split in SPLITS if split in (splits or SPLITS)]
-            result = evaluate_splits(files, settings, chosen, jobs=jobs, progress=progress)
+            result = evaluate_splits(files, settings, chosen, jobs=jobs, steps=steps)
         else:
-            result = evaluate_model(files, model, settings, jobs=jobs, progress=progress)
+            result = evaluate_model(files, model, settings, jobs=jobs, steps=steps)
     name = RunName("svm", model_path, config_name, assignments)
     print_results(
         [run_line(name), *lines(result)],

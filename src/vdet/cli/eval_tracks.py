@@ -6,6 +6,7 @@ import click
 
 import vdet
 from vdet.cli.command import Command
+from vdet.cli.messages import progress_steps
 from vdet.cli.options import PATH, POSITIVE, print_results, results_options
 from vdet.evaluate.output import check_outputs
 
@@ -31,7 +32,9 @@ from vdet.evaluate.output import check_outputs
     help="Frames per second, for the number of false tracks per minute.",
 )
 @results_options
+@click.pass_obj
 def tracks(
+    quiet: bool,
     *,
     prediction: Path,
     truth: Path,
@@ -51,7 +54,9 @@ def tracks(
     from vdet.evaluate.report.video_page import video_page
 
     check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
-    run = score_files(prediction, truth, until=until, rate=rate)
+    with progress_steps("", quiet=quiet) as steps:
+        steps("comparing", None)
+        run = score_files(prediction, truth, until=until, rate=rate)
     print_results(
         run_lines([run]),
         plain_clip(run.clips[0]),

@@ -1,19 +1,27 @@
 """Standard error: lines, log records and progress bars that do not disturb one another."""
 
 import logging
+import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 from tqdm import tqdm
 
+from vdet.batch.progress import FrameCounts, batch_state, frame_counts
 from vdet.files import escaped
-from vdet.pipeline.loop import Advance, Progress
+from vdet.pipeline.loop import Advance, Progress, Steps
 
 if TYPE_CHECKING:
     from vdet.learn.network.training import TrainingState
+
+
+REFRESH_INTERVAL = 1.0  # seconds
+_BATCH_FORMAT = "{percentage:3.0f}%|{bar:10}| {n_fmt}/{total_fmt} frames [{elapsed}{postfix}]"
 
 
 def print_lines(*lines: str, err: bool = False) -> None:
@@ -57,30 +65,116 @@ def progress_bar(unit: str, *, quiet: bool) -> Iterator[Progress]:
 
     There is no bar where standard error is no terminal.
     """
+    with progress_steps(unit, quiet=quiet) as start:
+        yield lambda total: start("", total)
+
+
+@contextmanager
+def progress_steps(unit: str, *, quiet: bool) -> Iterator[Steps]:
+    """Give a function that ends the bar of the step before and starts one with a name.
+
+    A step without a total shows how long it has taken, and disappears at its end.
+    """
     with ExitStack() as stack:
 
-        def start(total: int | None) -> Advance:
-            bar = tqdm(total=total, unit=unit, disable=_disable(quiet), dynamic_ncols=True)
-            return stack.enter_context(bar).update
+        def start(what: str, total: int | None) -> Advance:
+            stack.close()
+            timed = total is None and bool(what)
+            bar = tqdm(
+                total=total,
+                desc=what or None,
+                unit=unit,
+                disable=_disable(quiet),
+                dynamic_ncols=True,
+                leave=not timed,
+                bar_format="{desc} [{elapsed}]" if timed else None,
+            )
+            stack.enter_context(bar)
+            stack.enter_context(_refreshed(bar))
+            return bar.update
 
         yield start
 
 
 @contextmanager
-def files_bar(total: int, *, quiet: bool) -> Iterator[Callable[[int], None]]:
-    """Give a function that counts a finished file and its frames; the bar shows frames/s."""
-    began = time.perf_counter()
-    frames = 0
-    with tqdm(total=total, unit=" files", disable=_disable(quiet), dynamic_ncols=True) as bar:
+def _refreshed(bar: "tqdm[Any]") -> Iterator[None]:
+    """Refresh a bar while nothing advances it, so that it shows that the program is at work."""
+    if bar.disable:
+        yield
+        return
+    with _repeated(bar.refresh):
+        yield
 
-        def advance(frames_of_file: int) -> None:
-            nonlocal frames
-            frames += frames_of_file
-            rate = frames / (time.perf_counter() - began)
-            bar.set_postfix_str(f"{rate:.1f} frames/s", refresh=False)
-            bar.update()
 
-        yield advance
+@contextmanager
+def _repeated(call: Callable[[], object]) -> Iterator[None]:
+    """Call a function in a thread, every `REFRESH_INTERVAL`."""
+    ended = threading.Event()
+
+    def repeat() -> None:
+        while not ended.wait(REFRESH_INTERVAL):
+            call()
+
+    thread = threading.Thread(target=repeat, name="vdet-progress", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+@contextmanager
+def batch_bar(
+    sources: Sequence[Path], *, by_size: bool, quiet: bool
+) -> Iterator[FrameCounts | None]:
+    """Give counts of frames to a batch of files, and show them in a bar with the running files.
+
+    Gives None where there is no bar, or no temporary file for the counts can be made.
+
+    Parameters
+    ----------
+    by_size
+        Whether to guess the frames of files that are not begun from their sizes in bytes.
+    """
+    with ExitStack() as stack:
+        bar = tqdm(disable=_disable(quiet), dynamic_ncols=True, bar_format=_BATCH_FORMAT)
+        stack.enter_context(bar)
+        counts = None
+        if not bar.disable:
+            with suppress(OSError):
+                counts = stack.enter_context(frame_counts(len(sources)))
+        if counts is not None:
+            sizes = [_size(path) if by_size else 1.0 for path in sources]
+            show = partial(_show_batch, bar, counts, sources, sizes, time.time())
+            stack.callback(show)
+            stack.enter_context(_repeated(show))
+        yield counts
+
+
+def _size(path: Path) -> float:
+    try:
+        return float(path.stat().st_size)
+    except OSError:
+        return 0.0
+
+
+def _show_batch(
+    bar: "tqdm[Any]",
+    counts: FrameCounts,
+    sources: Sequence[Path],
+    sizes: Sequence[float],
+    began: float,
+) -> None:
+    now = time.time()
+    state = batch_state(counts.rows(), sizes, began, now)
+    parts = [f"{state.done / max(now - began, 1e-3):.0f} frames/s"]
+    if state.seconds_left is not None:
+        parts.insert(0, f"{tqdm.format_interval(state.seconds_left)} left")
+    parts.append(f"{state.ended} of {counted(len(sources), 'file')}")
+    parts += [f"{escaped(sources[n].name)} {share:.0%}" for n, share in state.running]
+    bar.n, bar.total = state.done, state.total
+    bar.set_postfix_str(", ".join(parts))
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
-from vdet.cli.messages import print_lines
+from vdet.cli.messages import print_lines, progress_steps
 from vdet.config.loading import find_config, load_settings, shipped_configs
 from vdet.config.schema import Settings
 from vdet.evaluate.output import write_page
@@ -210,5 +210,7 @@ def print_results(
     if json_target is not None:
         write_json(values, json_target, overwrite=overwrite)
     if report is not None:
-        page = write_page(make_page(), report, overwrite=overwrite)
+        with progress_steps("", quiet=click.get_current_context().obj) as steps:
+            steps("writing the report", None)
+            page = write_page(make_page(), report, overwrite=overwrite)
         print_lines("", f"{page}: the report", err=to_stderr)

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import print_lines, progress_bar
+from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import (
     PATH,
     PROCESSES,
@@ -73,14 +73,14 @@ def train(
     if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
     files, boxed = find_patches(data), find_boxed(data)
-    with progress_bar(" patches", quiet=quiet) as start:
+    with progress_steps(" patches", quiet=quiet) as steps:
         model, report = fit_model(
             files,
             settings,
             boxed=boxed,
             jobs=jobs,
             scheduler=scheduler,
-            progress=start(len(files) + len(boxed)),
+            steps=steps,
         )
     save_model(model, output, overwrite=overwrite)
     report.write(report_path, overwrite=overwrite)

@@ -1,6 +1,6 @@
 """Where a vehicle's sides are, from the HOG of a window around it: linear ridge regression."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,11 +10,12 @@ from vdet.config.schema import Settings, TrainingSettings
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
 from vdet.geometry import BoolArray, Float32Array, Float64Array
-from vdet.learn.augmentation import augment, zoom_in
+from vdet.learn.augmentation import Augmenter, augment, zoom_in
 from vdet.learn.dataset import PatchFile, Sides
 from vdet.learn.extraction import LabelledVectors, SampleVectors, extract
 from vdet.learn.report import BoxError
 from vdet.learn.training_set import SplitName, hold_out, training_set
+from vdet.pipeline.loop import Steps, no_steps
 from vdet.workers import Workers
 
 _ASSUMED_SIDES: Sides = (-0.47, -0.40, 0.47, 0.42)
@@ -46,7 +47,7 @@ def extract_box_patches(
     settings: Settings,
     *,
     workers: Workers,
-    progress: Callable[[int], object],
+    steps: Steps = no_steps,
 ) -> BoxPatches | None:
     """Describe the patches that the regression uses besides `files`.
 
@@ -64,13 +65,18 @@ def extract_box_patches(
     if not with_boxes or not settings.svm.features.hog.channels:
         return None
     training = settings.training
-    describe = partial(
-        extract,
-        settings=settings.svm.features,
-        max_broken=training.max_broken,
-        seed=training.seed,
-        workers=workers,
-    )
+
+    def describe(some: Sequence[PatchFile], augmenter: Augmenter, step: str) -> LabelledVectors:
+        return extract(
+            some,
+            settings.svm.features,
+            max_broken=training.max_broken,
+            augmenter=augmenter,
+            seed=training.seed,
+            workers=workers,
+            progress=steps(step, len(some)),
+        )
+
     without_parts = training.augmentation.model_copy(update={"parts": 0.0})  # parts have no box
     augmenter = partial(augment, settings=without_parts)
     assumed = [
@@ -79,8 +85,8 @@ def extract_box_patches(
         if file.vehicle and file.source not in with_boxes and training.boxes.assumed
     ]
     return BoxPatches(
-        describe(boxed, augmenter=augmenter, progress=progress) if boxed else None,
-        describe(assumed, augmenter=zoom_in) if assumed else None,
+        describe(boxed, augmenter, "describing patches with boxes") if boxed else None,
+        describe(assumed, zoom_in, "describing vehicles again") if assumed else None,
     )
 
 

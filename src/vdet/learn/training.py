@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from functools import partial
 
@@ -22,6 +22,7 @@ from vdet.learn.extraction import LabelledVectors, extract
 from vdet.learn.fitting import fit_patches
 from vdet.learn.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
 from vdet.learn.training_set import SplitName, hold_out
+from vdet.pipeline.loop import Steps, no_steps
 from vdet.workers import make_workers
 
 _TIMED_PATCHES = 200
@@ -34,7 +35,7 @@ def train(
     boxed: Sequence[PatchFile] = (),
     jobs: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[int], object] = lambda _: None,
+    steps: Steps = no_steps,
 ) -> tuple[LinearModel, TrainingReport]:
     """Describe the patches, fit on the configured split, and on the other one for comparison.
 
@@ -47,8 +48,8 @@ def train(
         Processes, as joblib counts them: -1 for one per core.
     scheduler
         Address of a Dask scheduler whose workers describe the patches instead.
-    progress
-        Called with the number of patches described since the last call.
+    steps
+        Called at the start of each step, with the number of patches to describe or None.
 
     Returns
     -------
@@ -72,14 +73,15 @@ def train(
         workers=workers,
         augmenter=partial(augment, settings=training.augmentation),
         seed=training.seed,
-        progress=progress,
+        progress=steps("describing patches", len(files)),
     )
-    boxes = extract_box_patches(files, boxed, settings, workers=workers, progress=progress)
+    boxes = extract_box_patches(files, boxed, settings, workers=workers, steps=steps)
     extract_seconds = time.perf_counter() - began
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != training.split)
-    fitted = [_fit_split(data, boxes, settings, name) for name in names]
+    fitted = [_fit_split(data, boxes, settings, name, steps) for name in names]
     model = fitted[0][0]
+    steps("timing the classifier", None)
     report = TrainingReport(
         vehicles=int(np.count_nonzero(data.vehicle)),
         non_vehicles=int(np.count_nonzero(~data.vehicle)),
@@ -103,16 +105,22 @@ def train(
 
 
 def _fit_split(
-    data: LabelledVectors, boxes: BoxPatches | None, settings: Settings, name: SplitName
+    data: LabelledVectors,
+    boxes: BoxPatches | None,
+    settings: Settings,
+    name: SplitName,
+    steps: Steps,
 ) -> tuple[LinearModel, SplitReport]:
     training = settings.training
     held = hold_out(data.groups, name, training.test_fraction, training.seed)
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
+    steps(f"fitting the classifier, {name} split", None)
     model = fit_patches(data, ~held, settings)
     regression, error = None, None
     if boxes is not None:
+        steps(f"fitting the sides of boxes, {name} split", None)
         regression, error = fit_split_boxes(data, held, boxes, name, settings)
     seconds = time.perf_counter() - began
     predicted = model.probabilities(data.vectors) >= 0.5

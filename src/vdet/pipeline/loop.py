@@ -44,6 +44,15 @@ Advance = Callable[[int], object]
 Progress = Callable[[int | None], Advance]
 
 
+Steps = Callable[[str, int | None], Advance]
+"""A `Progress` for work in several steps: it gets the name of each step too."""
+
+
+def no_steps(_: str, __: int | None) -> Advance:
+    """Show no progress."""
+    return no_progress(None)
+
+
 def no_progress(_: int | None) -> Advance:
     """Show no progress."""
     return lambda _: None

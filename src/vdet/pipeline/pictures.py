@@ -18,6 +18,7 @@ from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
+from vdet.pipeline.loop import Progress, no_progress
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
@@ -103,11 +104,12 @@ def run_pictures(
     lanes: LaneRequest | None = None,
     *,
     overwrite: bool = False,
+    progress: Progress = no_progress,
 ) -> list[ImageError]:
     """Search pictures; return the errors of those that cannot be read or searched.
 
     The outputs of one picture appear together. The `shared` outputs, which get the results of all
-    pictures, appear at the end.
+    pictures, appear at the end. `progress` gets the number of pictures, and then each.
 
     Raises
     ------
@@ -119,11 +121,13 @@ def run_pictures(
         files = stack.enter_context(OutputFiles(overwrite=overwrite))
         context = SinkContext(files, settings)
         sinks = [stack.enter_context(open_sink(output, context)) for output in shared]
+        advance = progress(len(jobs))
         for job in jobs:
             try:
                 run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
             except ImageError as error:
                 failures.append(error)
+            advance(1)
     return failures
 
 

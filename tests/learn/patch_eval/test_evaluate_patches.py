@@ -39,18 +39,19 @@ def bright_and_dark(tmp_path: Path) -> Path:
 
 
 def test_each_split_is_tested_in_the_order_given(bright_and_dark: Path) -> None:
-    totals: list[int | None] = []
+    steps: list[tuple[str, int | None]] = []
 
-    def progress(total: int | None) -> Callable[[int], object]:
-        totals.append(total)
+    def start(what: str, total: int | None) -> Callable[[int], object]:
+        steps.append((what, total))
         return lambda _: None
 
     report = evaluate_splits(
-        find_patches([bright_and_dark]), SETTINGS, ("tail", "groups"), jobs=1, progress=progress
+        find_patches([bright_and_dark]), SETTINGS, ("tail", "groups"), jobs=1, steps=start
     )
     assert [trial.name for trial in report.trials] == ["tail", "groups"]
     assert [trial.scores.patches for trial in report.trials] == [8, 48]
-    assert totals == [48, 1 + 4], "patches to describe, then fits to make"
+    expected = [("describing patches", 48), ("fitting models", 1 + 4), ("computing scores", None)]
+    assert steps == expected
     assert [trial.scores.accuracy for trial in report.trials] == [1, 1]
 
 

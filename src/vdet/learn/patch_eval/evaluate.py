@@ -22,7 +22,7 @@ from vdet.learn.patch_eval.metrics import (
     reliability,
 )
 from vdet.learn.patch_eval.trials import Trial, TrialSplit, holdouts, model_trial, run_trial
-from vdet.pipeline.loop import Advance, Progress, no_progress
+from vdet.pipeline.loop import Advance, Steps, no_steps
 from vdet.workers import make_workers
 
 MOST_MISTAKES = 24
@@ -83,7 +83,7 @@ def evaluate_splits(
     splits: Sequence[TrialSplit],
     *,
     jobs: int | None = None,
-    progress: Progress = no_progress,
+    steps: Steps = no_steps,
 ) -> PatchReport:
     """Train for each split, and test on the patches that were held out.
 
@@ -91,9 +91,9 @@ def evaluate_splits(
     ----------
     jobs
         Processes that describe patches, as joblib counts them: -1 for one per core.
-    progress
-        Called with the number of patches to describe, then with the number of models to fit; what
-        it returns is called with the number done since the last call.
+    steps
+        Called at the start of each step, with the number of patches to describe, of models to fit,
+        or None; what it returns is called with the number done since the last call.
 
     Raises
     ------
@@ -101,11 +101,12 @@ def evaluate_splits(
         Too many patches are unreadable, or there are too few for a split.
     """
     augmenter = partial(augment, settings=settings.training.augmentation)
-    advance = progress(len(files))
+    advance = steps("describing patches", len(files))
     data = _extract(files, settings, settings.svm.features, jobs, advance, augmenter=augmenter)
     plans = [(split, holdouts(data, settings, split)) for split in splits]
-    advance = progress(sum(len(parts) for _, parts in plans))
+    advance = steps("fitting models", sum(len(parts) for _, parts in plans))
     trials = [run_trial(split, data, settings, parts, advance) for split, parts in plans]
+    steps("computing scores", None)
     return _report(files, data, [(trial, _MEANINGS[trial.name]) for trial in trials])
 
 
@@ -115,10 +116,12 @@ def evaluate_model(
     settings: Settings,
     *,
     jobs: int | None = None,
-    progress: Progress = no_progress,
+    steps: Steps = no_steps,
 ) -> PatchReport:
     """Test a ready model on all patches; parameters and errors as in `evaluate_splits`."""
-    data = _extract(files, settings, model.features, jobs, progress(len(files)))
+    advance = steps("describing patches", len(files))
+    data = _extract(files, settings, model.features, jobs, advance)
+    steps("computing scores", None)
     return _report(files, data, [(model_trial(data, model), _origin(model, data))])
 
 
