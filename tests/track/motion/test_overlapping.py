@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from vdet.geometry import Float64Array
-from vdet.track.motion.overlapping import are_hidden, is_part, is_same, shows_both, stretched
+from vdet.track.motion.overlapping import are_hidden, are_parts, is_same, shows_both, stretched
 
 
 def box(x: float, y: float, width: float, height: float) -> Float64Array:
@@ -62,9 +62,16 @@ def test_one_of_several_is_enough_and_none_is_not() -> None:
     assert not is_same(one, np.zeros((0, 4)))
 
 
-def test_a_part_lies_in_the_other_box_for_more_than_the_share() -> None:
-    assert is_part(box(0, 0, 20, 20), boxes(box(8, 0, 100, 60)), 0.59)
-    assert not is_part(box(0, 0, 20, 20), boxes(box(8, 0, 100, 60)), 0.6)
+def test_a_part_lies_in_a_box_that_scores_higher_for_more_than_the_share() -> None:
+    found = boxes(box(0, 0, 20, 20), box(8, 0, 100, 60))
+    assert are_parts(found, np.array([0.3, 0.9]), 0.59).tolist() == [True, False]
+    assert are_parts(found, np.array([0.3, 0.9]), 0.6).tolist() == [False, False]
+    assert are_parts(found, np.array([0.9, 0.3]), 0.59).tolist() == [False, False]
+
+
+def test_a_box_with_nearly_the_score_of_the_one_before_it_is_no_part() -> None:
+    found = boxes(box(0, 0, 20, 20), box(8, 0, 100, 60))
+    assert are_parts(found, np.array([0.65, 0.8]), 0.5).tolist() == [False, False]
 
 
 LEFT, RIGHT = box(100, 100, 80, 50), box(170, 100, 80, 70)

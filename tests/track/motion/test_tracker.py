@@ -8,6 +8,7 @@ from track.motion.scenes import (
     HEIGHT,
     WEAK,
     WIDTH,
+    Scored,
     detections,
     first_shown,
     follow,
@@ -194,6 +195,30 @@ def test_a_vehicle_that_comes_out_displaced_is_the_same_one() -> None:
     shown = follow(clip)
     assert id_at(shown[-1], beside) == id_at(shown[10], CAR)
     assert len(ids(shown)) == 2
+
+
+def test_weak_detections_on_the_nearer_vehicle_do_not_move_the_hidden_one() -> None:
+    arriving, hiding = moving(VAN, dx=6, frames=46), VAN.moved_to(370, 390)
+    parts: list[Scored] = [
+        (Box(400 - n // 2, 400 - n // 5, 100 + n, 70 + n), WEAK) for n in range(50)
+    ]
+    clip: list[list[Box] | list[Scored]] = [
+        *[[CAR, van] for van in arriving],
+        *[[(hiding, CLEAR), part] for part in parts],
+        *[[van] for van in moving(hiding, dx=6, frames=12)],
+        *[[van, CAR] for van in moving(hiding.moved_to(442, 390), dx=6, frames=10)],
+    ]
+    shown = follow(clip)
+    assert ids(shown) == {1, 2}
+    assert id_at(shown[-1], CAR) == id_at(shown[10], CAR)
+    assert id_at(shown[90], hiding) == id_at(shown[10], arriving[10])
+
+
+def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detected() -> None:
+    hiding, half = VAN.moved_to(200, 390), Box(310, 400, 110, 70)
+    assert half.intersection(hiding).area > DEFAULTS.part * half.area
+    shown = follow([*[[hiding]] * 10, *[[hiding, half]] * 6])
+    assert len(shown[-1]) == 2
 
 
 def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:

@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import Float64Array, iou_matrix, visible
-from vdet.track.motion.overlapping import is_part, is_same
+from vdet.track.motion.overlapping import are_parts, is_same
 from vdet.track.motion.vehicle import Vehicle
 
 Pairs = dict[int, int]
@@ -138,10 +138,11 @@ def _track_of_same(
     for other in others:
         if not other.confirmed or other.unseen:
             continue
-        box, there = visible(np.stack([vehicle.state.box, other.state.box]), size)
+        boxes = visible(np.stack([vehicle.state.box, other.state.box]), size)
+        scores = np.array([vehicle.detection_score, other.detection_score])
         weaker = vehicle.confirmed or vehicle.score <= other.score
-        part = not vehicle.confirmed and is_part(box, there[np.newaxis], settings.part)
-        if part or (weaker and is_same(box, there[np.newaxis])):
+        part = not vehicle.confirmed and are_parts(boxes, scores, settings.part)[0]
+        if part or (weaker and is_same(boxes[0], boxes[1:])):
             return other
     return None
 

@@ -19,6 +19,9 @@ _LEVEL_OVERLAP = 0.3
 _ALIKE = 0.5
 """Intersection over union from which on two boxes are of one vehicle, level or not."""
 
+_WEAKER = 0.8
+"""A part of a vehicle scores less than this share of the vehicle's score."""
+
 
 def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float) -> list[bool]:
     """Tell of each box whether another one covers more than `share` of it and is not farther.
@@ -48,9 +51,17 @@ def is_same(box: Float64Array, others: Float64Array) -> bool:
     return bool((alike | (level & (overlap > _LEVEL_OVERLAP))).any())
 
 
-def is_part(box: Float64Array, others: Float64Array, share: float) -> bool:
-    """Tell whether more than `share` of `box`, `(4,)`, lies in one of `others`, `(n, 4)`."""
-    return bool((coverage(box[np.newaxis], others) > share).any())
+def are_parts(boxes: Float64Array, scores: Float64Array, share: float) -> npt.NDArray[np.bool_]:
+    """Tell of each box, `(n, 4)`, whether more than `share` of it lies in one that scores higher.
+
+    A vehicle that comes out from behind another one has nearly the same score, and is no part.
+
+    Returns
+    -------
+    bool `(n,)`.
+    """
+    weaker = scores[:, np.newaxis] < _WEAKER * scores
+    return np.asarray(((coverage(boxes, boxes) > share) & weaker).any(axis=1))
 
 
 def around(boxes: Float64Array) -> Float64Array:
@@ -67,7 +78,8 @@ def shows_both(found: Float64Array, expected: Float64Array, share: float) -> boo
     """
     region = found[np.newaxis]
     alone, together = iou_matrix(region, np.stack([expected[0], around(expected)]))[0]
-    return is_part(expected[1], region, share) and bool(together > alone)
+    (inside,) = coverage(expected[1:], region)[0]
+    return bool(inside > share and together > alone)
 
 
 def stretched(box: Float64Array, before: Float64Array, after: Float64Array) -> Float64Array:

@@ -10,7 +10,7 @@ from vdet.detect.detections import Detections
 from vdet.geometry import Box, Float64Array, are_nested, to_sides, visible
 from vdet.media.images import Image
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
-from vdet.track.motion.overlapping import are_hidden, around, shows_both, stretched
+from vdet.track.motion.overlapping import are_hidden, are_parts, around, shows_both, stretched
 from vdet.track.motion.vehicle import Observation, Vehicle
 from vdet.track.track import Track
 
@@ -119,6 +119,10 @@ class MotionTracker:
         values[values < self._settings.overlap] = 0
         weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
+        scores = np.array([observation.score for observation in observations])
+        parts = are_parts(boxes, scores, self._settings.part)
+        hidden = np.flatnonzero(self._hidden(expected))
+        values[np.ix_(hidden, parts)] = 0  # these are parts of the vehicle that hides it
         return pair(values, [present, lost, new])
 
     def _adds_evidence(self, observation: Observation) -> bool:
