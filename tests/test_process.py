@@ -7,8 +7,10 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import cv2
 import pytest
 
+from red_cars import car_at, road
 from running import Running, names, start, write_drive
 from vdet.__main__ import leave_out_current_folder
 from vdet.evaluate.report.page import draw
@@ -160,3 +162,32 @@ def test_a_report_does_not_depend_on_settings_in_the_current_folder(tmp_path: Pa
     )
     assert done.stderr == ""
     assert done.stdout.rstrip() == draw(lambda axes: axes.plot([1, 2]), 3, 2).rstrip()
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["config"],
+        ["detect-image", "drive.png", "--json", "-"],
+        ["detect-video", "drive.mp4", "--no-video", "--tracks", "-"],
+    ],
+    ids=lambda command: command[0],
+)
+@pytest.mark.parametrize("full", [True, False], ids=["full", "closed"])
+def test_standard_output_that_takes_nothing_is_told_in_one_line(
+    command: list[str], full: bool, running: list[Running], tmp_path: Path
+) -> None:
+    write_drive(tmp_path / "drive.mp4", 2)
+    cv2.imwrite(str(tmp_path / "drive.png"), road(car_at(0)))
+
+    def lose_output() -> None:
+        os.chdir(tmp_path)
+        os.close(1)
+        if full:
+            os.open("/dev/full", os.O_WRONLY)
+
+    running.append(start(command, before=lose_output))
+    result = running[0].finish()
+    assert result.code == 1
+    assert "cannot be written" in result.err
+    assert result.err.count("\n") == 1

@@ -71,7 +71,7 @@ def in_one_line(error: Exception) -> str:
     if isinstance(error, VdetError):
         return str(error)
     if isinstance(error, OSError):
-        return f"{error.filename or 'input'}: {error.strerror or error}"
+        return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
     if isinstance(error, MemoryError):
         return "there is too little memory; end other programs, or raise the limit (ulimit -v)"
     text = " ".join(f"{type(error).__name__}: {error}".split())

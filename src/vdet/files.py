@@ -258,7 +258,9 @@ def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
     """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
     text = json.dumps(values, indent=2, allow_nan=False) + "\n"
     if target == "-":
-        sys.stdout.write(text)
+        with output_errors(Path("standard output")):
+            sys.stdout.write(text)
+            sys.stdout.flush()
         return
     with staged(Path(target), overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")

@@ -58,7 +58,7 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
 
     Save them, change what you like, and give the file to a command with -c.
     """
-    click.echo(render(read_settings(config_name, assignments)), nl=False)
+    print_lines(*render(read_settings(config_name, assignments)).splitlines())
 
 
 for _command in (calibrate, demo, detect_image, detect_video, info, mine, train, train_net):
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except (KeyboardInterrupt, click.Abort):
         sys.exit(_print_error(["interrupted"], INTERRUPTED))
     except BrokenPipeError:  # whoever read our output has ended
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_unwritten()
         sys.exit(1)
     except Exception as error:
         code = error.exit_code if isinstance(error, VdetError) else VdetError.exit_code
@@ -96,4 +96,13 @@ def _print_error(lines: Iterable[str], code: int) -> int:
     print_lines(*(f"vdet: {line}" for line in lines), err=True)
     if os.environ.get("VDET_DEBUG") == "1":
         traceback.print_exc()
+    _drop_unwritten()
     return code
+
+
+def _drop_unwritten() -> None:
+    """Drop what standard output does not take: Python would try it again as it ends."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

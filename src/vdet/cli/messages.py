@@ -13,7 +13,7 @@ import click
 from tqdm import tqdm
 
 from vdet.batch.progress import FrameCounts, batch_state, frame_counts
-from vdet.files import escaped
+from vdet.files import escaped, output_errors
 from vdet.pipeline.loop import Advance, Progress, Steps
 
 if TYPE_CHECKING:
@@ -28,8 +28,16 @@ def print_lines(*lines: str, err: bool = False) -> None:
     """Print each text as one line.
 
     Texts may have names of files in them: a name could forge a line, or control the terminal.
+
+    Raises
+    ------
+    BrokenPipeError
+        Whoever read standard output has ended.
+    OutputError
+        Standard output cannot be written for another reason.
     """
-    click.echo("\n".join(map(escaped, lines)), err=err)
+    with output_errors(Path("standard output")):
+        click.echo("\n".join(map(escaped, lines)), err=err)
 
 
 def print_message(line: str) -> None:

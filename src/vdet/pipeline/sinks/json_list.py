@@ -32,6 +32,7 @@ class JsonSink:
         text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
         if self._path == STANDARD_OUTPUT:
             sys.stdout.write(text)
+            sys.stdout.flush()
         else:
             self._context.files.stage(self._path).write_text(text, encoding="utf-8")
 

@@ -115,6 +115,8 @@ class TrackSink:
     def __exit__(self, *raised: object) -> None:
         if self._file is not None:
             self._file.close()
+        else:
+            sys.stdout.flush()
 
     def write(self, result: FrameResult) -> None:
         """Add the tracks of a frame, and its lane if the format has it."""
