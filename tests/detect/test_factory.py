@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
 
@@ -10,11 +11,11 @@ import pytest
 
 from vdet.config.detector import DetectorSettings
 from vdet.config.loading import load_settings
-from vdet.config.schema import FeatureSettings, Settings, SvmSettings
-from vdet.detect.factory import load_detector, model_file
+from vdet.config.schema import FeatureSettings, NetworkSettings, Settings, SvmSettings
+from vdet.detect.factory import learnt_from, load_detector, model_file
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
-from vdet.detect.svm.model import load_model
+from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ConfigError, ModelError
 
 OTHER = FeatureSettings(color_space="HSV")
@@ -61,6 +62,19 @@ class TestLinearModel:
         default = shipped_model(SvmSettings())
         with pytest.raises(ModelError, match="was trained with other features"):
             load_detector(SvmSettings(features=OTHER), default)
+
+    def test_the_names_of_the_data_that_the_shipped_models_have_seen_are_known(self) -> None:
+        settings = Settings().detector
+        names = learnt_from(settings, model_file(settings))
+        assert {"KITTI_extracted", "GTI_Far", "mined_project_video"} <= set(names)
+        assert learnt_from(settings, None) == ()
+        network = NetworkSettings()
+        assert {"idd", "project_video.mp4"} <= set(learnt_from(network, model_file(network)))
+
+    def test_a_model_file_need_not_say_what_it_was_trained_on(self, tmp_path: Path) -> None:
+        model = load_model(shipped_model(SvmSettings()))
+        save_model(replace(model, provenance={"report": []}), tmp_path / "a.npz")
+        assert learnt_from(SvmSettings(), tmp_path / "a.npz") == ()
 
     def test_a_missing_model_file_is_named(self, tmp_path: Path) -> None:
         with pytest.raises(ModelError, match=r"none\.npz: cannot be read"):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import OutputError
-from vdet.evaluate.output import check_outputs, share, table, write_page
+from vdet.evaluate.output import RunName, check_outputs, run_lines, share, table, write_page
 from vdet.files import write_json
 
 
@@ -19,6 +19,13 @@ def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
 
 def test_a_table_without_rows_is_its_headings() -> None:
     assert table(("name", "n"), []) == ["name  n"]
+
+
+def test_a_run_says_what_its_model_was_trained_on_where_that_is_known() -> None:
+    first, second = run_lines(RunName("net", Path("x/a.onnx"), None, ("b=1",), ("idd", "uk")))
+    assert first.endswith(", detector net, model a.onnx, settings default b=1")
+    assert second == "trained on idd, uk"
+    assert len(run_lines(RunName("net", Path("x/a.onnx"), None, ()))) == 1
 
 
 def test_a_missing_share_is_a_dash() -> None:

@@ -14,9 +14,9 @@ from vdet.cli.options import (
     results_options,
     settings_options,
 )
-from vdet.detect.svm.kind import requested_features
+from vdet.detect.svm.kind import learnt_from, requested_features
 from vdet.detect.svm.model import load_model
-from vdet.evaluate.output import RunName, check_outputs, plain_run, run_line
+from vdet.evaluate.output import RunName, check_outputs, plain_run, run_lines
 from vdet.learn.dataset import find_patches
 
 
@@ -89,9 +89,10 @@ def patches(
             result = evaluate_splits(files, settings, chosen, jobs=jobs, steps=steps)
         else:
             result = evaluate_model(files, model, settings, jobs=jobs, steps=steps)
-    name = RunName("svm", model_path, config_name, assignments)
+    learnt = learnt_from(model_path) if model_path else ()
+    name = RunName("svm", model_path, config_name, assignments, learnt)
     print_results(
-        [run_line(name), *lines(result)],
+        [*run_lines(name), *lines(result)],
         plain_run(name) | plain(result),
         lambda: patch_page(result, name),
         json_target=json_target,

@@ -50,7 +50,7 @@ def tracks(
     labels or CVAT for video 1.1.
     """
     from vdet.evaluate.clips.evaluate import score_files
-    from vdet.evaluate.clips.text import plain_clip, run_lines
+    from vdet.evaluate.clips.text import plain_clip, result_lines
     from vdet.evaluate.report.video_page import video_page
 
     check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
@@ -58,7 +58,7 @@ def tracks(
         steps("comparing", None)
         run = score_files(prediction, truth, until=until, rate=rate)
     print_results(
-        run_lines([run]),
+        result_lines([run]),
         plain_clip(run.clips[0]),
         lambda: video_page([run], f"compared with {truth} by vdet {vdet.__version__}"),
         json_target=json_target,

@@ -17,8 +17,8 @@ from vdet.cli.options import (
     settings_options,
     sink_option,
 )
-from vdet.detect.factory import load_detector, model_file
-from vdet.evaluate.output import RunName, check_outputs, run_line
+from vdet.detect.factory import learnt_from, load_detector, model_file
+from vdet.evaluate.output import RunName, check_outputs, run_lines
 from vdet.pipeline.sinks.protocol import check_sinks
 
 
@@ -82,7 +82,7 @@ def video(
     from vdet.evaluate.clips.clip import Variant, open_clip
     from vdet.evaluate.clips.evaluate import evaluate_clips
     from vdet.evaluate.clips.sweep import grid, with_values_in_force
-    from vdet.evaluate.clips.text import plain, run_lines
+    from vdet.evaluate.clips.text import plain, result_lines
     from vdet.evaluate.report.video_page import video_page
 
     if len(videos) != len(truths):
@@ -105,11 +105,12 @@ def video(
     with progress_bar(" frames", quiet=quiet) as progress:
         runs = evaluate_clips(clips, variants, progress, outputs=outputs, overwrite=overwrite)
     first = variants[0].settings.detector
-    name = RunName(first.kind, model_file(first, model_path), config_name, assignments)
+    file = model_file(first, model_path)
+    name = RunName(first.kind, file, config_name, assignments, learnt_from(first, file))
     print_results(
-        [run_line(name), *run_lines(runs)],
+        [*run_lines(name), *result_lines(runs)],
         plain(runs, name),
-        lambda: video_page(runs, run_line(name)),
+        lambda: video_page(runs, "; ".join(run_lines(name))),
         json_target=json_target,
         report=report,
         overwrite=overwrite,

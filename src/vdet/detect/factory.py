@@ -14,6 +14,11 @@ def _no_model(_: Any) -> None:
     """Say that a kind needs no model file."""
 
 
+def _nothing(_: Path) -> tuple[str, ...]:
+    """Say that a model file does not tell what it was trained on."""
+    return ()
+
+
 @dataclass(frozen=True, slots=True)
 class DetectorKind:
     """What is registered under the name of a kind of detector.
@@ -26,11 +31,14 @@ class DetectorKind:
         Loads it from its settings and a model file; None stands for the shipped file.
     shipped
         Returns the shipped model file for some settings; None where the kind needs no file.
+    learnt_from
+        Returns the names of the data that a model file was trained on, as far as it says.
     """
 
     settings: type[DetectorSettings]
     load: Callable[[Any, Path | None], DetectorModel]
     shipped: Callable[[Any], Path | None] = _no_model
+    learnt_from: Callable[[Path], tuple[str, ...]] = _nothing
 
 
 def load_detector(settings: DetectorSettings, model: Path | None = None) -> DetectorModel:
@@ -49,6 +57,11 @@ def load_detector(settings: DetectorSettings, model: Path | None = None) -> Dete
 def model_file(settings: DetectorSettings, model: Path | None = None) -> Path | None:
     """Return the model file that `load_detector` would read; None for a detector without one."""
     return model or _kind(settings).shipped(settings)
+
+
+def learnt_from(settings: DetectorSettings, path: Path | None) -> tuple[str, ...]:
+    """Return the names of the data that a model file was trained on, as far as it says."""
+    return _kind(settings).learnt_from(path) if path else ()
 
 
 def _kind(settings: DetectorSettings) -> DetectorKind:

@@ -18,19 +18,27 @@ ABSENT = "–"
 
 @dataclass(frozen=True, slots=True)
 class RunName:
-    """Which detector was measured: its kind, model file, file of settings and changes to them."""
+    """Which detector was measured.
+
+    Its kind, model file, file of settings and changes to them, and the names of the data that the
+    model was trained on, as far as its file says.
+    """
 
     kind: str
     model: Path | None
     config: str | None
     assignments: tuple[str, ...]
+    learnt_from: tuple[str, ...] = ()
 
 
-def run_line(run: RunName) -> str:
-    """Return which detector was measured."""
+def run_lines(run: RunName) -> list[str]:
+    """Return which detector was measured, and what its model was trained on."""
     model = f", model {run.model.name}" if run.model else ""
     settings = " ".join([run.config or "default", *run.assignments])
-    return f"vdet {vdet.__version__}, detector {run.kind}{model}, settings {settings}"
+    lines = [f"vdet {vdet.__version__}, detector {run.kind}{model}, settings {settings}"]
+    if run.learnt_from:
+        lines.append(f"trained on {', '.join(run.learnt_from)}")
+    return lines
 
 
 def plain_run(run: RunName) -> dict[str, Any]:
@@ -41,6 +49,7 @@ def plain_run(run: RunName) -> dict[str, Any]:
         "model": str(run.model) if run.model else None,
         "config": run.config or "default",
         "set": list(run.assignments),
+        "trained_on": list(run.learnt_from),
     }
 
 

@@ -25,10 +25,10 @@ _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
     """A two-class linear SVM as a scikit-learn estimator.
 
-    `vectors` is float32 `(n, features)`. The methods take numbers of its rows, ascending, so that a
-    cross-validation copies only the vectors that it fits on. `C` is the penalty of the errors,
-    `max_iter` the most iterations of the solver. `fit` warns with `ConvergenceWarning` if they are
-    not enough. It takes no sample weights.
+    `vectors` is float32 `(n, features)`. The methods take numbers of its rows, each once,
+    so that a cross-validation copies no vectors. `C` is the penalty of the errors, `max_iter` the
+    most iterations of the solver. `fit` warns with `ConvergenceWarning` if they are not enough. It
+    takes no sample weights.
     """
 
     def __init__(self, vectors: Float32Array, C: float = 1.0, max_iter: int = 1000) -> None:
@@ -41,13 +41,15 @@ class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit
 
     def fit(self, rows: RowNumbers, y: BoolArray) -> "LinearSvm":
         """Fit to some rows, with labels `y`, bool `(m,)`."""
-        signs = np.where(y, 1, -1).astype(np.float32)
-        x = self.vectors if len(rows) == len(self.vectors) else self.vectors[rows]
+        x = self.vectors  # all of them: a copy of some would take their memory again
+        signs = np.zeros(len(x), np.float32)
+        signs[rows] = np.where(y, 1, -1)
+        used = abs(signs)
         scale = 1 / (self.C * len(y))  # the loss of zero weights becomes 1
 
         def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
             weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
-            errors = np.maximum(0, 1 - signs * (x @ weights + bias))
+            errors = np.maximum(0, used - signs * (x @ weights + bias))
             slopes = -2 * self.C * (errors * signs)
             gradient = parameters + np.append(slopes @ x, slopes.sum())
             squares = float(np.square(errors, dtype=np.float64).sum())

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from vdet.evaluate.clips.evaluate import RunResult, best, score_files, score_video, total
-from vdet.evaluate.clips.text import plain, run_lines, sweep_rows
+from vdet.evaluate.clips.text import plain, result_lines, sweep_rows
 from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
 from vdet.evaluate.output import RunName
 from vdet.evaluate.report.video_page import video_page
@@ -31,20 +31,20 @@ def test_the_total_counts_the_boxes_of_all_clips() -> None:
 
 
 def test_several_clips_have_a_row_each_and_a_total() -> None:
-    lines = list(run_lines([run((), TEN, range(1, 6))]))
+    lines = list(result_lines([run((), TEN, range(1, 6))]))
     assert [line.split("  ")[0] for line in lines[1:4]] == ["clip 0", "clip 1", "total"]
     assert any(line.startswith("largest of 1 losses in clip 1") for line in lines)
 
 
 def test_a_single_clip_needs_no_total() -> None:
-    assert not any(line.startswith("total") for line in run_lines([run((), TEN)]))
+    assert not any(line.startswith("total") for line in result_lines([run((), TEN)]))
 
 
 def test_a_sweep_has_a_row_for_each_setting_and_names_the_best() -> None:
     runs = [run(("a=1", "b=2"), range(1, 6)), run(("a=2", "b=2"), TEN)]
     assert [row[0] for row in sweep_rows(runs)] == ["a=1 b=2", "a=2 b=2"]
     assert best(runs) is runs[1]
-    assert list(run_lines(runs))[-1] == "best F1: a=2 b=2 (1.000)"
+    assert list(result_lines(runs))[-1] == "best F1: a=2 b=2 (1.000)"
 
 
 def test_plain_values_of_one_run_and_of_a_sweep() -> None:
@@ -63,7 +63,7 @@ def test_only_frames_that_the_truth_covers_are_compared_and_the_others_are_told(
     covered = score_files(found, truth)
     assert (covered.total.false_positives, covered.clips[0].left_out) == (0, 10)
     told = f"{found}: frames 1–10 compared; left out: 10 boxes found in later ones"
-    assert told in run_lines([covered])
+    assert told in result_lines([covered])
     assert told in video_page([covered], "")
     longer = score_files(found, truth, until=15)
     assert (longer.total.false_positives, longer.clips[0].left_out) == (5, 5)

@@ -48,4 +48,13 @@ def requested_features(settings: SvmSettings) -> FeatureSettings | None:
     return None if settings.features == FeatureSettings() else settings.features
 
 
-SVM = DetectorKind(SvmSettings, load_svm, shipped_model)
+def learnt_from(path: Path) -> tuple[str, ...]:
+    """Return the names of the groups of patches that a linear model was trained on."""
+    try:
+        groups = load_model(path).provenance["report"]["groups"]
+        return tuple(dict.fromkeys(str(group).rpartition("/")[2] for group in groups))
+    except (LookupError, TypeError):
+        return ()
+
+
+SVM = DetectorKind(SvmSettings, load_svm, shipped_model, learnt_from)

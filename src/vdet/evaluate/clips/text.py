@@ -26,7 +26,7 @@ def key_figures(scores: Scores) -> list[str]:
     return [*ratios, str(scores.id_switches), str(scores.false_tracks)]
 
 
-def run_lines(runs: Sequence[RunResult]) -> Iterator[str]:
+def result_lines(runs: Sequence[RunResult]) -> Iterator[str]:
     """Yield runs as lines: one run in full, several (a sweep) with a row each."""
     if len(runs) > 1:
         yield from sweep_lines(runs)

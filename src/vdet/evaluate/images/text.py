@@ -7,7 +7,7 @@ from typing import Any
 from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.labelled import LabelledImages
 from vdet.evaluate.images.scores import SIZE_NAMES, ImageScores, SizeScores
-from vdet.evaluate.output import ABSENT, RunName, plain_run, run_line, share, table
+from vdet.evaluate.output import ABSENT, RunName, plain_run, run_lines, share, table
 from vdet.files import printable
 
 HEADINGS = (
@@ -21,7 +21,7 @@ _MOST_OTHERS = 8  # labels that are named
 
 def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
     """Yield the detector, what counted, and the scores of each source."""
-    yield run_line(run)
+    yield from run_lines(run)
     yield counting_line(result)
     yield ""
     yield from table(HEADINGS, rows(result))

@@ -21,7 +21,7 @@ from vdet.evaluate.images.text import (
     size_rows,
 )
 from vdet.evaluate.matching import match
-from vdet.evaluate.output import RunName, run_line, share
+from vdet.evaluate.output import RunName, run_lines, share
 from vdet.evaluate.report.page import (
     COLORS,
     SOFT,
@@ -53,7 +53,7 @@ def images_page(result: ImagesResult, run: RunName) -> str:
 
     Needs matplotlib. Raises `ImageError` if a picture can no longer be read.
     """
-    subtitle = f"{run_line(run)}; {counting_line(result)}"
+    subtitle = "; ".join([*run_lines(run), counting_line(result)])
     return page("vdet: vehicles in pictures", subtitle, _sections(result))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from vdet.evaluate.output import RunName, run_line, share
+from vdet.evaluate.output import RunName, run_lines, share
 from vdet.evaluate.report.page import (
     COLORS,
     INK,
@@ -38,7 +38,7 @@ _CHART_SIDE = 3.55  # inches
 def patch_page(report: PatchReport, run: RunName) -> str:
     """Return the report as HTML."""
     patches = f"{report.vehicles} patches of vehicles, {report.non_vehicles} of other things"
-    subtitle = f"{patches}; {run_line(run)}"
+    subtitle = "; ".join([patches, *run_lines(run)])
     return page("vdet: the classifier", subtitle, _sections(report))
 
 
