@@ -174,7 +174,7 @@ class _Run:
     def save(self, path: Path) -> None:
         """Write the state to a file."""
         state = {
-            "settings": self._settings.model_dump(),
+            "settings": self._learnt_with(),
             "step": self.step,
             "network": self._network.state_dict(),
             "averaged": self.averaged.state_dict(),
@@ -183,11 +183,15 @@ class _Run:
         with OutputFiles(overwrite=True) as files:
             torch.save(state, files.stage(path))
 
+    def _learnt_with(self) -> dict[str, Any]:
+        """Return the settings without those that change no weight."""
+        return self._settings.model_dump(exclude={"score"})
+
     def restore(self, path: Path) -> None:
         """Go on from a file that `save` has written. Raises `DataError`."""
         try:
             state: dict[str, Any] = torch.load(path, weights_only=True)
-            same = state["settings"] == self._settings.model_dump()
+            same = state["settings"] == self._learnt_with()
             self._network.load_state_dict(state["network"])
             self.averaged.load_state_dict(state["averaged"])
             self._optimizer.load_state_dict(state["optimizer"])
