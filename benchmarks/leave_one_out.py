@@ -7,7 +7,7 @@ Results are kept in the folder `--work`; a run that was stopped goes on from the
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -17,10 +17,11 @@ from sklearn.linear_model import LogisticRegression
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
+from vdet.evaluate.comparison import pool
+from vdet.evaluate.detection_metrics import rank_predictions
 from vdet.evaluate.images.evaluate import ImagesResult, evaluate_images
 from vdet.evaluate.images.reading import read_labelled_images
-from vdet.evaluate.images.scores import Counting
-from vdet.evaluate.matching import match
+from vdet.evaluate.images.scores import Counting, Source
 from vdet.geometry import BoolArray, Float64Array
 from vdet.learn.network.run import NetworkJob, train_to_file
 from vdet.learn.network.sources import LabelledClip
@@ -40,61 +41,32 @@ LEAST_WIDTH = 0.03
 _LEAST_SCORE = 0.02
 
 
-@dataclass(frozen=True, slots=True)
-class GroupResult:
-    """What one training reached on the sets that it has not seen.
-
-    `logits` and `right` tell of each detection its output, and whether it finds a vehicle.
-    """
-
-    names: tuple[str, ...]
-    f1: tuple[float | None, ...]
-    best_scores: tuple[float | None, ...]
-    ap50: tuple[float | None, ...]
-    logits: tuple[float, ...]
-    right: tuple[bool, ...]
-
-
-def run_group(
+def train_without(
     group: Sequence[str], roads: Path, clip: LabelledClip, settings: Settings, work: Path
-) -> GroupResult:
-    """Train without a group and search it."""
-    names = sorted(path.name for path in roads.iterdir() if path.is_dir())
+) -> Path:
+    """Train on the clip and all sets but those of a group; return the file of the network."""
     output = work / f"without_{group[0]}.onnx"
     if not output.exists():
+        names = sorted(path.name for path in roads.iterdir() if path.is_dir())
         learnt = tuple(roads / name for name in names if name not in group)
         job = NetworkJob(learnt, (clip,), output)
         train_to_file(job, settings.network, progress=lambda state: _print_step(group, state.step))
+    return output
+
+
+def measure(group: Sequence[str], roads: Path, network: Path) -> ImagesResult:
+    """Search the sets of a group."""
     detector = NetworkSettings(least=_LEAST_SCORE).showing_all()
-    counting = Counting(_LEAST_SCORE, LEAST_WIDTH, detector.classes)
+    counting = Counting(detector.shown_score, LEAST_WIDTH, detector.classes)
     sets = [read_labelled_images(roads / name) for name in group]
-    model = load_detector(detector, output)
-    result = evaluate_images(sets, model, counting, threads=core_count())
-    scores = [source.scores for source in result.sources]
-    logits, right = _detections(result)
-    return GroupResult(
-        tuple(group),
-        tuple(each.best_f1 for each in scores),
-        tuple(each.best_score for each in scores),
-        tuple(each.ap50 for each in scores),
-        tuple(np.round(logits, 4).tolist()),
-        tuple(right.tolist()),
-    )
+    return evaluate_images(sets, load_detector(detector, network), counting, threads=core_count())
 
 
-def _detections(result: ImagesResult) -> tuple[Float64Array, BoolArray]:
-    """Return the output of the network for each detection that counts, and whether it is right."""
-    logits: list[float] = []
-    right: list[bool] = []
-    for source in result.sources:
-        for image in source.images:
-            for frame in match(image.compare(_LEAST_SCORE)):
-                scores = np.clip(frame.frame.scores, 1e-6, 1 - 1e-6)
-                logits += np.log(scores / (1 - scores)).tolist()
-                hits = np.zeros(len(scores), np.bool_)
-                hits[frame.track_rows] = True
-                right += hits.tolist()
-    return np.array(logits), np.array(right, np.bool_)
+def ranked_logits(sources: Sequence[Source]) -> tuple[Float64Array, BoolArray]:
+    """Return the output of the network for each detection, and whether it finds a vehicle."""
+    ranked = [rank_predictions(pool([i.compare(0) for i in each.images])) for each in sources]
+    scores = np.clip(np.concatenate([each.scores for each in ranked]), 1e-6, 1 - 1e-6)
+    return np.log(scores / (1 - scores)), np.concatenate([each.right[0] for each in ranked])
 
 
 def fit_calibration(logits: Float64Array, right: BoolArray) -> tuple[float, float]:
@@ -121,33 +93,89 @@ def main() -> None:
     clip = LabelledClip(arguments.video, arguments.truth, settings.network.every)
     results = []
     for group in GROUPS:
-        results.append(run_group(group, arguments.roads, clip, settings, arguments.work))
-        print(_line(results[-1]), flush=True)
-    print(_summary(results))
+        network = train_without(group, arguments.roads, clip, settings, arguments.work)
+        results.append(measure(group, arguments.roads, network))
+        print(f"without {', '.join(group)}: {results[-1].mean.best_f1:.3f}", flush=True)
+    summary = summarize(results)
+    print("\n".join(summary.lines()))
     path = arguments.work / "results.json"
-    path.write_text(json.dumps([asdict(each) for each in results]), encoding="utf-8")
+    path.write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
 
 
-def _line(result: GroupResult) -> str:
-    parts = [
-        f"{name}: best F1 {f1:.3f} at {score:.2f}, AP50 {ap50:.3f}"
-        for name, f1, score, ap50 in zip(
-            result.names, result.f1, result.best_scores, result.ap50, strict=True
+@dataclass(frozen=True, slots=True)
+class SetScores:
+    """Of a set that the network has not seen: F1 at the common score, and at its own best one."""
+
+    name: str
+    vehicles: int
+    f1: float
+    best_f1: float | None
+    best_score: float | None
+    ap50: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The scores of all sets with vehicles, their means, and the calibration of the scores.
+
+    `score` is the score, as the networks give it, at which the mean F1 of the groups is highest.
+    """
+
+    sets: tuple[SetScores, ...]
+    score: float
+    mean_f1: float
+    mean_best_f1: float
+    slope: float
+    offset: float
+
+    def lines(self) -> Iterator[str]:
+        """Yield the summary as lines of text."""
+        for each in self.sets:
+            yield (
+                f"{each.name:<20} {each.vehicles:5d} vehicles  F1 {each.f1:.3f}  "
+                f"best {each.best_f1:.3f} at {each.best_score:.2f}  AP50 {each.ap50:.3f}"
+            )
+        yield (
+            f"mean F1 of the groups {self.mean_f1:.3f} at score {self.score:.2f}; "
+            f"each at its best score {self.mean_best_f1:.3f}"
         )
-        if f1 is not None and score is not None and ap50 is not None
-    ]
-    return "; ".join(parts)
+        yield f"network.score.slope={self.slope:.3f} network.score.offset={self.offset:.3f}"
 
 
-def _summary(results: Sequence[GroupResult]) -> str:
-    means = [float(np.mean([f1 for f1 in result.f1 if f1 is not None])) for result in results]
-    logits = np.array([each for result in results for each in result.logits])
-    right = np.array([each for result in results for each in result.right])
-    slope, offset = fit_calibration(logits, right)
-    return (
-        f"mean of {len(means)} groups: best F1 {np.mean(means):.3f}\n"
-        f"calibration of scores: network.score.slope={slope:.3f} network.score.offset={offset:.3f}"
+def summarize(results: Sequence[ImagesResult]) -> Summary:
+    """Return the scores at one score for all groups, and fit the calibration to all detections."""
+    sources = [source for result in results for source in result.sources]
+    scores = np.unique(np.concatenate([source.curve.scores for source in sources]))
+    means = np.mean([_group_f1(result, scores) for result in results], axis=0)
+    common = scores[np.argmax(means)]
+    slope, offset = fit_calibration(*ranked_logits(sources))
+    bests = [result.mean.best_f1 for result in results if result.mean.best_f1 is not None]
+    return Summary(
+        sets=tuple(
+            SetScores(
+                Path(labelled.name).name,
+                source.scores.vehicles,
+                float(source.curve.at(common)),
+                source.scores.best_f1,
+                source.scores.best_score,
+                source.scores.ap50,
+            )
+            for result in results
+            for labelled, source in zip(result.sets, result.sources, strict=True)
+            if source.scores.vehicles
+        ),
+        score=float(common),
+        mean_f1=float(means.max()),
+        mean_best_f1=float(np.mean(bests)),
+        slope=slope,
+        offset=offset,
     )
+
+
+def _group_f1(result: ImagesResult, scores: Float64Array) -> Float64Array:
+    """Return the mean F1 of the sets with vehicles at each of `scores`."""
+    curves = [source.curve for source in result.sources if source.scores.vehicles]
+    return np.asarray(np.mean([curve.at(scores) for curve in curves], axis=0))
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import ImageError, OutputError, in_one_line
+from vdet.media import VideoReader
 from vdet.media.images import (
     Image,
     capture_stderr,
@@ -152,6 +153,20 @@ def test_the_size_alone_is_that_of_the_picture_upright(tmp_path: Path, orientati
     path.write_bytes(turned_jpeg(smooth(), orientation))
     height, width = read_image(path).shape[:2]
     assert read_size(path) == (width, height)
+
+
+@pytest.mark.parametrize("orientation", range(10))
+def test_numbered_photographs_are_as_upright_as_each_alone(
+    tmp_path: Path, orientation: int
+) -> None:
+    for number in (1, 2):
+        (tmp_path / f"{number}.jpg").write_bytes(turned_jpeg(smooth(), orientation))
+    expected = read_image(tmp_path / "1.jpg")
+    with VideoReader(tmp_path / "%d.jpg") as reader:
+        frames = [frame.image for frame in reader]
+    assert len(frames) == 2
+    for image in frames:
+        np.testing.assert_allclose(image, expected, atol=12)
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,12 @@ class Orientation:
     rotation: int = 0
     mirrored: bool = False
 
+    @classmethod
+    def of_exif(cls, number: int) -> "Orientation":
+        """Return the orientation of a number, 1 to 8, in EXIF data (CIPA DC-008, 4.6.4)."""
+        rotation = (0, 0, 180, 180, 90, 270, 270, 90)[number - 1]
+        return cls(rotation, mirrored=number in (2, 4, 5, 7))
+
 
 @dataclass(frozen=True, slots=True)
 class Tags:

@@ -1,4 +1,6 @@
-"""The size that the header of a picture file claims, read before the picture is decoded.
+"""The size and the orientation that the header of a picture file claims.
+
+They are read before the picture is decoded.
 
 A decompression bomb is a file of a few kilobytes that claims gigabytes of pixels. Decoders set
 memory aside for what a header claims, so it is read here first, in the way that they read it.
@@ -11,10 +13,12 @@ from collections.abc import Callable, Set
 _MAX_TIFF_TAGS = 4096  # as in libtiff
 _TIFF_WIDTH, _TIFF_HEIGHT, _TIFF_ORIENTATION = 256, 257, 274
 _TIFF_INTEGERS = {1: "B", 3: "H", 4: "I", 6: "b", 8: "h", 9: "i", 16: "Q", 17: "q"}
+_JPEG = b"\xff\xd8\xff"
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 _JPEG_WITHOUT_LENGTH = frozenset({0x00, 0x01, *range(0xD0, 0xD8)})
 _JPEG_EXIF, _EXIF = 0xE1, b"Exif\0\0"
-_TURNED = range(5, 9)  # the orientations that are turned by a quarter
+_ORIENTATIONS = range(1, 9)
+_TURNED = range(5, 9)  # by a quarter
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:
@@ -39,9 +43,25 @@ def _png(data: bytes) -> tuple[int, int]:
     return width, height
 
 
+def exif_orientation(data: bytes) -> int:
+    """Return the orientation, 1 to 8, that the EXIF data of a JPEG file give; 1 for none."""
+    if data.startswith(_JPEG):
+        with contextlib.suppress(struct.error, LookupError, OverflowError, ValueError):
+            return _jpeg_header(data)[2]
+    return 1
+
+
 def _jpeg(data: bytes) -> tuple[int, int]:
-    """Find the first start of a frame (ITU-T T.81, annex B), past the segments before it."""
-    position, is_turned = 2, False
+    width, height, orientation = _jpeg_header(data)
+    return (height, width) if orientation in _TURNED else (width, height)
+
+
+def _jpeg_header(data: bytes) -> tuple[int, int, int]:
+    """Return width and height as coded, and the orientation.
+
+    They stand in the first start of a frame (ITU-T T.81, annex B) and in a segment before it.
+    """
+    position, orientation = 2, 1
     while True:
         position = data.index(b"\xff", position)
         while data[position] == 0xFF:
@@ -50,20 +70,21 @@ def _jpeg(data: bytes) -> tuple[int, int]:
         position += 1
         if marker in _JPEG_FRAMES:
             height, width = struct.unpack_from(">HH", data, position + 3)
-            return (height, width) if is_turned else (width, height)
+            return width, height, orientation
         if marker not in _JPEG_WITHOUT_LENGTH:
             (length,) = struct.unpack_from(">H", data, position)
             segment = data[position + 2 : position + length]
             if marker == _JPEG_EXIF and segment.startswith(_EXIF):
-                is_turned = _is_turned(segment[len(_EXIF) :])
+                orientation = _orientation(segment[len(_EXIF) :])
             position += max(2, length)
 
 
-def _is_turned(exif: bytes) -> bool:
-    """Tell whether EXIF data, which are a TIFF file, turn the picture by a quarter."""
+def _orientation(exif: bytes) -> int:
+    """Return the orientation in EXIF data, which are a TIFF file; 1 where there is no valid one."""
     with contextlib.suppress(struct.error, LookupError, ValueError):
-        return _tiff_tags(exif, {_TIFF_ORIENTATION})[_TIFF_ORIENTATION] in _TURNED
-    return False
+        orientation = _tiff_tags(exif, {_TIFF_ORIENTATION})[_TIFF_ORIENTATION]
+        return orientation if orientation in _ORIENTATIONS else 1
+    return 1
 
 
 def _bmp(data: bytes) -> tuple[int, int]:
@@ -112,7 +133,7 @@ def _tiff_tags(data: bytes, wanted: Set[int]) -> dict[int, int]:
 
 _FORMATS: dict[bytes, Callable[[bytes], tuple[int, int]]] = {
     b"\x89PNG\r\n\x1a\n": _png,
-    b"\xff\xd8\xff": _jpeg,
+    _JPEG: _jpeg,
     b"BM": _bmp,
     b"RIFF": _webp,
     b"II*\0": _tiff,

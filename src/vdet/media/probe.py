@@ -13,6 +13,7 @@ from vdet.errors import VideoError
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
 from vdet.media.frame import ColorTags, Orientation, Tags, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS
+from vdet.media.picture_size import exif_orientation
 from vdet.media.pixels import orientation
 
 _DEFAULT_RATE = Fraction(25)
@@ -51,6 +52,13 @@ def check_size(path: Path, width: int, height: int) -> None:
         )
 
 
+def _orientation(container: InputContainer, first: av.VideoFrame) -> Orientation:
+    if container.format.name == "image2":  # PyAV gives no display matrix where there are EXIF data
+        picture = Path(container.name % int(container.options["start_number"]))
+        return Orientation.of_exif(exif_orientation(picture.read_bytes()))
+    return orientation(first) or Orientation()
+
+
 def describe(
     path: Path, container: InputContainer, stream: VideoStream, first: av.VideoFrame
 ) -> VideoInfo:
@@ -59,7 +67,7 @@ def describe(
     rate = _first_sensible(stream.average_rate, stream.guessed_rate)
     start = (first.pts or 0) * time_base
     duration = stated_duration(stream, start) or _longest(container)
-    turn = orientation(first) or Orientation()
+    turn = _orientation(container, first)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
     if turn.rotation in (90, 270):
         width, height, aspect = height, width, 1 / aspect
