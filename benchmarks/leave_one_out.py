@@ -2,7 +2,8 @@
 
 Each group of sets is left out of a training in turn, and searched by the network that was trained
 without it. The scores of all groups together give the calibration of the shipped network's scores.
-Results are kept in the folder `--work`; a run that was stopped goes on from there.
+The last network is trained without the video, and then follows the vehicles in it. Results are
+kept in the folder `--work`; a run that was stopped goes on from there.
 """
 
 import argparse
@@ -17,6 +18,9 @@ from sklearn.linear_model import LogisticRegression
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
+from vdet.evaluate.clips.clip import Variant, open_clip
+from vdet.evaluate.clips.evaluate import evaluate_clips
+from vdet.evaluate.clips.text import result_lines
 from vdet.evaluate.comparison import pool
 from vdet.evaluate.detection_metrics import rank_predictions
 from vdet.evaluate.images.evaluate import ImagesResult, evaluate_images
@@ -39,19 +43,14 @@ LEAST_WIDTH = 0.03
 """Narrower vehicles are ignore regions, share of the picture's width."""
 
 _LEAST_SCORE = 0.02
+_UNCALIBRATED = ("network.score.slope=1", "network.score.offset=0")
 
 
-def train_without(
-    group: Sequence[str], roads: Path, clip: LabelledClip, settings: Settings, work: Path
-) -> Path:
-    """Train on the clip and all sets but those of a group; return the file of the network."""
-    output = work / f"without_{group[0]}.onnx"
-    if not output.exists():
-        names = sorted(path.name for path in roads.iterdir() if path.is_dir())
-        learnt = tuple(roads / name for name in names if name not in group)
-        job = NetworkJob(learnt, (clip,), output)
-        train_to_file(job, settings.network, progress=lambda state: _print_step(group, state.step))
-    return output
+def train(job: NetworkJob, settings: Settings) -> Path:
+    """Train a network, if there is none yet, and return its file."""
+    if not job.output.exists():
+        train_to_file(job, settings.network, progress=lambda state: _print_step(job, state.step))
+    return job.output
 
 
 def measure(group: Sequence[str], roads: Path, network: Path) -> ImagesResult:
@@ -75,9 +74,9 @@ def fit_calibration(logits: Float64Array, right: BoolArray) -> tuple[float, floa
     return float(model.coef_[0, 0]), float(model.intercept_[0])
 
 
-def _print_step(group: Sequence[str], step: int) -> None:
+def _print_step(job: NetworkJob, step: int) -> None:
     if step % 500 == 0:
-        print(f"without {group[0]}: step {step}", flush=True)
+        print(f"{job.output.stem}: step {step}", flush=True)
 
 
 def main() -> None:
@@ -89,17 +88,24 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path("build/leave_one_out"))
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    settings = load_settings(find_config("net"), [f"network.steps={arguments.steps}"])
+    settings = load_settings(
+        find_config("net"), [f"network.steps={arguments.steps}", *_UNCALIBRATED]
+    )
     clip = LabelledClip(arguments.video, arguments.truth, settings.network.every)
+    sets = sorted(path for path in arguments.roads.iterdir() if path.is_dir())
     results = []
     for group in GROUPS:
-        network = train_without(group, arguments.roads, clip, settings, arguments.work)
-        results.append(measure(group, arguments.roads, network))
+        learnt = tuple(path for path in sets if path.name not in group)
+        job = NetworkJob(learnt, (clip,), arguments.work / f"without_{group[0]}.onnx")
+        results.append(measure(group, arguments.roads, train(job, settings)))
         print(f"without {', '.join(group)}: {results[-1].mean.best_f1:.3f}", flush=True)
     summary = summarize(results)
     print("\n".join(summary.lines()))
     path = arguments.work / "results.json"
     path.write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
+    job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx")
+    network = train(job, load_settings(find_config("net"), [f"network.steps={arguments.steps}"]))
+    print("\n".join(video_lines(clip, network, settings)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +176,12 @@ def summarize(results: Sequence[ImagesResult]) -> Summary:
         slope=slope,
         offset=offset,
     )
+
+
+def video_lines(clip: LabelledClip, network: Path, settings: Settings) -> list[str]:
+    """Return how well a network finds and follows the vehicles of a video."""
+    variant = Variant(settings, load_detector(settings.detector, network), ())
+    return list(result_lines(evaluate_clips([open_clip(clip.video, clip.truth)], [variant])))
 
 
 def _group_f1(result: ImagesResult, scores: Float64Array) -> Float64Array:

@@ -58,7 +58,7 @@ class MotionTrackerSettings(TrackerSettings):
     )
     part: Fraction = Field(
         0.6,
-        description="a weaker detection with more than this share inside a vehicle is a part of it",
+        description="a detection with more than this share inside a shown vehicle is a part of it",
     )
     hidden: Fraction = Field(
         0.5, description="a vehicle is hidden where a nearer one covers more than this share of it"

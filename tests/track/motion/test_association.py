@@ -204,8 +204,8 @@ PART = np.array([420.0, 205.0, 50.0, 30.0])
 
 def test_a_new_track_inside_a_vehicle_is_a_part_of_it_and_a_shown_one_is_not() -> None:
     whole = vehicle(number=1)
-    assert without(whole, vehicle(PART, score=0.5, confirmed=False)) == [whole]
-    assert len(without(whole, vehicle(PART, score=0.5, number=2))) == 2
+    assert without(whole, vehicle(PART, confirmed=False)) == [whole]
+    assert len(without(whole, vehicle(PART, number=2))) == 2
 
 
 @pytest.mark.parametrize(("first", "second"), [(0, 0.1), (0.1, 0)])

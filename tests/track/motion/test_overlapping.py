@@ -2,7 +2,14 @@ import numpy as np
 import pytest
 
 from vdet.geometry import Float64Array
-from vdet.track.motion.overlapping import are_hidden, are_parts, is_same, shows_both, stretched
+from vdet.track.motion.overlapping import (
+    are_hidden,
+    are_parts,
+    is_part,
+    is_same,
+    shows_both,
+    stretched,
+)
 
 
 def box(x: float, y: float, width: float, height: float) -> Float64Array:
@@ -60,6 +67,11 @@ def test_one_of_several_is_enough_and_none_is_not() -> None:
     one = box(0, 0, 100, 60)
     assert is_same(one, boxes(box(500, 0, 9, 9), one))
     assert not is_same(one, np.zeros((0, 4)))
+
+
+def test_a_part_lies_in_the_other_box_for_more_than_the_share() -> None:
+    assert is_part(box(0, 0, 20, 20), boxes(box(8, 0, 100, 60)), 0.59)
+    assert not is_part(box(0, 0, 20, 20), boxes(box(8, 0, 100, 60)), 0.6)
 
 
 def test_a_part_lies_in_a_box_that_scores_higher_for_more_than_the_share() -> None:

@@ -215,10 +215,12 @@ def test_weak_detections_on_the_nearer_vehicle_do_not_move_the_hidden_one() -> N
 
 
 def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detected() -> None:
-    hiding, half = VAN.moved_to(200, 390), Box(310, 400, 110, 70)
+    hiding, half = VAN.moved_to(370, 390), Box(480, 400, 110, 70)  # it went on behind the van
     assert half.intersection(hiding).area > DEFAULTS.part * half.area
-    shown = follow([*[[hiding]] * 10, *[[hiding, half]] * 6])
-    assert len(shown[-1]) == 2
+    before = [[CAR, van] for van in moving(VAN, dx=6, frames=46)]
+    shown = follow([*before, *[[hiding]] * 20, *[[hiding, half]] * 6])
+    assert id_at(shown[-1], half) == id_at(shown[10], CAR)
+    assert len(follow([*[[hiding]] * 20, *[[hiding, half]] * 6])[-1]) == 1
 
 
 def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:

@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import Float64Array, iou_matrix, visible
-from vdet.track.motion.overlapping import are_parts, is_same
+from vdet.track.motion.overlapping import CLEAR, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
 
 Pairs = dict[int, int]
@@ -112,8 +112,9 @@ def without_duplicates(
     stays beside it while its score is higher.
     """
     kept: list[Vehicle] = []
+    hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
     for vehicle in sorted(vehicles, key=_rank):
-        same = _track_of_same(vehicle, kept, size, settings)
+        same = _track_of_same(vehicle, kept, hidden, size, settings)
         if same is None:
             kept.append(vehicle)
         elif vehicle.id is not None:
@@ -129,22 +130,33 @@ def _rank(vehicle: Vehicle) -> tuple[bool, float]:
 def _track_of_same(
     vehicle: Vehicle,
     others: Sequence[Vehicle],
+    hidden: Sequence[Vehicle],
     size: tuple[int, int],
     settings: MotionTrackerSettings,
 ) -> Vehicle | None:
-    """Return the track among `others`, higher in rank, that shows the same vehicle."""
+    """Return the track among `others`, higher in rank, that shows the same vehicle.
+
+    One that may be a `hidden` vehicle that comes out is no part of the vehicle before it.
+    """
     if vehicle.unseen:
         return None
     for other in others:
         if not other.confirmed or other.unseen:
             continue
         boxes = visible(np.stack([vehicle.state.box, other.state.box]), size)
-        scores = np.array([vehicle.detection_score, other.detection_score])
         weaker = vehicle.confirmed or vehicle.score <= other.score
-        part = not vehicle.confirmed and are_parts(boxes, scores, settings.part)[0]
-        if part or (weaker and is_same(boxes[0], boxes[1:])):
+        part = not vehicle.confirmed and is_part(boxes[0], boxes[1:], settings.part)
+        if (part and not _comes_out(vehicle, other, hidden)) or (
+            weaker and is_same(boxes[0], boxes[1:])
+        ):
             return other
     return None
+
+
+def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
+    """Tell whether one of the `hidden` vehicles was near and this one is as clear as the nearer."""
+    is_clear = vehicle.detection_score > CLEAR * nearer.detection_score
+    return is_clear and any(_distance(each, vehicle) < _REACH for each in hidden)
 
 
 def _distance(one: Vehicle, other: Vehicle) -> float:

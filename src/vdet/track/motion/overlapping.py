@@ -19,8 +19,8 @@ _LEVEL_OVERLAP = 0.3
 _ALIKE = 0.5
 """Intersection over union from which on two boxes are of one vehicle, level or not."""
 
-_WEAKER = 0.8
-"""A part of a vehicle scores less than this share of the vehicle's score."""
+CLEAR = 0.8
+"""A detection on a nearer vehicle that scores less than this share of its score is a part of it."""
 
 
 def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float) -> list[bool]:
@@ -60,8 +60,13 @@ def are_parts(boxes: Float64Array, scores: Float64Array, share: float) -> npt.ND
     -------
     bool `(n,)`.
     """
-    weaker = scores[:, np.newaxis] < _WEAKER * scores
+    weaker = scores[:, np.newaxis] < CLEAR * scores
     return np.asarray(((coverage(boxes, boxes) > share) & weaker).any(axis=1))
+
+
+def is_part(box: Float64Array, others: Float64Array, share: float) -> bool:
+    """Tell whether more than `share` of `box`, `(4,)`, lies in one of `others`, `(n, 4)`."""
+    return bool((coverage(box[np.newaxis], others) > share).any())
 
 
 def around(boxes: Float64Array) -> Float64Array:
@@ -78,8 +83,7 @@ def shows_both(found: Float64Array, expected: Float64Array, share: float) -> boo
     """
     region = found[np.newaxis]
     alone, together = iou_matrix(region, np.stack([expected[0], around(expected)]))[0]
-    (inside,) = coverage(expected[1:], region)[0]
-    return bool(inside > share and together > alone)
+    return is_part(expected[1], region, share) and bool(together > alone)
 
 
 def stretched(box: Float64Array, before: Float64Array, after: Float64Array) -> Float64Array:
