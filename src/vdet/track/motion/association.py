@@ -145,10 +145,9 @@ def _track_of_same(
             continue
         boxes = visible(np.stack([vehicle.state.box, other.state.box]), size)
         weaker = vehicle.confirmed or vehicle.score <= other.score
-        part = not vehicle.confirmed and is_part(boxes[0], boxes[1:], settings.part)
-        if (part and not _comes_out(vehicle, other, hidden)) or (
-            weaker and is_same(boxes[0], boxes[1:])
-        ):
+        inside = not vehicle.confirmed and is_part(boxes[0], boxes[1:], settings.part)
+        part = inside and not _comes_out(vehicle, other, hidden)
+        if part or (weaker and is_same(boxes[0], boxes[1:])):
             return other
     return None
 
