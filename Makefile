@@ -27,7 +27,7 @@ types: $(READY)  ## check types
 	$(BIN)/mypy
 
 tests: $(READY)  ## run all tests
-	$(BIN)/pytest -n 2 --dist worksteal
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
 nettest: $(READY)  ## install torch, and run the tests of training networks
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt

@@ -51,9 +51,9 @@ def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> R
 
 @pytest.fixture(scope="session")
 def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of generated patches, 300 of each class."""
+    """A folder of generated patches, 160 of each class."""
     folder = tmp_path_factory.mktemp("patches")
-    write_patches(folder, seed=5, vehicles=300, non_vehicles=300)
+    write_patches(folder, seed=5, vehicles=160, non_vehicles=160)
     return folder
 
 

@@ -3,9 +3,24 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from conftest import Run
 
-QUICK = ("--set", "training.C=0.001", "--jobs", "1")
+QUICK = (
+    *(
+        "--set",
+        "training.C=0.001",
+        "--set",
+        "training.augmentation={mirror: false, cut: 0, parts: 0}",
+    ),
+    *("--jobs", "1"),
+)
+
+
+@pytest.fixture(autouse=True)
+def _few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vdet.learn.patch_eval.metrics.RESAMPLES", 20)
 
 
 def test_trains_a_model_for_a_split(run: Run, patches_path: Path, tmp_path: Path) -> None:
@@ -13,10 +28,10 @@ def test_trains_a_model_for_a_split(run: Run, patches_path: Path, tmp_path: Path
     options = ("--split", "tail", "--json", target, "--report", folder)
     result = run("eval", "patches", patches_path, *options, *QUICK)
     assert result.code == 0, result.err
-    for words in ("300 vehicles, 300 non-vehicles", "leak-free", "calibration error", "["):
+    for words in ("160 vehicles, 160 non-vehicles", "leak-free", "calibration error", "["):
         assert words in result.out
     (trial,) = json.loads(target.read_text())["trials"]
-    assert (trial["name"], trial["scores"]["patches"]) == ("tail", 120)
+    assert (trial["name"], trial["scores"]["patches"]) == ("tail", 65)
     assert trial["scores"]["accuracy"] > 0.9
     html = (folder / "report.html").read_text()
     for words in ("Curves", "Accuracy by group", "Worst mistakes: tail", "data:image/svg+xml"):
@@ -30,7 +45,7 @@ def test_measures_a_ready_model_on_everything(
     result = run("eval", "patches", patches_path, *options)
     assert result.code == 0, result.err
     (trial,) = json.loads(result.out)["trials"]
-    assert trial["scores"]["patches"] == 600
+    assert trial["scores"]["patches"] == 320
     assert "was trained on most of these very patches" in trial["meaning"]
     assert "ROC AUC" in result.err, "the table makes room on standard output"
 

@@ -16,14 +16,14 @@ def test_makes_a_model_and_a_report(run: Run, patches_path: Path, tmp_path: Path
     model = load_model(tmp_path / "m.npz")
     assert model.weights.shape == (1, 4800)
     report = json.loads((tmp_path / "m.json").read_text())
-    assert (report["vehicles"], report["non_vehicles"]) == (300, 300)
+    assert (report["vehicles"], report["non_vehicles"]) == (160, 160)
     assert [split["split"] for split in report["splits"]] == ["random", "tail"]
     random = report["splits"][0]
-    assert random["test_patches"] == sum(random["confusion"].values()) == 120
+    assert random["test_patches"] == sum(random["confusion"].values()) == 64
     assert random["test_accuracy"] > 0.9
     assert random["train_augmented"] > random["train_patches"], "mirror images, and some others"
     assert model.provenance["report"] == report
-    for words in ("300 vehicles", "leak-free", "said vehicle", "vehicles/near", "one prediction"):
+    for words in ("160 vehicles", "leak-free", "said vehicle", "vehicles/near", "one prediction"):
         assert words in result.out
 
 
@@ -64,8 +64,8 @@ def test_data_with_no_class(run: Run, tmp_path: Path) -> None:
 
 
 def _small_set(folder: Path, patches_path: Path, broken: int) -> Path:
-    """Return a set of 200 patches, of which some are cut off."""
-    files = sorted(patches_path.rglob("*.png"))[::3]
+    """Return a set of 160 patches, of which some are cut off."""
+    files = sorted(patches_path.rglob("*.png"))[::2]
     for number, file in enumerate(files):
         target = folder / file.relative_to(patches_path)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -86,7 +86,7 @@ def test_too_many_broken_patches_are_an_error(run: Run, patches_path: Path, tmp_
     data = _small_set(tmp_path / "data", patches_path, broken=3)
     result = run("train", data, "-o", tmp_path / "m.npz", *QUICK)
     assert result.code == 1
-    assert "3 of 200 patches are broken, more than the 1.0% of training.max_broken" in result.err
+    assert "3 of 160 patches are broken, more than the 1.0% of training.max_broken" in result.err
     assert not (tmp_path / "m.npz").exists()
 
 
