@@ -1,6 +1,11 @@
 """What many tests need: the program, a small model, a small road clip, the real data set."""
 
 import os
+
+if disabled := os.environ.get("OPENCV_CPU_DISABLE"):  # before the first import of OpenCV
+    # Its names have hyphens. For one that it does not know, it prints a line in each process.
+    os.environ["OPENCV_CPU_DISABLE"] = disabled.replace("_", "-")
+
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
