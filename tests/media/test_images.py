@@ -169,6 +169,22 @@ def test_numbered_photographs_are_as_upright_as_each_alone(
         np.testing.assert_allclose(image, expected, atol=12)
 
 
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+def test_numbered_pictures_of_another_format_are_turned_too(
+    tmp_path: Path, orientation: int
+) -> None:
+    exif = b"eXIfMM\0*\0\0\0\x08\0\1" + struct.pack(">HHIHHI", 0x0112, 3, 1, orientation, 0, 0)
+    chunk = struct.pack(">I", len(exif) - 4) + exif + struct.pack(">I", zlib.crc32(exif))
+    png = encoded(".png", smooth())
+    for number in (1, 2):
+        (tmp_path / f"{number}.png").write_bytes(png[:33] + chunk + png[33:])
+    expected = read_image(tmp_path / "1.png")
+    assert (expected.shape[0] > expected.shape[1]) == (orientation in {6, 8})
+    with VideoReader(tmp_path / "%d.png") as reader:
+        for frame in reader:
+            np.testing.assert_allclose(frame.image, expected, atol=2)
+
+
 @pytest.mark.parametrize(
     "exif", [b"", b"MM\0*", b"II*\0\xff\xff\xff\xff", b"MM\0*\0\0\0\x08\xff\xff"]
 )

@@ -43,12 +43,15 @@ def _png(data: bytes) -> tuple[int, int]:
     return width, height
 
 
-def exif_orientation(data: bytes) -> int:
-    """Return the orientation, 1 to 8, that the EXIF data of a JPEG file give; 1 for none."""
+def jpeg_orientation(data: bytes) -> int | None:
+    """Return the orientation, 1 to 8, of the EXIF data in a JPEG file, 1 where it has none.
+
+    None where the file is of another format, or its header is damaged.
+    """
     if data.startswith(_JPEG):
         with contextlib.suppress(struct.error, LookupError, OverflowError, ValueError):
             return _jpeg_header(data)[2]
-    return 1
+    return None
 
 
 def _jpeg(data: bytes) -> tuple[int, int]:

@@ -13,7 +13,7 @@ from vdet.errors import VideoError
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
 from vdet.media.frame import ColorTags, Orientation, Tags, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS
-from vdet.media.picture_size import exif_orientation
+from vdet.media.picture_size import jpeg_orientation
 from vdet.media.pixels import orientation
 
 _DEFAULT_RATE = Fraction(25)
@@ -53,9 +53,11 @@ def check_size(path: Path, width: int, height: int) -> None:
 
 
 def _orientation(container: InputContainer, first: av.VideoFrame) -> Orientation:
-    if container.format.name == "image2":  # PyAV gives no display matrix where there are EXIF data
+    if container.format.name == "image2":  # where there are EXIF data, PyAV gives only the rotation
         picture = Path(container.name % int(container.options["start_number"]))
-        return Orientation.of_exif(exif_orientation(picture.read_bytes()))
+        number = jpeg_orientation(picture.read_bytes())
+        if number is not None:
+            return Orientation.of_exif(number)
     return orientation(first) or Orientation()
 
 
