@@ -9,10 +9,11 @@ from textwrap import dedent
 import numpy as np
 import pytest
 
+from detect.onnx.graphs import RedBox, ultralytics, write_network
 from vdet.config.detector import DetectorSettings
 from vdet.config.loading import load_settings
 from vdet.config.schema import FeatureSettings, NetworkSettings, Settings, SvmSettings
-from vdet.detect.factory import learnt_from, load_detector, model_file
+from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import load_model, save_model
@@ -65,16 +66,23 @@ class TestLinearModel:
 
     def test_the_names_of_the_data_that_the_shipped_models_have_seen_are_known(self) -> None:
         settings = Settings().detector
-        names = learnt_from(settings, model_file(settings))
+        names = trained_on(settings, model_file(settings))
         assert {"KITTI_extracted", "GTI_Far", "mined_project_video"} <= set(names)
-        assert learnt_from(settings, None) == ()
+        assert trained_on(settings, None) == ()
         network = NetworkSettings()
-        assert {"idd", "project_video.mp4"} <= set(learnt_from(network, model_file(network)))
+        assert {"idd", "project_video.mp4"} <= set(trained_on(network, model_file(network)))
+
+    def test_another_network_need_not_name_its_classes_for_that(self, tmp_path: Path) -> None:
+        form = ultralytics((128, 64), RedBox(64, 32, 16, 8), 3)
+        path = write_network(tmp_path / "their.onnx", form, (128, 64), (0, 0))
+        settings = NetworkSettings(names=("car", "bus", "dog"))
+        load_detector(settings, path)
+        assert trained_on(settings, path) == ()
 
     def test_a_model_file_need_not_say_what_it_was_trained_on(self, tmp_path: Path) -> None:
         model = load_model(shipped_model(SvmSettings()))
         save_model(replace(model, provenance={"report": []}), tmp_path / "a.npz")
-        assert learnt_from(SvmSettings(), tmp_path / "a.npz") == ()
+        assert trained_on(SvmSettings(), tmp_path / "a.npz") == ()
 
     def test_a_missing_model_file_is_named(self, tmp_path: Path) -> None:
         with pytest.raises(ModelError, match=r"none\.npz: cannot be read"):

@@ -196,7 +196,7 @@ def trials(folder: Path) -> dict[str, Trial]:
     return dict(zip(names, done, strict=True))
 
 
-def test_100_bad_sets_are_learnt_from_or_refused(trials: dict[str, Trial], folder: Path) -> None:
+def test_100_bad_sets_are_trained_on_or_refused(trials: dict[str, Trial], folder: Path) -> None:
     assert len(trials) == 100
     assert broken_promises(list(trials.values())) == []
     assert len(ODD) <= sum(trial.code == 0 for trial in trials.values()) < 50

@@ -14,7 +14,7 @@ from vdet.cli.options import (
     results_options,
     settings_options,
 )
-from vdet.detect.factory import learnt_from, load_detector, model_file
+from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.evaluate.output import RunName, check_outputs
 from vdet.workers import core_count
 
@@ -87,7 +87,7 @@ def images(
     with progress_bar(" pictures", quiet=quiet) as progress:
         threads = core_count()
         result = evaluate_images(sets, model, counting, threads=threads, progress=progress)
-    run = RunName(detector.kind, file, config_name, assignments, learnt_from(detector, file))
+    run = RunName(detector.kind, file, config_name, assignments, trained_on(detector, file))
     print_results(
         lines(result, run),
         plain(result, run),

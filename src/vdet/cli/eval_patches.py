@@ -14,7 +14,7 @@ from vdet.cli.options import (
     results_options,
     settings_options,
 )
-from vdet.detect.svm.kind import learnt_from, requested_features
+from vdet.detect.svm.kind import requested_features, trained_on
 from vdet.detect.svm.model import load_model
 from vdet.evaluate.output import RunName, check_outputs, plain_run, run_lines
 from vdet.learn.dataset import find_patches
@@ -89,8 +89,8 @@ def patches(
             result = evaluate_splits(files, settings, chosen, jobs=jobs, steps=steps)
         else:
             result = evaluate_model(files, model, settings, jobs=jobs, steps=steps)
-    learnt = learnt_from(model_path) if model_path else ()
-    name = RunName("svm", model_path, config_name, assignments, learnt)
+    sources = trained_on(model_path) if model_path else ()
+    name = RunName("svm", model_path, config_name, assignments, sources)
     print_results(
         [*run_lines(name), *lines(result)],
         plain_run(name) | plain(result),

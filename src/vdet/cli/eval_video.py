@@ -17,7 +17,7 @@ from vdet.cli.options import (
     settings_options,
     sink_option,
 )
-from vdet.detect.factory import learnt_from, load_detector, model_file
+from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.evaluate.output import RunName, check_outputs, run_lines
 from vdet.pipeline.sinks.protocol import check_sinks
 
@@ -106,7 +106,7 @@ def video(
         runs = evaluate_clips(clips, variants, progress, outputs=outputs, overwrite=overwrite)
     first = variants[0].settings.detector
     file = model_file(first, model_path)
-    name = RunName(first.kind, file, config_name, assignments, learnt_from(first, file))
+    name = RunName(first.kind, file, config_name, assignments, trained_on(first, file))
     print_results(
         [*run_lines(name), *result_lines(runs)],
         plain(runs, name),

@@ -31,14 +31,14 @@ class DetectorKind:
         Loads it from its settings and a model file; None stands for the shipped file.
     shipped
         Returns the shipped model file for some settings; None where the kind needs no file.
-    learnt_from
+    trained_on
         Returns the names of the data that a model file was trained on, as far as it says.
     """
 
     settings: type[DetectorSettings]
     load: Callable[[Any, Path | None], DetectorModel]
     shipped: Callable[[Any], Path | None] = _no_model
-    learnt_from: Callable[[Path], tuple[str, ...]] = _nothing
+    trained_on: Callable[[Path], tuple[str, ...]] = _nothing
 
 
 def load_detector(settings: DetectorSettings, model: Path | None = None) -> DetectorModel:
@@ -59,9 +59,9 @@ def model_file(settings: DetectorSettings, model: Path | None = None) -> Path | 
     return model or _kind(settings).shipped(settings)
 
 
-def learnt_from(settings: DetectorSettings, path: Path | None) -> tuple[str, ...]:
+def trained_on(settings: DetectorSettings, path: Path | None) -> tuple[str, ...]:
     """Return the names of the data that a model file was trained on, as far as it says."""
-    return _kind(settings).learnt_from(path) if path else ()
+    return _kind(settings).trained_on(path) if path else ()
 
 
 def _kind(settings: DetectorSettings) -> DetectorKind:

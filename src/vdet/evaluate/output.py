@@ -28,7 +28,7 @@ class RunName:
     model: Path | None
     config: str | None
     assignments: tuple[str, ...]
-    learnt_from: tuple[str, ...] = ()
+    trained_on: tuple[str, ...] = ()
 
 
 def run_lines(run: RunName) -> list[str]:
@@ -36,8 +36,8 @@ def run_lines(run: RunName) -> list[str]:
     model = f", model {run.model.name}" if run.model else ""
     settings = " ".join([run.config or "default", *run.assignments])
     lines = [f"vdet {vdet.__version__}, detector {run.kind}{model}, settings {settings}"]
-    if run.learnt_from:
-        lines.append(f"trained on {', '.join(run.learnt_from)}")
+    if run.trained_on:
+        lines.append(f"trained on {', '.join(run.trained_on)}")
     return lines
 
 
@@ -49,7 +49,7 @@ def plain_run(run: RunName) -> dict[str, Any]:
         "model": str(run.model) if run.model else None,
         "config": run.config or "default",
         "set": list(run.assignments),
-        "trained_on": list(run.learnt_from),
+        "trained_on": list(run.trained_on),
     }
 
 

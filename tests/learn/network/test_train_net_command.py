@@ -8,7 +8,7 @@ import pytest
 from conftest import Run
 from evaluate.images.writers import WRITERS, Boxed, Labelled
 from vdet.config.schema import NetworkSettings
-from vdet.detect.factory import learnt_from
+from vdet.detect.factory import trained_on
 from vdet.detect.onnx.recognition import recognize
 from vdet.detect.onnx.session import Session
 
@@ -37,7 +37,7 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     result = run("train-net", folder, "-o", output, *QUICK)
     assert result.code == 0, result.err
     assert result.out.splitlines()[0].split() == ["my_set", "2", "pictures", "2", "vehicles"]
-    assert learnt_from(NetworkSettings(), output) == ("my_set",)
+    assert trained_on(NetworkSettings(), output) == ("my_set",)
     report = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
     assert (report["steps"], report["sources"][0]["vehicles"]) == (2, 2)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.json", "net.onnx"]

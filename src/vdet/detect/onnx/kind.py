@@ -5,7 +5,7 @@ from pathlib import Path
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import DetectorKind
 from vdet.detect.onnx.detector import NetworkModel
-from vdet.detect.onnx.recognition import recognize
+from vdet.detect.onnx.recognition import read_header
 from vdet.detect.onnx.session import Session
 
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
@@ -22,9 +22,9 @@ def load_network(settings: NetworkSettings, path: Path | None) -> NetworkModel:
     return NetworkModel(path or SHIPPED, settings)
 
 
-def learnt_from(path: Path) -> tuple[str, ...]:
+def trained_on(path: Path) -> tuple[str, ...]:
     """Return the names of the sets that a network of ours was trained on; of others, nothing."""
-    header = recognize(Session(path), path).header
+    header = read_header(Session(path), path)
     try:
         sources = header.provenance["report"]["sources"] if header else []
         return tuple(str(source["name"]) for source in sources)
@@ -32,4 +32,4 @@ def learnt_from(path: Path) -> tuple[str, ...]:
         return ()
 
 
-NET = DetectorKind(NetworkSettings, load_network, lambda _: SHIPPED, learnt_from)
+NET = DetectorKind(NetworkSettings, load_network, lambda _: SHIPPED, trained_on)

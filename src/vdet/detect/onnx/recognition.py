@@ -91,8 +91,9 @@ def recognize(session: Session, path: Path, names: Sequence[str] = ()) -> Recogn
     ModelError
         The network is of no known form; the message says what was seen.
     """
-    if HEADER_KEY in session.metadata:
-        return _ours(session, path)
+    header = read_header(session, path)
+    if header is not None:
+        return _ours(session, path, header)
     if any(slot.name == _SIZES for slot in session.inputs):
         return _rt_detr(session, path, names)
     if len(session.inputs) != 1:
@@ -100,11 +101,17 @@ def recognize(session: Session, path: Path, names: Sequence[str] = ()) -> Recogn
     return _by_shape(session, path, names)
 
 
-def _ours(session: Session, path: Path) -> Recognized:
+def read_header(session: Session, path: Path) -> Header | None:
+    """Return the header of a network of ours, None of another one. Raises `ModelError`."""
+    if HEADER_KEY not in session.metadata:
+        return None
     try:
-        header = Header.model_validate_json(session.metadata[HEADER_KEY])
+        return Header.model_validate_json(session.metadata[HEADER_KEY])
     except ValidationError as error:
         raise ModelError(f"{path}: its header is damaged or from a newer vdet") from error
+
+
+def _ours(session: Session, path: Path, header: Header) -> Recognized:
     form, layout = _our_form(header, 1, 1)
     reasons = ("it has a header of vdet",)
     found = Recognized("vdet", reasons, header.classes, form, layout, header=header)

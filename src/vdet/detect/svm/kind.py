@@ -48,7 +48,7 @@ def requested_features(settings: SvmSettings) -> FeatureSettings | None:
     return None if settings.features == FeatureSettings() else settings.features
 
 
-def learnt_from(path: Path) -> tuple[str, ...]:
+def trained_on(path: Path) -> tuple[str, ...]:
     """Return the names of the groups of patches that a linear model was trained on."""
     try:
         groups = load_model(path).provenance["report"]["groups"]
@@ -57,4 +57,4 @@ def learnt_from(path: Path) -> tuple[str, ...]:
         return ()
 
 
-SVM = DetectorKind(SvmSettings, load_svm, shipped_model, learnt_from)
+SVM = DetectorKind(SvmSettings, load_svm, shipped_model, trained_on)
