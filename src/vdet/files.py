@@ -254,13 +254,18 @@ def output_errors(path: Path) -> Iterator[None]:
         raise OutputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
+def print_now(text: str) -> None:
+    """Write to standard output, so that an error comes here and not as Python ends."""
+    sys.stdout.write(text)
+    sys.stdout.flush()
+
+
 def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
     """Write to the file `target`, or to standard output for `-`. Raises `OutputError`."""
     text = json.dumps(values, indent=2, allow_nan=False) + "\n"
     if target == "-":
         with output_errors(Path("standard output")):
-            sys.stdout.write(text)
-            sys.stdout.flush()
+            print_now(text)
         return
     with staged(Path(target), overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")

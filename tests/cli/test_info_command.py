@@ -1,6 +1,9 @@
 """`vdet info`: what a model file is."""
 
+from collections.abc import Sequence
 from pathlib import Path
+
+import pytest
 
 from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
@@ -8,21 +11,23 @@ from detect.onnx.graphs import RedBox, ultralytics, write_network
 MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
 
 
-def test_a_linear_model_says_what_it_was_trained_on(run: Run) -> None:
-    result = run("info", MODELS / "default.npz")
-    assert result.code == 0
-    assert "a linear model of vdet" in result.out
-    assert "sides of boxes: learnt" in result.out
-    assert "data_sha256: " in result.out
+LINEAR = ("a linear model of vdet", "sides of boxes: learnt", "data_sha256: ")
+NETWORK = (
+    "a network of the form vdet",
+    "input: 512×288 for a frame of 1280×720, BGR up to 255",
+    "vehicles: car, truck, bus",
+    '"steps": ',
+)
 
 
-def test_the_shipped_network_says_what_it_was_trained_on(run: Run) -> None:
-    result = run("info", MODELS / "net.onnx")
+@pytest.mark.parametrize(("name", "told"), [("default.npz", LINEAR), ("net.onnx", NETWORK)])
+def test_a_shipped_model_says_what_it_was_trained_on(
+    run: Run, name: str, told: Sequence[str]
+) -> None:
+    result = run("info", MODELS / name)
     assert result.code == 0
-    assert "a network of the form vdet" in result.out
-    assert "input: 512×288 for a frame of 1280×720, BGR up to 255" in result.out
-    assert "vehicles: car, truck, bus" in result.out
-    assert '"steps": ' in result.out
+    for words in told:
+        assert words in result.out
 
 
 def test_another_network_says_why_it_was_taken_for_what(run: Run, tmp_path: Path) -> None:

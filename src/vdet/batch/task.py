@@ -55,7 +55,9 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
                 make_folder(output.path.parent)
             model = load_detector(work.settings.detector, work.model)
             summary = run_video(
-                *(job, model, work.settings),
+                job,
+                model,
+                work.settings,
                 threads=threads,
                 codec_threads=threads,
                 progress=progress,

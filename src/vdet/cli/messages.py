@@ -32,11 +32,11 @@ def print_lines(*lines: str, err: bool = False) -> None:
     Raises
     ------
     BrokenPipeError
-        Whoever read standard output has ended.
+        Whoever read the stream has ended.
     OutputError
-        Standard output cannot be written for another reason.
+        It cannot be written for another reason.
     """
-    with output_errors(Path("standard output")):
+    with output_errors(Path("standard error" if err else "standard output")):
         click.echo("\n".join(map(escaped, lines)), err=err)
 
 
@@ -98,20 +98,11 @@ def progress_steps(unit: str, *, quiet: bool) -> Iterator[Steps]:
                 bar_format="{desc} [{elapsed}]" if timed else None,
             )
             stack.enter_context(bar)
-            stack.enter_context(_refreshed(bar))
+            if not bar.disable:  # shows that the program is at work while nothing advances
+                stack.enter_context(_repeated(bar.refresh))
             return bar.update
 
         yield start
-
-
-@contextmanager
-def _refreshed(bar: "tqdm[Any]") -> Iterator[None]:
-    """Refresh a bar while nothing advances it, so that it shows that the program is at work."""
-    if bar.disable:
-        yield
-        return
-    with _repeated(bar.refresh):
-        yield
 
 
 @contextmanager

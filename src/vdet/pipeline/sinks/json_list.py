@@ -1,10 +1,10 @@
 """The sink `json`: the vehicles of still pictures as one JSON list."""
 
 import json
-import sys
 from pathlib import Path
 from typing import Any, Self
 
+from vdet.files import print_now
 from vdet.lanes.lane import lane_record
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
@@ -31,8 +31,7 @@ class JsonSink:
             return
         text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
         if self._path == STANDARD_OUTPUT:
-            sys.stdout.write(text)
-            sys.stdout.flush()
+            print_now(text)
         else:
             self._context.files.stage(self._path).write_text(text, encoding="utf-8")
 

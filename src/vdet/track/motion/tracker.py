@@ -53,9 +53,10 @@ class MotionTracker:
         observations = self._observations(detections)
         self._predict(seconds)
         expected = self._boxes()
-        pairs = self._pair(expected, observations)
+        hidden = self._hidden(expected)
+        pairs = self._pair(expected, hidden, observations)
         found = {row: observations[number] for row, number in pairs.items()}
-        found |= self._seen_as_one(expected, found)
+        found |= self._seen_as_one(expected, hidden, found)
         for row, vehicle in enumerate(self._vehicles):
             if row in found:
                 vehicle.see(found[row], seconds, self._size, self._settings)
@@ -103,7 +104,12 @@ class MotionTracker:
             if min(width, height) >= 1 and not vehicle.is_over(self._settings)
         ]
 
-    def _pair(self, expected: Float64Array, observations: Sequence[Observation]) -> dict[int, int]:
+    def _pair(
+        self,
+        expected: Float64Array,
+        hidden: Sequence[bool],
+        observations: Sequence[Observation],
+    ) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first."""
         present: list[int] = []
         lost: list[int] = []
@@ -121,8 +127,7 @@ class MotionTracker:
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
         scores = np.array([observation.score for observation in observations])
         parts = are_parts(boxes, scores, self._settings.part)
-        hidden = np.flatnonzero(self._hidden(expected))
-        values[np.ix_(hidden, parts)] = 0  # these are parts of the vehicle that hides it
+        values[np.ix_(np.flatnonzero(hidden), parts)] = 0  # parts of the vehicle that hides it
         return pair(values, [present, lost, new])
 
     def _adds_evidence(self, observation: Observation) -> bool:
@@ -134,11 +139,10 @@ class MotionTracker:
         return are_hidden(boxes, np.array(present, bool), self._settings.hidden)
 
     def _seen_as_one(
-        self, expected: Float64Array, found: dict[int, Observation]
+        self, expected: Float64Array, hidden: Sequence[bool], found: dict[int, Observation]
     ) -> dict[int, Observation]:
         """Share a detection among two vehicles that it shows as one."""
         shared: dict[int, Observation] = {}
-        hidden = self._hidden(expected)
         missed = [row for row in range(len(expected)) if row not in found and not hidden[row]]
         for row, other in product(self._confirmed(found), self._confirmed(missed)):
             observation, both = found[row], expected[[row, other]]
