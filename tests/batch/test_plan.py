@@ -12,7 +12,8 @@ from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import OutputOptions, Plan, make_plan
 from vdet.errors import BatchError, ConfigError, OutputError
 from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output
+from vdet.pipeline.sinks import tracks
+from vdet.pipeline.sinks.protocol import BatchTotal, Output
 
 COMMON = VideoJob(Path(), frames=7)
 DIGEST = "settings"
@@ -214,3 +215,34 @@ class TestRefused:
         monkeypatch.setattr("os.access", lambda _, mode: mode != os.W_OK)
         with pytest.raises(OutputError, match="cannot be written to"):
             plan("clips")
+
+
+@pytest.mark.usefixtures("clips")
+class TestTotals:
+    """A sink with a total: a file over all videos."""
+
+    @pytest.fixture(autouse=True)
+    def all_tracks(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        total = BatchTotal("all", lambda _, target: target.touch())
+        kind = replace(tracks.TRACKS, total=total)
+        monkeypatch.setattr(tracks, "TRACKS", kind)
+
+    def test_it_is_made_from_the_outputs_of_all_videos_by_their_names(self) -> None:
+        (total,) = plan_outputs("clips", suffixes={"tracks": ".cars.csv"}).totals
+        assert total.path == Path("out/all.cars.csv")
+        assert total.outputs == {
+            name: Path(f"out/{name}.cars.csv") for name in ("a", "b", "c", "day/a")
+        }
+
+    def test_it_is_kept_like_other_outputs(self) -> None:
+        Path("out").mkdir()
+        Path("out/all.csv").write_text("precious")
+        with pytest.raises(OutputError, match=r"out/all.csv: is there already"):
+            plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"})
+        plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, overwrite=True)
+        plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, skip_existing=True)
+
+    def test_a_video_must_not_have_its_name(self) -> None:
+        Path("clips/all.mp4").write_bytes(b"clip")
+        with pytest.raises(BatchError, match="which is over all videos; rename the video"):
+            plan_outputs("clips", suffixes={"tracks": ".csv"})

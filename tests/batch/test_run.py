@@ -1,12 +1,16 @@
 """Every item is done once, whatever happens to the processes; here the processes are simulated."""
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeVar
 
 import pytest
 
-from vdet.batch.run import each_once
+from vdet.batch.plan import Plan, Total
+from vdet.batch.run import each_once, write_totals
+from vdet.errors import OutputError
+from vdet.pipeline.sinks.protocol import BatchTotal
 from vdet.workers import WorkerKilledError
 
 T = TypeVar("T")
@@ -75,3 +79,28 @@ def test_another_error_is_raised() -> None:
 
     with pytest.raises(ValueError, match="a bug"):
         list(each_once(fail, [1], FakeWorkers(1)))
+
+
+def join(outputs: Mapping[str, Path], target: Path) -> None:
+    target.write_text("".join(f"{name}: {path.read_text()}\n" for name, path in outputs.items()))
+
+
+def test_a_total_is_made_from_the_outputs_that_are_there(tmp_path: Path) -> None:
+    outputs = {name: tmp_path / f"{name}.txt" for name in ("a", "failed", "b")}
+    for name in ("a", "b"):
+        outputs[name].write_text(f"of {name}")
+    total = Total(BatchTotal("all", join), tmp_path / "all.txt", outputs)
+    (tmp_path / "all.txt").write_text("of an earlier run")
+    write_totals(Plan(tmp_path, (), (), (total,)))
+    assert (tmp_path / "all.txt").read_text() == "a: of a\nb: of b\n"
+
+
+def test_a_total_that_cannot_be_made_leaves_nothing(tmp_path: Path) -> None:
+    def fail(_: Mapping[str, Path], target: Path) -> None:
+        target.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    total = Total(BatchTotal("all", fail), tmp_path / "all.txt", {})
+    with pytest.raises(OutputError, match=r"all.txt: .*No space left"):
+        write_totals(Plan(tmp_path, (), (), (total,)))
+    assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,7 @@ from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
 from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output, check_sinks, sink_kind
+from vdet.pipeline.sinks.protocol import BatchTotal, Output, check_sinks, sink_kind
 
 MANIFEST = "manifest.jsonl"
 
@@ -38,12 +38,25 @@ class OutputOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class Total:
+    """A file over all videos of a batch.
+
+    `outputs` are those that it is made from, by the name of their video.
+    """
+
+    made_by: BatchTotal
+    path: Path
+    outputs: Mapping[str, Path]
+
+
+@dataclass(frozen=True, slots=True)
 class Plan:
     """The jobs to do and those that are left out; all their outputs lie in `folder`."""
 
     folder: Path
     jobs: tuple[VideoJob, ...]
     skipped: tuple[VideoJob, ...]
+    totals: tuple[Total, ...] = ()
 
     @property
     def manifest(self) -> Path:
@@ -81,7 +94,8 @@ def make_plan(
     sources = find_sources(clips)
     jobs = [_job(source, folder, common, options) for source in sources]
     _refuse_inside(sources, folder)
-    _refuse_shared(jobs, folder)
+    totals = _totals(sources, folder, options)
+    _refuse_shared(jobs, folder, totals)
     manifest = folder / MANIFEST
     check_manifest(manifest)
     check_output(manifest, overwrite=True, makes_folder=True)
@@ -92,7 +106,25 @@ def make_plan(
         (skipped if written and _is_done(job, digest, written) else to_do).append(job)
     for job in to_do:
         check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
-    return Plan(folder, tuple(to_do), tuple(skipped))
+    for total in totals:
+        replaces = options.overwrite or options.skip_existing
+        check_output(total.path, overwrite=replaces, makes_folder=True)
+    return Plan(folder, tuple(to_do), tuple(skipped), totals)
+
+
+def _totals(sources: Sequence[Source], folder: Path, options: OutputOptions) -> tuple[Total, ...]:
+    return tuple(
+        Total(
+            total,
+            folder / f"{total.name}{total.suffix or suffix or ''}",
+            {
+                source.place.with_suffix("").as_posix(): _path(folder / source.place, sink, suffix)
+                for source in sources
+            },
+        )
+        for sink, suffix in options.suffixes.items()
+        if (total := sink_kind(sink).total)
+    )
 
 
 def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions) -> VideoJob:
@@ -144,10 +176,11 @@ def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
             )
 
 
-def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
-    """Refuse an output with the name of another output, of the manifest or of an input."""
+def _refuse_shared(jobs: Iterable[VideoJob], folder: Path, totals: Sequence[Total]) -> None:
+    """Refuse an output with the name of another output, of a total, the manifest or an input."""
     inputs = {job.source.resolve() for job in jobs}
     owners: dict[Path, Path] = {}
+    total_paths = {total.path for total in totals}
     for job in jobs:
         for path in (output.path for output in job.outputs):
             if path.resolve() in inputs:
@@ -155,6 +188,11 @@ def _refuse_shared(jobs: Iterable[VideoJob], folder: Path) -> None:
             if path == folder / MANIFEST:
                 raise BatchError(
                     f"{job.source}: one of its outputs would be {path}, which is the manifest"
+                )
+            if path in total_paths:
+                raise BatchError(
+                    f"{job.source}: one of its outputs would be {path}, which is over all videos; "
+                    "rename the video"
                 )
             if path not in owners:
                 owners[path] = job.source

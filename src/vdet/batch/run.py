@@ -9,7 +9,7 @@ from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import Plan
 from vdet.batch.progress import FrameCounts
 from vdet.batch.task import Work, process_file, record_of_killed
-from vdet.files import make_folder, remove_stale
+from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
 from vdet.pipeline.loop import VideoJob, no_progress
 from vdet.workers import WorkerKilledError, Workers
 
@@ -54,9 +54,18 @@ def run_batch(
                 if counts:
                     counts.end(number, record.frames)
                 yield job, record
+        write_totals(plan)
     finally:
         for folder in {output.path.parent for job in plan.jobs for output in job.outputs}:
             remove_stale(folder)
+
+
+def write_totals(plan: Plan) -> None:
+    """Write the files over all videos, from the outputs that are there. Raises `OutputError`."""
+    for total in plan.totals:
+        there = {name: path for name, path in total.outputs.items() if path.exists()}
+        with OutputFiles(overwrite=True) as files, output_errors(total.path):
+            total.made_by.write(there, files.stage(total.path))
 
 
 def _process_numbered(

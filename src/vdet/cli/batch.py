@@ -30,6 +30,9 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 log = logging.getLogger("vdet")
 
+_SUFFIX = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
+"""The end of an output's name, such as `.csv` or `.cars.csv`."""
+
 
 @dataclass(frozen=True, slots=True)
 class BatchOptions:
@@ -109,9 +112,9 @@ def _suffix(output: Output) -> str:
     kind, suffix = sink_kind(output.sink), str(output.path).lower()
     if kind.takes == "pictures":
         raise click.UsageError(f"{output.sink}: is for pictures; give another sink")
-    if kind.marker:
+    if kind.one_frame:
         raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
-    if not re.fullmatch(r"\.[a-z0-9]+", suffix) or suffix not in (kind.suffixes or [suffix]):
+    if not _SUFFIX.fullmatch(suffix) or not suffix.endswith(tuple(kind.suffixes) or suffix):
         known = ", ".join(kind.suffixes) or "as in .txt"
         option = "--tracks" if output.sink == "tracks" else f"--sink {output.sink}"
         raise click.UsageError(f"with -d give {option} a suffix: {known}")

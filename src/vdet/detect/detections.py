@@ -114,6 +114,13 @@ class Detections:
             for x1, y1, x2, y2 in np.floor(self.boxes + 0.5).astype(int).tolist()
         ]
 
+    @property
+    def class_names(self) -> list[str | None]:
+        """The name of each box's class; None for all where the detector does not tell classes."""
+        if self.classes is None:
+            return [None] * len(self)
+        return [self.names[number] for number in self.classes.tolist()]
+
     def to_supervision(self) -> "supervision.Detections":
         """Return a `supervision.Detections` with copies; needs the package supervision."""
         import supervision
@@ -122,9 +129,7 @@ class Detections:
             xyxy=self.boxes.copy(),
             confidence=self.scores.copy(),
             class_id=None if self.classes is None else self.classes.astype(int),
-            data={}
-            if self.classes is None
-            else {"class_name": np.array([self.names[i] for i in self.classes.tolist()])},
+            data={} if self.classes is None else {"class_name": np.array(self.class_names)},
         )
 
 

@@ -206,17 +206,16 @@ def _named(source: Path) -> Iterator[None]:
 
 
 def _tracks(detections: Detections) -> tuple[Track, ...]:
-    classes = detections.classes
     return tuple(
         Track(
             number + 1,
             box,
             float(np.float64(score)),
             predicted=False,
-            class_id=None if classes is None else int(classes[number]),
+            class_name=name,
         )
-        for number, (box, score) in enumerate(
-            zip(detections.rounded, detections.scores.tolist(), strict=True)
+        for number, (box, score, name) in enumerate(
+            zip(detections.rounded, detections.scores.tolist(), detections.class_names, strict=True)
         )
     )
 

@@ -8,7 +8,7 @@ from vdet.detect.protocol import VideoDetector
 from vdet.lanes.road import Road
 from vdet.media import Frame
 from vdet.media.images import Image
-from vdet.track.track import Track
+from vdet.track.track import FrameTracks, Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,11 @@ class FrameResult:
     tracks: tuple[Track, ...]
     road: Road | None
     detector: VideoDetector = field(repr=False)
+
+    @property
+    def frame_tracks(self) -> FrameTracks:
+        """The tracks with the number and the time of the frame."""
+        return FrameTracks(self.frame.index, float(self.frame.time), self.tracks)
 
     def stage_pictures(self) -> dict[str, Image]:
         """Return a picture of each stage of the detection, by name, in order."""

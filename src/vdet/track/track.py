@@ -1,4 +1,4 @@
-"""What a tracker says about a frame."""
+"""What a tracker says about a frame: the vehicles that are shown in it."""
 
 from dataclasses import dataclass
 
@@ -23,13 +23,47 @@ class Track:
     predicted
         Whether the detector did not see the vehicle in this frame: it is shown where its motion
         leads or, by the rules, where its image was found again.
-    class_id
-        Its class as the detector numbers them (`Detections.names`); None where the detector does
-        not tell classes.
+    class_name
+        Its class, one of `Detections.names`; None where the detector does not tell classes.
+    whole_foot
+        Middle of the lower edge of the whole box, with its part outside the frame; x and y, pixels.
+        None where the tracker does not know it: see `foot`.
+    distance
+        Metres along the road from the camera to the vehicle; None where it is not known.
+    lane
+        0 in the own lane, 1 in the next one to the right, -1 to the left and so on; None where it
+        is not known.
     """
 
     id: int
     box: Box
     score: float
     predicted: bool
-    class_id: int | None = None
+    class_name: str | None = None
+    whole_foot: tuple[float, float] | None = None
+    distance: float | None = None
+    lane: int | None = None
+
+    @property
+    def foot(self) -> tuple[float, float]:
+        """Where the vehicle stands: the middle of its lower edge, x and y in pixels."""
+        return self.whole_foot or (self.box.x + self.box.width / 2, float(self.box.bottom))
+
+
+@dataclass(frozen=True, slots=True)
+class FrameTracks:
+    """The vehicles that are shown in one frame of a video.
+
+    Attributes
+    ----------
+    index
+        Number of the frame, from 0 at the start of the video.
+    time
+        When the frame is shown, seconds.
+    tracks
+        By id.
+    """
+
+    index: int
+    time: float
+    tracks: tuple[Track, ...]

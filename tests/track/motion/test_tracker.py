@@ -349,3 +349,11 @@ def test_the_size_of_the_frame_does_not_matter() -> None:
         assert [track.id for track in twice] == [track.id for track in tracks]
         for one, other in zip(tracks, twice, strict=True):
             assert doubled(one.box).iou(other.box) > 0.95
+
+
+def test_a_vehicle_that_leaves_the_frame_stands_where_its_whole_box_does() -> None:
+    last = follow([[box] for box in moving(CAR.moved_to(WIDTH - 160, 400), 8, frames=15)])[-1]
+    (track,) = last
+    assert track.box.right == WIDTH
+    assert track.foot[0] > track.box.x + track.box.width / 2 + 5
+    assert track.foot[1] == pytest.approx(470, abs=3)

@@ -12,9 +12,9 @@ FRAME = 0.04
 
 
 def observation(
-    x: float = 400, width: float = 100, score: float = 1.0, class_id: int | None = None
+    x: float = 400, width: float = 100, score: float = 1.0, class_name: str | None = None
 ) -> Observation:
-    return Observation(np.array([x, 200, width, width / 2]), score, class_id)
+    return Observation(np.array([x, 200, width, width / 2]), score, class_name)
 
 
 def seen(
@@ -126,9 +126,9 @@ def test_the_score_falls_while_a_vehicle_is_not_seen() -> None:
 
 
 def test_the_class_is_the_one_with_the_highest_sum_of_scores() -> None:
-    vehicle = Vehicle.new(observation(score=0.9, class_id=2), FRAME, SETTINGS)
-    assert vehicle.class_id == 2
+    vehicle = Vehicle.new(observation(score=0.9, class_name="bus"), FRAME, SETTINGS)
+    assert vehicle.class_name == "bus"
     for _ in range(2):
-        vehicle.see(observation(score=0.6, class_id=0), FRAME, SIZE, SETTINGS)
-    assert vehicle.class_id == 0
-    assert seen(3).class_id is None
+        vehicle.see(observation(score=0.6, class_name="car"), FRAME, SIZE, SETTINGS)
+    assert vehicle.class_name == "car"
+    assert seen(3).class_name is None

@@ -344,8 +344,8 @@ def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
     for class_id in (0, 1, 1):
         found = Detections(corners, [0.9], classes=[class_id], names=("car", "van"))
         (track,) = cars.update(found, 0.0, GREY)
-    assert track.class_id == 1
-    assert see(RulesTracker(tracker_but(detections_needed=1)), SEDAN)[0][0].class_id is None
+    assert track.class_name == "van"
+    assert see(RulesTracker(tracker_but(detections_needed=1)), SEDAN)[0][0].class_name is None
 
 
 def test_without_the_frame_it_says_that_it_needs_it() -> None:

@@ -1,6 +1,6 @@
 """The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -76,6 +76,26 @@ class SinkContext:
 
 
 @dataclass(frozen=True, slots=True)
+class BatchTotal:
+    """A file over all videos of a batch, made from the outputs of each.
+
+    Attributes
+    ----------
+    name
+        Its name in the folder of the batch, without suffix.
+    write
+        Function that gets the outputs that are there, by the name of their video (as in the folder
+        of the batch, without suffix), and the file to write.
+    suffix
+        Suffix of the file; None for that of the outputs.
+    """
+
+    name: str
+    write: Callable[[Mapping[str, Path], Path], None]
+    suffix: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SinkKind:
     """A kind of sink, which is registered under a name.
 
@@ -100,6 +120,8 @@ class SinkKind:
     may_replace
         Says whether `--overwrite` may replace a file that is there. `OutputFiles.stage` takes it
         too, for a file that appears during the run.
+    total
+        What a batch writes in addition, over all its videos.
     """
 
     open: Callable[[Path, SinkContext], Sink]
@@ -110,6 +132,7 @@ class SinkKind:
     one_frame: bool = False
     takes: Literal["videos", "pictures", "both"] = "both"
     may_replace: MayReplace = any_file
+    total: BatchTotal | None = None
 
 
 @dataclass(frozen=True, slots=True)

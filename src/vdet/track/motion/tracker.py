@@ -76,10 +76,11 @@ class MotionTracker:
 
     def _observations(self, detections: Detections) -> list[Observation]:
         boxes = visible(to_sides(detections.boxes), self._size)
-        classes = [None] * len(boxes) if detections.classes is None else detections.classes.tolist()
         return [
-            Observation(box, score, class_id)
-            for box, score, class_id in zip(boxes, detections.scores.tolist(), classes, strict=True)
+            Observation(box, score, name)
+            for box, score, name in zip(
+                boxes, detections.scores.tolist(), detections.class_names, strict=True
+            )
             if min(box[2:]) >= 1
         ]
 
@@ -150,7 +151,7 @@ class MotionTracker:
                 continue
             for each in (row, other):
                 box = stretched(expected[each], around(both), observation.box)
-                shared[each] = Observation(box, observation.score, observation.class_id)
+                shared[each] = Observation(box, observation.score, observation.class_name)
         return shared
 
     def _confirmed(self, rows: Iterable[int]) -> list[int]:
@@ -167,9 +168,16 @@ class MotionTracker:
         tracks = []
         for vehicle, box in self._without_nested(shown):
             vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
-            predicted = vehicle.unseen > 0
-            track = Track(vehicle.id, _rounded(box), vehicle.score, predicted, vehicle.class_id)
-            tracks.append(track)
+            tracks.append(
+                Track(
+                    vehicle.id,
+                    _rounded(box),
+                    vehicle.score,
+                    predicted=vehicle.unseen > 0,
+                    class_name=vehicle.class_name,
+                    whole_foot=_foot(vehicle.state.box),
+                )
+            )
         return sorted(tracks, key=lambda track: track.id)
 
     def _is_clear(self, vehicle: Vehicle, box: Float64Array) -> bool:
@@ -193,3 +201,8 @@ def _rounded(box: Float64Array) -> Box:
     left, top = np.floor(box[:2] + 0.5).astype(int).tolist()
     right, bottom = np.floor(box[:2] + box[2:] + 0.5).astype(int).tolist()
     return Box(left, top, right - left, bottom - top)
+
+
+def _foot(box: Float64Array) -> tuple[float, float]:
+    left, top, width, height = box.tolist()
+    return left + width / 2, top + height

@@ -34,7 +34,7 @@ class Observation:
 
     box: Float64Array
     score: float
-    class_id: int | None = None
+    class_name: str | None = None
 
 
 @dataclass(eq=False, slots=True)
@@ -82,7 +82,7 @@ class Vehicle:
     hidden: float = 0.0
     _scores: _RecentMean = field(default_factory=_RecentMean)
     _detection_scores: _RecentMean = field(default_factory=_RecentMean)
-    _class_scores: dict[int, float] = field(default_factory=dict)
+    _class_scores: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def new(
@@ -107,7 +107,7 @@ class Vehicle:
         return self._detection_scores.value
 
     @property
-    def class_id(self) -> int | None:
+    def class_name(self) -> str | None:
         """The class with the highest sum of scores."""
         return max(self._class_scores, key=self._class_scores.__getitem__, default=None)
 
@@ -153,9 +153,9 @@ class Vehicle:
     ) -> None:
         self._weigh(observation.score, seconds, settings)
         self._detection_scores.add(observation.score, seconds)
-        if observation.class_id is not None:
-            sums = self._class_scores
-            sums[observation.class_id] = sums.get(observation.class_id, 0.0) + observation.score
+        if observation.class_name is not None:
+            sums, name = self._class_scores, observation.class_name
+            sums[name] = sums.get(name, 0.0) + observation.score
 
     def _weigh(self, score: float, seconds: float, settings: MotionTrackerSettings) -> None:
         gained = (score - settings.leak) * min(seconds, LONGEST_LOOK)

@@ -34,7 +34,7 @@ class Region:
     centroid: Point
     peak: float
     score: float = 1.0
-    class_id: int | None = None
+    class_name: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class CarDetection:
     centroid: Point
     image: Image
     score: float
-    class_id: int | None
+    class_name: str | None
 
 
 @dataclass(eq=False, slots=True)
@@ -116,9 +116,9 @@ class Car:
         return fmean(detection.score for detection in self.detections)
 
     @property
-    def class_id(self) -> int | None:
+    def class_name(self) -> str | None:
         """The most frequent class of the detections, the earliest one among equals."""
-        return multimode(detection.class_id for detection in self.detections)[0]
+        return multimode(detection.class_name for detection in self.detections)[0]
 
     @property
     def is_shown(self) -> bool:
@@ -134,7 +134,7 @@ class Car:
         """Add a detection by template match alone, in the frame `image`."""
         last = self.detections[-1]
         self.matches += 1
-        self._add(Region(box, self.centroid_at(box), 0.0, last.score, last.class_id), image)
+        self._add(Region(box, self.centroid_at(box), 0.0, last.score, last.class_name), image)
 
     def miss(self) -> None:
         """Note a frame without a detection."""
@@ -173,7 +173,7 @@ class Car:
         box = region.box
         cutout = image[box.y : box.bottom, box.x : box.right].copy()
         self.detections.append(
-            CarDetection(box, region.centroid, cutout, region.score, region.class_id)
+            CarDetection(box, region.centroid, cutout, region.score, region.class_name)
         )
         self.detected = True
         self.in_a_row += 1

@@ -92,7 +92,7 @@ class RulesTracker:
         for car in self._cars:
             if car.is_shown:
                 car.id = next(self._ids) if car.id is None else car.id
-                tracks.append(Track(car.id, car.box, car.score, car.matches > 0, car.class_id))
+                tracks.append(Track(car.id, car.box, car.score, car.matches > 0, car.class_name))
         return sorted(tracks, key=lambda track: track.id)
 
 
@@ -104,21 +104,20 @@ def large_enough(
     Rule 1. The part of a region outside the frame does not count.
     """
     least = max(1, settings.min_region)
-    classes = [None] * len(detections) if detections.classes is None else detections.classes
     regions = [
         Region(
             box.clipped(frame_width, frame_height),
             (float(x), float(y)),
             float(strength),
             float(score),
-            None if class_id is None else int(class_id),
+            name,
         )
-        for box, (x, y), strength, score, class_id in zip(
+        for box, (x, y), strength, score, name in zip(
             detections.rounded,
             detections.centroids,
             detections.strengths,
             detections.scores,
-            classes,
+            detections.class_names,
             strict=True,
         )
     ]
