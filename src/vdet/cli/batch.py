@@ -86,13 +86,12 @@ def output_options(
     options: BatchOptions,
     *,
     no_video: bool,
-    tracks: Sequence[Path],
-    sinks: Sequence[Output],
+    others: Sequence[Output],
     overwrite: bool,
 ) -> OutputOptions:
     """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
     suffixes: dict[str, str | None] = {} if no_video else {"video": None}
-    for output in (*(Output("tracks", path) for path in tracks), *sinks):
+    for output in others:
         if suffixes.get(output.sink) is not None:
             raise click.UsageError(f"{output.sink} is given two suffixes; keep one")
         suffixes[output.sink] = _suffix(output)
@@ -116,7 +115,9 @@ def _suffix(output: Output) -> str:
         raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
     if not _SUFFIX.fullmatch(suffix) or not suffix.endswith(tuple(kind.suffixes) or suffix):
         known = ", ".join(kind.suffixes) or "as in .txt"
-        option = "--tracks" if output.sink == "tracks" else f"--sink {output.sink}"
+        flags = {flag for each in click.get_current_context().command.params for flag in each.opts}
+        option = f"--{output.sink}"
+        option = option if option in flags else f"--sink {output.sink}"
         raise click.UsageError(f"with -d give {option} a suffix: {known}")
     return suffix
 

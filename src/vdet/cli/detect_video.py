@@ -19,6 +19,7 @@ from vdet.cli.options import (
     TimeType,
     lane_options,
     model_option,
+    output_option,
     overwrite_option,
     read_lanes,
     read_settings,
@@ -44,12 +45,10 @@ from vdet.pipeline.sinks.protocol import Output
 )
 @click.argument("clips", nargs=-1, required=True, type=PATH, metavar="IN [OUT] | CLIP...")
 @click.option("--no-video", is_flag=True, help="Write no video, only other outputs.")
-@click.option(
-    "--tracks",
-    type=PATH,
-    multiple=True,
-    metavar="FILE",
-    help="Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -, they go to "
+@output_option(
+    "tracks",
+    "FILE",
+    "Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -, they go to "
     "standard output as .jsonl. With -d, give only the suffix. Can be repeated.",
 )
 @click.option(
@@ -88,7 +87,6 @@ def detect_video(
     *,
     clips: tuple[Path, ...],
     no_video: bool,
-    tracks: tuple[Path, ...],
     start: Fraction | None,
     end: Fraction | None,
     frames: int | None,
@@ -122,16 +120,14 @@ def detect_video(
     others = read_sinks(sinks)
     if folder is None:
         source, output = _in_and_out(clips, batch)
-        outputs = _outputs(output, tracks, stages, others)
+        outputs = _outputs(output, stages, others)
         _check_usage(output, outputs, no_video=no_video, with_stages=stages is not None, at=at)
         batch_outputs = None
     else:
         if stages is not None or at is not None:
             raise click.UsageError("--stages and --at are for one video; leave out -d")
         source, outputs = Path(), ()  # each video has its own
-        batch_outputs = output_options(
-            batch, no_video=no_video, tracks=tracks, sinks=others, overwrite=overwrite
-        )
+        batch_outputs = output_options(batch, no_video=no_video, others=others, overwrite=overwrite)
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments, model_path)
     job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request, overwrite)
@@ -165,9 +161,9 @@ def _in_and_out(clips: tuple[Path, ...], batch: BatchOptions) -> tuple[Path, Pat
 
 
 def _outputs(
-    video: Path | None, tracks: Sequence[Path], stages: Path | None, others: Sequence[Output]
+    video: Path | None, stages: Path | None, others: Sequence[Output]
 ) -> tuple[Output, ...]:
-    named = [("video", video), *(("tracks", path) for path in tracks), ("stages", stages)]
+    named = [("video", video), ("stages", stages)]
     return (*(Output(sink, path) for sink, path in named if path is not None), *others)
 
 

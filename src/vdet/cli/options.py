@@ -30,6 +30,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 log = logging.getLogger("vdet")
 
+_OUTPUTS = f"{__name__}.outputs"
 _LONGEST = 10_000 * 3600  # seconds
 _TIME = re.compile(r"([0-9]{1,9}:){0,2}[0-9]{1,9}(\.[0-9]{1,9})?", re.ASCII)
 
@@ -131,9 +132,26 @@ sink_option = click.option(
 )
 
 
+def output_option(sink: str, metavar: str, help_text: str) -> Callable[[F], F]:
+    """Add the option `--SINK PATH`, which asks for an output of this sink; see `read_sinks`."""
+
+    def add(context: click.Context, _: click.Parameter, paths: tuple[Path, ...]) -> None:
+        context.meta.setdefault(_OUTPUTS, []).extend(Output(sink, path) for path in paths)
+
+    return click.option(
+        f"--{sink}",
+        type=PATH,
+        multiple=True,
+        metavar=metavar,
+        expose_value=False,
+        callback=add,
+        help=help_text,
+    )
+
+
 def read_sinks(sinks: tuple[str, ...]) -> tuple[Output, ...]:
-    """Read the outputs that `sink_option` asks for."""
-    outputs = []
+    """Read the outputs that each `output_option` of the command and `sink_option` ask for."""
+    outputs: list[Output] = list(click.get_current_context().meta.get(_OUTPUTS, []))
     for text in sinks:
         name, equals, path = text.partition("=")
         if not (name and equals and path):
