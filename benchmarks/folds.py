@@ -21,9 +21,10 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo, Row
+from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.scores import score
 from vdet.evaluate.truth import read_truth
+from vdet.formats.rows import Row
 from vdet.learn.augmentation import augment
 from vdet.learn.box_regression import extract_box_patches, fit_boxes
 from vdet.learn.dataset import PatchFile, find_boxed, find_patches

@@ -19,9 +19,10 @@ from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import horizon_of
 from vdet.evaluate.comparison import Comparison, compare
-from vdet.evaluate.labelled_video import LabelledVideo, Row
+from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
 from vdet.evaluate.scores import score, score_comparison
+from vdet.formats.rows import Row
 from vdet.geometry import Box, Float64Array
 from vdet.media import Frame, VideoInfo
 from vdet.pipeline.loop import follow_frames, peek

@@ -24,7 +24,7 @@ def open_archive(file: Path | IO[bytes]) -> zipfile.ZipFile:
         raise ArchiveError("is neither a folder nor a readable zip file") from error
 
 
-def list_members(path: Path) -> list[str]:
+def list_members(file: Path | IO[bytes]) -> list[str]:
     """Return the names of the files in a zip file.
 
     Raises
@@ -33,7 +33,7 @@ def list_members(path: Path) -> list[str]:
         It is not a zip file or is damaged, a name occurs twice or leads out of the folder that the
         archive would be unpacked in, or a member is a symbolic link.
     """
-    with open_archive(path) as archive:
+    with open_archive(file) as archive:
         members = [member for member in archive.infolist() if not member.is_dir()]
     names: set[str] = set()
     for member in members:

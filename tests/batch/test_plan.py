@@ -9,7 +9,7 @@ import pytest
 
 from vdet.batch.digest import result_digest
 from vdet.batch.manifest import Origin, Record, open_manifest
-from vdet.batch.plan import OutputOptions, Plan, make_plan
+from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
 from vdet.errors import BatchError, ConfigError, OutputError
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks import tracks
@@ -40,7 +40,11 @@ def plan_outputs(
     *inputs: str, suffixes: Mapping[str, str | None], folder: str = "out", **options: bool
 ) -> Plan:
     clips = [Path(path) for path in inputs]
-    return make_plan(clips, Path(folder), COMMON, OutputOptions(suffixes, **options), DIGEST)
+    return make_plan(clips, Path(folder), COMMON, wanted(suffixes, **options), DIGEST)
+
+
+def wanted(suffixes: Mapping[str, str | None], **options: bool) -> OutputOptions:
+    return OutputOptions([OutputSuffix(*each) for each in suffixes.items()], **options)
 
 
 def outputs(jobs: tuple[VideoJob, ...]) -> list[list[str]]:
@@ -83,6 +87,11 @@ class TestJobs:
         assert outputs(plan("clips/a.mp4", tracks=".csv").jobs) == [["out/a.mp4", "out/a.csv"]]
         alone = plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"})
         assert outputs(alone.jobs) == [["out/a.csv"]]
+
+    def test_a_sink_may_write_several_outputs_of_each_video(self) -> None:
+        suffixes = [OutputSuffix("tracks", end) for end in (".txt", ".kitti.txt", ".coco.json")]
+        plan = make_plan([Path("clips/a.mp4")], Path("out"), COMMON, OutputOptions(suffixes))
+        assert outputs(plan.jobs) == [["out/a.txt", "out/a.kitti.txt", "out/a.coco.json"]]
 
     def test_a_suffix_for_the_video_chooses_its_container(self) -> None:
         made = plan_outputs("clips/a.mp4", "clips/c.avi", suffixes={"video": ".mkv"})
@@ -168,8 +177,8 @@ class TestRefused:
             plan_outputs("clips/a.mp4", suffixes=two)
 
     def test_a_suffix_that_the_sink_cannot_write(self) -> None:
-        with pytest.raises(OutputError, match=r"out/a\.xml: tracks are written as \.txt, \.csv"):
-            plan("clips/a.mp4", tracks=".xml")
+        with pytest.raises(OutputError, match=r"out/a\.json: tracks are written as \.txt, \.csv"):
+            plan("clips/a.mp4", tracks=".json")
 
     def test_a_sink_that_is_not_known(self) -> None:
         with pytest.raises(ConfigError, match=r"^nothing: is no sink; known are video, tracks"):
@@ -241,6 +250,13 @@ class TestTotals:
             plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"})
         plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, overwrite=True)
         plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, skip_existing=True)
+
+    def test_two_of_one_name_are_refused(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        total = BatchTotal("all", lambda _, target: target.touch(), suffix=".json")
+        monkeypatch.setattr(tracks, "TRACKS", replace(tracks.TRACKS, total=total))
+        both = OutputOptions([OutputSuffix("tracks", ".csv"), OutputSuffix("tracks", ".txt")])
+        with pytest.raises(BatchError, match=r"^out/all\.json: two outputs over all videos"):
+            make_plan([Path("clips")], Path("out"), COMMON, both)
 
     def test_a_video_must_not_have_its_name(self) -> None:
         Path("clips/all.mp4").write_bytes(b"clip")

@@ -6,7 +6,7 @@ import pytest
 
 from running import write_drive
 from vdet.batch.manifest import Origin
-from vdet.batch.plan import OutputOptions, make_plan
+from vdet.batch.plan import OutputOptions, OutputSuffix, make_plan
 from vdet.batch.progress import BatchState, FrameCounts, batch_state, frame_counts
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
@@ -75,7 +75,9 @@ def test_where_the_counts_cannot_be_seen_nothing_is_counted(tmp_path: Path) -> N
 def test_a_batch_counts_the_frames_of_each_file_while_it_runs(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     clips = [write_drive(tmp_path / "in" / name, n) for name, n in (("a.mp4", 3), ("b.mp4", 5))]
-    plan = make_plan(clips, tmp_path / "out", VideoJob(Path()), OutputOptions({"tracks": ".csv"}))
+    plan = make_plan(
+        clips, tmp_path / "out", VideoJob(Path()), OutputOptions([OutputSuffix("tracks", ".csv")])
+    )
     work = Work(Settings(), None, threads=1)
     with frame_counts(2) as counts:
         results = run_batch(

@@ -340,12 +340,12 @@ class TestBatch:
         [
             (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
             (("--sink", "tracks=a.csv"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
-            (("--sink", "tracks=.xml"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
+            (("--sink", "tracks=.json"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
             (("--sink", "video=.avi"), 2, "with -d give --sink video a suffix: .mp4, .mov, .mkv"),
             (("--sink", "json=.json"), 2, "json: is for pictures; give another sink"),
             (("--sink", "stages=.png"), 2, "stages: is for one video; leave out -d"),
             (("--sink", "counts=.csv"), 1, f"counts: is no sink; {KNOWN}"),
-            (("--tracks", ".csv", "--sink", "tracks=.txt"), 2, "tracks is given two suffixes"),
+            (("--tracks", ".csv", "--sink", "tracks=.csv"), 2, "tracks is given .csv twice"),
         ],
     )
     def test_what_cannot_be_is_refused_before_any_work(

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from vdet.evaluate.labelled_video import LabelledVideo, Row, checked_video
+from vdet.evaluate.labelled_video import LabelledVideo, checked_video
+from vdet.formats.rows import Row
 
 TEN = range(1, 11)
 

@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 
 from vdet.errors import TruthError
-from vdet.evaluate.labelled_video import NO_ID, LabelledVideo, Row, checked_video
+from vdet.evaluate.labelled_video import LabelledVideo, checked_video
+from vdet.formats.rows import NO_ID, Row
 
 
 def scene(frame_count: int | None = None) -> LabelledVideo:

@@ -1,12 +1,18 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from formats.saving import car, frame, written
 from vdet.errors import TruthError
-from vdet.evaluate.labelled_video import LabelledVideo, Row
-from vdet.evaluate.truth import cvat_rows, kitti_rows, read_truth
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.evaluate.truth import read_truth
+from vdet.formats import mot
+from vdet.formats.coco import COCO
+from vdet.formats.protocol import Format
+from vdet.formats.registry import FORMATS
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 KITTI = "".join(
@@ -107,126 +113,63 @@ def test_truth_that_is_written_is_read_back(
     assert dict(zip(keys, boxes, strict=True)) == truth
 
 
-KITTI_FILE = Path("0000.txt")
 KITTI_REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
 
 
-def kitti_line(frame: int, track: int, name: str, box: str = "10.5 20 40.5 60") -> str:
-    return f"{frame} {track} {name} 0 2 -1.57 {box} {KITTI_REST}"
+def kitti(*names: str) -> str:
+    """Return KITTI labels of a frame with a box for each name."""
+    lines = [
+        f"0 {-1 if name == 'DontCare' else number} {name} 0 2 -1.57 10.5 20 40.5 60 {KITTI_REST}\n"
+        for number, name in enumerate(names)
+    ]
+    return "".join(lines)
 
 
-def test_kitti_frames_count_from_0_and_boxes_are_corners() -> None:
-    assert list(kitti_rows(KITTI_FILE, kitti_line(0, 3, "Car"))) == [Row(1, 1, 3, 10.5, 20, 30, 40)]
+def cvat(label: str, occluded: int = 0) -> str:
+    box = f'<box frame="0" outside="0" occluded="{occluded}" xtl="1" ytl="2" xbr="4" ybr="6"/>'
+    return f'<annotations>\n<track id="3" label="{label}">{box}</track></annotations>'
 
 
-def test_kitti_car_van_and_truck_are_vehicles() -> None:
-    text = "\n".join(
-        kitti_line(0, track, name) for track, name in enumerate(["Car", "Van", "Truck"])
-    )
-    assert [row.ignored for row in kitti_rows(KITTI_FILE, text)] == [False] * 3
+def test_cars_vans_and_trucks_are_vehicles_in_kitti(tmp_path: Path) -> None:
+    video = read_truth(write(tmp_path, kitti("Car", "Van", "Truck")))
+    assert video.ignored.tolist() == [False] * 3
 
 
-def test_kitti_dontcare_is_an_ignore_region() -> None:
-    assert [row.ignored for row in kitti_rows(KITTI_FILE, kitti_line(0, -1, "DontCare"))] == [True]
+def test_what_nobody_must_find_is_an_ignore_region(tmp_path: Path) -> None:
+    assert read_truth(write(tmp_path, kitti("DontCare", "Tram"))).ignored.tolist() == [True] * 2
+    assert read_truth(write(tmp_path, cvat("ignore"))).ignored.tolist() == [True]
 
 
-def test_kitti_people_are_neither_vehicles_nor_ignore_regions() -> None:
-    assert not list(
-        kitti_rows(KITTI_FILE, kitti_line(0, 1, "Pedestrian") + "\n" + kitti_line(0, 2, "Cyclist"))
-    )
+def test_people_are_neither_vehicles_nor_ignore_regions(tmp_path: Path) -> None:
+    assert len(read_truth(write(tmp_path, kitti("Pedestrian", "Cyclist")))) == 0
+    assert len(read_truth(write(tmp_path, cvat("pedestrian")))) == 0
 
 
-@pytest.mark.parametrize(
-    ("second", "message"),
-    [
-        (
-            kitti_line(1, 3, "Car") + " 0.9",
-            "KITTI tracking has 17 columns between spaces; this line has 18",
-        ),
-        ("2,7,1,1,20,10,1,3,1", "KITTI tracking has 17 columns between spaces; this line has 1"),
-        (kitti_line(1, 3, "Spaceship"), "label 'Spaceship' is unknown"),
-        (kitti_line(1, 3, "Car", "10 20 nan 60"), "'nan' is not a number"),
-    ],
-)
-def test_a_wrong_kitti_line_is_refused_with_its_number(second: str, message: str) -> None:
-    with pytest.raises(TruthError) as caught:
-        list(kitti_rows(KITTI_FILE, kitti_line(0, 3, "Car") + "\n" + second))
-    assert str(caught.value).startswith(f"0000.txt:2: {message}")
+def test_an_occluded_vehicle_counts(tmp_path: Path) -> None:
+    assert read_truth(write(tmp_path, cvat("car", occluded=1))).ignored.tolist() == [False]
 
 
-CVAT_FILE = Path("annotations.xml")
-BOX = '<box frame="0" outside="0" occluded="0" xtl="10" ytl="20" xbr="40.5" ybr="60"/>'
+@pytest.mark.parametrize("content", [kitti("Car", "Spaceship"), cvat("cow")])
+def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path, content: str) -> None:
+    with pytest.raises(TruthError, match=r"truth:2: label '(Spaceship|cow)' is unknown; use one"):
+        read_truth(write(tmp_path, content))
 
 
-def document(content: str) -> str:
-    return (
-        '<?xml version="1.0" encoding="utf-8"?>\n<annotations>\n<version>1.1</version>\n'
-        f"<meta><task><size>100</size></task></meta>\n{content}\n</annotations>\n"
-    )
+@pytest.mark.parametrize("form", [each for each in FORMATS if each is not mot.MOT])
+def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> None:
+    path = tmp_path / f"truth{form.ending}"
+    kinds = (None, "bus", "motorcycle")
+    tracks = [car(number, class_name=name) for number, name in enumerate(kinds, start=1)]
+    path.write_bytes(written(form, [frame(2, *tracks)]))
+    video = read_truth(path)
+    assert video.frames.tolist() == [3, 3, 3]
+    assert video.ids.tolist() == [1, 2, 3]
+    assert np.allclose(video.boxes, [[10, 20, 30, 40]] * 3, atol=0.01)
+    assert video.scores.tolist() == [1, 1, 1]
+    assert video.ignored.tolist() == [False, False, True]
 
 
-def track(content: str, label: str = "car") -> str:
-    return document(f'<track id="3" label="{label}" source="manual">{content}</track>')
-
-
-def test_cvat_frames_count_from_0_and_boxes_are_corners() -> None:
-    assert cvat_rows(CVAT_FILE, track(BOX)) == [Row(5, 1, 3, 10, 20, 30.5, 40)]
-
-
-def test_a_cvat_box_outside_is_left_out() -> None:
-    assert not cvat_rows(CVAT_FILE, track(BOX.replace('outside="0"', 'outside="1"')))
-
-
-def test_an_occluded_cvat_box_counts() -> None:
-    (row,) = cvat_rows(CVAT_FILE, track(BOX.replace('occluded="0"', 'occluded="1"')))
-    assert not row.ignored
-
-
-def test_a_cvat_track_labelled_ignore_is_an_ignore_region() -> None:
-    (row,) = cvat_rows(CVAT_FILE, track(BOX, "ignore"))
-    assert row.ignored
-
-
-def test_a_cvat_pedestrian_is_skipped() -> None:
-    assert not cvat_rows(CVAT_FILE, track(BOX, "pedestrian"))
-
-
-def test_attributes_of_a_cvat_box_are_ignored() -> None:
-    box = BOX.replace("/>", '><attribute name="colour">red</attribute></box>')
-    assert len(cvat_rows(CVAT_FILE, track(box))) == 1
-
-
-def test_a_cvat_file_without_tracks_has_no_rows() -> None:
-    assert cvat_rows(CVAT_FILE, document("")) == []
-
-
-BOMB = (
-    '<?xml version="1.0"?>\n<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>\n'
-    "<annotations><version>&b;</version></annotations>"
-)
-EXTERNAL = '<!DOCTYPE annotations SYSTEM "http://example.org/evil.dtd"><annotations></annotations>'
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (BOMB, "2: the XML declares a document type"),
-        (EXTERNAL, "1: the XML declares a document type"),
-        (document("<version>&b;</version>"), "5: broken XML: undefined entity"),
-        (document("<meta>"), "6: broken XML: mismatched tag"),
-        (document('<track label="car"/>'), "5: <track> without its 'id'"),
-        (document('<track id="3"/>'), "5: <track> without its 'label'"),
-        (document('<image id="0" name="a.png"/>'), "5: CVAT for images"),
-        ("<svg/>", "1: <svg> where CVAT for video 1.1 has <annotations>"),
-        (track(BOX, "cow"), "5: label 'cow' is unknown"),
-        (track('<polygon frame="0" points="1,2;3,4"/>'), "5: <polygon> in a track; only boxes"),
-        (track(BOX.replace(' xtl="10"', "")), "5: <box> without its 'xtl'"),
-        (track(BOX.replace("10", "NaN")), "5: 'NaN' is not a number"),
-        (track(BOX.replace("/>", ' rotation="30"/>')), "5: the box is rotated"),
-    ],
-)
-def test_other_xml_than_cvat_video_is_refused_with_its_line(text: str, message: str) -> None:
-    with pytest.raises(TruthError) as caught:
-        cvat_rows(CVAT_FILE, text)
-    assert str(caught.value).startswith(f"annotations.xml:{message}")
-    assert "\n" not in str(caught.value)
+def test_a_crowd_in_coco_is_an_ignore_region(tmp_path: Path) -> None:
+    path = tmp_path / "truth.json"
+    path.write_bytes(written(COCO, [frame(0, car())]).replace(b'"iscrowd": 0', b'"iscrowd": 1'))
+    assert read_truth(path).ignored.tolist() == [True]

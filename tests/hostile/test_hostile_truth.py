@@ -10,11 +10,11 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.errors import TruthError
-from vdet.evaluate import labelled_video
 from vdet.evaluate.comparison import MAX_IDS, MAX_IN_FRAME, compare
 from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.truth import read_truth
-from vdet.evaluate.xml_reader import MAX_DEPTH
+from vdet.formats import rows
+from vdet.formats.xml_reader import MAX_DEPTH
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
 GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)
@@ -194,7 +194,7 @@ def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
 
 
 def test_too_many_boxes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(labelled_video, "MAX_ROWS", 10)
+    monkeypatch.setattr(rows, "MAX_ROWS", 10)
     path = tmp_path / "t.txt"
     path.write_text("".join(f"{n},1,1,1,1,1,1,1,1\n" for n in range(1, 11)))
     assert len(read_truth(path)) == 10

@@ -37,7 +37,8 @@ class Record:
     Attributes
     ----------
     input, outputs
-        Absolute paths; that of each output is under the name of its sink.
+        Absolute paths; that of each output is under the name of its sink, or all of them where the
+        sink writes several.
     started
         In UTC, as ISO 8601 writes it.
     seconds
@@ -55,7 +56,7 @@ class Record:
     """
 
     input: str
-    outputs: dict[str, str]
+    outputs: Mapping[str, str | tuple[str, ...]]
     started: str
     seconds: float
     width: int | None = None

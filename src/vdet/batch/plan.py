@@ -1,6 +1,7 @@
 """The plan of a batch: a job for each video. A wrong plan is refused before any work."""
 
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,14 +18,30 @@ MANIFEST = "manifest.jsonl"
 
 
 @dataclass(frozen=True, slots=True)
+class OutputSuffix:
+    """An output that every video of a batch gets.
+
+    Attributes
+    ----------
+    sink
+        The name of its sink.
+    suffix
+        What its name ends in, after that of the video. None: the video's own suffix if the sink
+        can write it, else the first that the sink can write.
+    """
+
+    sink: str
+    suffix: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class OutputOptions:
     """Which outputs every video gets, and what happens to outputs that are there already.
 
     Attributes
     ----------
     suffixes
-        The suffix of the output for each sink, by the sink's name. None: the video's own suffix if
-        the sink can write it, else the first that the sink can write.
+        The outputs of each video; a sink may come several times.
     overwrite
         Outputs that are there already are replaced.
     skip_existing
@@ -32,7 +49,7 @@ class OutputOptions:
         date. Else all are made again.
     """
 
-    suffixes: Mapping[str, str | None]
+    suffixes: Sequence[OutputSuffix]
     overwrite: bool = False
     skip_existing: bool = False
 
@@ -95,6 +112,7 @@ def make_plan(
     jobs = [_job(source, folder, common, options) for source in sources]
     _refuse_inside(sources, folder)
     totals = _totals(sources, folder, options)
+    _refuse_equal(totals)
     _refuse_shared(jobs, folder, totals)
     manifest = folder / MANIFEST
     check_manifest(manifest)
@@ -116,32 +134,30 @@ def _totals(sources: Sequence[Source], folder: Path, options: OutputOptions) -> 
     return tuple(
         Total(
             total,
-            folder / f"{total.name}{total.suffix or suffix or ''}",
+            folder / f"{total.name}{total.suffix or each.suffix or ''}",
             {
-                source.place.with_suffix("").as_posix(): _path(folder / source.place, sink, suffix)
+                source.place.with_suffix("").as_posix(): _path(folder / source.place, each)
                 for source in sources
             },
         )
-        for sink, suffix in options.suffixes.items()
-        if (total := sink_kind(sink).total)
+        for each in options.suffixes
+        if (total := sink_kind(each.sink).total)
     )
 
 
 def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions) -> VideoJob:
     place = folder / source.place
-    outputs = [
-        Output(sink, _path(place, sink, suffix)) for sink, suffix in options.suffixes.items()
-    ]
+    outputs = [Output(each.sink, _path(place, each)) for each in options.suffixes]
     replaces = options.overwrite or (
         options.skip_existing and any(os.path.lexists(output.path) for output in outputs)
     )
     return replace(common, source=source.path, outputs=tuple(outputs), overwrite=replaces)
 
 
-def _path(place: Path, sink: str, suffix: str | None) -> Path:
-    if suffix is not None:
-        return place.with_suffix(suffix)
-    writable = sink_kind(sink).suffixes
+def _path(place: Path, output: OutputSuffix) -> Path:
+    if output.suffix is not None:
+        return place.with_suffix(output.suffix)
+    writable = sink_kind(output.sink).suffixes
     if not writable or place.suffix.lower() in writable:
         return place
     return place.with_suffix(writable[0])
@@ -174,6 +190,12 @@ def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
             raise BatchError(
                 f"{source.path}: this input lies in the output folder {folder}; give another"
             )
+
+
+def _refuse_equal(totals: Sequence[Total]) -> None:
+    for path, count in Counter(total.path for total in totals).items():
+        if count > 1:
+            raise BatchError(f"{path}: two outputs over all videos would have this name; keep one")
 
 
 def _refuse_shared(jobs: Iterable[VideoJob], folder: Path, totals: Sequence[Total]) -> None:

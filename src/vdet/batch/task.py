@@ -99,12 +99,19 @@ def _record(
 ) -> Record:
     return Record(
         input=str(job.source.absolute()),
-        outputs={output.sink: str(output.path.absolute()) for output in job.outputs},
+        outputs=_paths_by_sink(job),
         started=started,
         seconds=round(seconds, 3),
         warnings=warnings,
         error=error,
     )
+
+
+def _paths_by_sink(job: VideoJob) -> dict[str, str | tuple[str, ...]]:
+    paths: dict[str, tuple[str, ...]] = {}
+    for output in job.outputs:
+        paths[output.sink] = (*paths.get(output.sink, ()), str(output.path.absolute()))
+    return {sink: each[0] if len(each) == 1 else each for sink, each in paths.items()}
 
 
 def _now() -> str:

@@ -3,6 +3,7 @@
 import hashlib
 import logging
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ import click
 import vdet
 from vdet.batch.digest import work_digest
 from vdet.batch.manifest import Origin, Record
-from vdet.batch.plan import OutputOptions, Plan, make_plan
+from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
 from vdet.cli.messages import batch_bar, counted, print_lines, print_message
@@ -90,11 +91,12 @@ def output_options(
     overwrite: bool,
 ) -> OutputOptions:
     """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
-    suffixes: dict[str, str | None] = {} if no_video else {"video": None}
-    for output in others:
-        if suffixes.get(output.sink) is not None:
-            raise click.UsageError(f"{output.sink} is given two suffixes; keep one")
-        suffixes[output.sink] = _suffix(output)
+    suffixes = [OutputSuffix(output.sink, _suffix(output)) for output in others]
+    for each, count in Counter(suffixes).items():
+        if count > 1:
+            raise click.UsageError(f"{each.sink} is given {each.suffix} twice; leave one out")
+    if not no_video and not any(each.sink == "video" for each in suffixes):
+        suffixes.insert(0, OutputSuffix("video"))
     if not suffixes:
         raise click.UsageError(
             "nothing would be written; leave out --no-video, or give --tracks or --sink"
@@ -113,7 +115,7 @@ def _suffix(output: Output) -> str:
         raise click.UsageError(f"{output.sink}: is for pictures; give another sink")
     if kind.one_frame:
         raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
-    if not _SUFFIX.fullmatch(suffix) or not suffix.endswith(tuple(kind.suffixes) or suffix):
+    if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
         known = ", ".join(kind.suffixes) or "as in .txt"
         flags = {flag for each in click.get_current_context().command.params for flag in each.opts}
         option = f"--{output.sink}"

@@ -1,4 +1,4 @@
-"""Boxes with ids, frame by frame: truth and predictions in memory, and the checks of their rows."""
+"""Boxes with ids, frame by frame: truth and predictions in memory."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -6,33 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.errors import TruthError
+from vdet.formats.rows import Row, checked_rows
 from vdet.geometry import BoolArray, Float64Array, Int64Array
-
-MAX_ROWS = 500_000
-"""Most boxes in one file: five hours of video with one vehicle in sight."""
-
-NO_ID = -1
-"""Id of an ignore region without an id; the only id that may occur twice in a frame."""
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A box as it stands in a file.
-
-    `line` is its line in the file, `frame` counts from 1, `x`, `y`, `width` and `height` are
-    full-frame pixels counted from 0.
-    """
-
-    line: int
-    frame: int
-    id: int
-    x: float
-    y: float
-    width: float
-    height: float
-    score: float = 1.0
-    ignored: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,39 +99,7 @@ def checked_video(
     Raises
     ------
     TruthError
-        A frame before the first or beyond `frame_count`, a negative id of a vehicle, an id twice
-        in a frame, a box without area, or more than `MAX_ROWS` boxes.
+        As `checked_rows`.
     """
-    checked: list[Row] = []
-    lines: dict[tuple[int, int], int] = {}
-    for row in rows:
-        if len(checked) == MAX_ROWS:
-            raise line_error(path, row.line, f"has more than {MAX_ROWS:,} boxes; cut it into parts")
-        mistake = _mistake_in(row, frame_count)
-        key = row.frame, row.id
-        if mistake is None and key in lines and row.id != NO_ID:
-            mistake = f"id {row.id} is in the same frame already (line {lines[key]})"
-        if mistake is not None:
-            raise line_error(path, row.line, mistake)
-        lines[key] = row.line
-        checked.append(row)
+    checked = checked_rows(path, rows, frame_count=frame_count)
     return LabelledVideo.from_rows(checked, frame_count=frame_count, rate=rate)
-
-
-def line_error(path: Path, line: int, what: str) -> TruthError:
-    """Return the error that says what is wrong in a line of a file."""
-    return TruthError(f"{path}:{line}: {what}")
-
-
-def _mistake_in(row: Row, frame_count: int | None) -> str | None:
-    if row.frame < 1:
-        return "the frame comes before the video's first"
-    if frame_count is not None and row.frame > frame_count:
-        return (
-            f"the frame is number {row.frame} of a video of {frame_count}; is it another video's?"
-        )
-    if row.id < (NO_ID if row.ignored else 0):
-        return f"id {row.id} is negative; number the vehicles from 0 or 1"
-    if row.width <= 0 or row.height <= 0 or row.width * row.height <= 0:
-        return f"the box has no area: {row.width:g} wide, {row.height:g} high"
-    return None

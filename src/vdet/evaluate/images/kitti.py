@@ -5,8 +5,8 @@ from pathlib import Path
 
 from vdet.evaluate.images.folders import labelled_pairs
 from vdet.evaluate.images.labelled import ImageLabels, Label
-from vdet.evaluate.labelled_video import line_error
-from vdet.evaluate.parsing import numbered_lines, parse_number, read_text
+from vdet.formats.parsing import numbered_lines, parse_number, read_text
+from vdet.formats.rows import line_error
 
 _COLUMNS = 15
 

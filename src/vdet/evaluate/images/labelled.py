@@ -9,9 +9,9 @@ import numpy as np
 
 from vdet.errors import ImageError, TruthError
 from vdet.evaluate.comparison import MAX_IN_FRAME
-from vdet.evaluate.labelled_video import MAX_ROWS
-from vdet.evaluate.labels import class_of
 from vdet.files import printable
+from vdet.formats.labels import class_of
+from vdet.formats.rows import MAX_ROWS
 from vdet.geometry import BoolArray, Float64Array
 from vdet.media.images import Image, read_image
 

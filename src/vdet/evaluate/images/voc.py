@@ -5,8 +5,8 @@ from pathlib import Path
 
 from vdet.evaluate.images.folders import labelled_pairs
 from vdet.evaluate.images.labelled import ImageLabels, Label
-from vdet.evaluate.parsing import parse_number, parse_whole, read_text
-from vdet.evaluate.xml_reader import XmlReader
+from vdet.formats.parsing import parse_number, parse_whole, read_text
+from vdet.formats.xml_reader import XmlReader
 
 _CORNERS = ("xmin", "ymin", "xmax", "ymax")
 _VALUES = {"name", "difficult", "width", "height", *_CORNERS}

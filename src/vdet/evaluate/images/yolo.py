@@ -7,11 +7,11 @@ from vdet.config.document import read_document
 from vdet.errors import ConfigError, ImageError, TruthError
 from vdet.evaluate.images.folders import pictures_below
 from vdet.evaluate.images.labelled import ImageLabels, Label
-from vdet.evaluate.labelled_video import line_error
-from vdet.evaluate.parsing import numbered_lines, parse_number, parse_whole, read_text
+from vdet.formats.parsing import numbered_lines, read_text
+from vdet.formats.rows import line_error
+from vdet.formats.yolo import DATA, class_names, yolo_box
 from vdet.media.images import read_size
 
-_NAMES = "data.yaml"
 _NO_LABELS = "classes.txt"
 """A file that label tools write beside the labels."""
 
@@ -44,20 +44,14 @@ def yolo_labels(folder: Path) -> Iterator[ImageLabels]:
 
 
 def _class_names(folder: Path) -> list[str]:
-    path = next((p for p in (folder / _NAMES, folder.parent / _NAMES) if p.is_file()), None)
+    path = next((p for p in (folder / DATA, folder.parent / DATA) if p.is_file()), None)
     if path is None:
-        raise TruthError(f"{folder}: needs {_NAMES} with the names of the classes, here or above")
+        raise TruthError(f"{folder}: needs {DATA} with the names of the classes, here or above")
     try:
-        names = read_document(path).values.get("names")
+        values = read_document(path).values
     except ConfigError as error:
         raise TruthError(str(error).splitlines()[0]) from error
-    if isinstance(names, dict):  # number: name
-        names = [names.get(str(number)) for number in range(len(names))]
-    if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
-        raise TruthError(
-            f"{path}: names must be a list of the names of all classes, or number them"
-        )
-    return names
+    return class_names(values, str(path))
 
 
 def _labelled(picture: Path, file: Path, names: list[str]) -> ImageLabels:
@@ -76,13 +70,7 @@ def _label(file: Path, line: int, text: str, names: list[str], size: tuple[int, 
     try:
         if len(columns) != 5:
             raise ValueError(f"YOLO has 5 columns between spaces; this line has {len(columns)}")
-        number = parse_whole(columns[0])
-        if not 0 <= number < len(names):
-            raise ValueError(f"class {number} has no name; {_NAMES} has {len(names)} names")
-        shares = [parse_number(column) for column in columns[1:]]
-        if not all(0 <= share <= 1 for share in shares):
-            raise ValueError("a number is not between 0 and 1; YOLO has shares of the picture")
+        name, box = yolo_box(columns, names, size)
     except ValueError as error:
         raise line_error(file, line, str(error)) from error
-    x, y, width, height = (share * size[i % 2] for i, share in enumerate(shares))
-    return Label(f"{file}:{line}", names[number], x - width / 2, y - height / 2, width, height)
+    return Label(f"{file}:{line}", name, *box)

@@ -104,7 +104,8 @@ class SinkKind:
     open
         Function that takes the path of the output and a `SinkContext`, and returns the sink.
     suffixes
-        Suffixes that the output may have, lower case; empty for any.
+        What the name of the output may end in, lower case, such as ".csv" or ".coco.json"; empty
+        for any.
     what
         Noun for what it writes, for messages: "tracks".
     marker
@@ -133,6 +134,11 @@ class SinkKind:
     takes: Literal["videos", "pictures", "both"] = "both"
     may_replace: MayReplace = any_file
     total: BatchTotal | None = None
+
+    def takes_name(self, name: str) -> bool:
+        """Return whether an output may have this name, without its folder."""
+        ends = [len(each) for each in self.suffixes if name.lower().endswith(each)]
+        return not self.suffixes or 0 < max(ends, default=0) < len(name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +243,7 @@ def _kind_for(output: Output) -> SinkKind:
     kind, path = sink_kind(output.sink), output.path
     if _is_standard_output(output):
         return kind
-    if kind.suffixes and path.suffix.lower() not in kind.suffixes:
+    if not kind.takes_name(path.name):
         names = ", ".join(kind.suffixes)
         raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
     return kind

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import TruthError
-from vdet.evaluate.parsing import LIMIT, numbered_lines, parse_number, parse_whole, read_text
+from vdet.formats.parsing import LIMIT, numbered_lines, parse_number, parse_whole, read_text
 
 
 def test_blank_lines_count_and_any_line_ending_is_read() -> None:

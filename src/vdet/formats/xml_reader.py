@@ -3,7 +3,7 @@
 from pathlib import Path
 from xml.parsers import expat
 
-from vdet.evaluate.labelled_video import line_error
+from vdet.formats.rows import line_error
 
 MAX_DEPTH = 32
 """Most nested XML elements; label files have 5."""

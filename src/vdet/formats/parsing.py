@@ -23,6 +23,22 @@ JsonNumber = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False, st
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file. Raises `TruthError` if it is larger than `MAX_BYTES`."""
+    return read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
+
+
+def text_of(path: Path, data: bytes) -> str:
+    """Return the text of the content of a file. Raises `TruthError` if it is not UTF-8."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes") from error
+    if "\0" in text:
+        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
+    return text
+
+
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
@@ -31,14 +47,7 @@ def read_text(path: Path) -> str:
     TruthError
         The file cannot be read, is larger than `MAX_BYTES` or is not text.
     """
-    data = read_whole(path, most=MAX_BYTES, what="file of boxes", error=TruthError)
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes") from error
-    if "\0" in text:
-        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
-    return text
+    return text_of(path, read_bytes(path))
 
 
 def numbered_lines(text: str) -> Iterator[tuple[int, str]]:

@@ -3,7 +3,7 @@
 import pytest
 
 from vdet.detect.classes import OUR_NAMES, our_name
-from vdet.evaluate.labels import Role, class_of, role_of
+from vdet.formats.labels import Role, class_of, role_of
 
 
 @pytest.mark.parametrize("label", ["Car", "van", "TRUCK", "bus", "vehicle"])

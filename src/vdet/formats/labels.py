@@ -13,16 +13,18 @@ class Role(Enum):
     OTHER = "not a vehicle: the box is skipped, and a prediction on it is wrong"
 
 
+_REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
 _WORDS = {
     Role.VEHICLE: tuple(
         word for name in ("car", "truck", "bus", "vehicle") for word in WORDS[name]
     ),
     Role.IGNORED: (
-        *("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care"),
+        *_REGIONS,
         *("tram", "train", "misc", "trailer", "caravan", "auto-rickshaw", *WORDS["motorcycle"]),
     ),
     Role.OTHER: ("pedestrian", "person", "person sitting", "cyclist", "bicycle", "rider"),
 }
+_REGION_LETTERS = {letters(word) for word in _REGIONS}
 _ROLES = {letters(word): role for role, words in _WORDS.items() for word in words}
 
 
@@ -39,6 +41,11 @@ def role_of(label: str) -> Role:
         known = "; ".join(", ".join(words) for words in _WORDS.values())
         raise ValueError(f"label {label!r:.40} is unknown; use one of: {known}")
     return role
+
+
+def is_region(label: str | None) -> bool:
+    """Return whether a label says that its box is a region, and no single thing."""
+    return label is not None and letters(label) in _REGION_LETTERS
 
 
 def class_of(label: str) -> tuple[str, bool] | None:
