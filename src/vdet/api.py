@@ -203,7 +203,8 @@ def detect_video(
     video
         The video with the vehicles drawn in: .mp4, .mov or .mkv.
     tracks
-        Every shown box: .txt (MOTChallenge), .csv or .jsonl.
+        Every shown box: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml (CVAT), .kitti.txt or
+        .yolo.zip.
     outputs
         Other outputs, by the name of their sink.
     threads

@@ -188,7 +188,7 @@ def test_an_output_that_cannot_be(
 
 
 def test_tracks_of_unknown_kind(run: Run, clip_path: Path, tmp_path: Path) -> None:
-    result = run("detect-video", clip_path, "--no-video", "--tracks", tmp_path / "t.xml")
+    result = run("detect-video", clip_path, "--no-video", "--tracks", tmp_path / "t.json")
     assert result.code == 1
     assert "tracks are written as .txt, .csv, .jsonl" in result.err
 

@@ -12,13 +12,18 @@ import numpy as np
 import pytest
 
 from conftest import Run
+from formats.saving import car, written
 from vdet.config.schema import InputSettings
 from vdet.detect.svm.model import load_model
 from vdet.evaluate.truth import read_truth
+from vdet.formats.coco import COCO
+from vdet.formats.mot import read_mot
+from vdet.geometry import Box
 from vdet.learn.dataset import find_boxed, find_patches, read_patches
 from vdet.media import VideoReader
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
+from vdet.track.track import FrameTracks
 
 SETS = ", ".join(
     f"{{size: {size}, step: 1, top: {top}, bottom: {bottom}}}"
@@ -76,6 +81,35 @@ def test_mines_patches_that_train_learns_from(
     model = load_model(model_path)
     assert model.box_regression is not None
     assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
+
+
+def test_the_same_truth_in_another_format_gives_the_same_patches(
+    run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    rows = read_mot(truth_path, truth_path.read_bytes()).rows
+    frames = [
+        FrameTracks(
+            row.frame - 1,
+            0.0,
+            tuple(
+                car(
+                    each.id,
+                    Box(int(each.x), int(each.y), int(each.width), int(each.height)),
+                    class_name="ignore" if each.ignored else "car",
+                )
+                for each in rows
+                if each.frame == row.frame
+            ),
+        )
+        for row in {row.frame: row for row in rows}.values()
+    ]
+    other = tmp_path / "truth.coco.json"
+    other.write_bytes(written(COCO, frames))
+    few = ("--from", "5", "--until", "5")
+    for name, extra in (("a.zip", ()), ("b.zip", ("--truth", other))):
+        result = run("mine", clip_path, "-o", tmp_path / name, *options, *few, *extra)
+        assert result.code == 0, result.err
+    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
 
 def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(

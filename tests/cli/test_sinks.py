@@ -94,7 +94,7 @@ class TestDetectVideo:
         ("sink", "words"),
         [
             ("counts=a.csv", f"counts: is no sink; {KNOWN}"),
-            ("tracks=a.xml", "a.xml: tracks are written as .txt, .csv, .jsonl; name it so"),
+            ("tracks=a.json", "a.json: tracks are written as .txt, .csv, .jsonl, "),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
             ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
             ("picture=a.png", "a.png: the sink picture is for pictures; give another for videos"),
@@ -295,7 +295,7 @@ class TestEvalVideo:
         [
             (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
             (("--sink", "counts=a.csv"), 1, f"counts: is no sink; {KNOWN}"),
-            (("--sink", "tracks=a.xml"), 1, "a.xml: tracks are written as"),
+            (("--sink", "tracks=a.json"), 1, "a.json: tracks are written as"),
             (
                 ("--sink", "tracks=a.csv", "--sweep", "output.crf=1,2"),
                 2,

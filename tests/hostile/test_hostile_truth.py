@@ -183,6 +183,25 @@ WICKED_TRACKS = {
 }
 
 
+DEEP = 1_000_000
+WICKED_TRACKS |= {
+    "deep COCO": ("t.coco.json", '{"images": ' + "[" * DEEP, "is not COCO .*recursion limit"),
+    "no numbers in COCO": (
+        "t.coco.json",
+        '{"images": [], "categories": [], "annotations": [{"bbox": [1e999, NaN, 1, 1]}]}',
+        "is not COCO with tracks: annotations.0",
+    ),
+    "a huge id in COCO": ("t.coco.json", '{"images": [{"id": ' + "9" * DEEP, "is not COCO"),
+    "an entity in CVAT": ("t.xml", ENTITY_BOMB, ":1: the XML declares a document type"),
+    "a long class": (
+        "t.csv",
+        CSV.replace("predicted\n", "class\n").replace(",0\n", "," + "x" * 1000 + "\n"),
+        ":2: the label has more than 100 characters",
+    ),
+    "no zip file": ("t.yolo.zip", "PK" + "x" * DEEP, "neither a folder nor a readable zip"),
+}
+
+
 @pytest.mark.parametrize("name", WICKED_TRACKS)
 def test_wicked_tracks_are_refused_by_name(tmp_path: Path, name: str) -> None:
     refused_by_name(read_predictions, tmp_path, *WICKED_TRACKS[name])

@@ -48,8 +48,9 @@ from vdet.pipeline.sinks.protocol import Output
 @output_option(
     "tracks",
     "FILE",
-    "Write the boxes of every frame: .txt (MOTChallenge), .csv or .jsonl. With -, they go to "
-    "standard output as .jsonl. With -d, give only the suffix. Can be repeated.",
+    "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml (CVAT), "
+    ".kitti.txt or .yolo.zip. With -, they go to standard output as .jsonl. With -d, give only the "
+    "ending. Can be repeated.",
 )
 @click.option(
     "--start",

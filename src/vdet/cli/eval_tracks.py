@@ -47,7 +47,7 @@ def tracks(
     """Compare a file of tracks with the truth.
 
     PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
-    labels or CVAT for video 1.1.
+    labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl as vdet writes it.
     """
     from vdet.evaluate.clips.evaluate import score_files
     from vdet.evaluate.clips.text import plain_clip, result_lines

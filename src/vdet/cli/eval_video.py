@@ -37,8 +37,8 @@ from vdet.pipeline.sinks.protocol import check_sinks
     required=True,
     type=PATH,
     metavar="FILE",
-    help="True boxes of a video: MOTChallenge, KITTI or CVAT. Repeat it for each IN, in the same "
-    "order.",
+    help="True boxes of a video: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat it "
+    "for each IN, in the same order.",
 )
 @click.option(
     "--until",

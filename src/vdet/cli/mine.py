@@ -29,7 +29,7 @@ from vdet.files import check_output
     required=True,
     type=PATH,
     metavar="FILE",
-    help="True boxes: MOTChallenge, KITTI or CVAT.",
+    help="True boxes: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl.",
 )
 @click.option("-o", "--output", required=True, type=PATH, metavar="FILE", help="Zip file to write.")
 @click.option(

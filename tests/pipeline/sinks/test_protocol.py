@@ -253,7 +253,11 @@ class TestCheck:
 
     @pytest.mark.parametrize(
         ("sink", "name", "what"),
-        [("video", "a.avi", "videos"), ("tracks", "a.json", "tracks"), ("picture", "a", "pictures")],
+        [
+            ("video", "a.avi", "videos"),
+            ("tracks", "a.json", "tracks"),
+            ("picture", "a", "pictures"),
+        ],
     )
     def test_a_suffix_that_the_sink_does_not_write_is_refused(
         self, tmp_path: Path, sink: str, name: str, what: str

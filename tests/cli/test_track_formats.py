@@ -1,0 +1,70 @@
+"""All formats of tracks in one run and in a batch, and as what `vdet eval` takes."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from red_cars import SETTINGS, red_finder
+from running import names, write_drive
+from vdet.config.rendering import render
+from vdet.detect.svm.model import save_model
+from vdet.formats.registry import ENDINGS, read_tracks
+
+RESULTS = [each for each in ENDINGS if each != ".txt"]
+"""Endings of tracks that are truth too; MOTChallenge has another form for it."""
+
+
+@pytest.fixture(scope="module")
+def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
+    """Options with which red cars are found."""
+    folder = tmp_path_factory.mktemp("red")
+    save_model(red_finder(), folder / "red.npz")
+    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
+    return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))
+
+
+@pytest.fixture
+def clip(tmp_path: Path) -> Path:
+    (tmp_path / "in").mkdir()
+    return write_drive(tmp_path / "in" / "a.mp4", 15)
+
+
+def test_one_run_writes_every_format_and_each_is_read_as_the_same_tracks(
+    run: Run, clip: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    wanted = [word for ending in ENDINGS for word in ("--tracks", tmp_path / f"a{ending}")]
+    done = run("detect-video", clip, "--no-video", *wanted, *red)
+    assert done.code == 0, done.err
+    assert {f"a{ending}" for ending in ENDINGS} <= set(names(tmp_path))
+    assert len(read_tracks(tmp_path / "a.csv").rows) > 5
+    for ending in ENDINGS:
+        truth = tmp_path / f"a{RESULTS[ENDINGS.index(ending) - 1]}"
+        compared = run("eval", "tracks", tmp_path / f"a{ending}", truth, "--json", "-")
+        assert compared.code == 0, compared.err
+        values = json.loads(compared.out)
+        assert (values["f1"], values["idf1"]) == (1, 1), ending
+        assert values["mean_iou"] == pytest.approx(1, abs=1e-3)
+
+
+def test_a_batch_writes_several_formats_of_each_video(
+    run: Run, clip: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    out = tmp_path / "out"
+    wanted = ("--tracks", ".csv", "--tracks", ".XML", "--tracks", ".cars.coco.json")
+    arguments = ("detect-video", clip.parent, "-d", out, "--no-video", *wanted, *red)
+    done = run(*arguments)
+    assert done.code == 0, done.err
+    assert names(out) == ["a.cars.coco.json", "a.csv", "a.xml", "manifest.jsonl"]
+    (record,) = map(json.loads, (out / "manifest.jsonl").read_text().splitlines())
+    ends = (".csv", ".xml", ".cars.coco.json")
+    assert record["outputs"] == {"tracks": [str(out / f"a{end}") for end in ends]}
+    again = run(*arguments, "--skip-existing")
+    assert "1 file there already" in again.err
+
+
+def test_the_message_names_all_endings(run: Run, clip: Path, tmp_path: Path) -> None:
+    result = run("detect-video", clip, "--no-video", "--tracks", tmp_path / "a.json")
+    assert result.code == 1
+    assert f"tracks are written as {', '.join(ENDINGS)}; name it so" in result.err
