@@ -7,6 +7,7 @@ import pytest
 
 from formats.saving import VIDEO, car, frame, read_back, written
 from vdet.errors import TruthError
+from vdet.formats import cvat
 from vdet.formats.cvat import CVAT, read_cvat
 from vdet.formats.protocol import SourceVideo
 from vdet.formats.rows import Row
@@ -154,6 +155,16 @@ def test_other_xml_than_cvat_video_is_refused_with_its_line(text: str, message: 
         rows(text)
     assert str(caught.value).startswith(f"annotations.xml:{message}")
     assert "\n" not in str(caught.value)
+
+
+def test_a_bomb_in_a_zip_file_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cvat, "MAX_BYTES", 100_000)
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("annotations.xml", " " * 100_001)
+    assert len(file.getvalue()) < 1000
+    with pytest.raises(TruthError, match=r"annotations\.xml is larger than 100,000 bytes"):
+        read_cvat(Path("a.zip"), file.getvalue())
 
 
 def test_a_zip_file_without_annotations_is_refused() -> None:
