@@ -1,6 +1,7 @@
 """Files: outputs that are whole or absent, temporary files that are stale, limits, names."""
 
 import os
+import resource
 import subprocess
 import sys
 import tracemalloc
@@ -16,9 +17,9 @@ from vdet.files import (
     check_output,
     printable,
     read_whole,
-    remove_stale,
     staged,
 )
+from vdet.temporary import remove_stale
 
 
 def names(folder: Path) -> list[str]:
@@ -491,3 +492,67 @@ def test_a_name_is_shown_on_one_line_without_control_characters(name: str) -> No
     assert shown.isprintable()
     assert len(shown) <= 81
     assert shown == name or not name.isprintable() or name.startswith(shown[:-1])
+
+
+class TestFolder:
+    """`OutputFiles.stage_folder`: very many files, which appear together too."""
+
+    def test_all_files_appear_in_the_folder_when_the_block_ends(self, tmp_path: Path) -> None:
+        with OutputFiles() as files:
+            folder = files.stage_folder(tmp_path, "*.txt")
+            assert folder.parent == tmp_path
+            (folder / "a.txt").write_text("a")
+            (folder / "b.txt").write_text("b")
+            assert names(tmp_path) == [folder.name]
+        assert names(tmp_path) == ["a.txt", "b.txt"]
+
+    def test_there_may_be_more_of_them_than_files_can_be_open(self, tmp_path: Path) -> None:
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (200, hard))
+        try:
+            with OutputFiles() as files:
+                folder = files.stage_folder(tmp_path, "*.txt")
+                for number in range(300):
+                    (folder / f"{number}.txt").touch()
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        assert len(names(tmp_path)) == 300
+
+    def test_none_appears_after_an_error(self, tmp_path: Path) -> None:
+        def fail() -> None:
+            with OutputFiles() as files:
+                (files.stage_folder(tmp_path, "*.txt") / "a.txt").touch()
+                raise ValueError("broken")
+
+        with pytest.raises(ValueError, match="broken"):
+            fail()
+        assert names(tmp_path) == []
+
+    def test_what_is_there_is_kept_unless_it_is_overwritten(self, tmp_path: Path) -> None:
+        for name in ("a.txt", "of-an-earlier-run.txt", "mine.png"):
+            (tmp_path / name).write_text("old")
+
+        def write(overwrite: bool) -> None:
+            with OutputFiles(overwrite=overwrite) as files:
+                (files.stage_folder(tmp_path, "*.txt") / "a.txt").write_text("new")
+
+        with pytest.raises(OutputError, match=r"a\.txt: has appeared during the run"):
+            write(overwrite=False)
+        assert names(tmp_path) == ["a.txt", "mine.png", "of-an-earlier-run.txt"]
+        assert (tmp_path / "a.txt").read_text() == "old"
+        write(overwrite=True)
+        assert names(tmp_path) == ["a.txt", "mine.png"]
+        assert (tmp_path / "a.txt").read_text() == "new"
+
+    def test_that_of_a_killed_run_is_removed_and_that_of_a_running_one_is_kept(
+        self, tmp_path: Path
+    ) -> None:
+        left = tmp_path / ".x.vdet-1a2b3c4d"
+        left.mkdir()
+        (left / "a.txt").touch()
+        with OutputFiles() as files:
+            mine = files.stage_folder(tmp_path, "*.txt")
+            with OutputFiles() as others:
+                others.stage_folder(tmp_path, "*.txt")
+                assert mine.is_dir()
+            assert not left.exists()

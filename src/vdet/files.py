@@ -1,16 +1,9 @@
-"""Files: outputs that appear only when they are complete, and inputs read up to a limit.
-
-A temporary file lies beside its output and is named `.name.vdet-1a2b3c4d.suffix`. Its writer holds
-a lock on it, which the system releases when the process ends, in whatever way. So the files that a
-killed run left can be told from those that another run is writing at the moment, also from other
-machines on a shared file system.
-"""
+"""Files: outputs that appear only when they are complete, and inputs read up to a limit."""
 
 import contextlib
 import json
 import os
-import re
-import secrets
+import shutil
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -20,15 +13,8 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from vdet.errors import OutputError, VdetError
+from vdet.temporary import create_file, create_folder, remove_stale, sync
 
-try:
-    import fcntl
-except ImportError:  # Windows: files are not locked, and none is taken for stale
-    fcntl = None  # type: ignore[assignment]
-
-_TEMPORARY = re.compile(r"\..*\.vdet-[0-9a-f]{8}(\.[^.]*)?", re.DOTALL)
-_MAX_STEM = 200  # bytes; a whole name may have 255
-_FLAGS = os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
 _CHUNK = 1_000_000  # bytes
 _MAX_SHOWN = 80  # characters of a name
 
@@ -108,6 +94,28 @@ class _Staged:
     path: Path
     may_replace: MayReplace
 
+    def files(self) -> "list[_Staged]":
+        return [self]
+
+    def earlier(self) -> Iterable[Path]:
+        return ()
+
+
+@dataclass(frozen=True, slots=True)
+class _StagedFolder:
+    """A temporary folder whose files go into `path`; earlier ones are named as `pattern` says."""
+
+    temporary: Path
+    path: Path
+    pattern: str
+
+    def files(self) -> list[_Staged]:
+        inside = sorted(self.temporary.iterdir())
+        return [_Staged(file, self.path / file.name, any_file) for file in inside]
+
+    def earlier(self) -> Iterable[Path]:
+        return self.path.glob(self.pattern)
+
 
 class OutputFiles:
     """The output files of one run, which appear together; a context manager.
@@ -132,7 +140,7 @@ class OutputFiles:
 
     def __init__(self, *, overwrite: bool = False) -> None:
         self._overwrite = overwrite
-        self._staged: list[_Staged] = []
+        self._staged: list[_Staged | _StagedFolder] = []
         self._cleanup = contextlib.ExitStack()
 
     def stage(self, path: Path, may_replace: MayReplace = any_file) -> Path:
@@ -148,7 +156,7 @@ class OutputFiles:
         """
         with output_errors(path):
             remove_stale(path.parent)
-            temporary, descriptor = _create(path)
+            temporary, descriptor = create_file(path)
             if self._overwrite and path.is_file() and not path.is_symlink():
                 # What replaces a private file is private from the beginning.
                 temporary.chmod(stat.S_IMODE(path.stat().st_mode) | stat.S_IRUSR | stat.S_IWUSR)
@@ -156,6 +164,22 @@ class OutputFiles:
             self._cleanup.callback(os.close, descriptor)
         self._cleanup.callback(_try_to_remove, temporary)
         self._staged.append(_Staged(temporary, path, may_replace))
+        return temporary
+
+    def stage_folder(self, path: Path, pattern: str) -> Path:
+        """Return a new, empty folder in the folder `path`; its files will then lie in `path`.
+
+        It is for many files: each one of `stage` is kept open. With `overwrite`, the files in
+        `path` that the glob `pattern` names and that this run did not write are removed in the end:
+        they are of an earlier run.
+        """
+        with output_errors(path):
+            remove_stale(path)
+            temporary, descriptor = create_folder(path)
+        if descriptor is not None:
+            self._cleanup.callback(os.close, descriptor)
+        self._cleanup.callback(shutil.rmtree, temporary, ignore_errors=True)
+        self._staged.append(_StagedFolder(temporary, path, pattern))
         return temporary
 
     def __enter__(self) -> Self:
@@ -169,11 +193,12 @@ class OutputFiles:
                 self._publish()
 
     def _publish(self) -> None:
-        for file in self._staged:
+        files = [file for staged in self._staged for file in staged.files()]
+        for file in files:
             with output_errors(file.path):
-                _sync(file.temporary)
+                sync(file.temporary)
         with contextlib.ExitStack() as undo:
-            for file in self._staged:
+            for file in files:
                 with output_errors(file.path):
                     if self._overwrite and os.path.lexists(file.path):
                         _replace(file)
@@ -181,6 +206,10 @@ class OutputFiles:
                         _add_name(file.temporary, file.path)
                         undo.callback(_try_to_remove, file.path)
             undo.pop_all()
+        if self._overwrite:
+            found = {path for staged in self._staged for path in staged.earlier()}
+            for old in found - {file.path for file in files}:
+                _try_to_remove(old)
 
 
 def _replace(file: _Staged) -> None:
@@ -269,66 +298,6 @@ def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
         return
     with staged(Path(target), overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def remove_stale(folder: Path) -> None:
-    """Remove the temporary files in `folder` whose writers have ended."""
-    with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            if _TEMPORARY.fullmatch(entry.name):
-                with contextlib.suppress(OSError):
-                    _remove_if_stale(entry.path)
-
-
-def _remove_if_stale(path: str) -> None:
-    if fcntl is None:
-        return
-    descriptor = os.open(path, _FLAGS)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.unlink(path)  # noqa: PTH108
-    finally:
-        os.close(descriptor)
-
-
-def _create(path: Path) -> tuple[Path, int | None]:
-    """Return a new temporary file, and the descriptor that holds its lock, if there are locks."""
-    stem = os.fsencode(path.stem)[:_MAX_STEM].decode(errors="ignore")
-    while True:
-        candidate = path.with_name(f".{stem}.vdet-{secrets.token_hex(4)}{path.suffix}")
-        descriptor = os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
-        if fcntl is None:
-            os.close(descriptor)
-            return candidate, None
-        # Another run may have taken it for stale and removed it before it was locked.
-        if try_to_lock(descriptor) and os.fstat(descriptor).st_nlink:
-            return candidate, descriptor
-        os.close(descriptor)
-
-
-def try_to_lock(descriptor: int) -> bool:
-    """Lock a file for this process until it is closed; return False if another has locked it.
-
-    Without locks, as on some network disks, the answer is True.
-    """
-    if fcntl is None:
-        return True
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        pass
-    return True
-
-
-def _sync(path: Path) -> None:
-    """Wait until the content of a file, however it was written, is on the disk."""
-    descriptor = os.open(path, _FLAGS)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _try_to_remove(path: Path) -> None:

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -262,3 +263,58 @@ class TestTotals:
         Path("clips/all.mp4").write_bytes(b"clip")
         with pytest.raises(BatchError, match="which is over all videos; rename the video"):
             plan_outputs("clips", suffixes={"tracks": ".csv"})
+
+
+@pytest.mark.usefixtures("clips")
+class TestFolders:
+    """An output may be a folder: that of each video has its name too."""
+
+    SUFFIXES: ClassVar[dict[str, str | None]] = {"stages": ".stages"}
+
+    def plan(self, *, overwrite: bool = False, skip_existing: bool = False) -> Plan:
+        options = {"overwrite": overwrite, "skip_existing": skip_existing}
+        return plan_outputs("clips/a.mp4", suffixes=self.SUFFIXES, folder="out", **options)
+
+    def record(self) -> None:
+        """Write the pictures of a.mp4 and what the manifest says about them."""
+        folder = Path("out/a.stages")
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in ("1-boxes.png", "2-boxes.png"):
+            (folder / name).write_bytes(b"picture")
+        digest = result_digest(DIGEST, Path("clips/a.mp4"))
+        sizes = {str(folder.absolute()): 2 * len(b"picture")}
+        with open_manifest(Path("out/manifest.jsonl"), Origin("vdet", None, None)) as add:
+            add(Record("clips/a.mp4", {}, "now", 0.0, digest=digest, sizes=sizes))
+
+    def test_planning_makes_no_folder(self) -> None:
+        assert outputs(self.plan().jobs) == [["out/a.stages"]]
+        assert not Path("out").exists()
+
+    def test_one_that_is_there_is_refused_or_replaced_unless_it_is_empty(self) -> None:
+        Path("out/a.stages").mkdir(parents=True)
+        assert self.plan().jobs
+        self.record()
+        with pytest.raises(OutputError, match=r"out/a\.stages/1-boxes\.png: is there already"):
+            self.plan()
+        assert self.plan(overwrite=True).jobs
+
+    def test_one_that_is_up_to_date_is_skipped(self) -> None:
+        self.record()
+        assert self.plan(skip_existing=True).skipped
+        Path("out/a.stages/notes.txt").write_text("mine")
+        assert self.plan(skip_existing=True).skipped, "only what the sink writes counts"
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda: Path("out/a.stages/1-boxes.png").unlink(),
+            lambda: Path("out/a.stages/1-boxes.png").write_bytes(b""),
+            lambda: Path("out/a.stages/3-boxes.png").write_bytes(b"picture"),
+            lambda: Path("out/a.stages").rename("elsewhere"),
+        ],
+    )
+    def test_one_that_was_changed_is_made_again(self, change: Callable[[], object]) -> None:
+        self.record()
+        change()
+        (job,) = self.plan(skip_existing=True).jobs
+        assert job.overwrite == Path("out/a.stages").exists()

@@ -13,7 +13,8 @@ from typing import BinaryIO
 from pydantic import BaseModel, ValidationError
 
 from vdet.errors import OutputError
-from vdet.files import output_errors, try_to_lock
+from vdet.files import output_errors
+from vdet.temporary import try_to_lock
 
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
@@ -52,7 +53,7 @@ class Record:
     digest
         Of all that the outputs depend on: see `vdet.batch.digest`. None if there are none.
     sizes
-        Bytes of each output, by its path.
+        Bytes of each output, by its path; of a folder those of the files in it.
     """
 
     input: str

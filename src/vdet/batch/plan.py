@@ -12,7 +12,13 @@ from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
 from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import BatchTotal, Output, check_sinks, sink_kind
+from vdet.pipeline.sinks.protocol import (
+    BatchTotal,
+    Output,
+    check_sinks,
+    output_size,
+    sink_kind,
+)
 
 MANIFEST = "manifest.jsonl"
 
@@ -167,9 +173,8 @@ def _is_done(job: VideoJob, digest: str, written: Mapping[str, Written]) -> bool
     """Return whether all outputs of a job are as they were written, for this work and input."""
     digest = result_digest(digest, job.source)
     return all(
-        output.path.is_file()
-        and written.get(os.path.realpath(output.path))
-        == Written(digest, output.path.stat().st_size)
+        (size := output_size(output)) is not None
+        and written.get(os.path.realpath(output.path)) == Written(digest, size)
         for output in job.outputs
     )
 

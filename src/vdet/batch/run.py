@@ -9,8 +9,9 @@ from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import Plan
 from vdet.batch.progress import FrameCounts
 from vdet.batch.task import Work, process_file, record_of_killed
-from vdet.files import OutputFiles, make_folder, output_errors, remove_stale
+from vdet.files import OutputFiles, make_folder, output_errors
 from vdet.pipeline.loop import VideoJob, no_progress
+from vdet.temporary import remove_stale
 from vdet.workers import WorkerKilledError, Workers
 
 T = TypeVar("T")
@@ -56,7 +57,8 @@ def run_batch(
                 yield job, record
         write_totals(plan)
     finally:
-        for folder in {output.path.parent for job in plan.jobs for output in job.outputs}:
+        paths = [output.path for job in plan.jobs for output in job.outputs]
+        for folder in {path.parent for path in paths} | {path for path in paths if path.is_dir()}:
             remove_stale(folder)
 
 

@@ -5,7 +5,7 @@ import os
 import time
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,8 +15,8 @@ from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import in_one_line
-from vdet.files import make_folder
 from vdet.pipeline.loop import Progress, VideoJob, no_progress, run_video
+from vdet.pipeline.sinks.protocol import make_folders, output_size
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
     with _collected_warnings(job) as warnings:
         try:
             for output in job.outputs:
-                make_folder(output.path.parent)
+                make_folders(output)
             model = load_detector(work.settings.detector, work.model)
             summary = run_video(
                 job,
@@ -62,10 +62,13 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
                 codec_threads=threads,
                 progress=progress,
             )
-            paths = [output.path.absolute() for output in job.outputs]
-            sizes = {str(path): path.stat().st_size for path in paths}
+            for output in job.outputs:
+                sizes[str(output.path.absolute())] = output_size(output) or 0
         except Exception as failure:
             error = in_one_line(failure)
+            for output in job.outputs:
+                with suppress(OSError):
+                    output.path.rmdir()  # only a folder, and only if it is empty
             if os.environ.get("VDET_DEBUG") == "1":
                 traceback.print_exc()
     seconds = time.perf_counter() - began

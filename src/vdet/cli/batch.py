@@ -16,7 +16,7 @@ import vdet
 from vdet.batch.digest import work_digest
 from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
-from vdet.batch.run import run_batch
+from vdet.batch.run import run_batch, write_totals
 from vdet.batch.task import Work
 from vdet.cli.messages import batch_bar, counted, print_lines, print_message
 from vdet.cli.options import PATH, PROCESSES, scheduler_option
@@ -116,7 +116,8 @@ def _suffix(output: Output) -> str:
     if kind.one_frame:
         raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
     if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
-        known = ", ".join(kind.suffixes) or "as in .txt"
+        example = f".{output.sink}" if kind.marker else ".txt"
+        known = ", ".join(kind.suffixes) or f"as in {example}"
         flags = {flag for each in click.get_current_context().command.params for flag in each.opts}
         option = f"--{output.sink}"
         option = option if option in flags else f"--sink {output.sink}"
@@ -147,6 +148,7 @@ def process_batch(
         print_lines(*_plan_lines(plan))
         return 0
     if not plan.jobs:
+        write_totals(plan)  # a run that was interrupted may have left them out
         print_message(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already")
         return 0
     workers, search_threads = _workers(options, len(plan.jobs))

@@ -172,7 +172,16 @@ def run_video(
         info = reader.info
         _check_times(job, reader.length)
         read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
-        context = SinkContext(files, settings, info, job.is_part, job.at, codec_threads, timeout)
+        context = SinkContext(
+            files,
+            settings,
+            info,
+            is_part=job.is_part,
+            at=job.at,
+            codec_threads=codec_threads,
+            timeout=timeout,
+            outputs=job.outputs,
+        )
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         advance = progress(None if only_at else reader.expected)
         results = _follow_job(read, job, model, settings, video=info, threads=threads)

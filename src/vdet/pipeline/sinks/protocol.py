@@ -47,6 +47,14 @@ class Sink(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class Output:
+    """An output of a run: the name of its sink, and its path."""
+
+    sink: str
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
 class SinkContext:
     """What a sink gets when it is opened.
 
@@ -64,6 +72,8 @@ class SinkContext:
         Number of threads of an encoder; None lets it choose.
     timeout
         Seconds after which a write that does not end is an error.
+    outputs
+        All outputs of the run, for a sink that refers to another.
     """
 
     files: OutputFiles
@@ -73,6 +83,7 @@ class SinkContext:
     at: Fraction = Fraction(0)
     codec_threads: int | None = None
     timeout: float | None = None
+    outputs: tuple[Output, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,8 +120,8 @@ class SinkKind:
     what
         Noun for what it writes, for messages: "tracks".
     marker
-        Only if the output is a folder, which is made: pattern of a file in it. If there is such a
-        file, the folder is the output of an earlier run.
+        Only if the output is a folder, which is made: pattern of the files in it. If there is such
+        a file, the folder is the output of an earlier run.
     writes_standard_output
         Whether the path `-` means standard output.
     one_frame
@@ -139,14 +150,6 @@ class SinkKind:
         """Return whether an output may have this name, without its folder."""
         ends = [len(each) for each in self.suffixes if name.lower().endswith(each)]
         return not self.suffixes or 0 < max(ends, default=0) < len(name)
-
-
-@dataclass(frozen=True, slots=True)
-class Output:
-    """An output of a run: the name of its sink, and its path."""
-
-    sink: str
-    path: Path
 
 
 def sink_kind(name: str) -> SinkKind:
@@ -181,8 +184,9 @@ def check_sinks(
         if _is_standard_output(output):
             continue
         if kind.marker:
-            make_folder(path)
-            path = next(path.glob(kind.marker), path / kind.marker)
+            if not makes_folder:
+                make_folder(path)
+            path = min(path.glob(kind.marker), default=path / kind.marker)
         check_output(
             path,
             overwrite=overwrite,
@@ -190,6 +194,22 @@ def check_sinks(
             makes_folder=makes_folder,
             may_replace=kind.may_replace,
         )
+
+
+def make_folders(output: Output) -> None:
+    """Make the folder of an output, or the folder that it is. Raises `OutputError`."""
+    make_folder(output.path if sink_kind(output.sink).marker else output.path.parent)
+
+
+def output_size(output: Output) -> int | None:
+    """Return the bytes of an output, of a folder those of all its files; None if it is not there.
+
+    In a folder only the files count that the sink writes.
+    """
+    marker, path = sink_kind(output.sink).marker, output.path
+    if not marker:
+        return path.stat().st_size if path.is_file() else None
+    return sum(file.stat().st_size for file in path.glob(marker)) if path.is_dir() else None
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:

@@ -1,0 +1,111 @@
+"""Temporary files and folders, which outputs are written into before they appear.
+
+A temporary file lies beside its output and is named `.name.vdet-1a2b3c4d.suffix`; a temporary
+folder lies in the folder that its files go into. The writer holds a lock on it, which the system
+releases when the process ends, in whatever way. So what a killed run left can be told from what
+another run is writing at the moment, also from other machines on a shared file system.
+"""
+
+import contextlib
+import os
+import re
+import secrets
+import shutil
+import stat
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # Windows: files are not locked, and none is taken for stale
+    fcntl = None  # type: ignore[assignment]
+
+_NAME = re.compile(r"\..*\.vdet-[0-9a-f]{8}(\.[^.]*)?", re.DOTALL)
+_MAX_STEM = 200  # bytes; a whole name may have 255
+_NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
+_FLAGS = os.O_RDWR | _NOT_A_LINK | getattr(os, "O_BINARY", 0)
+_FOLDER_FLAGS = os.O_RDONLY | _NOT_A_LINK | getattr(os, "O_DIRECTORY", 0)
+
+
+def create_file(path: Path) -> tuple[Path, int | None]:
+    """Make an empty file beside `path`; return it, and the open descriptor that holds its lock.
+
+    The descriptor is None where there are no locks.
+    """
+    while True:
+        candidate = _candidate(path, path.parent)
+        descriptor = os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
+        if fcntl is None:
+            os.close(descriptor)
+            return candidate, None
+        # Another run may have taken it for stale and removed it before it was locked.
+        if try_to_lock(descriptor) and os.fstat(descriptor).st_nlink:
+            return candidate, descriptor
+        os.close(descriptor)
+
+
+def create_folder(path: Path) -> tuple[Path, int | None]:
+    """Make an empty folder in the folder `path`; return as `create_file` does."""
+    while True:
+        candidate = _candidate(path, path)
+        candidate.mkdir()
+        if fcntl is None:
+            return candidate, None
+        with contextlib.suppress(FileNotFoundError):  # as above
+            descriptor = os.open(candidate, _FOLDER_FLAGS)
+            if try_to_lock(descriptor) and candidate.is_dir():
+                return candidate, descriptor
+            os.close(descriptor)
+
+
+def _candidate(path: Path, folder: Path) -> Path:
+    stem = os.fsencode(path.stem)[:_MAX_STEM].decode(errors="ignore")
+    return folder / f".{stem}.vdet-{secrets.token_hex(4)}{path.suffix}"
+
+
+def remove_stale(folder: Path) -> None:
+    """Remove the temporary files and folders in `folder` whose writers have ended."""
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if _NAME.fullmatch(entry.name):
+                with contextlib.suppress(OSError):
+                    _remove_if_stale(entry.path)
+
+
+def _remove_if_stale(path: str) -> None:
+    if fcntl is None:
+        return
+    is_folder = stat.S_ISDIR(os.lstat(path).st_mode)
+    descriptor = os.open(path, _FOLDER_FLAGS if is_folder else _FLAGS)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if is_folder:
+            shutil.rmtree(path)
+        else:
+            os.unlink(path)  # noqa: PTH108
+    finally:
+        os.close(descriptor)
+
+
+def try_to_lock(descriptor: int) -> bool:
+    """Lock a file for this process until it is closed; return False if another has locked it.
+
+    Without locks, as on some network disks, the answer is True.
+    """
+    if fcntl is None:
+        return True
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass
+    return True
+
+
+def sync(path: Path) -> None:
+    """Wait until the content of a file, however it was written, is on the disk."""
+    descriptor = os.open(path, _FLAGS)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
