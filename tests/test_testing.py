@@ -45,6 +45,9 @@ def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettin
         ("stages", "stages"),
         ("picture", "out.png"),
         ("json", "out.json"),
+        ("summary", "out.csv"),
+        ("summary", "out.json"),
+        ("crops", "crops"),
     ],
 )
 def test_every_sink_passes(name: str, file: str, tmp_path: Path) -> None:

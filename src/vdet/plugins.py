@@ -25,6 +25,8 @@ _BUILT_IN = {
         "stages": "vdet.pipeline.sinks.stages:STAGES",
         "picture": "vdet.pipeline.sinks.picture:PICTURE",
         "json": "vdet.pipeline.sinks.json_list:JSON",
+        "summary": "vdet.pipeline.sinks.summary:SUMMARY",
+        "crops": "vdet.pipeline.sinks.crops:CROPS",
     },
 }
 

@@ -10,8 +10,8 @@ from vdet.cli.messages import set_up_logs
 
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
-        *("--output", "--no-video", "--tracks", "--json", "--report", "--preview", "--stages"),
-        *("--at", "--sink", "--overwrite"),
+        *("--output", "--no-video", "--tracks", "--summary", "--crops", "--json", "--report"),
+        *("--preview", "--stages", "--at", "--sink", "--overwrite"),
     ),
     "What is processed": (
         *("--truth", "--video", "--start", "--end", "--frames", "--every", "--from", "--until"),

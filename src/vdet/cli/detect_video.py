@@ -52,6 +52,17 @@ from vdet.pipeline.sinks.protocol import Output
     ".kitti.txt or .yolo.zip. With -, they go to standard output as .jsonl. With -d, give only the "
     "ending. Can be repeated.",
 )
+@output_option(
+    "summary",
+    "FILE",
+    "Write a record of each vehicle: .csv or .json. With -d, give only the suffix; one file over "
+    "all videos is written too.",
+)
+@output_option(
+    "crops",
+    "DIR",
+    "Write the best picture of each vehicle into DIR. With -d, give an end such as .crops.",
+)
 @click.option(
     "--start",
     type=TimeType(),

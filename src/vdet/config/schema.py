@@ -27,6 +27,7 @@ from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
+from vdet.config.summary import CropSettings, SummarySettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
 from vdet.config.training import (
     AugmentationSettings,
@@ -41,6 +42,7 @@ __all__ = [
     "BoxSettings",
     "CalibrationSettings",
     "ColorSpace",
+    "CropSettings",
     "DetectorSettings",
     "FeatureSettings",
     "HeatSettings",
@@ -61,6 +63,7 @@ __all__ = [
     "Settings",
     "SpatialSettings",
     "StillSettings",
+    "SummarySettings",
     "SvmSettings",
     "TrackerSettings",
     "TrainingSettings",
@@ -80,6 +83,8 @@ class Settings(Section):
     network: NetworkTrainingSettings = NetworkTrainingSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
+    summary: SummarySettings = SummarySettings()
+    crops: CropSettings = CropSettings()
 
     @property
     def svm(self) -> SvmSettings:
