@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import vdet
-from pages import blocks
+from doc_pages import blocks
 from red_cars import drive
 from running import frames_of
 from vdet.media.images import write_image

@@ -27,6 +27,7 @@ _BUILT_IN = {
         "json": "vdet.pipeline.sinks.json_list:JSON",
         "summary": "vdet.pipeline.sinks.summary:SUMMARY",
         "crops": "vdet.pipeline.sinks.crops:CROPS",
+        "report": "vdet.pipeline.sinks.report:REPORT",
     },
 }
 

@@ -55,13 +55,19 @@ from vdet.pipeline.sinks.protocol import Output
 @output_option(
     "summary",
     "FILE",
-    "Write a record of each vehicle: .csv or .json. With -d, give only the suffix; one file over "
-    "all videos is written too.",
+    "Write a record of each vehicle: .csv or .json. With -d, give only the suffix. A file over all "
+    "videos is then written too.",
 )
 @output_option(
     "crops",
     "DIR",
     "Write the best picture of each vehicle into DIR. With -d, give an end such as .crops.",
+)
+@output_option(
+    "report",
+    "DIR",
+    "Write report.html into DIR: a page on the vehicles of the video. With -d, give an end such as "
+    ".report. A page that links all videos is then written too.",
 )
 @click.option(
     "--start",

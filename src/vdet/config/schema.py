@@ -25,6 +25,7 @@ from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
 from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
+from vdet.config.report import ReportSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
 from vdet.config.summary import CropSettings, SummarySettings
@@ -56,6 +57,7 @@ __all__ = [
     "NetworkTrainingSettings",
     "OutputSettings",
     "PerspectiveSettings",
+    "ReportSettings",
     "RulesTrackerSettings",
     "ScoreSettings",
     "SearchSettings",
@@ -85,6 +87,7 @@ class Settings(Section):
     output: OutputSettings = OutputSettings()
     summary: SummarySettings = SummarySettings()
     crops: CropSettings = CropSettings()
+    report: ReportSettings = ReportSettings()
 
     @property
     def svm(self) -> SvmSettings:

@@ -11,8 +11,8 @@ from typing import Any
 import vdet
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder, staged
+from vdet.pages.frame import PAGE
 
-PAGE = "report.html"
 ABSENT = "–"
 
 

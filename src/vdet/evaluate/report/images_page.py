@@ -22,23 +22,11 @@ from vdet.evaluate.images.text import (
 )
 from vdet.evaluate.matching import match
 from vdet.evaluate.output import RunName, run_lines, share
-from vdet.evaluate.report.page import (
-    COLORS,
-    SOFT,
-    Picture,
-    cards,
-    charts,
-    contact_sheet,
-    draw,
-    html_table,
-    page,
-    paragraph,
-    section,
-    unit_axis,
-)
+from vdet.evaluate.report.page import COLORS, SOFT, charts, draw, unit_axis
 from vdet.evaluate.report.video_page import FOUND_COLOR, TRUE_COLOR
 from vdet.geometry import Float64Array
 from vdet.media.images import Image
+from vdet.pages.frame import Picture, cards, contact_sheet, html_table, page, paragraph, section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -25,21 +25,13 @@ from vdet.evaluate.clips.text import (
 )
 from vdet.evaluate.comparison import ComparedFrame
 from vdet.evaluate.output import share
-from vdet.evaluate.report.page import (
-    Picture,
-    cards,
-    charts,
-    contact_sheet,
-    html_table,
-    page,
-    paragraph,
-    section,
-)
+from vdet.evaluate.report.page import charts
 from vdet.evaluate.report.video_charts import sweep_chart, tightness_chart, timeline_chart
 from vdet.evaluate.scores import Scores
 from vdet.geometry import Float64Array
 from vdet.media import VideoReader
 from vdet.media.images import Image
+from vdet.pages.frame import Picture, cards, contact_sheet, html_table, page, paragraph, section
 
 TILE = (330, 220)
 """Width and height of a picture, pixels."""

@@ -9,24 +9,11 @@ import cv2
 import numpy as np
 
 from vdet.evaluate.output import RunName, run_lines, share
-from vdet.evaluate.report.page import (
-    COLORS,
-    INK,
-    SOFT,
-    Picture,
-    cards,
-    charts,
-    contact_sheet,
-    draw,
-    html_table,
-    page,
-    paragraph,
-    section,
-    unit_axis,
-)
+from vdet.evaluate.report.page import COLORS, INK, SOFT, charts, draw, unit_axis
 from vdet.learn.dataset import read_patches
 from vdet.learn.patch_eval.evaluate import Mistake, PatchReport, TrialReport
 from vdet.learn.patch_eval.text import group_rows, metric_rows
+from vdet.pages.frame import Picture, cards, contact_sheet, html_table, page, paragraph, section
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

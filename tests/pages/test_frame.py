@@ -3,16 +3,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 
-from vdet.evaluate.report.page import (
-    Picture,
-    cards,
-    charts,
-    contact_sheet,
-    html_table,
-    page,
-    paragraph,
-    section,
-)
+from vdet.evaluate.report.page import charts
+from vdet.pages.frame import Picture, cards, contact_sheet, html_table, page, paragraph, section
 
 NASTY = '<script>alert("&")</script>'
 TILE = np.zeros((4, 6, 3), np.uint8)

@@ -1,0 +1,1 @@
+"""Pages that show results: HTML files that need no network."""
