@@ -5,6 +5,7 @@ be read at any width.
 """
 
 import heapq
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,7 @@ STYLE = """
 _HEIGHT = 150  # of the plot, pixels
 _AXIS = 22  # of the labels below it
 _TOP = 16  # above the highest value, for its label
+_OVERLAP = 0.2  # of a level with the next, percent; else there may be a gap as thin as a hair
 _ROW = 24  # of a vehicle
 _NARROWEST = 300  # of a chart on a phone, pixels
 _ROOMY = 700  # of a chart in a window of more than 800 pixels
@@ -70,13 +72,17 @@ def level_chart(levels: Sequence[int], start: float, end: float, what: str) -> s
     """Return a chart of a number over time; `levels` are of equal steps from `start` to `end`."""
     top = _top(max(levels, default=0))
     width = 100 / max(1, len(levels))
-    bars = "".join(
-        f'<rect class="level" x="{_percent(index * width)}" width="{_percent(width)}" '
-        f'y="{_y(level, top):.1f}" height="{_bottom() - _y(level, top):.1f}"/>'
-        for index, level in enumerate(levels)
-        if level
-    )
-    return _svg(what, _bottom() + _AXIS, bars + _grid(top) + _time_axis(start, end, _bottom()))
+    bars, first = [], 0
+    for level, run in itertools.groupby(levels):
+        steps = len(list(run))
+        if level:
+            bars.append(
+                f'<rect class="level" x="{_percent(first * width)}" '
+                f'width="{_percent(steps * width + _OVERLAP)}" {_height(0, level, top)}/>'
+            )
+        first += steps
+    axis = _time_axis(start, end, _bottom())
+    return _svg(what, _bottom() + _AXIS, "".join(bars) + _grid(top) + axis)
 
 
 def minute_chart(series: Sequence[Series], minutes: range, what: str) -> str:
@@ -119,6 +125,12 @@ def _bottom() -> int:
 
 def _y(value: float, top: float) -> float:
     return _TOP + _HEIGHT * (1 - value / top)
+
+
+def _height(low: float, high: float, top: float) -> str:
+    """Return the place of a bar from one value to another; it can always be seen."""
+    height = max(1.0, _y(low, top) - _y(high, top))
+    return f'y="{_y(low, top) - height:.1f}" height="{height:.1f}"'
 
 
 def _top(most: int) -> int:
@@ -168,10 +180,9 @@ def _minute_bars(series: Sequence[Series], minutes: range, top: float) -> Iterat
         for number, each in enumerate(series):
             value = each.by_minute.get(minute, 0)
             if value:
-                y, bottom = _y(below + value, top), _y(below, top)
                 yield (
                     f'<rect x="{_percent(width * (place + 0.1))}" width="{_percent(width * 0.8)}" '
-                    f'y="{y:.1f}" height="{bottom - y:.1f}" fill="{_color(number)}">'
+                    f'{_height(below, below + value, top)} fill="{_color(number)}">'
                     f"<title>{clock(60 * minute)}: {value} {escape(each.name)}</title></rect>"
                 )
             below += value

@@ -1,8 +1,11 @@
 """How many vehicles are shown at once, over time."""
 
+import math
 from collections.abc import Sequence
 
 from vdet.track.track import FrameTracks
+
+_ROUNDING = 1e-6  # of a step
 
 
 class Levels:
@@ -37,8 +40,8 @@ class Levels:
         step = (self._last - start) / number
         ends = [time for time, _ in self._changes[1:]] + [self._last]
         for (begin, count), end in zip(self._changes, ends, strict=True):
-            first = int((begin - start) / step) if step else 0
-            last = int((end - start) / step) if step else 0
-            for index in range(min(first, number - 1), min(last, number - 1) + 1):
+            first = min(number - 1, int((begin - start) / step + _ROUNDING)) if step else 0
+            last = math.ceil((end - start) / step - _ROUNDING) if step else 0
+            for index in range(first, max(first + 1, last)):
                 levels[index] = max(levels[index], count)
         return levels

@@ -1,0 +1,112 @@
+"""`--summary`, `--crops` and `--report` of `vdet detect-video`, for one video and for many."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from red_cars import SETTINGS, red_finder
+from running import names, write_drive
+from vdet.config.rendering import render
+from vdet.detect.svm.model import save_model
+
+NASTY = "<img src=x onerror=alert(1)>"
+ENDS = ("--summary", ".cars.csv", "--crops", ".crops", "--report", ".report")
+
+
+@pytest.fixture(scope="module")
+def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
+    """Options with which red cars are found, by the names of files."""
+    folder = tmp_path_factory.mktemp("red")
+    save_model(red_finder(), folder / "red.npz")
+    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
+    return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))
+
+
+@pytest.fixture
+def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "clips"
+    (folder / "day").mkdir(parents=True)
+    write_drive(folder / f"{NASTY}.mp4", 12)
+    write_drive(folder / "day" / "a.mp4", 8)
+    monkeypatch.chdir(tmp_path)
+    return folder
+
+
+def test_one_video(run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]) -> None:
+    options = ("--summary", "a.json", "--crops", "crops", "--report", "report", *red)
+    result = run("detect-video", clips / "day" / "a.mp4", "--no-video", *options)
+    assert result.code == 0, result.err
+    (vehicle,) = json.loads(Path("a.json").read_text())
+    assert vehicle["id"] == 1
+    assert len(names(tmp_path / "crops")) == 1
+    assert names(tmp_path / "report") == ["report.html"]
+    again = run("detect-video", clips / "day" / "a.mp4", "--no-video", "--crops", "crops", *red)
+    assert again.code == 1
+    assert "is there already; give --overwrite to replace it" in again.err
+
+
+def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
+    run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    command = ("detect-video", clips, "-d", "found", *ENDS, "--jobs", "1", *red)
+    listed = run(*command, "--dry-run")
+    assert "day/a.crops" in listed.out
+    assert not Path("found").exists(), "listing makes no folder"
+    result = run(*command)
+    assert result.code == 0, result.err
+    found = names(tmp_path / "found")
+    crops = [name for name in found if ".crops/" in name]
+    assert [name.partition(".crops/")[0] for name in crops] == [NASTY, "day/a"]
+    assert set(found) - set(crops) == {
+        *("all.cars.csv", "index.html", "manifest.jsonl"),
+        *(f"{NASTY}{end}" for end in (".cars.csv", ".mp4", ".report/report.html")),
+        *(f"day/a{end}" for end in (".cars.csv", ".mp4", ".report/report.html")),
+    }
+    with Path("found/all.cars.csv").open() as file:
+        assert [row["video"] for row in csv.DictReader(file)] == [NASTY, "day/a"]
+    assert "day/a.report/report.html" in Path("found/index.html").read_text()
+
+    before = {name: (tmp_path / "found" / name).stat().st_mtime_ns for name in found}
+    Path("found/index.html").unlink()  # as if the batch had been interrupted before it
+    skipped = run(*command, "--skip-existing")
+    assert "2 files there already" in skipped.err
+    assert Path("found/index.html").exists()
+    next(Path("found/day/a.crops").iterdir()).unlink()
+    again = run(*command, "--skip-existing")
+    assert "1 file done, 1 there already, 0 failed" in again.err
+    assert names(tmp_path / "found") == found
+    same = [n for n in found if (tmp_path / "found" / n).stat().st_mtime_ns == before[n]]
+    assert sorted(same) == sorted(name for name in found if name.startswith(NASTY))
+
+
+def test_a_video_that_fails_leaves_no_folder(
+    run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]
+) -> None:
+    (clips / "day" / "b.mp4").write_bytes(b"no video")
+    result = run(
+        "detect-video", clips / "day", "-d", "found", "--no-video", *ENDS, "--jobs", "1", *red
+    )
+    assert result.code == 3
+    assert {path.name for path in (tmp_path / "found").iterdir()} == {
+        *("a.cars.csv", "a.crops", "a.report", "all.cars.csv", "index.html", "manifest.jsonl")
+    }
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--crops", "crops"), "with -d give --crops a suffix: as in .crops"),
+        (("--report", "report"), "with -d give --report a suffix: as in .report"),
+        (("--summary", ".xml"), "with -d give --summary a suffix: .csv, .json"),
+    ],
+)
+def test_an_end_that_is_none_is_wrong_usage(
+    run: Run, clips: Path, options: tuple[str, ...], words: str
+) -> None:
+    result = run("detect-video", clips, "-d", "found", *options)
+    assert result.code == 2
+    assert words in result.err
+    assert not Path("found").exists()
