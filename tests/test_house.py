@@ -17,9 +17,9 @@ LONGEST = 400
 
 ROOMS = (
     "__main__", "process", "cli", "testing", "api", "batch", "learn", "evaluate", "pipeline",
-    "pages", "summary", "formats", "lanes", "track", "detect", "synthetic", "draw", "media",
-    "config", "plugins", "workers", "archives", "files", "temporary", "geometry", "errors",
-    "__init__",
+    "pages", "summary", "count", "formats", "lanes", "track", "detect", "synthetic", "draw",
+    "media", "config", "plugins", "workers", "archives", "files", "temporary", "polygons",
+    "geometry", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

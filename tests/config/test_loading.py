@@ -195,7 +195,7 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
             "tracker: {method: rules, histroy: 3}",
             "1:26: tracker.histroy: is no setting; did you mean history?",
         ),
-        ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, lanes, "),
+        ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, regions, "),
         ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
     ],
 )

@@ -27,6 +27,8 @@ _PACKAGE = Path(__file__).parents[1]
 # In a wheel the configs lie in the package; in a work tree beside `src`.
 _CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
 
+_YAML_SUFFIXES = (".yaml", ".yml")
+
 Chosen = Mapping[str, type[Section]]
 """The class of the chosen kind, by the name of the section."""
 
@@ -53,8 +55,16 @@ def shipped_configs() -> dict[str, Path]:
     return {file.stem: file for folder in _CONFIGS for file in sorted(folder.glob("*.yaml"))}
 
 
-def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> Settings:
+def load_settings(
+    path: Path | None = None,
+    assignments: Sequence[str] = (),
+    places: Mapping[str, Path] | None = None,
+) -> Settings:
     """Read settings: defaults, then the file at `path`, then assignments such as `output.crf=18`.
+
+    `places` are files by the name of a section with places in the frame (`PlacedSection`). Such a
+    file holds the keys of this section; for `regions` one that is not named `.yaml` or `.yml` is a
+    mask. It lies above `path`, and replaces all places of the section.
 
     A list in a later layer replaces the whole list of an earlier one; an assignment may name one
     item of it (`detector.search.windows.0.step=2`). Where a layer chooses another kind of detector
@@ -68,6 +78,7 @@ def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> 
     """
     errors: list[str] = []
     layers = [read_document(path)] if path else []
+    layers += [_read_places(name, file) for name, file in (places or {}).items()]
     layers.append(_read_assignments(assignments, errors))
     merged, chosen = _merge(layers, errors)
     details: list[ErrorDetails] = []
@@ -79,6 +90,17 @@ def load_settings(path: Path | None = None, assignments: Sequence[str] = ()) -> 
         described = (_describe(detail, merged, chosen) for detail in details)
         raise config_error(itertools.chain(errors, described), len(errors) + len(details))
     return settings
+
+
+def _read_places(section: str, path: Path) -> Document:
+    """Read a file of a section with places in the frame as a layer of settings."""
+    defaults: Mapping[str, Any] = getattr(Settings(), section).model_dump(mode="json")
+    no_places = {name: value for name, value in defaults.items() if value in ([], "")}
+    if "mask" in no_places and path.suffix.lower() not in _YAML_SUFFIXES:
+        return Document(str(path), {section: no_places | {"mask": str(path)}})
+    document = read_document(path)
+    places = {(section, *key): place for key, place in document.places.items()}
+    return Document(document.name, {section: no_places | document.values}, places)
 
 
 def _read_assignments(assignments: Sequence[str], errors: list[str]) -> Document:

@@ -5,6 +5,7 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from pydantic import SerializeAsAny
 
+from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
 from vdet.config.detector import (
     DetectorSettings,
     NetworkSettings,
@@ -25,6 +26,7 @@ from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
 from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
+from vdet.config.regions import RegionSettings, RegionsSettings
 from vdet.config.report import ReportSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
@@ -43,6 +45,7 @@ __all__ = [
     "BoxSettings",
     "CalibrationSettings",
     "ColorSpace",
+    "CountSettings",
     "CropSettings",
     "DetectorSettings",
     "FeatureSettings",
@@ -51,12 +54,15 @@ __all__ = [
     "HogSettings",
     "InputSettings",
     "LaneSettings",
+    "LineSettings",
     "MiningSettings",
     "MotionTrackerSettings",
     "NetworkSettings",
     "NetworkTrainingSettings",
     "OutputSettings",
     "PerspectiveSettings",
+    "RegionSettings",
+    "RegionsSettings",
     "ReportSettings",
     "RulesTrackerSettings",
     "ScoreSettings",
@@ -71,6 +77,7 @@ __all__ = [
     "TrainingSettings",
     "VoteSettings",
     "WindowSettings",
+    "ZoneSettings",
 ]
 
 
@@ -79,6 +86,8 @@ class Settings(Section):
 
     detector: SerializeAsAny[DetectorSettings] = SvmSettings()
     tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
+    regions: RegionsSettings = RegionsSettings()
+    counts: CountSettings = CountSettings()
     lanes: LaneSettings = LaneSettings()
     training: TrainingSettings = TrainingSettings()
     mining: MiningSettings = MiningSettings()
