@@ -28,6 +28,7 @@ _BUILT_IN = {
         "summary": "vdet.pipeline.sinks.summary:SUMMARY",
         "crops": "vdet.pipeline.sinks.crops:CROPS",
         "report": "vdet.pipeline.sinks.report:REPORT",
+        "counts": "vdet.pipeline.sinks.counts:COUNTS",
     },
 }
 

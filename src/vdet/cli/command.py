@@ -10,12 +10,23 @@ from vdet.cli.messages import set_up_logs
 
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
-        *("--output", "--no-video", "--tracks", "--summary", "--crops", "--json", "--report"),
-        *("--preview", "--stages", "--at", "--sink", "--overwrite"),
+        *("--output", "--no-video", "--tracks", "--counts", "--summary", "--crops", "--json"),
+        *("--report", "--preview", "--stages", "--at", "--sink", "--overwrite"),
     ),
     "What is processed": (
         *("--truth", "--video", "--start", "--end", "--frames", "--every", "--from", "--until"),
-        *("--rate", "--seed", "--split", "--sweep", "--pattern", "--score", "--least-width"),
+        *(
+            "--roi",
+            "--lines",
+            "--size",
+            "--rate",
+            "--seed",
+            "--split",
+            "--sweep",
+            "--pattern",
+            "--score",
+            "--least-width",
+        ),
     ),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),
     "Lanes": ("--lanes", "--camera"),

@@ -15,6 +15,7 @@ from vdet.cli.options import (
     read_lanes,
     read_settings,
     read_sinks,
+    roi_option,
     settings_options,
     sink_option,
 )
@@ -50,6 +51,7 @@ log = logging.getLogger("vdet")
     help="Write the boxes to FILE, or with - to standard output.",
 )
 @click.option("--stages", type=PATH, metavar="DIR", help="Write a picture of every stage into DIR.")
+@roi_option
 @sink_option
 @lane_options
 @model_option
@@ -66,6 +68,7 @@ def detect_image(
     sinks: tuple[str, ...],
     lanes: bool,
     camera_path: Path | None,
+    roi: Path | None,
     model_path: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
@@ -81,7 +84,7 @@ def detect_image(
     if not (output or stages or shared):
         raise click.UsageError("nothing would be written; give -o, --json, --stages or --sink")
     request = read_lanes(lanes, camera_path)
-    settings = read_settings(config_name, assignments, model_path)
+    settings = read_settings(config_name, assignments, model_path, roi=roi)
     model = load_detector(settings.detector, model_path)
     sources = find_images(images)
     check_sinks(shared, overwrite=overwrite, inputs=sources)

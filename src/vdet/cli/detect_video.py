@@ -17,13 +17,16 @@ from vdet.cli.options import (
     PROCESSES,
     TIME_FORM,
     TimeType,
+    check_counts,
     lane_options,
+    lines_option,
     model_option,
     output_option,
     overwrite_option,
     read_lanes,
     read_settings,
     read_sinks,
+    roi_option,
     settings_options,
     sink_option,
 )
@@ -40,6 +43,7 @@ from vdet.pipeline.sinks.protocol import Output
         "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
         "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
         "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
+        "vdet detect-video in.mp4 --no-video --lines lines.yaml --counts counts.csv",
         "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
     ),
 )
@@ -69,6 +73,14 @@ from vdet.pipeline.sinks.protocol import Output
     "Write report.html into DIR: a page on the vehicles of the video. With -d, give an end such as "
     ".report. A page that links all videos is then written too.",
 )
+@output_option(
+    "counts",
+    "FILE",
+    "Write which vehicles cross the lines and visit the zones of --lines: .csv has the events, "
+    ".json also all totals. With -d, give only the end, as in .counts.csv. Can be repeated.",
+)
+@roi_option
+@lines_option
 @click.option(
     "--start",
     type=TimeType(),
@@ -114,6 +126,8 @@ def detect_video(
     sinks: tuple[str, ...],
     lanes: bool,
     camera_path: Path | None,
+    roi: Path | None,
+    lines: Path | None,
     model_path: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
@@ -147,7 +161,8 @@ def detect_video(
         source, outputs = Path(), ()  # each video has its own
         batch_outputs = output_options(batch, no_video=no_video, others=others, overwrite=overwrite)
     request = read_lanes(lanes, camera_path)
-    settings = read_settings(config_name, assignments, model_path)
+    settings = read_settings(config_name, assignments, model_path, roi=roi, lines=lines)
+    check_counts(others, settings)
     job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request, overwrite)
     if batch_outputs is not None:
         load_detector(settings.detector, model_path)  # an error is raised before any work

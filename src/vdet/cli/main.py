@@ -11,6 +11,7 @@ import click
 import vdet
 from vdet.cli.calibrate import calibrate
 from vdet.cli.command import Command
+from vdet.cli.count import count
 from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
@@ -61,7 +62,7 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     print_lines(*render(read_settings(config_name, assignments)).splitlines())
 
 
-for _command in (calibrate, demo, detect_image, detect_video, info, mine, train, train_net):
+for _command in (calibrate, count, demo, detect_image, detect_video, info, mine, train, train_net):
     cli.add_command(_command)
 for _command in (images, patches, tracks, video):
     evaluate.add_command(_command)

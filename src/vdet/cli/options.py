@@ -106,12 +106,38 @@ def _keys(values: Mapping[str, Any], before: str = "") -> Iterator[str]:
 
 
 def read_settings(
-    config_name: str | None, assignments: tuple[str, ...], model_path: Path | None = None
+    config_name: str | None,
+    assignments: tuple[str, ...],
+    model_path: Path | None = None,
+    *,
+    roi: Path | None = None,
+    lines: Path | None = None,
 ) -> Settings:
-    """Read the settings that `settings_options` ask for; a model in ONNX form is a network."""
+    """Read the settings that `settings_options`, `roi_option` and `lines_option` ask for.
+
+    A model in ONNX form is a network.
+    """
     if config_name is None and model_path is not None and model_path.suffix.lower() == ".onnx":
         config_name = "net"
-    return load_settings(find_config(config_name) if config_name else None, assignments)
+    path = find_config(config_name) if config_name else None
+    named = {"regions": roi, "counts": lines}
+    return load_settings(path, assignments, {name: file for name, file in named.items() if file})
+
+
+roi_option = click.option(
+    "--roi",
+    type=PATH,
+    metavar="FILE",
+    help="Search only these regions of the frame: polygons (.yaml), or a mask, which is a picture "
+    "with the regions in white.",
+)
+
+lines_option = click.option(
+    "--lines",
+    type=PATH,
+    metavar="FILE",
+    help="Count at the lines and zones of this file (.yaml).",
+)
 
 
 model_option = click.option(
@@ -158,6 +184,12 @@ def read_sinks(sinks: tuple[str, ...]) -> tuple[Output, ...]:
             raise click.UsageError(f"--sink {text}: expected NAME=FILE, as in tracks=out.csv")
         outputs.append(Output(name, Path(path)))
     return tuple(outputs)
+
+
+def check_counts(outputs: Iterable[Output], settings: Settings) -> None:
+    """Raise `click.UsageError` where counts are wanted, but there is nothing to count at."""
+    if not settings.counts and any(output.sink == "counts" for output in outputs):
+        raise click.UsageError("--counts needs lines or zones; give --lines FILE")
 
 
 def lane_options(command: F) -> F:

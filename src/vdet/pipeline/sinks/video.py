@@ -12,6 +12,7 @@ from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image
 from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
 from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.counts import CountsPicture, layout_of
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.threads import write_async
 from vdet.track.track import Track
@@ -29,6 +30,8 @@ class VideoSink:
         self._context = context
         self._video = context.video
         self._scores = context.settings.output.scores
+        counts = context.settings.counts
+        self._counts = CountsPicture(layout_of(context)) if counts and counts.drawn else None
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
@@ -59,6 +62,8 @@ class VideoSink:
     def write(self, result: FrameResult) -> None:
         """Draw the shown vehicles, and give the frame to the encoder."""
         image = annotate(result, scores=self._scores)
+        if self._counts:
+            image = self._counts.draw(image, result)
         self._encode(Frame(result.frame.index, result.frame.time, image))
 
 
