@@ -18,8 +18,8 @@ LONGEST = 400
 ROOMS = (
     "__main__", "process", "cli", "testing", "api", "batch", "learn", "evaluate", "pipeline",
     "pages", "summary", "count", "formats", "lanes", "track", "detect", "synthetic", "draw",
-    "media", "config", "plugins", "workers", "archives", "files", "temporary", "polygons",
-    "geometry", "errors", "__init__",
+    "regions", "media", "config", "plugins", "workers", "archives", "files", "temporary",
+    "polygons", "geometry", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 

@@ -13,8 +13,18 @@ _NO_EFFECT = {"training", "mining"}  # sections that detection does not read
 
 def work_digest(origin: Origin, settings: Settings, job: VideoJob) -> str:
     """Return a digest of program, model and settings, and of the part and lanes that are wanted."""
-    wanted = (origin.program, origin.model_sha256, job.start, job.end, job.frames, job.lanes)
+    wanted = (
+        *(origin.program, origin.model_sha256, job.start, job.end, job.frames, job.lanes),
+        _content_digest(settings.regions.mask),
+    )
     return _digest(repr(wanted), settings.model_dump_json(exclude=_NO_EFFECT))
+
+
+def _content_digest(path: str) -> str:
+    """Return a digest of a file; nothing where there is none."""
+    with contextlib.suppress(OSError):
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""
+    return ""
 
 
 def result_digest(work: str, source: Path) -> str:

@@ -141,6 +141,7 @@ def process_batch(
     if options.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
         model = model.absolute() if model else None
+        settings = _with_absolute_mask(settings)
     origin = _origin(settings, model)
     digest = work_digest(origin, settings, common)
     plan = make_plan(clips, folder, common, outputs, digest)
@@ -155,6 +156,14 @@ def process_batch(
     work = Work(settings, model, threads or search_threads, digest)
     failed = _run(plan, work, origin, workers, quiet=quiet)
     return failure_code(len(failed), len(plan.jobs) + len(plan.skipped))
+
+
+def _with_absolute_mask(settings: Settings) -> Settings:
+    regions = settings.regions
+    if not regions.mask:
+        return settings
+    regions = regions.model_copy(update={"mask": str(Path(regions.mask).absolute())})
+    return settings.model_copy(update={"regions": regions})
 
 
 def _plan_lines(plan: Plan) -> list[str]:

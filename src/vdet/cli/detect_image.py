@@ -23,6 +23,7 @@ from vdet.detect.factory import load_detector
 from vdet.errors import failure_code
 from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
 from vdet.pipeline.sinks.protocol import Output, check_sinks
+from vdet.regions import check_mask
 
 log = logging.getLogger("vdet")
 
@@ -85,6 +86,7 @@ def detect_image(
         raise click.UsageError("nothing would be written; give -o, --json, --stages or --sink")
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments, model_path, roi=roi)
+    check_mask(settings.regions)
     model = load_detector(settings.detector, model_path)
     sources = find_images(images)
     check_sinks(shared, overwrite=overwrite, inputs=sources)

@@ -35,6 +35,7 @@ from vdet.detect.factory import load_detector
 from vdet.media.writer import may_replace_video
 from vdet.pipeline.loop import VideoJob, check_job, run_video
 from vdet.pipeline.sinks.protocol import Output
+from vdet.regions import check_mask
 
 
 @click.command(
@@ -162,6 +163,7 @@ def detect_video(
         batch_outputs = output_options(batch, no_video=no_video, others=others, overwrite=overwrite)
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments, model_path, roi=roi, lines=lines)
+    check_mask(settings.regions)
     check_counts(others, settings)
     job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request, overwrite)
     if batch_outputs is not None:

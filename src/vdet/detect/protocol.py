@@ -1,10 +1,11 @@
 """The protocol of all detectors, which is all that the rest of the program knows of them."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from vdet.detect.detections import Detections
 from vdet.media.images import Image
+from vdet.regions import Regions, SearchArea
 
 
 class VideoDetector(Protocol):
@@ -36,6 +37,24 @@ class VideoDetector(Protocol):
 
         `detections` is what `detect` returned for this `image`.
         """
+
+
+@runtime_checkable
+class LimitableDetector(VideoDetector, Protocol):
+    """A detector that can leave out the parts of the frame in which nothing is looked for."""
+
+    def limited_to(self, area: SearchArea) -> VideoDetector:
+        """Return a detector for the same video that need not search outside `area`.
+
+        It finds the same in the area.
+        """
+
+
+def limited(detector: VideoDetector, regions: Regions | None) -> VideoDetector:
+    """Return a detector that searches only the regions, if it can; else the detector itself."""
+    if regions is not None and isinstance(detector, LimitableDetector):
+        return detector.limited_to(regions.area())
+    return detector
 
 
 class DetectorModel(Protocol):

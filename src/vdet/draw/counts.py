@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from vdet.draw.boxes import Color, draw_label, label_tag, line_width
+from vdet.draw.regions import draw_outline
 from vdet.media.images import Image
 
 Point = tuple[float, float]
@@ -53,25 +54,18 @@ def draw_counts(image: Image, lines: Sequence[DrawnLine], zones: Sequence[DrawnZ
     return image
 
 
-def outline_polygon(image: Image, corners: Sequence[Point], color: Color, name: str) -> None:
-    """Shade a polygon, draw its sides, and write a name at its highest corner."""
-    points = np.round(np.array(corners)).astype(np.int32)
-    x, y, width, height = cv2.boundingRect(points)
-    rows, columns = slice(max(0, y), y + height), slice(max(0, x), x + width)
-    part = image[rows, columns]
-    mask = np.zeros(part.shape[:2], np.uint8)
-    cv2.fillPoly(mask, [points - (columns.start, rows.start)], 255)
-    tint = np.full_like(part, color)
-    shaded = np.asarray(cv2.addWeighted(part, 1 - _SHADE, tint, _SHADE, 0), np.uint8)
-    part[mask > 0] = shaded[mask > 0]
-    cv2.polylines(image, [points], True, color, line_width(image), cv2.LINE_AA)
-    left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
-    height = label_tag(image, name, (0, 0)).height
-    draw_label(image, name, (round(left), round(top) + height), color)
-
-
 def _draw_zone(image: Image, zone: DrawnZone) -> None:
-    outline_polygon(image, zone.corners, ZONE, f"{zone.name}: {zone.present}")
+    points = np.round(np.array(zone.corners)).astype(np.int32)
+    x, y, width, height = cv2.boundingRect(points)
+    left, top = max(0, x), max(0, y)
+    part = image[top : max(0, y + height), left : max(0, x + width)]
+    if part.size:
+        mask = np.zeros(part.shape[:2], np.uint8)
+        cv2.fillPoly(mask, [points - np.array([left, top], np.int32)], 255)
+        tint = np.full_like(part, ZONE)
+        shaded = np.asarray(cv2.addWeighted(part, 1 - _SHADE, tint, _SHADE, 0), np.uint8)
+        part[mask > 0] = shaded[mask > 0]
+    draw_outline(image, zone.corners, ZONE, f"{zone.name}: {zone.present}")
 
 
 def _draw_line(image: Image, line: DrawnLine) -> None:

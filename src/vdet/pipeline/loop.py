@@ -12,7 +12,7 @@ from typing import Any
 
 from vdet.config.schema import Settings
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.detect.protocol import DetectorModel, VideoDetector, limited
 from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
 from vdet.files import OutputFiles
 from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
@@ -27,6 +27,7 @@ from vdet.pipeline.threads import (
     run_in_thread,
     single_threaded_libraries,
 )
+from vdet.regions import lay_regions
 from vdet.track.factory import make_tracker
 from vdet.workers import core_count
 
@@ -247,7 +248,14 @@ def follow_frames(
     """Find and follow the vehicles through the frames of a video, and with `roads` the lane.
 
     `threads` frames are searched at once. The results do not depend on their number.
+
+    Raises
+    ------
+    ConfigError, ImageError
+        The regions of the settings do not fit the frames.
     """
+    regions = lay_regions(settings.regions, video.width, video.height)
+    detector = limited(detector, regions)
     tracker = make_tracker(settings, video.width, video.height)
 
     def search(frame: Frame) -> tuple[Any, FrameView | None]:
@@ -258,6 +266,8 @@ def follow_frames(
         for frame, (candidates, view) in searched:
             detections = detector.detect(candidates)
             tracks = tracker.update(detections, float(frame.time), frame.image)
+            if regions is not None:
+                tracks = [track for track in tracks if regions.contains(track.foot)]
             road = roads.update(view) if roads and view else None
             yield FrameResult(video.path, frame, detections, tuple(tracks), road, detector)
 

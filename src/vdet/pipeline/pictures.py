@@ -12,7 +12,7 @@ import numpy as np
 
 from vdet.config.schema import Settings
 from vdet.detect.detections import Detections
-from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.detect.protocol import DetectorModel, VideoDetector, limited
 from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
@@ -22,6 +22,7 @@ from vdet.pipeline.loop import Progress, no_progress
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
+from vdet.regions import Regions, lay_regions
 from vdet.track.track import Track
 
 
@@ -175,8 +176,11 @@ def detect_picture(
     ImageError
         The picture cannot be searched.
     """
+    height, width = image.shape[:2]
     with single_threaded_libraries():
-        detector, detections = search_picture(source, image, model)
+        with _named(source):
+            regions = lay_regions(settings.regions, width, height)
+        detector, detections = search_picture(source, image, model, regions)
     with _named(source):
         road = _road(image, settings, lanes) if lanes else None
     frame = Frame(0, Fraction(0), image)
@@ -184,16 +188,22 @@ def detect_picture(
 
 
 def search_picture(
-    source: Path, image: Image, model: DetectorModel
+    source: Path, image: Image, model: DetectorModel, regions: Regions | None = None
 ) -> tuple[VideoDetector, Detections]:
     """Return what a picture shows, and the detector that found it; threads may call this at once.
+
+    With `regions`, only vehicles that stand in them are found.
 
     Arguments and errors as in `detect_picture`.
     """
     height, width = image.shape[:2]
     with _named(source):
-        detector = model.for_video(width, height, [image])
-        return detector, detector.detect(detector.search(image, None))
+        detector = limited(model.for_video(width, height, [image]), regions)
+        detections = detector.detect(detector.search(image, None))
+    if regions is None:
+        return detector, detections
+    feet = [(box.x + box.width / 2, float(box.bottom)) for box in detections.rounded]
+    return detector, detections[[n for n, foot in enumerate(feet) if regions.contains(foot)]]
 
 
 @contextlib.contextmanager

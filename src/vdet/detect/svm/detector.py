@@ -20,6 +20,7 @@ from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows, join_windows
 from vdet.geometry import are_nested
 from vdet.media.images import Image
+from vdet.regions import SearchArea
 
 log = logging.getLogger("vdet")
 
@@ -72,6 +73,8 @@ class SvmDetector:
         Size of the frames, pixels.
     horizon
         Row of the horizon, share of the frames' height (`horizon_of`).
+    area
+        Where vehicles are looked for; None for the whole frame.
 
     Raises
     ------
@@ -91,8 +94,11 @@ class SvmDetector:
         height: int,
         *,
         horizon: float = DEFAULT_HORIZON,
+        area: SearchArea | None = None,
     ) -> None:
-        self._search = FrameSearch(model, settings, width, height, horizon=horizon)
+        self._search = FrameSearch(model, settings, width, height, horizon=horizon, area=area)
+        self._model = model
+        self._horizon = horizon
         self._features = model.features
         self._size = width, height
         self._settings = settings
@@ -100,6 +106,11 @@ class SvmDetector:
         self._map = HeatMap(width, height, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
         self._weak = self._strong = 0
+
+    def limited_to(self, area: SearchArea) -> "SvmDetector":
+        """Return a detector that leaves out windows far from an area. Raises `ImageError`."""
+        size, horizon = self._size, self._horizon
+        return SvmDetector(self._model, self._settings, *size, horizon=horizon, area=area)
 
     def search(self, image: Image, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""

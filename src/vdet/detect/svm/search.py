@@ -10,19 +10,20 @@ from vdet.config.schema import FeatureSettings, SearchSettings, SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense_search import dense_search, why_not_dense
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
+from vdet.detect.svm.limits import ALIGNMENT, limited_grid
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import NO_WINDOWS, GridResult, WindowGrid, Windows, lay_grid
 from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.geometry import Float32Array
 from vdet.media.images import Image
+from vdet.regions import SearchArea
 
 MAX_WINDOWS = 100_000
 """In a frame; more take minutes. The shipped settings lay about 2,700 over a frame of 16:9."""
 
-_ALIGNMENT = 16  # of the pyramid's first row and column, so that its levels begin at whole pixels
 _MIN_SIDE = 0.2  # of the smallest vehicle that a window can show, sides of the window
 
 log = logging.getLogger("vdet")
@@ -55,7 +56,7 @@ class FrameSearch:
     FrameSizeError
         No window fits into such a frame.
     ImageError
-        More than `MAX_WINDOWS` windows fit.
+        More than `MAX_WINDOWS` windows fit, or none reaches `area`.
     ConfigError
         The dense engine is asked for, and cannot compute the model's features.
     """
@@ -68,6 +69,7 @@ class FrameSearch:
         height: int,
         *,
         horizon: float = DEFAULT_HORIZON,
+        area: SearchArea | None = None,
     ) -> None:
         grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
         if not grids:
@@ -83,8 +85,14 @@ class FrameSearch:
                 "detector.search.windows and detector.search.perspective"
             )
         engine = dense_search if _use_dense(settings.search, model.features) else PatchSearch
-        self.grids = grids
-        self._sets = [_WindowSet(grid, engine(model, grid)) for grid in grids]
+        parts = [limited_grid(grid, area, model.features) if area else grid for grid in grids]
+        self.grids = tuple(part for part in parts if part is not None)
+        if not self.grids:
+            raise ImageError("no search window reaches the regions; make them larger, or lower")
+        self._sets = [
+            _WindowSet(part, engine(model, part), grid.share) if part else None
+            for grid, part in zip(grids, parts, strict=True)
+        ]
         self._alternate = min(settings.search.alternate, len(grids))
         self._probability = settings.search.probability
         self._regression = model.box_regression
@@ -99,13 +107,21 @@ class FrameSearch:
         Parameters
         ----------
         sets
-            Indices of sets in `grids`; None for all of them.
+            Indices of sets, from `sets_of`; None for all of them.
         """
         chosen = self._sets if sets is None else [self._sets[index] for index in sets]
-        top = min(each.top for each in chosen) // _ALIGNMENT * _ALIGNMENT
-        margin = -(min(each.left for each in chosen) // _ALIGNMENT * _ALIGNMENT)
-        frame = FramePyramid(image, top, max(each.bottom for each in chosen), margin=margin)
-        return [self._windows(each, each.search.search(frame)) for each in chosen]
+        near = [each for each in chosen if each is not None]
+        if not near:
+            return [NO_WINDOWS] * len(chosen)
+        top = min(each.top for each in near) // ALIGNMENT * ALIGNMENT
+        margin = max(0, -(min(each.left for each in near) // ALIGNMENT * ALIGNMENT))
+        margin = max(margin, max(each.right for each in near) - image.shape[1])
+        margin = -(-margin // ALIGNMENT) * ALIGNMENT
+        frame = FramePyramid(image, top, max(each.bottom for each in near), margin=margin)
+        return [
+            self._windows(each, each.search.search(frame)) if each else NO_WINDOWS
+            for each in chosen
+        ]
 
     def _windows(self, window_set: "_WindowSet", result: GridResult) -> Windows:
         boxes = window_set.boxes
@@ -120,12 +136,12 @@ class FrameSearch:
 class _WindowSet:
     """A grid, its search, and what is the same in every frame."""
 
-    def __init__(self, grid: WindowGrid, search: GridSearch) -> None:
+    def __init__(self, grid: WindowGrid, search: GridSearch, share: float) -> None:
         self.search = search
         self.boxes = grid.boxes
-        self.shares = np.full(len(grid), grid.share, np.float32)
+        self.shares = np.full(len(grid), share, np.float32)
         self.left, self.top = self.boxes[:, :2].min(axis=0).tolist()
-        self.bottom = int((self.boxes[:, 1] + self.boxes[:, 3]).max())
+        self.right, self.bottom = (self.boxes[:, :2] + self.boxes[:, 2:]).max(axis=0).tolist()
 
 
 def _vehicle_boxes(windows: Float32Array, sides: Float32Array) -> Float32Array:

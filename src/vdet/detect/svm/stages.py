@@ -40,8 +40,10 @@ def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dic
     features
         The features of the model.
     """
-    return {
-        "patches": patch_sheet(_examples(image, trace.windows), features),
+    patches = {}
+    if len(trace.windows):  # in a frame of a video, none may be near the regions
+        patches["patches"] = patch_sheet(_examples(image, trace.windows), features)
+    return patches | {
         "windows": _draw_window_sets(image, trace.grids),
         "hits": _draw_hits(image, trace.hits),
         "heat": _draw_heat(image, trace.heat),

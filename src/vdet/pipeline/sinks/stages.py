@@ -3,12 +3,15 @@
 from pathlib import Path
 from typing import Self
 
+from vdet.config.regions import RegionsSettings
 from vdet.draw.boxes import WHITE, draw_box, draw_label
+from vdet.draw.regions import draw_regions
 from vdet.files import make_folder
 from vdet.media.images import Image, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
 from vdet.pipeline.sinks.video import draw_tracks
+from vdet.regions import Regions
 
 _BOXES = "boxes"
 
@@ -35,12 +38,25 @@ class StagesSink:
             return
         self._is_done = True
         make_folder(self._folder)
-        pictures = {**result.stage_pictures(), _BOXES: _with_boxes(result)}
+        pictures = result.stage_pictures()
+        if self._context.settings.regions:
+            pictures["regions"] = _with_regions(result, self._context.settings.regions)
+        pictures[_BOXES] = _with_boxes(result)
         if result.road:
             pictures |= result.road.pictures()
         for number, (name, picture) in enumerate(pictures.items(), start=1):
             path = self._folder / f"{number}-{name}.png"
             self._context.files.stage(path).write_bytes(encode_image(picture, path))
+
+
+def _with_regions(result: FrameResult, settings: RegionsSettings) -> Image:
+    height, width = result.frame.image.shape[:2]
+    regions = Regions(settings, width, height)
+    included, excluded = (
+        {name: each.corners for name, each in outlines.items()}
+        for outlines in (regions.included, regions.excluded)
+    )
+    return draw_regions(result.frame.image, regions.pixels(), included, excluded)
 
 
 def _with_boxes(result: FrameResult) -> Image:

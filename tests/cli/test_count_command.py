@@ -1,0 +1,154 @@
+"""`vdet count`, and `--lines` and `--counts` of `vdet detect-video`."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from red_cars import SETTINGS, red_finder
+from running import write_drive
+from vdet.config.rendering import render
+from vdet.detect.svm.model import save_model
+
+LINES = """
+size: [320, 240]
+lines:
+  - {name: gate, start: [100, 0], end: [100, 240], left: out, right: in}
+zones:
+  - {name: yard, points: [[110, 0], [320, 0], [320, 240], [110, 240]]}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a clip of the red car, what finds it, and lines."""
+    folder = tmp_path_factory.mktemp("red")
+    write_drive(folder / "red.mp4", 60)
+    save_model(red_finder(), folder / "red.npz")
+    (folder / "red.yaml").write_text(render(SETTINGS))
+    (folder / "lines.yaml").write_text(LINES)
+    return folder
+
+
+def options(folder: Path) -> tuple[str | Path, ...]:
+    return ("--model", folder / "red.npz", "-c", folder / "red.yaml")
+
+
+def events_of(path: Path) -> list[tuple[str, ...]]:
+    with path.open() as file:
+        keys = ("frame", "name", "direction", "id", "score", "stitched")
+        return [tuple(row[key] for key in keys) for row in csv.DictReader(file)]
+
+
+@pytest.mark.parametrize("form", ["csv", "jsonl", "txt"])
+def test_counting_a_file_of_tracks_gives_what_the_run_gave(
+    run: Run, folder: Path, tmp_path: Path, form: str
+) -> None:
+    tracks, live, again = tmp_path / f"t.{form}", tmp_path / "live.csv", tmp_path / "again.csv"
+    lines = ("--lines", folder / "lines.yaml")
+    wanted = ("--no-video", "--tracks", tracks, "--counts", live, *lines)
+    result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
+    assert result.code == 0, result.err
+    rate = ("--rate", "25") if form == "txt" else ()
+    result = run("count", tracks, *lines, "--counts", again, *rate)
+    assert (result.code, result.err) == (0, "")
+    assert events_of(again) == events_of(live) != []
+
+
+def write_tracks(path: Path, *, shift: int = 0) -> Path:
+    """Write the tracks of a car that goes to the right, 4 pixels a frame."""
+    rows = [f"{n},{n / 25:.6f},1,{shift + 4 * n},100,40,40,0.9,0" for n in range(50)]
+    path.write_text("\n".join(["frame,time,id,x,y,width,height,score,predicted", *rows]) + "\n")
+    return path
+
+
+def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
+    tracks = write_tracks(tmp_path / "t.csv")
+    result = run("count", tracks, "--lines", folder / "lines.yaml")
+    assert result.code == 0, result.err
+    assert [line.split() for line in result.out.splitlines()[:3]] == [
+        ["name", "direction", "count"], ["gate", "out", "1"], ["gate", "in", "0"],
+    ]  # fmt: skip
+    assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
+
+
+def test_several_files_are_counted_each_and_together(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    files = [write_tracks(tmp_path / f"{n}.csv", shift=30 * n) for n in (0, 1)]
+    out = tmp_path / "all.json"
+    result = run("count", *files, "--lines", folder / "lines.yaml", "--counts", out)
+    assert result.code == 0, result.err
+    assert "all files" in result.out
+    whole = json.loads(out.read_text())
+    assert list(whole["videos"]) == [str(file) for file in files]
+    assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
+
+
+def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
+    tracks, lines = write_tracks(tmp_path / "t.csv"), tmp_path / "lines.yaml"
+    lines.write_text("lines: [{name: gate, start: [0.5, 0], end: [0.5, 1]}]")
+    result = run("count", tracks, "--lines", lines)
+    assert result.code == 2
+    assert "give --size, as in 1280x720" in result.err
+    result = run("count", tracks, "--lines", lines, "--size", "320x240")
+    assert result.code == 0, result.err
+    assert result.out.split()[3:6] == ["gate", "left", "1"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["t.csv"], 2, "nothing to count at; give --lines FILE"),
+        (["t.csv", "--lines", "none.yaml"], 1, "none.yaml: cannot be read"),
+        (["t.csv", "--lines", "l.yaml", "--size", "320x200"], 1, "given for frames of 320×240"),
+        (["t.csv", "--lines", "l.yaml", "--size", "big"], 2, "'big' is no size"),
+        (["t.csv", "--lines", "l.yaml", "--counts", "c.txt"], 2, "written as .csv, .json"),
+        (["t.csv", "--lines", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
+        (["t.txt", "--lines", "l.yaml"], 1, "has no times; give the frames per second"),
+        (["none.csv", "--lines", "l.yaml"], 1, "none.csv"),
+    ],
+)
+def test_mistakes_are_refused(
+    run: Run,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_tracks(Path("t.csv"))
+    Path("t.txt").write_text("1,1,1,1,40,40,1,-1,-1,-1\n")
+    Path("l.yaml").write_text(LINES)
+    result = run("count", *arguments)
+    assert result.code == code
+    assert message in result.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["l.yaml", "t.csv", "t.txt"]
+
+
+def test_detect_video_wants_lines_for_counts(run: Run, folder: Path, tmp_path: Path) -> None:
+    wanted = ("--no-video", "--counts", tmp_path / "c.csv")
+    result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
+    assert result.code == 2
+    assert "--counts needs lines or zones; give --lines FILE" in result.err
+
+
+def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
+    run: Run, folder: Path, tmp_path: Path
+) -> None:
+    clips = tmp_path / "clips" / "day"
+    clips.mkdir(parents=True)
+    for name in "ab":
+        (clips / f"{name}.mp4").write_bytes((folder / "red.mp4").read_bytes())
+    wanted = ("--no-video", "--counts", ".counts.csv", "--lines", folder / "lines.yaml")
+    out = tmp_path / "found"
+    result = run("detect-video", clips.parent, "-d", out, *wanted, "--jobs", "1", *options(folder))
+    assert result.code == 0, result.err
+    own = events_of(out / "day" / "a.counts.csv")
+    assert own == events_of(out / "day" / "b.counts.csv")
+    with (out / "counts.counts.csv").open() as file:
+        videos = [row["video"] for row in csv.DictReader(file)]
+    assert videos == ["day/a"] * len(own) + ["day/b"] * len(own)

@@ -1,0 +1,83 @@
+"""A search of some regions: the same results inside, and fewer windows."""
+
+import numpy as np
+import pytest
+
+from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, red_finder, road
+from seed import SEED
+from textured_road import textured_road
+from vdet.config.schema import Settings, SvmSettings
+from vdet.detect.protocol import LimitableDetector
+from vdet.detect.svm.detector import SvmDetector
+from vdet.detect.svm.kind import shipped_model
+from vdet.detect.svm.limits import limited_grid
+from vdet.detect.svm.model import load_model
+from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.errors import ImageError
+from vdet.geometry import Box
+from vdet.regions import SearchArea
+
+
+def area_of(box: Box, width: int, height: int) -> SearchArea:
+    pixels = np.zeros((height, width), bool)
+    pixels[box.y : box.bottom, box.x : box.right] = True
+    return SearchArea(pixels)
+
+
+@pytest.mark.parametrize("settings", [SvmSettings(), SEED.svm], ids=["default", "seed"])
+@pytest.mark.parametrize(
+    "box", [Box(700, 420, 200, 50), Box(0, 380, 333, 340), Box(901, 433, 379, 77)]
+)
+def test_windows_that_touch_the_area_look_the_same(settings: SvmSettings, box: Box) -> None:
+    image, model = textured_road(1280, 720), load_model(shipped_model(settings))
+    area = area_of(box, 1280, 720)
+    whole = FrameSearch(model, settings, 1280, 720)
+    part = FrameSearch(model, settings, 1280, 720, area=area)
+    assert sum(map(len, part.grids)) < sum(map(len, whole.grids))
+    for all_windows, some in zip(whole.search(image), part.search(image), strict=True):
+        near = area.touches(all_windows.boxes)
+        kept = area.touches(some.boxes)
+        assert np.array_equal(all_windows.boxes[near], some.boxes[kept])
+        assert np.allclose(all_windows.probabilities[near], some.probabilities[kept], atol=1e-6)
+        assert np.allclose(all_windows.vehicles[near], some.vehicles[kept], atol=1e-3)
+        assert np.allclose(all_windows.shares[near], some.shares[kept])
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["rows", "perspective"])
+def test_a_vehicle_in_the_area_is_found_as_before(settings: Settings) -> None:
+    detector = SvmDetector(red_finder(), settings.svm, WIDTH, HEIGHT)
+    assert isinstance(detector, LimitableDetector)
+    near, far = Box(90, 130, 80, 50), Box(300, 100, 20, 140)
+    found = {}
+    for name, each in {
+        "whole": detector,
+        "near": detector.limited_to(area_of(near, WIDTH, HEIGHT)),
+        "far": detector.limited_to(area_of(far, WIDTH, HEIGHT)),
+    }.items():
+        for index in range(3):
+            found[name] = each.detect(each.search(road(CAR), index)).rounded
+    assert len(found["whole"]) == 1
+    assert found["near"] == found["whole"]
+    assert found["far"] == []
+
+
+def test_regions_that_no_window_reaches_are_refused() -> None:
+    detector = SvmDetector(red_finder(), SETTINGS.svm, WIDTH, HEIGHT)
+    with pytest.raises(ImageError, match="no search window reaches the regions"):
+        detector.limited_to(area_of(Box(0, 0, 320, 20), WIDTH, HEIGHT))
+
+
+def test_a_set_out_of_reach_takes_its_turn_without_windows() -> None:
+    settings = SvmSettings()
+    model = load_model(shipped_model(settings))
+    area = area_of(Box(700, 420, 60, 10), 1280, 720)
+    grids = lay_grids(settings, model.features, 1280, 720)
+    kept = [limited_grid(grid, area, model.features) for grid in grids]
+    low = SvmDetector(model, settings, 1280, 720, area=area)
+    image = textured_road(1280, 720)
+    for index in range(2):
+        candidates = low.search(image, index)
+        expected = [part for part in kept[index::2] if part is not None]
+        assert len(candidates.windows) == sum(map(len, expected))
+        pictures = low.stage_pictures(image, low.detect(candidates))
+        assert "windows" in pictures

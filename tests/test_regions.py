@@ -1,0 +1,125 @@
+"""Regions laid over frames: what lies in them, and what has to be searched."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.config.regions import RegionsSettings
+from vdet.errors import ConfigError, ImageError
+from vdet.media.images import write_image
+from vdet.regions import Regions, SearchArea, check_mask, lay_regions
+
+ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
+BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8]]}
+
+
+def laid(*polygons: dict[str, Any], mask: str = "", size: tuple[int, int] = (320, 180)) -> Regions:
+    return Regions(RegionsSettings.model_validate({"polygons": polygons, "mask": mask}), *size)
+
+
+def test_no_regions_are_the_whole_frame() -> None:
+    assert lay_regions(RegionsSettings(), 320, 180) is None
+
+
+def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:
+    regions = laid(ROAD, BUSH | {"kind": "exclude"})
+    assert regions.contains((200, 120))
+    assert not regions.contains((60, 120))
+    assert not regions.contains((270, 130))
+    assert regions.name_at((200, 120)) == "road"
+    assert regions.name_at((60, 120)) is None
+
+
+def test_with_nothing_included_all_but_the_excluded_counts() -> None:
+    regions = laid(BUSH | {"kind": "exclude"})
+    assert regions.contains((60, 20))
+    assert not regions.contains((270, 130))
+
+
+def test_what_stands_beyond_the_edge_counts_as_at_the_edge() -> None:
+    regions = laid(ROAD)
+    assert regions.contains((350, 100))
+    assert regions.contains((200, 400))
+    assert not regions.contains((-20, 170))
+
+
+class TestMasks:
+    @pytest.fixture
+    def mask(self, tmp_path: Path) -> str:
+        """A mask of twice the size: white at the right."""
+        image = np.zeros((360, 640, 3), np.uint8)
+        image[:, 400:] = 255
+        write_image(tmp_path / "mask.png", image)
+        return str(tmp_path / "mask.png")
+
+    def test_white_is_included(self, mask: str) -> None:
+        regions = laid(mask=mask)
+        assert [regions.contains((x, 90)) for x in (199, 200, 400)] == [False, True, True]
+
+    def test_polygons_and_a_mask_both_decide(self, mask: str) -> None:
+        regions = laid(ROAD, mask=mask)
+        assert [regions.contains(p) for p in ((210, 80), (190, 120), (210, 120))] == [
+            False, False, True,
+        ]  # fmt: skip
+
+    def test_one_of_another_shape_is_refused(self, mask: str) -> None:
+        with pytest.raises(
+            ConfigError, match="the mask of 640×360 has another shape than the frames"
+        ):
+            laid(mask=mask, size=(320, 240))
+
+    def test_one_that_is_no_picture_is_refused_before_any_work(self, tmp_path: Path) -> None:
+        (tmp_path / "mask.png").write_text("white")
+        for name in ("mask.png", "none.png"):
+            with pytest.raises(ImageError, match=name):
+                check_mask(RegionsSettings(mask=str(tmp_path / name)))
+
+
+def test_pixels_for_another_shape_are_refused() -> None:
+    settings = RegionsSettings.model_validate(
+        {"size": [100, 100], "polygons": [{"name": "a", "points": [[0, 0], [9, 0], [9, 9]]}]}
+    )
+    with pytest.raises(ConfigError, match=r"^regions\.size: places are given for frames of 1"):
+        lay_regions(settings, 320, 180)
+
+
+corners = st.tuples(st.integers(0, 40), st.integers(0, 30))
+
+
+@given(st.lists(corners, min_size=3, max_size=3, unique=True), st.booleans(), st.data())
+def test_every_place_of_a_region_is_searched(
+    points: list[tuple[int, int]], excluded: bool, data: st.DataObject
+) -> None:
+    try:
+        settings = RegionsSettings.model_validate(
+            {
+                "size": (40, 30),
+                "polygons": [
+                    {"name": "a", "points": points, "kind": "exclude" if excluded else "include"}
+                ],
+            }
+        )
+    except ValueError:
+        return
+    regions = Regions(settings, 40, 30)
+    x = data.draw(st.floats(0, 39.9))
+    y = data.draw(st.floats(0, 29.9))
+    if regions.contains((x, y)):
+        box = np.array([[int(x), int(y), 1, 1]], np.int32)
+        near = box + np.array([-1, -1, 2, 2], np.int32)
+        assert regions.area().touches(near)[0]
+
+
+@given(st.integers(-20, 50), st.integers(-20, 40), st.integers(1, 30), st.integers(1, 30))
+def test_a_box_touches_the_area_where_they_have_a_pixel_in_common(
+    x: int, y: int, width: int, height: int
+) -> None:
+    pixels = np.zeros((30, 40), bool)
+    pixels[10:20, 15:30] = True
+    inside = pixels[max(0, y) : max(0, y + height), max(0, x) : max(0, x + width)]
+    boxes = np.array([[x, y, width, height]], np.int32)
+    assert SearchArea(pixels).touches(boxes)[0] == inside.any()
