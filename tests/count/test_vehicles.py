@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from count.scenes import ZONE, events, feet, frames, joined, numbered, through, track, ways
+from vdet.config.counts import LineSettings
 from vdet.track.track import FrameTracks
 
 DOWN = through((0, 600, 300), (4, 600, 500))
@@ -64,6 +65,14 @@ class TestNewIds:
             through((3.5, 600, 405), (6, 600, 500)),
         ):
             assert events(joined(old, numbered(frames(new), 2))) == ()
+
+    def test_one_that_comes_in_where_another_has_just_left_is_another_vehicle(self) -> None:
+        out = frames(through((0, 1100, 380), (3, 1260, 440)), seconds=3)
+        in_ = numbered(frames(through((3.6, 1255, 425), (8, 1100, 380)), seconds=8), 2)
+        edge = LineSettings(name="line", start=(900, 400), end=(1280, 400), left="away", right="in")
+        found = events(joined(out, in_), edge)
+        assert [(event.id, event.direction) for event in found] == [(1, "in"), (2, "away")]
+        assert not any(event.stitched for event in found)
 
     def test_a_flag_stands_only_where_the_count_rests_on_the_old_id(self) -> None:
         old = frames(through((0, 600, 100), (1, 600, 150)), seconds=1)

@@ -17,7 +17,8 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
 7. The class of a vehicle is that with the highest sum of scores over all its frames.
 8. A vehicle that is first seen within `counts.gap` seconds of the end of another, and where that
    one would be, is taken for the same: it takes over its side and whether it was counted. An event
-   that rests on this is `stitched`.
+   that rests on this is `stitched`. A vehicle that moves out at the edge of the frame has no such
+   successor.
 9. Events are what is stored. All totals follow from them.
 
 `layout` places lines and zones in a frame, `border` holds what a vehicle does at one of them,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from vdet.count.border import BorderState, Change, Sighting
 from vdet.count.events import Event
 from vdet.count.layout import APPEAR, VANISH, Layout, Zone
+from vdet.geometry import Box
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 
@@ -15,6 +16,8 @@ REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
 
 _CLOCK = 1e-4
+_LEAVES = 0.1
+"""Heights of its box a second that a vehicle moves at least to leave the frame."""
 _MOST_GROWTH = 2.0
 """A box is at most so many times as high as the one that it goes on from."""
 
@@ -40,6 +43,7 @@ class _Vehicle:
     id: int
     first: Sighting
     last: Sighting
+    outward: Point  # the sides of the frame that its last box touches: x and y, -1, 0 or 1
     shown: float  # when it was last shown, also by prediction
     states: list[BorderState]
     entered: dict[int, float] = field(default_factory=dict)  # by the number of the zone
@@ -53,6 +57,12 @@ class _Vehicle:
     def class_name(self) -> str | None:
         """The class with the highest sum of scores."""
         return max(self.classes, key=self.classes.__getitem__, default=None)
+
+    @property
+    def is_leaving(self) -> bool:
+        """Whether it moves out at the edge of the frame: then its end is no loss of the tracker."""
+        outward = sum(v * side for v, side in zip(self.velocity, self.outward, strict=True))
+        return outward > _LEAVES * self.last.height
 
     def expected(self, time: float) -> Point:
         """Return where it would be, had it gone on."""
@@ -122,6 +132,7 @@ class VehicleCounter:
                 sighting = _sighting(track, frame)
                 vehicle = known or self._begin(track.id, sighting, shown)
                 vehicle.vote(track)
+                vehicle.outward = _touched_sides(track.box, self._layout.size)
                 self._see(vehicle, sighting)
 
     def finish(self) -> tuple[Event, ...]:
@@ -155,13 +166,14 @@ class VehicleCounter:
         before = self._before(sighting, shown)
         if before is None:
             states = [BorderState() for _ in self._borders]
-            vehicle = _Vehicle(number, sighting, sighting, sighting.time, states)
+            vehicle = _Vehicle(number, sighting, sighting, (0, 0), sighting.time, states)
         else:
             before.is_taken_over = True
             vehicle = _Vehicle(
                 number,
                 before.first,
                 before.last,
+                (0, 0),
                 sighting.time,
                 [state.taken_over() for state in before.states],
                 dict(before.entered),
@@ -176,7 +188,7 @@ class VehicleCounter:
         gap = self._layout.settings.gap
         near = []
         for vehicle in self._vehicles.values():
-            if vehicle.id in shown or vehicle.is_taken_over:
+            if vehicle.id in shown or vehicle.is_taken_over or vehicle.is_leaving:
                 continue
             heights = vehicle.last.height, sighting.height
             if sighting.time - vehicle.shown > gap or max(heights) > _MOST_GROWTH * min(heights):
@@ -252,6 +264,13 @@ def _sighting(track: Track, frame: FrameTracks) -> Sighting:
         float(track.box.height),
         round(track.score, 4),
     )
+
+
+def _touched_sides(box: Box, size: tuple[int, int]) -> Point:
+    """Return at which sides of the frame a box is: -1 left or top, 1 right or bottom, 0 neither."""
+    x = (box.right >= size[0] - 1) - (box.x <= 1)
+    y = (box.bottom >= size[1] - 1) - (box.y <= 1)
+    return x, y
 
 
 def _finished(event: Event, class_name: str | None) -> Event:

@@ -8,7 +8,7 @@ from seed import SEED
 from textured_road import textured_road
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.protocol import LimitableDetector
-from vdet.detect.svm.detector import SvmDetector
+from vdet.detect.svm.detector import SvmDetector, SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.limits import limited_grid
 from vdet.detect.svm.model import load_model
@@ -45,7 +45,7 @@ def test_windows_that_touch_the_area_look_the_same(settings: SvmSettings, box: B
 
 @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["rows", "perspective"])
 def test_a_vehicle_in_the_area_is_found_as_before(settings: Settings) -> None:
-    detector = SvmDetector(red_finder(), settings.svm, WIDTH, HEIGHT)
+    detector = SvmModel(red_finder(), settings.svm).for_video(WIDTH, HEIGHT, [road(CAR)])
     assert isinstance(detector, LimitableDetector)
     near, far = Box(90, 130, 80, 50), Box(300, 100, 20, 140)
     found = {}
