@@ -61,16 +61,16 @@ def vdet(package: Path, *arguments: str | Path) -> "subprocess.CompletedProcess[
 
 
 def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path: Path) -> None:
-    out, tracks, counts = (tmp_path / name for name in ("out.mp4", "out.jsonl", "counts.txt"))
+    out, tracks, tally = (tmp_path / name for name in ("out.mp4", "out.jsonl", "tally.txt"))
     done = vdet(
         package,
         *("detect-video", clip, out, *CHOSEN),
-        *("--tracks", tracks, "--sink", f"counts={counts}"),
+        *("--tracks", tracks, "--sink", f"tally={tally}"),
         *("--stages", tmp_path / "stages", "--at", "0.5"),
     )
     assert done.returncode == 0, done.stderr
     assert frames_of(out) == FRAMES
-    assert counts.read_text() == "".join(f"{number} 1\n" for number in range(FRAMES))
+    assert tally.read_text() == "".join(f"{number} 1\n" for number in range(FRAMES))
     records = [json.loads(line) for line in tracks.read_text().splitlines()]
     for number, record in enumerate(records):
         (track,) = record["tracks"]
@@ -81,13 +81,13 @@ def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path:
 
 
 def test_the_detector_and_the_sink_run_through_detect_image(package: Path, tmp_path: Path) -> None:
-    picture, boxes, counts = (tmp_path / name for name in ("red.png", "boxes.json", "counts.txt"))
+    picture, boxes, tally = (tmp_path / name for name in ("red.png", "boxes.json", "tally.txt"))
     (frame,) = drive(1)
     write_image(picture, frame.image)
     done = vdet(
         package,
         *("detect-image", picture, "--set", "detector.kind=red"),
-        *("--json", boxes, "--sink", f"counts={counts}"),
+        *("--json", boxes, "--sink", f"tally={tally}"),
     )
     assert done.returncode == 0, done.stderr
     (item,) = json.loads(boxes.read_text())
@@ -100,11 +100,11 @@ def test_the_detector_and_the_sink_run_through_detect_image(package: Path, tmp_p
         car.height,
     )
     assert box["score"] == pytest.approx(0.9)
-    assert counts.read_text() == "0 1\n"
+    assert tally.read_text() == "0 1\n"
 
 
 def test_all_three_run_through_eval_video(package: Path, clip: Path, tmp_path: Path) -> None:
-    truth, counts = tmp_path / "gt.txt", tmp_path / "counts.txt"
+    truth, tally = tmp_path / "gt.txt", tmp_path / "tally.txt"
     cars = [car_at(number) for number in range(FRAMES)]
     truth.write_text(
         "".join(
@@ -115,12 +115,12 @@ def test_all_three_run_through_eval_video(package: Path, clip: Path, tmp_path: P
     done = vdet(
         package,
         *("eval", "video", clip, "--truth", truth, *CHOSEN),
-        *("--sink", f"counts={counts}", "--json", "-"),
+        *("--sink", f"tally={tally}", "--json", "-"),
     )
     assert done.returncode == 0, done.stderr
     total = json.loads(done.stdout)["total"]
     assert (total["f1"], total["ap50"], total["id_switches"]) == (1, pytest.approx(1), 0)
-    assert len(counts.read_text().splitlines()) == FRAMES
+    assert len(tally.read_text().splitlines()) == FRAMES
 
 
 def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) -> None:
@@ -142,14 +142,14 @@ def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path
     done = vdet(
         package,
         *("detect-video", tmp_path / "in", "-d", tmp_path / "out", *CHOSEN),
-        *("--sink", "counts=.txt"),
+        *("--sink", "tally=.txt"),
     )
     assert done.returncode == 0, done.stderr
     for name in ("a", "b"):
         assert len((tmp_path / "out" / f"{name}.txt").read_text().splitlines()) == FRAMES
         assert frames_of(tmp_path / "out" / f"{name}.mp4") == FRAMES
     record = json.loads((tmp_path / "out" / "manifest.jsonl").read_text().splitlines()[0])
-    assert set(record["outputs"]) == {"video", "counts"}
+    assert set(record["outputs"]) == {"video", "tally"}
     assert (record["model"], record["error"]) == (None, None)
 
 
@@ -194,4 +194,4 @@ def test_all_three_pass_the_checks(module: ModuleType, tmp_path: Path) -> None:
     check_tracker(
         lambda width, height: module.NEAREST.make(module.NearestSettings(), width, height)
     )
-    check_sink(module.COUNTS, tmp_path / "counts.txt", Settings())
+    check_sink(module.TALLY, tmp_path / "tally.txt", Settings())

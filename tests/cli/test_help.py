@@ -116,7 +116,10 @@ def test_examples_of_settings_have_an_effect(names: tuple[str, ...], text: str) 
 
 def test_one_option_means_the_same_in_every_command() -> None:
     """Options of one name have one help, but for examples and for what is the command's own."""
-    own = {"--output", "--until", "--model", "--stages", "--json", "--jobs", "--truth"}
+    own = {
+        *("--output", "--until", "--model", "--stages", "--json", "--jobs", "--truth"),
+        *("--rate", "--counts"),
+    }
     texts: dict[str, set[str]] = {}
     for _, option, text in OPTIONS:
         texts.setdefault(option, set()).add(re.sub(r"for example \S+", "", text))
