@@ -1,7 +1,7 @@
 """`vdet count`: count the vehicles of track files at lines and in zones."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,11 @@ from vdet.cli.options import (
 from vdet.config.counts import CountSettings
 from vdet.count.counter import count_events
 from vdet.count.files import SUFFIXES, sum_totals, write_counts, write_counts_of_all
-from vdet.count.layout import Layout, lay_out
+from vdet.count.layout import lay_out
 from vdet.count.totals import Counts, Total
 from vdet.errors import TruthError
-from vdet.evaluate.predictions import read_predictions
 from vdet.files import check_output, printable, staged
-from vdet.geometry import Box
-from vdet.track.track import FrameTracks, Track
+from vdet.formats.registry import read_tracks
 
 _SIZE = re.compile(r"([1-9][0-9]{0,4})[x×]([1-9][0-9]{0,4})", re.ASCII)
 
@@ -70,7 +68,7 @@ class SizeType(click.ParamType):  # type: ignore[type-arg]  # generic from click
     "--size",
     type=SizeType(),
     metavar="WIDTHxHEIGHT",
-    show_default="the size that the lines are given for",
+    show_default="as TRACKS say, else the size that the lines are given for",
     help="Size of the frames of the video, pixels.",
 )
 @click.option(
@@ -107,12 +105,11 @@ def count(
         if target.suffix.lower() not in SUFFIXES:
             raise click.UsageError(f"--counts: counts are written as {', '.join(SUFFIXES)}")
         check_output(target, overwrite=overwrite, inputs=tracks)
-    layout = lay_out(settings, *_frame_size(settings, size))
     with progress_bar(" files", quiet=quiet) as progress:
         advance = progress(len(tracks) if len(tracks) > 1 else None)
         videos = {}
         for path in tracks:
-            videos[str(path)] = _count(path, layout, rate)
+            videos[str(path)] = _count(path, settings, size, rate)
             advance(1)
     if target is not None:
         with staged(target, overwrite=overwrite) as temporary:
@@ -123,41 +120,23 @@ def count(
     print_lines(*_table(videos))
 
 
-def _frame_size(settings: CountSettings, given: tuple[int, int] | None) -> tuple[int, int]:
-    if given is not None:
-        return given
+def _count(
+    path: Path, settings: CountSettings, size: tuple[int, int] | None, rate: float | None
+) -> Counts:
+    saved = read_tracks(path, rate)
+    if not saved.has_times:
+        raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
+    layout = lay_out(settings, *(size or saved.size or _own_size(settings)))
+    zones = [zone.name for zone in layout.zones]
+    return Counts.of(count_events(saved.frames, layout), layout.keys, zones)
+
+
+def _own_size(settings: CountSettings) -> tuple[int, int]:
+    """Return the size of frames that the lines are given for."""
     if not settings.size:
         raise click.UsageError("the lines are shares of the frame; give --size, as in 1280x720")
     width, height = settings.size
     return width, height
-
-
-def _count(path: Path, layout: Layout, rate: float | None) -> Counts:
-    zones = [zone.name for zone in layout.zones]
-    return Counts.of(count_events(_read_tracks(path, rate), layout), layout.keys, zones)
-
-
-def _read_tracks(path: Path, rate: float | None) -> Iterator[FrameTracks]:
-    """Read the tracks of a file, frame by frame. Raises `TruthError`."""
-    video = read_predictions(path)
-    rate = rate or video.rate
-    if rate is None:
-        raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
-    for number in sorted(set(video.frames.tolist())):
-        rows = video.frame(number)
-        found = tuple(
-            Track(
-                id_,
-                Box(*map(round, box)),
-                score,
-                predicted=False,
-                whole_foot=(box[0] + box[2] / 2, box[1] + box[3]),
-            )
-            for id_, box, score in zip(
-                rows.ids.tolist(), rows.boxes.tolist(), rows.scores.tolist(), strict=True
-            )
-        )
-        yield FrameTracks(number - 1, (number - 1) / rate, found)
 
 
 def _table(videos: Mapping[str, Counts]) -> list[str]:
