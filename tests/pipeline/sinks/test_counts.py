@@ -14,6 +14,8 @@ from vdet.config.schema import Settings
 from vdet.count.files import join_counts
 from vdet.errors import OutputError
 from vdet.geometry import Box
+from vdet.pages.facts import read_facts
+from vdet.pages.frame import PAGE
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.counts import COUNTS
 from vdet.pipeline.sinks.protocol import Output
@@ -124,3 +126,10 @@ def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_pat
         whole = json.loads(text)
         assert whole["videos"]["b"] == json.loads(paths["b"].read_text())
         assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
+
+
+def test_a_report_shows_the_counts_by_minute(red_clip: Path, tmp_path: Path) -> None:
+    run_red(VideoJob(red_clip, outputs(report=tmp_path / "page")), with_counts())
+    facts = read_facts(tmp_path / "page" / PAGE)
+    assert facts.counts == {"gate: out": 1, "yard: enter": 1, "yard: vanish": 1}
+    assert "Counts by minute" in (tmp_path / "page" / PAGE).read_text()

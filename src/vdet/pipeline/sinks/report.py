@@ -1,6 +1,7 @@
 """The sink `report`: a folder with the page of a video."""
 
 import platform
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -10,13 +11,18 @@ import numpy as np
 
 import vdet
 from vdet.config.rendering import render
+from vdet.count.counter import VehicleCounter
+from vdet.count.events import Event
+from vdet.count.totals import by_minute
 from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
+from vdet.pages.charts import Series
 from vdet.pages.frame import PAGE, jpeg_uri
 from vdet.pages.index_page import write_index
 from vdet.pages.player import Player
 from vdet.pages.video_page import Thumbnail, VideoReport, video_page
 from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.counts import layout_of
 from vdet.pipeline.sinks.protocol import BatchTotal, SinkContext, SinkKind
 from vdet.summary.crops import BestCrops, Crop
 from vdet.summary.heat import HeatMap
@@ -42,6 +48,8 @@ class ReportSink:
         self._heat = HeatMap(video.width, video.height)
         self._levels = Levels()
         self._thumbnails: dict[int, Thumbnail] = {}
+        counts = settings.counts
+        self._counter = VehicleCounter(layout_of(context)) if counts else None
         self._still: Image | None = None
         self._frames = 0
         self._start = self._last = float(video.start)
@@ -69,6 +77,8 @@ class ReportSink:
         self._records.add(frame)
         self._levels.add(frame)
         self._heat.add(frame)
+        if self._counter:
+            self._counter.update(frame)
         self._keep(self._crops.add(frame, image))
 
     def _keep(self, crops: list[Crop]) -> None:
@@ -93,6 +103,7 @@ class ReportSink:
             most_vehicles=self._settings.report.vehicles,
             settings=render(self._settings),
             versions=_versions(),
+            counts=_series(self._counter.finish()) if self._counter else (),
         )
 
     def _player(self) -> Player | None:
@@ -112,6 +123,14 @@ def _at_most(image: Image, most: int, side: int) -> Image:
         return image.copy()
     height, width = (max(1, round(each * most / side)) for each in image.shape[:2])
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _series(events: Sequence[Event]) -> list[Series]:
+    """Return the counts of each line or zone and direction by minute."""
+    minutes: dict[tuple[str, str], dict[int, int]] = {}
+    for each in by_minute(events):
+        minutes.setdefault((each.name, each.direction), {})[each.minute] = each.count
+    return [Series(": ".join(key), counts) for key, counts in minutes.items()]
 
 
 def _versions() -> dict[str, str]:
