@@ -51,6 +51,7 @@ class ReportSink:
         counts = settings.counts
         self._counter = VehicleCounter(layout_of(context)) if counts else None
         self._still: Image | None = None
+        self._is_even = True
         self._frames = 0
         self._start = self._last = float(video.start)
 
@@ -72,8 +73,9 @@ class ReportSink:
             self._start = frame.time
         self._frames += 1
         self._last = frame.time
-        if self._still is None or self._still.std() < _EVEN:
+        if self._still is None or self._is_even:
             self._still = _at_most(image, self._settings.report.still, image.shape[1])
+            self._is_even = float(self._still.std()) < _EVEN
         self._records.add(frame)
         self._levels.add(frame)
         self._heat.add(frame)
