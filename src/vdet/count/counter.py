@@ -260,7 +260,7 @@ def _sighting(track: Track, frame: FrameTracks) -> Sighting:
     return Sighting(
         round(frame.time, 6),
         frame.index,
-        (round(x, 1), round(y, 1)),
+        (round(x, 2), round(y, 2)),
         float(track.box.height),
         round(track.score, 4),
     )
