@@ -21,7 +21,7 @@ from vdet.pipeline.sinks.tracks import TrackSink
 from vdet.pipeline.sinks.video import VideoSink
 
 FRAMES = 15
-KNOWN = "known are video, tracks, stages, picture, json"
+KNOWN = "known are video, tracks, stages, picture, json, counts"
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +93,7 @@ class TestDetectVideo:
     @pytest.mark.parametrize(
         ("sink", "words"),
         [
-            ("counts=a.csv", f"counts: is no sink; {KNOWN}"),
+            ("tallies=a.csv", f"tallies: is no sink; {KNOWN}"),
             ("tracks=a.json", "a.json: tracks are written as .txt, .csv, .jsonl, "),
             ("tracks=none/a.csv", "none/a.csv: the folder none does not exist; make it first"),
             ("tracks=old.csv", "old.csv: is there already; give --overwrite to replace it"),
@@ -247,7 +247,7 @@ class TestDetectImage:
         ("sink", "code", "words"),
         [
             ("json", 2, "--sink json: expected NAME=FILE"),
-            ("counts=a.csv", 1, f"counts: is no sink; {KNOWN}"),
+            ("tallies=a.csv", 1, f"tallies: is no sink; {KNOWN}"),
             ("picture=a.txt", 1, "a.txt: pictures are written as "),
             ("video=a.mp4", 1, "a.mp4: the sink video is for videos"),
             ("json=red.png", 1, "red.png: is the input itself"),
@@ -294,7 +294,7 @@ class TestEvalVideo:
         ("arguments", "code", "words"),
         [
             (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
-            (("--sink", "counts=a.csv"), 1, f"counts: is no sink; {KNOWN}"),
+            (("--sink", "tallies=a.csv"), 1, f"tallies: is no sink; {KNOWN}"),
             (("--sink", "tracks=a.json"), 1, "a.json: tracks are written as"),
             (
                 ("--sink", "tracks=a.csv", "--sweep", "output.crf=1,2"),
@@ -344,7 +344,7 @@ class TestBatch:
             (("--sink", "video=.avi"), 2, "with -d give --sink video a suffix: .mp4, .mov, .mkv"),
             (("--sink", "json=.json"), 2, "json: is for pictures; give another sink"),
             (("--sink", "stages=.png"), 2, "stages: is for one video; leave out -d"),
-            (("--sink", "counts=.csv"), 1, f"counts: is no sink; {KNOWN}"),
+            (("--sink", "tallies=.csv"), 1, f"tallies: is no sink; {KNOWN}"),
             (("--tracks", ".csv", "--sink", "tracks=.csv"), 2, "tracks is given .csv twice"),
         ],
     )
