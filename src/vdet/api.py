@@ -137,6 +137,13 @@ class Tracker:
         """
         return self._tracker.update(detections, time, image)
 
+    def carry(self, time: float, image: Image | None = None) -> list[Track]:
+        """Follow the vehicles into a frame in which no detector looked for them.
+
+        Nothing is missed there. The tracks are predicted. Arguments as of `update`.
+        """
+        return self._tracker.carry(time, image)
+
 
 def follow(
     source: PathName,

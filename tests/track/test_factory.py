@@ -7,13 +7,16 @@ from seed import SEED
 from vdet.config.schema import RulesTrackerSettings, Settings
 from vdet.detect.detections import NO_DETECTIONS
 from vdet.track.factory import make_tracker
+from vdet.track.holding import HoldingTracker
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 
 
 def test_the_method_decides_which_tracker_it_is() -> None:
     assert isinstance(make_tracker(Settings(), 1280, 720), MotionTracker)
-    assert isinstance(make_tracker(SEED, 1280, 720), RulesTracker)
+    rules = make_tracker(SEED, 1280, 720)
+    assert isinstance(rules, HoldingTracker)
+    assert isinstance(rules.tracker, RulesTracker)
 
 
 def test_the_lengths_of_the_rules_are_scaled_to_the_frame(monkeypatch: pytest.MonkeyPatch) -> None:

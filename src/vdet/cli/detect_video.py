@@ -91,6 +91,13 @@ from vdet.regions import check_mask
 @click.option("--end", type=TimeType(), metavar=TIME_FORM, help="Stop before this time.")
 @click.option("--frames", type=POSITIVE, metavar="N", help="Process at most N frames.")
 @click.option(
+    "--stride",
+    type=click.IntRange(1, 100),
+    metavar="N",
+    help="Search every N-th frame; the tracker moves the vehicles on in the others. The same as "
+    "--set detector.stride=N.",
+)
+@click.option(
     "--threads",
     type=PROCESSES,
     metavar="N",
@@ -121,6 +128,7 @@ def detect_video(
     start: Fraction | None,
     end: Fraction | None,
     frames: int | None,
+    stride: int | None,
     threads: int | None,
     stages: Path | None,
     at: Fraction | None,
@@ -162,6 +170,8 @@ def detect_video(
         source, outputs = Path(), ()  # each video has its own
         batch_outputs = output_options(batch, no_video=no_video, others=others, overwrite=overwrite)
     request = read_lanes(lanes, camera_path)
+    if stride is not None:
+        assignments = (*assignments, f"detector.stride={stride}")
     settings = read_settings(config_name, assignments, model_path, roi=roi, lines=lines)
     check_mask(settings.regions)
     check_counts(others, settings)

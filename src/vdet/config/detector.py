@@ -16,13 +16,20 @@ class DetectorSettings(Section):
     """Which detector finds vehicles, and its settings; each kind has its own class."""
 
     kind: str
+    stride: int = Field(
+        1,
+        ge=1,
+        le=100,
+        description="one of so many frames of a video is searched; the tracker moves the vehicles "
+        "on in the others",
+    )
 
     @property
     def search_key(self) -> Hashable:
-        """What the search of a frame depends on.
+        """What the search of a frame depends on, apart from `stride`.
 
-        Detectors whose settings have the same key, and that read the same model file, find the
-        same candidates in a frame.
+        Detectors whose settings have the same key and the same stride, and that read the same model
+        file, find the same candidates in a frame.
         """
         return self
 

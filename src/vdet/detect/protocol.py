@@ -23,7 +23,8 @@ class VideoDetector(Protocol):
         image
             BGR uint8 `(H, W, 3)`.
         index
-            Number of the frame in its video, from 0; None for a still picture.
+            Number of the frame in its video, from 0; None for a still picture. With a `stride`
+            in the settings, only every so many frames are searched.
         """
 
     def detect(self, candidates: Any) -> Detections:

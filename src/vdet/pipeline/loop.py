@@ -8,7 +8,6 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from vdet.config.schema import Settings
 from vdet.detect.detections import NO_DETECTIONS, Detections
@@ -20,6 +19,7 @@ from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sinks, open_sink, sink_kind
+from vdet.pipeline.stride import Search, follow_frame, search_frame
 from vdet.pipeline.threads import (
     StalledError,
     map_ordered,
@@ -192,8 +192,8 @@ def run_video(
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
-            last = result.frame.time - info.start
-            if only_at and last >= job.at:
+            last = result.frame.time - info.start if result.searched else last
+            if only_at and result.searched and last is not None and last >= job.at:
                 break
         _check_seen(job, last, reader.length)
     return Summary(info.width, info.height, frames, len(ids), time.perf_counter() - began)
@@ -257,19 +257,24 @@ def follow_frames(
     regions = lay_regions(settings.regions, video.width, video.height)
     detector = limited(detector, regions)
     tracker = make_tracker(settings, video.width, video.height)
+    stride = settings.detector.stride
 
-    def search(frame: Frame) -> tuple[Any, FrameView | None]:
-        candidates = detector.search(frame.image, frame.index)
-        return candidates, roads.observe(frame.image) if roads else None
+    def search(numbered: tuple[int, Frame]) -> tuple[Search | None, FrameView | None]:
+        position, frame = numbered
+        view = roads.observe(frame.image) if roads else None
+        return search_frame(detector, frame, position, stride), view
 
-    with map_ordered(search, frames, threads) as searched:
-        for frame, (candidates, view) in searched:
-            detections = detector.detect(candidates)
-            tracks = tracker.update(detections, float(frame.time), frame.image)
+    with map_ordered(search, enumerate(frames), threads) as results:
+        for (_, frame), (found, view) in results:
+            searched = found is not None
+            detections = detector.detect(found.candidates) if found else NO_DETECTIONS
+            tracks = follow_frame(tracker, detections, frame, searched=searched)
             if regions is not None:
-                tracks = [track for track in tracks if regions.contains(track.foot)]
+                tracks = tuple(track for track in tracks if regions.contains(track.foot))
             road = roads.update(view) if roads and view else None
-            yield FrameResult(video.path, frame, detections, tuple(tracks), road, detector)
+            yield FrameResult(
+                video.path, frame, detections, tracks, road, detector, searched=searched
+            )
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:

@@ -27,6 +27,9 @@ class FrameResult:
         The lane, and the undistorted frame; None if lanes are not searched for.
     detector
         The detector that found `detections`.
+    searched
+        Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
+        no detections, and the tracks are predicted.
     """
 
     source: Path
@@ -35,6 +38,7 @@ class FrameResult:
     tracks: tuple[Track, ...]
     road: Road | None
     detector: VideoDetector = field(repr=False)
+    searched: bool = True
 
     @property
     def frame_tracks(self) -> FrameTracks:

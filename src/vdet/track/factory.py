@@ -12,7 +12,8 @@ from vdet.config.schema import (
 )
 from vdet.config.section import scale_lengths
 from vdet.plugins import TRACKERS, load_plugin
-from vdet.track.protocol import VideoTracker
+from vdet.track.holding import HoldingTracker
+from vdet.track.protocol import CarryingTracker, VideoTracker
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +32,10 @@ class TrackerKind:
     make: Callable[[Any, int, int], VideoTracker]
 
 
-def make_tracker(settings: Settings, width: int, height: int) -> VideoTracker:
+def make_tracker(settings: Settings, width: int, height: int) -> CarryingTracker:
     """Return a new tracker for the frames of one video, `width` × `height` pixels.
+
+    One that cannot carry vehicles holds them where they are in frames that are not searched.
 
     Raises
     ------
@@ -40,7 +43,8 @@ def make_tracker(settings: Settings, width: int, height: int) -> VideoTracker:
         There is no method of that name.
     """
     kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.method)
-    return kind.make(settings.tracker, width, height)
+    tracker = kind.make(settings.tracker, width, height)
+    return tracker if isinstance(tracker, CarryingTracker) else HoldingTracker(tracker)
 
 
 def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:

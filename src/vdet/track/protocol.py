@@ -1,6 +1,6 @@
 """What the rest of the program knows of a tracker."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from vdet.detect.detections import Detections
 from vdet.media.images import Image
@@ -32,4 +32,29 @@ class VideoTracker(Protocol):
         ------
         ValueError
             The tracker looks at pixels, and `image` is None.
+        """
+
+
+@runtime_checkable
+class CarryingTracker(VideoTracker, Protocol):
+    """A tracker that moves its vehicles on into frames that the detector did not search.
+
+    A tracker without `carry` is given one by `vdet.track.factory.make_tracker`: there the vehicles
+    stay where they were.
+    """
+
+    def carry(self, time: float, image: Image | None = None) -> list[Track]:
+        """Follow the vehicles into the next frame, which was not searched.
+
+        A vehicle that is not looked for is not missed: it must not be forgotten for it. All tracks
+        are `predicted`.
+
+        Parameters
+        ----------
+        time, image
+            As `update` takes them.
+
+        Returns
+        -------
+        The vehicles shown in this frame, by id.
         """

@@ -40,8 +40,9 @@ class Candidates:
     """What the search of one frame gives.
 
     `windows` are all that were searched. `by_frame` are the windows that each of one or more
-    consecutive frames adds to the heat: for a frame of a video there is one; a still picture counts
-    as several, each of which adds the sets that it would search in a video.
+    consecutive frames adds to the heat: for a frame of a video there is one. A still picture, and a
+    frame of a video of which not all are searched, count as several, each of which adds the sets
+    that it would search in a video.
     """
 
     windows: Windows
@@ -114,15 +115,22 @@ class SvmDetector:
 
     def search(self, image: Image, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
-        if index is not None:
-            windows = join_windows(self._search.search(image, self._search.sets_of(index)))
-            return Candidates(windows, (windows,), is_still=False)
-        by_set = self._search.search(image)
-        by_frame = tuple(
-            join_windows([by_set[number] for number in self._search.sets_of(frame)])
-            for frame in range(self._heat.frames)
-        )
-        return Candidates(join_windows(by_set), by_frame, is_still=True)
+        turns = [self._search.sets_of(frame) for frame in self._frames_for(index)]
+        sets = sorted({number for turn in turns for number in turn})
+        by_set = dict(zip(sets, self._search.search(image, sets), strict=True))
+        by_frame = tuple(join_windows([by_set[number] for number in turn]) for turn in turns)
+        windows = join_windows(list(by_set.values()))
+        return Candidates(windows, by_frame, is_still=index is None)
+
+    def _frames_for(self, index: int | None) -> range:
+        """Return the frames for which a frame counts: itself, and those that are not searched.
+
+        So no hit stays in the heat for longer than `heat.frames` frames, whatever the stride. A
+        still picture counts for all frames of the heat.
+        """
+        if index is None:
+            return range(self._heat.frames)
+        return range(index, index + min(self._settings.stride, self._heat.frames))
 
     def detect(self, candidates: Candidates) -> Detections:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -137,7 +145,7 @@ class SvmDetector:
         regions = self._regions(heat)
         if candidates.is_still:
             regions = self._shown_in_still(regions, self._settings.stills)
-            hits = candidates.windows.hits(self._settings.search.probability)
+        hits = candidates.windows.hits(self._settings.search.probability)
         trace = Trace(candidates.windows, hits, heat, self._search.grids)
         detections = self._detections(regions, trace)
         self._count(detections)

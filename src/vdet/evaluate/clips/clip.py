@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
+from vdet.detect.detections import NO_DETECTIONS
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import ImageError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
@@ -20,6 +21,7 @@ from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.pipeline.loop import Progress, peek
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, SinkContext, open_sink
+from vdet.pipeline.stride import follow_frame, search_frame
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import make_tracker
 from vdet.track.track import Track
@@ -139,19 +141,26 @@ def follow_variants(
     detectors = [each.model.for_video(*size, images) for each in variants]
     del images  # else they stay in memory for the whole run
     trackers = [make_tracker(each.settings, *size) for each in variants]
-    keys = [each.settings.detector.search_key for each in variants]
+    sections = [each.settings.detector for each in variants]
+    keys = [(section.search_key, section.stride) for section in sections]
     searchers = dict(zip(keys, detectors, strict=True))
     with single_threaded_libraries():
-        for frame in frames:
-            candidates = {
-                key: searcher.search(frame.image, frame.index)
+        for position, frame in enumerate(frames):
+            searches = {
+                key: search_frame(searcher, frame, position, stride=key[1])
                 for key, searcher in searchers.items()
             }
             results = []
             for key, detector, tracker in zip(keys, detectors, trackers, strict=True):
-                detections = detector.detect(candidates[key])
-                tracks = tuple(tracker.update(detections, float(frame.time), frame.image))
-                results.append(FrameResult(video.path, frame, detections, tracks, None, detector))
+                found = searches[key]
+                searched = found is not None
+                detections = detector.detect(found.candidates) if found else NO_DETECTIONS
+                tracks = follow_frame(tracker, detections, frame, searched=searched)
+                results.append(
+                    FrameResult(
+                        video.path, frame, detections, tracks, None, detector, searched=searched
+                    )
+                )
             yield results
 
 

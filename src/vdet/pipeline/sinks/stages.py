@@ -17,7 +17,7 @@ _BOXES = "boxes"
 
 
 class StagesSink:
-    """Writes the pictures of the first frame at or after the time `SinkContext.at`."""
+    """Writes the pictures of the first searched frame at or after the time `SinkContext.at`."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         self._folder = path
@@ -34,7 +34,7 @@ class StagesSink:
 
     def write(self, result: FrameResult) -> None:
         """Write the pictures if it is the frame."""
-        if self._is_done or result.frame.time < self._time:
+        if self._is_done or not result.searched or result.frame.time < self._time:
             return
         self._is_done = True
         make_folder(self._folder)

@@ -38,6 +38,7 @@ class MotionTracker:
         self._vehicles: list[Vehicle] = []
         self._ids = count(1)
         self._time: float | None = None
+        self._unsearched = 0.0  # seconds since the latest frame that was searched
 
     def update(
         self,
@@ -49,9 +50,8 @@ class MotionTracker:
 
         The part of a detection outside the frame does not count.
         """
-        seconds = self._step_to(time)
         observations = self._observations(detections)
-        self._predict(seconds)
+        seconds, self._unsearched = self._unsearched + self._move_to(time), 0.0
         expected = self._boxes()
         hidden = self._hidden(expected)
         pairs = self._pair(expected, hidden, observations)
@@ -67,6 +67,21 @@ class MotionTracker:
         self._vehicles = take_over_ids(self._staying() + new)
         self._vehicles = without_duplicates(self._vehicles, self._size, self._settings)
         return self._tracks(seconds)
+
+    def carry(self, time: float, image: Image | None = None) -> list[Track]:  # noqa: ARG002
+        """Move the vehicles on into a frame that was not searched; as `CarryingTracker.carry`.
+
+        Nothing is missed there: the evidence and the times without a detection stay as they are,
+        and the next `update` counts the seconds since the one before.
+        """
+        self._unsearched += self._move_to(time)
+        return self._tracks(0.0, searched=False)
+
+    def _move_to(self, time: float) -> float:
+        """Move all vehicles on to this time, and return the seconds since the frame before."""
+        seconds = self._step_to(time)
+        self._predict(seconds)
+        return seconds
 
     def _step_to(self, time: float) -> float:
         """Return the seconds since the frame before."""
@@ -157,7 +172,7 @@ class MotionTracker:
     def _confirmed(self, rows: Iterable[int]) -> list[int]:
         return [row for row in rows if self._vehicles[row].confirmed]
 
-    def _tracks(self, seconds: float) -> list[Track]:
+    def _tracks(self, seconds: float, *, searched: bool = True) -> list[Track]:
         boxes = self._boxes()
         shown: list[tuple[Vehicle, Float64Array]] = []
         for vehicle, box, hidden in zip(self._vehicles, boxes, self._hidden(boxes), strict=True):
@@ -173,7 +188,7 @@ class MotionTracker:
                     vehicle.id,
                     _rounded(box),
                     vehicle.score,
-                    predicted=vehicle.unseen > 0,
+                    predicted=vehicle.unseen > 0 or not searched,
                     class_name=vehicle.class_name,
                     whole_foot=_foot(vehicle.state.box),
                 )

@@ -1,0 +1,43 @@
+from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.geometry import Box
+from vdet.media.images import Image
+from vdet.track.holding import HoldingTracker
+from vdet.track.track import Track
+
+CAR = Box(100, 100, 50, 40)
+
+
+class SeesOne:
+    """A tracker that shows one vehicle in each frame that it gets, and notes the times."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+
+    def update(
+        self,
+        detections: Detections,  # noqa: ARG002
+        time: float,
+        image: Image | None = None,  # noqa: ARG002
+    ) -> list[Track]:
+        self.times.append(time)
+        return [Track(1, CAR.moved_to(100 + round(100 * time), 100), 0.9, predicted=False)]
+
+
+def test_vehicles_stay_where_they_were_in_frames_that_are_not_searched() -> None:
+    tracker = HoldingTracker(SeesOne())
+    (seen,) = tracker.update(NO_DETECTIONS, 1.0)
+    for time in (1.1, 1.2):
+        (held,) = tracker.carry(time)
+        assert (held.id, held.box, held.score) == (seen.id, seen.box, seen.score)
+        assert held.predicted
+    assert not seen.predicted
+
+
+def test_the_tracker_sees_only_the_frames_that_are_searched() -> None:
+    inner = SeesOne()
+    tracker = HoldingTracker(inner)
+    assert tracker.carry(0.0) == []
+    for time in (1.0, 2.0):
+        tracker.update(NO_DETECTIONS, time)
+        tracker.carry(time + 0.5)
+    assert inner.times == [1.0, 2.0]
