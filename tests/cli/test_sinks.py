@@ -121,7 +121,8 @@ class TestDetectVideo:
     def test_labels_have_scores_where_they_are_asked_for(
         self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
     ) -> None:
-        for name, extra in (("plain.mp4", ()), ("scores.mp4", ("--set", "output.scores=true"))):
+        scores = ("--set", "draw.label=[id, score]")
+        for name, extra in (("plain.mp4", ()), ("scores.mp4", scores)):
             crisp = ("--set", "output.crf=5", "--set", "tracker.detections_needed=3")
             result = run("detect-video", clip, out / name, *red, *crisp, *extra)
             assert result.code == 0, result.err

@@ -196,6 +196,7 @@ class TestOtherPackages:
         assert type(detector.detector).__name__ == "FakeSettings"
         assert detector.detector.model_dump() == {
             "kind": "fake",
+            "stride": 1,
             "level": 9,
             "parts": ({"size": 5},),
             "by_name": {},

@@ -19,4 +19,3 @@ class OutputSettings(Section):
     crf: int = Field(
         25, ge=0, le=51, description="quality of the video: 0 is the best, 51 the worst"
     )
-    scores: bool = Field(False, description="write the score of each vehicle into its label")

@@ -13,6 +13,7 @@ from vdet.config.detector import (
     StillSettings,
     SvmSettings,
 )
+from vdet.config.draw import DrawSettings
 from vdet.config.features import (
     ColorSpace,
     FeatureSettings,
@@ -48,6 +49,7 @@ __all__ = [
     "CountSettings",
     "CropSettings",
     "DetectorSettings",
+    "DrawSettings",
     "FeatureSettings",
     "HeatSettings",
     "HistogramSettings",
@@ -97,6 +99,7 @@ class Settings(Section):
     summary: SummarySettings = SummarySettings()
     crops: CropSettings = CropSettings()
     report: ReportSettings = ReportSettings()
+    draw: DrawSettings = DrawSettings()
 
     @property
     def svm(self) -> SvmSettings:

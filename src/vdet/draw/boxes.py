@@ -31,14 +31,23 @@ def color_of(number: int) -> Color:
     return round(255 * blue), round(255 * green), round(255 * red)
 
 
-def line_width(image: Image) -> int:
-    """Return a line width in pixels that looks the same at any frame height; 3 at 720 rows."""
+def line_width(image: Image, thickness: float = 1.0) -> int:
+    """Return a line width in pixels that looks the same at any frame height; 3 at 720 rows.
+
+    `thickness` is a factor of it.
+    """
     height: int = image.shape[0]
-    return max(1, (height + 120) // 240)
+    return max(1, round(thickness * max(1, (height + 120) // 240)))
 
 
 def draw_box(
-    image: Image, box: Box, color: Color, label: str = "", *, dashed: bool = False
+    image: Image,
+    box: Box,
+    color: Color,
+    label: str = "",
+    *,
+    dashed: bool = False,
+    thickness: float = 1.0,
 ) -> None:
     """Draw an outline just inside a box, and a label above it (inside it at the frame's top).
 
@@ -50,9 +59,12 @@ def draw_box(
         In pixels of the image; it may reach beyond the image.
     dashed
         Whether the outline has gaps. This marks a box that is predicted, not detected.
+    thickness
+        Factor of the width of the outline.
     """
-    dash = _DASH * line_width(image) if dashed else None
-    for side in _sides(box, line_width(image)):
+    width = line_width(image, thickness)
+    dash = _DASH * width if dashed else None
+    for side in _sides(box, width):
         for part in _dashes(side, dash) if dash else [side]:
             _fill(image, part, color)
     if label:

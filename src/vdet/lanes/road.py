@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.config.lanes import LaneSettings, LaneTrackSettings
-from vdet.geometry import Box
+from vdet.geometry import Box, Float64Array
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves, NormalEquations, solve
 from vdet.lanes.drawing import stage_pictures
@@ -60,6 +60,10 @@ class Road:
     def place(self, box: Box) -> Box:
         """Return the box in `image` for a box in the original frame; area 0 if it lies outside."""
         return self.undistorter.box(box) if self.undistorter else box
+
+    def place_points(self, points: Float64Array) -> Float64Array:
+        """Return where points `(n, 2)` of the original frame, x and y, lie in `image`."""
+        return self.undistorter.points(points) if self.undistorter else points
 
     def pictures(self) -> dict[str, Image]:
         """Return a picture of every stage of finding the lane, as `stage_pictures` makes them."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.red_runs import model_for, result_of, video_info, write
-from pipeline.sinks.test_video import LANE, LENS, road_seen
+from pipeline.sinks.test_overlay import LANE, LENS, road_seen
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from vdet.detect.detections import Detections
 from vdet.draw.boxes import color_of

@@ -6,8 +6,8 @@ from typing import Self
 from vdet.errors import OutputError
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.overlay import Overlay
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
-from vdet.pipeline.sinks.video import annotate
 
 
 class PictureSink:
@@ -16,6 +16,7 @@ class PictureSink:
     def __init__(self, path: Path, context: SinkContext) -> None:
         self._path = path
         self._context = context
+        self._overlay = Overlay(context.settings.draw, None)
         self._is_done = False
 
     def __enter__(self) -> Self:
@@ -25,7 +26,7 @@ class PictureSink:
         pass
 
     def write(self, result: FrameResult) -> None:
-        """Draw the vehicles with their scores, and write the picture.
+        """Draw the vehicles, and write the picture.
 
         Raises `OutputError` for a second picture.
         """
@@ -34,7 +35,7 @@ class PictureSink:
                 f"{self._path}: takes one picture; for several give the name of a folder"
             )
         self._is_done = True
-        data = encode_image(annotate(result, scores=True), self._path)
+        data = encode_image(self._overlay.draw(result), self._path)
         self._context.files.stage(self._path).write_bytes(data)
 
 

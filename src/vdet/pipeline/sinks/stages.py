@@ -4,13 +4,13 @@ from pathlib import Path
 from typing import Self
 
 from vdet.config.regions import RegionsSettings
-from vdet.draw.boxes import WHITE, draw_box, draw_label
+from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
 from vdet.draw.regions import draw_regions
 from vdet.files import make_folder
 from vdet.media.images import Image, encode_image
 from vdet.pipeline.result import FrameResult
+from vdet.pipeline.sinks.overlay import PICTURE_LABEL, label_text
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
-from vdet.pipeline.sinks.video import draw_tracks
 from vdet.regions import Regions
 
 _BOXES = "boxes"
@@ -66,7 +66,10 @@ def _with_boxes(result: FrameResult) -> Image:
     for box, score in zip(detections.rounded, detections.scores.tolist(), strict=True):
         draw_box(picture, box, WHITE)
         draw_label(picture, f"{score:.2f}", (box.x, box.bottom), WHITE)
-    return draw_tracks(picture, result.tracks, scores=True)
+    for track in result.tracks:
+        text = label_text(track, PICTURE_LABEL)
+        draw_box(picture, track.box, color_of(track.id), text, dashed=track.predicted)
+    return picture
 
 
 STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png", one_frame=True)

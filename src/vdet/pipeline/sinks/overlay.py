@@ -1,0 +1,164 @@
+"""What the section `draw` asks for, drawn into a copy of each frame."""
+
+import zlib
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from vdet.config.draw import AUTO, DrawSettings
+from vdet.detect.classes import OUR_NAMES
+from vdet.draw.boxes import (
+    BLACK,
+    GREEN,
+    WHITE,
+    Color,
+    color_of,
+    draw_box,
+    draw_label,
+    line_width,
+)
+from vdet.draw.trails import draw_trail
+from vdet.lanes.drawing import draw_lane
+from vdet.lanes.road import Road
+from vdet.media import VideoInfo
+from vdet.media.images import Image
+from vdet.pipeline.result import FrameResult
+from vdet.track.steady import SteadyBoxes
+from vdet.track.track import Track
+
+VIDEO_LABEL = ("id",)
+PICTURE_LABEL = ("id", "score")
+_OTHER_CLASSES = 10
+"""Colours for classes that are not among `OUR_NAMES`."""
+
+Points = deque[tuple[float, float, float]]
+"""Time in seconds, x and y in pixels."""
+
+
+class Overlay:
+    """Draws the vehicles and the lane of one video, or of one still picture.
+
+    Parameters
+    ----------
+    video
+        The video; None for a picture, which has no trails, no time and no smoothing.
+    """
+
+    def __init__(self, settings: DrawSettings, video: VideoInfo | None) -> None:
+        self._settings = settings
+        self._start = video.start if video else None
+        automatic = VIDEO_LABEL if video else PICTURE_LABEL
+        self._label = automatic if AUTO in settings.label else settings.label
+        self._steady = SteadyBoxes(settings.smoothing) if video and settings.smoothing else None
+        self._trails: dict[int, Points] = {}
+        self._missed: set[int] = set()
+
+    def draw(self, result: FrameResult) -> Image:
+        """Return a copy of the frame with its vehicles; its own image if nothing is drawn.
+
+        If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
+        are drawn where they lie in it.
+        """
+        shown = self._shown(result)
+        if not (shown or result.road or self._settings.time):
+            return result.frame.image
+        image = (result.road or result.frame).image.copy()
+        if result.road and result.road.lane:
+            draw_lane(image, result.road.lane)
+        shown = _placed(shown, result.road, image)
+        self._draw_trails(image, shown, float(result.frame.time))
+        self._draw_vehicles(image, shown)
+        if self._settings.time and self._start is not None:
+            draw_label(image, time_text(result.frame.time - self._start), (0, len(image)), BLACK)
+        return image
+
+    def _shown(self, result: FrameResult) -> list[Track]:
+        """Return the vehicles to draw, with the boxes to draw, the farthest first."""
+        if result.searched:  # in the other frames, a vehicle is not missed
+            self._missed = {track.id for track in result.tracks if track.predicted}
+        tracks = list(result.tracks)
+        if self._steady:
+            tracks = self._steady.update(tracks, float(result.frame.time))
+        if self._settings.predicted == "hidden":
+            tracks = [track for track in tracks if track.id not in self._missed]
+        return sorted(tracks, key=lambda track: track.box.bottom)
+
+    def _draw_trails(self, image: Image, shown: Sequence[Track], now: float) -> None:
+        longest = self._settings.trails
+        if self._start is None or not longest:
+            return
+        for track in shown:
+            self._trails.setdefault(track.id, deque()).append((now, *track.foot))
+        for points in self._trails.values():
+            while points and now - points[0][0] > longest:
+                points.popleft()
+        self._trails = {id_: points for id_, points in self._trails.items() if points}
+        width = line_width(image, self._settings.thickness)
+        for track in shown:
+            path = [(x, y) for _, x, y in self._trails[track.id]]
+            draw_trail(image, path, self._color(track), width)
+
+    def _draw_vehicles(self, image: Image, shown: Sequence[Track]) -> None:
+        settings = self._settings
+        if settings.boxes:
+            for track in shown:
+                dashed = settings.predicted == "dashed" and track.id in self._missed
+                color, thickness = self._color(track), settings.thickness
+                draw_box(image, track.box, color, dashed=dashed, thickness=thickness)
+        for track in shown:
+            if text := label_text(track, self._label):
+                draw_label(image, text, (track.box.x, track.box.y), self._color(track))
+
+    def _color(self, track: Track) -> Color:
+        match self._settings.colors:
+            case "id":
+                return color_of(track.id)
+            case "class":
+                return _class_color(track.class_name)
+            case "one":
+                return GREEN
+
+
+def label_text(track: Track, parts: Sequence[str]) -> str:
+    """Return the text of a label: those of its parts that are known of the vehicle."""
+    texts: Mapping[str, str | None] = {
+        "id": f"#{track.id}",
+        "class": track.class_name,
+        "score": f"{track.score:.2f}",
+        "distance": None if track.distance is None else f"{track.distance:.0f} m",
+    }
+    return " ".join(text for part in parts if (text := texts[part]))
+
+
+def time_text(time: Fraction) -> str:
+    """Write a time in seconds as hours, minutes and seconds: 0:01:02.345."""
+    thousandths = round(time * 1000)
+    minutes, rest = divmod(max(0, thousandths), 60_000)
+    return f"{minutes // 60}:{minutes % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
+
+
+def _class_color(name: str | None) -> Color:
+    """Return the colour of a class; white where the detector does not tell it."""
+    if name is None:
+        return WHITE
+    if name in OUR_NAMES:
+        return color_of(OUR_NAMES.index(name) + 1)
+    return color_of(len(OUR_NAMES) + 1 + zlib.crc32(name.encode()) % _OTHER_CLASSES)
+
+
+def _placed(tracks: Sequence[Track], road: Road | None, image: Image) -> list[Track]:
+    """Return where the vehicles lie in the picture; those outside it are left out."""
+    height, width = image.shape[:2]
+    placed = []
+    for track in tracks:
+        box = track.box.clipped(width, height)
+        foot = track.foot
+        if road:
+            x, y = road.place_points(np.array([foot]))[0].tolist()
+            box, foot = road.place(box), (x, y)
+        if box.area:
+            placed.append(replace(track, box=box, whole_foot=foot))
+    return placed

@@ -1,0 +1,89 @@
+"""Boxes that do not tremble: each side is smoothed in time, for the eye.
+
+Each side of a box has a g-h filter with fading memory, which follows a side that moves steadily
+without lag, and which begins with growing memory (Brookner, "Tracking and Kalman Filtering Made
+Easy", 1998, chapter 1). A side stays within a small share of the box from where it was given, so
+that a vehicle that brakes or comes near is not left behind.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from vdet.geometry import Box
+from vdet.track.track import Track
+
+LIMIT = 0.025
+"""Largest distance of a side from where it was given, share of the box's width or height."""
+
+SETTLING = 0.05
+"""Share of what a side is put back by the limit that its speed is corrected for."""
+
+GAP = 0.5
+"""Seconds after which a vehicle that comes back is a new one to the filter."""
+
+SHORTEST_STEP = 0.001
+"""Seconds between frames at least."""
+
+
+@dataclass(slots=True)
+class _Sides:
+    """Left, top, right and bottom of a box, pixels, with their speeds; `count` of boxes so far."""
+
+    places: list[float]
+    speeds: list[float]
+    time: float
+    count: int = 1
+
+
+class SteadyBoxes:
+    """Smooths the boxes of the vehicles of one video.
+
+    Parameters
+    ----------
+    seconds
+        How long the filter remembers: what it was given that long ago counts 1/e.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._sides: dict[int, _Sides] = {}
+
+    def update(self, tracks: Sequence[Track], time: float) -> list[Track]:
+        """Return the tracks of the next frame, shown at `time` seconds, with smoothed boxes.
+
+        The foot of a track moves with its box. Boxes may reach a little beyond the frame.
+        """
+        self._sides = {id_: each for id_, each in self._sides.items() if time - each.time <= GAP}
+        return [_with_box(track, self._smoothed(track, time)) for track in tracks]
+
+    def _smoothed(self, track: Track, time: float) -> Box:
+        box = track.box
+        given = [float(side) for side in (box.x, box.y, box.right, box.bottom)]
+        sides = self._sides.get(track.id)
+        if sides is None:
+            self._sides[track.id] = _Sides(given, [0.0] * 4, time)
+            return box
+        elapsed = max(time - sides.time, SHORTEST_STEP)
+        kept = math.exp(-elapsed / self._seconds)
+        sides.time, sides.count = time, sides.count + 1
+        together = sides.count * (sides.count + 1)
+        g = max(1 - kept**2, 2 * (2 * sides.count - 1) / together)
+        h = max((1 - kept) ** 2, 6 / together)
+        for number, side in enumerate(given):
+            length = box.height if number % 2 else box.width
+            expected = sides.places[number] + sides.speeds[number] * elapsed
+            error, limit = side - expected, LIMIT * length
+            place = expected + g * error
+            kept_near = min(max(place, side - limit), side + limit)
+            sides.places[number] = kept_near
+            sides.speeds[number] += (h * error + SETTLING * (kept_near - place)) / elapsed
+        left, top, right, bottom = (math.floor(place + 0.5) for place in sides.places)
+        return Box(left, top, right - left, bottom - top)
+
+
+def _with_box(track: Track, box: Box) -> Track:
+    x, y = track.foot
+    old = track.box
+    across = box.x + box.width / 2 - (old.x + old.width / 2)
+    return replace(track, box=box, whole_foot=(x + across, y + box.bottom - old.bottom))

@@ -1,0 +1,112 @@
+"""Boxes that do not tremble."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.geometry import Box
+from vdet.track.steady import GAP, LIMIT, SteadyBoxes
+from vdet.track.track import Track
+
+SECONDS = 0.4
+CAR = Box(300, 200, 200, 160)
+
+
+def track(box: Box, id_: int = 1) -> Track:
+    return Track(id_, box, 0.9, predicted=False, whole_foot=(box.x + box.width / 2, box.bottom))
+
+
+def smoothed(boxes: Iterable[Box], rate: float = 25, seconds: float = SECONDS) -> list[Box]:
+    steady = SteadyBoxes(seconds)
+    shown = [steady.update([track(box)], n / rate) for n, box in enumerate(boxes)]
+    return [tracks[0].box for tracks in shown]
+
+
+def trembling(count: int, seed: int = 1, sides: float = 0.01) -> list[Box]:
+    noise = np.random.default_rng(seed).normal(0, sides * CAR.width, (count, 4)).round().astype(int)
+    return [
+        Box(CAR.x + x, CAR.y + y, CAR.width + w, CAR.height + h) for x, y, w, h in noise.tolist()
+    ]
+
+
+def changes(boxes: Iterable[Box]) -> float:
+    """Return the mean change of width from frame to frame."""
+    return float(np.abs(np.diff([box.width for box in boxes])).mean())
+
+
+@pytest.mark.parametrize("rate", [10, 25, 50])
+def test_widths_change_by_half_as_much_or_less(rate: int) -> None:
+    given = trembling(200)
+    assert changes(smoothed(given, rate)[10:]) < 0.5 * changes(given[10:])
+
+
+@pytest.mark.parametrize("speed", [-12, 0, 12])
+def test_a_vehicle_that_moves_and_grows_steadily_is_shown_without_lag(speed: int) -> None:
+    given = [Box(600 + speed * n, 200, 200 + 2 * n, 160 + n) for n in range(40)]
+    for box, place in zip(smoothed(given)[2:], given[2:], strict=True):
+        assert box.iou(place) > 0.98
+
+
+def test_a_vehicle_that_stops_at_once_is_hardly_overshot() -> None:
+    given = [Box(100 + 6 * min(n, 20), 200, 200, 160) for n in range(100)]
+    lag = [abs(box.x - place.x) for box, place in zip(smoothed(given), given, strict=True)]
+    assert max(lag) <= LIMIT * 200 + 1
+    assert max(lag[90:]) <= 1
+
+
+@given(
+    st.lists(
+        st.builds(
+            Box,
+            st.integers(-50, 1300),
+            st.integers(-50, 700),
+            st.integers(1, 900),
+            st.integers(1, 700),
+        ),
+        min_size=1,
+        max_size=20,
+    )
+)
+def test_a_side_never_lies_far_from_where_it_was_given(boxes: list[Box]) -> None:
+    for box, place in zip(smoothed(boxes), boxes, strict=True):
+        reach, drop = LIMIT * place.width + 0.5, LIMIT * place.height + 0.5
+        assert abs(box.x - place.x) <= reach
+        assert abs(box.right - place.right) <= reach
+        assert abs(box.y - place.y) <= drop
+        assert abs(box.bottom - place.bottom) <= drop
+        assert box.area
+
+
+def test_the_foot_moves_with_its_box() -> None:
+    steady = SteadyBoxes(SECONDS)
+    for number, box in enumerate(trembling(20)):
+        (shown,) = steady.update([track(box)], number / 25)
+        middle = shown.box.x + shown.box.width / 2
+        assert shown.foot == pytest.approx((middle, shown.box.bottom))
+
+
+def test_each_vehicle_is_smoothed_for_itself() -> None:
+    alone = smoothed(trembling(30))
+    steady = SteadyBoxes(SECONDS)
+    other = Box(900, 100, 80, 60)
+    for number, (box, expected) in enumerate(zip(trembling(30), alone, strict=True)):
+        first, second = steady.update([track(box), track(other, 2)], number / 25)
+        assert (first.box, second.box) == (expected, other)
+
+
+def test_a_vehicle_that_comes_back_later_begins_anew() -> None:
+    steady = SteadyBoxes(SECONDS)
+    for number in range(20):
+        steady.update([track(CAR.moved_to(10 * number, 200))], number / 25)
+    (back,) = steady.update([track(CAR)], 1 + GAP + 0.1)
+    assert back.box == CAR
+
+
+def test_times_that_stand_still_do_no_harm() -> None:
+    steady = SteadyBoxes(SECONDS)
+    for _ in range(5):
+        (shown,) = steady.update([track(CAR)], 1.0)
+    assert shown.box == CAR
