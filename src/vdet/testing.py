@@ -21,7 +21,7 @@ from vdet.media.images import Image
 from vdet.pipeline.loop import NullDetector
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
-from vdet.track.protocol import VideoTracker
+from vdet.track.protocol import CarryingTracker, VideoTracker
 from vdet.track.track import Track
 
 RATE = 25
@@ -87,6 +87,7 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     * The detections and the frame are left as they are.
     * Without detections there is nothing to show after some seconds.
     * Ids belong to a tracker: a second one gives the same, also in between.
+    * If it has `carry`: in frames that are not searched the same vehicles are shown, as predicted.
     """
     first, second = make(640, 360), make(640, 360)
     shown: list[list[Track]] = []
@@ -103,9 +104,25 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     assert not any(track.predicted for track in last), "a detected vehicle is called predicted"
     ids = {track.id for tracks in shown for track in tracks}
     assert ids == {track.id for track in last}, "a vehicle that is always detected changed its id"
+    if isinstance(first, CarryingTracker):
+        _check_carrying(make(640, 360))
     for index in range(3 * RATE, 30 * RATE):
         last = list(first.update(NO_DETECTIONS, index / RATE, _scene(0) // 2))
     assert last == [], "vehicles are shown long after the last detection"
+
+
+def _check_carrying(tracker: VideoTracker) -> None:
+    assert isinstance(tracker, CarryingTracker)
+    for index in range(3 * RATE):
+        time, image = index / RATE, _scene(index)
+        if index % 2 == 0:
+            shown = tracker.update(_detections(index), time, image)
+            continue
+        carried = tracker.carry(time, image)
+        _check_tracks(carried)
+        ids = [track.id for track in carried]
+        assert ids == [track.id for track in shown], "a vehicle that was not looked for is missed"
+        assert all(track.predicted for track in carried), "what was not looked for is predicted"
 
 
 def _check_tracks(tracks: Sequence[Track]) -> None:

@@ -76,6 +76,25 @@ def test_two_runs_give_the_same_tracks(
     assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
+def test_stride_is_the_setting_of_the_detector(
+    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
+) -> None:
+    """Only searched frames have tracks that are not predicted."""
+    given = (("--stride", "5"), ("--set", "detector.stride=5"))
+    for name, stride in zip(("a.jsonl", "b.jsonl"), given, strict=True):
+        tracks = ("--no-video", "--tracks", tmp_path / name, "--model", model_path)
+        result = run("detect-video", clip_path, *tracks, *QUICK_OPTIONS, *stride)
+        assert result.code == 0, result.err
+    records = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
+    assert len(records) == 30
+    shown = {each["frame"] for each in records if each["tracks"]}
+    seen = {each["frame"] for each in records for t in each["tracks"] if not t["predicted"]}
+    assert seen
+    assert seen < shown
+    assert all(number % 5 == 0 for number in seen)
+    assert (tmp_path / "a.jsonl").read_text() == (tmp_path / "b.jsonl").read_text()
+
+
 def test_a_part_of_the_video(run: Run, clip_path: Path, model_path: Path, tmp_path: Path) -> None:
     tracks = tmp_path / "t.jsonl"
     options = ("--start", "0:00.4", "--end", "0.8", "--tracks", tracks, "--model", model_path)

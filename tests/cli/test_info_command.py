@@ -1,12 +1,16 @@
-"""`vdet info`: what a model file is."""
+"""`vdet info`: what a video, a picture or a model file is."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from clips import write_clip
 from conftest import Run
 from detect.onnx.graphs import RedBox, ultralytics, write_network
+from vdet.media.images import write_image
 
 MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
 
@@ -47,3 +51,62 @@ def test_a_file_that_is_no_model_is_an_error(run: Run, tmp_path: Path) -> None:
     result = run("info", path)
     assert result.code == 1
     assert "none.onnx: cannot be loaded by onnxruntime" in result.err
+
+
+def test_a_model_is_described_as_json_too(run: Run) -> None:
+    for name, kind in (("default.npz", "linear model"), ("net.onnx", "network")):
+        result = run("info", MODELS / name, "--json", "-")
+        values = json.loads(result.out)
+        assert (values["kind"], values["file"]) == (kind, str(MODELS / name))
+        assert values["provenance"]
+        assert "a " in result.err
+
+
+def test_a_video_is_described(run: Run, tmp_path: Path) -> None:
+    path = write_clip(tmp_path / "in.mov", size=(160, 96), rotation=90, sounds=["aac", "pcm_mulaw"])
+    result = run("info", path)
+    assert result.code == 0
+    for line in (
+        "size: 160×96, upright; stored pictures are turned by 90° counter-clockwise",
+        "frames: about 12",
+        "rate: 25 frames/s on average",
+        "length: 0:00:00.480",
+        "codec: h264",
+        "sound 1: aac, 48000 Hz, 1 channel",
+        "kept in .mp4: every frame at its time; sound 1 (aac), as it is",
+        "lost in .mp4: sound 2 (pcm_mulaw): .mp4 cannot hold it, .mkv may",
+        "horizon: not found, so it is taken at 0.58 of the height",
+    ):
+        assert line in result.out
+
+
+def test_a_video_is_described_as_json(run: Run, tmp_path: Path, clip_path: Path) -> None:
+    result = run("info", clip_path, "--json", tmp_path / "facts.json")
+    assert result.out.startswith(f"{clip_path}: a video")
+    values = json.loads((tmp_path / "facts.json").read_text())
+    assert (values["width"], values["height"], values["frames"]) == (320, 180, 30)
+    assert (values["rate"], values["rotation"], values["lost"]) == (25.0, 0, [])
+    assert 0.3 <= values["horizon"] <= 0.74
+    again = run("info", clip_path, "--json", tmp_path / "facts.json")
+    assert (again.code, again.err.count("\n")) == (1, 1)
+    assert "is there already" in again.err
+
+
+def test_numbered_pictures_are_a_video_and_one_picture_is_not(run: Run, tmp_path: Path) -> None:
+    for number in range(3):
+        write_image(tmp_path / f"img_{number}.png", np.full((96, 160, 3), 90, np.uint8))
+    for path, words in (
+        (tmp_path, "frames: about 3"),
+        (tmp_path / "img_%d.png", "frames: about 3"),
+        (tmp_path / "img_1.png", "a picture\nsize: 160×96"),
+    ):
+        result = run("info", path)
+        assert (result.code, words in result.out) == (0, True), result.out + result.err
+
+
+def test_what_is_no_video_is_an_error(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("hello")
+    for name, words in (("notes.txt", "is not a video"), ("none.mp4", "there is no such file")):
+        result = run("info", tmp_path / name)
+        assert (result.code, result.out) == (1, "")
+        assert words in result.err

@@ -94,7 +94,7 @@ from vdet.regions import check_mask
     "--stride",
     type=click.IntRange(1, 100),
     metavar="N",
-    help="Search every N-th frame; the tracker moves the vehicles on in the others. The same as "
+    help="Search every N-th frame. In the others, the tracker moves the vehicles on. The same as "
     "--set detector.stride=N.",
 )
 @click.option(

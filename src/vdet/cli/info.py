@@ -1,70 +1,35 @@
-"""`vdet info`: what a model file is."""
+"""`vdet info`: what a video, a picture or a model file is."""
 
-import json
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import click
 
+from vdet.cli.clip_info import clip_facts, picture_facts
 from vdet.cli.command import Command
-from vdet.cli.messages import print_lines
-from vdet.cli.options import PATH
-from vdet.detect.classes import our_name
-from vdet.detect.onnx.recognition import recognize
-from vdet.detect.onnx.session import Session
-from vdet.detect.svm.model import load_model
-from vdet.files import printable
+from vdet.cli.model_info import linear_facts, network_facts
+from vdet.cli.options import PATH, facts_options, print_facts
+from vdet.files import check_output
+from vdet.media.images import is_picture_name
 
-_FITS = {
-    "stretch": "stretched to this size",
-    "center": "with grey around it, in the middle",
-    "corner": "with grey around it, at the top left",
-}
+_FACTS = {".npz": linear_facts, ".onnx": network_facts}
 
 
-@click.command(cls=Command, examples=("vdet info model.npz", "vdet info yolox_nano.onnx"))
-@click.argument("model", type=PATH, metavar="MODEL")
-def info(model: Path) -> None:
-    """Say what a model file is: what it wants, what it finds, what it was trained on.
+@click.command(
+    cls=Command,
+    examples=("vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz"),
+)
+@click.argument("path", type=PATH, metavar="FILE")
+@facts_options
+def info(path: Path, json_target: str | None, overwrite: bool) -> None:
+    """Say what a file is: a video, a picture or a model.
 
-    MODEL is a linear model (.npz), or a network (.onnx) of vdet or of another tool.
+    FILE is a video or numbered pictures (what it holds, what of it a written video keeps or loses,
+    where the horizon lies), a picture, a linear model (.npz), or a network (.onnx) of vdet or of
+    another tool.
     """
-    lines = _network_lines(model) if model.suffix.lower() == ".onnx" else _linear_lines(model)
-    print_lines(*lines)
-
-
-def _linear_lines(path: Path) -> Iterator[str]:
-    model = load_model(path)
-    yield f"{path}: a linear model of vdet"
-    yield f"features: {model.weights.shape[1]} of patches {model.features.patch} pixels wide"
-    yield f"sides of boxes: {'learnt' if model.box_regression else 'those of the windows'}"
-    yield from _provenance(model.provenance)
-
-
-def _network_lines(path: Path) -> Iterator[str]:
-    found = recognize(Session(path), path).for_frames(1280, 720)
-    yield f"{path}: a network of the form {found.name}"
-    for reason in found.reasons:
-        yield f"  {reason}"
-    form = found.form
-    yield (
-        f"input: {form.width}×{form.height} for a frame of 1280×720, "
-        f"{'RGB' if form.is_rgb else 'BGR'} up to {255 * form.factor:g}, {_FITS[form.fit]}"
-    )
-    known = {name: our_name(name) for name in found.names}
-    vehicles = [
-        printable(name) if name == ours else f"{printable(name)} ({ours})"
-        for name, ours in known.items()
-        if ours is not None
-    ]
-    others = [printable(name) for name, ours in known.items() if ours is None]
-    yield f"vehicles: {', '.join(vehicles) or 'none'}"
-    yield f"other classes: {', '.join(others) or 'none'}"
-    if found.header is not None:
-        yield from _provenance(found.header.provenance)
-
-
-def _provenance(provenance: dict[str, Any]) -> Iterator[str]:
-    for key, value in provenance.items():
-        yield f"{key}: {value if isinstance(value, str) else json.dumps(value)}"
+    if json_target not in (None, "-"):
+        check_output(Path(json_target), overwrite=overwrite, inputs=[path])
+    describe = _FACTS.get(path.suffix.lower())
+    if describe is None:
+        describe = picture_facts if is_picture_name(path) and "%" not in path.name else clip_facts
+    print_facts(describe(path), json_target, overwrite=overwrite)

@@ -15,6 +15,7 @@ from vdet.cli.count import count
 from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
+from vdet.cli.doctor import doctor
 from vdet.cli.eval_images import images
 from vdet.cli.eval_patches import patches
 from vdet.cli.eval_tracks import tracks
@@ -62,7 +63,10 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     print_lines(*render(read_settings(config_name, assignments)).splitlines())
 
 
-for _command in (calibrate, count, demo, detect_image, detect_video, info, mine, train, train_net):
+_COMMANDS = (
+    *(calibrate, count, demo, detect_image, detect_video, doctor, info, mine, train, train_net),
+)
+for _command in _COMMANDS:
     cli.add_command(_command)
 for _command in (images, patches, tracks, video):
     evaluate.add_command(_command)

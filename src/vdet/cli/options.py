@@ -2,7 +2,8 @@
 
 import logging
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, TypeVar
@@ -242,6 +243,36 @@ def results_options(command: F) -> F:
         metavar="FILE",
         help="Write all numbers to FILE. With -, they go to standard output, and the table to "
         "standard error.",
+    )(command)
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a command found out, as lines of text and as values for JSON."""
+
+    lines: Sequence[str]
+    values: Mapping[str, Any]
+
+
+def facts_options(command: F) -> F:
+    """Add `--json FILE` and `--overwrite`; give their values to `print_facts`."""
+    return _json_option(overwrite_option(command), "what is found out")
+
+
+def print_facts(facts: Facts, json_target: str | None, *, overwrite: bool) -> None:
+    """Print facts, and write the JSON that `facts_options` ask for."""
+    print_lines(*facts.lines, err=json_target == "-")
+    if json_target is not None:
+        write_json(facts.values, json_target, overwrite=overwrite)
+
+
+def _json_option(command: F, what: str) -> F:
+    return click.option(
+        "--json",
+        "json_target",
+        metavar="FILE",
+        help=f"Write {what} to FILE. With -, it goes to standard output, and the text to standard "
+        "error.",
     )(command)
 
 

@@ -80,7 +80,7 @@ class SoundCopy:
         """Add streams to the target; return them by their index in the source."""
         streams = {}
         kind = self._target.format.name
-        held = _try_sounds(self._path, kind)
+        held = held_sounds(self._path, kind)
         for stream in self._source.streams:
             if not isinstance(stream, AudioStream):
                 if stream.index != self._pictures.index or not restarts_clock(self._source):
@@ -133,7 +133,7 @@ def _begin(packet: "Packet[Stream]") -> Fraction:
     return (packet.pts or 0) * packet.time_base
 
 
-def _try_sounds(path: Path, kind: str) -> dict[int, bool]:
+def held_sounds(path: Path, kind: str) -> dict[int, bool]:
     """Return whether a file of the format `kind` can hold each sound stream of `path`, by index.
 
     Streams without packets are left out. It is tried in memory: an unknown codec and damaged

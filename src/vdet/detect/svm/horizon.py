@@ -4,7 +4,7 @@ Lane lines, barriers, kerbs and roofs run along the road, so in the picture they
 vanishing point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -47,22 +47,27 @@ def find_horizon(images: Iterable[Image]) -> float:
     -------
     0.30 to 0.74 in steps of 0.01; `DEFAULT_HORIZON` where too few lines run along the road.
     """
-    images = list(images)
+    seen = seen_horizon(list(images))
+    return DEFAULT_HORIZON if seen is None else seen
+
+
+def seen_horizon(images: Sequence[Image]) -> float | None:
+    """Return as `find_horizon` the row where lines meet; None where too few run along the road."""
     if not images:
-        return DEFAULT_HORIZON
+        return None
     height, width = images[0].shape[:2]
     if height > _MAX_ASPECT * width:
-        return DEFAULT_HORIZON
+        return None
     ends = np.concatenate([_segment_ends(image) for image in images])
     directions = ends[:, 2:] - ends[:, :2]
     falling = directions[:, 0] * directions[:, 1] > 0
     sides = [_segments(ends[side]) for side in (falling, ~falling)]
     if min(len(side.lengths) for side in sides) < _MIN_SEGMENTS:
-        return DEFAULT_HORIZON
+        return None
     left, right = (_sum_votes(side, height / width) for side in sides)
     both = np.minimum(left, right)  # a vanishing point has lines on both sides
     if not both.any():
-        return DEFAULT_HORIZON
+        return None
     votes = both + 0.2 * (left + right)
     row, _ = np.unravel_index(int(votes.argmax()), votes.shape)
     return round(float(_ROWS[row]), 2)
