@@ -50,7 +50,7 @@ class CountsSink:
 
 
 COUNTS = SinkKind(
-    CountsSink, SUFFIXES, "counts", takes="videos", total=BatchTotal("counts", join_counts)
+    CountsSink, SUFFIXES, "counts", takes="videos", total=BatchTotal("all", join_counts)
 )
 
 
