@@ -4,11 +4,12 @@ from collections.abc import Callable
 
 import pytest
 
-from vdet.config.lanes import LaneSettings, TopViewSettings
+from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.lane_view import lane_view
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Carriageway, Light, Line, Scene
 
@@ -20,23 +21,8 @@ NEAR, FAR = 6.0, 42.0
 def settings_for() -> Callable[[PinholeCamera], LaneSettings]:
     """Make settings whose top view shows the road from 6 m to 42 m ahead of a level camera."""
 
-    def row(camera: PinholeCamera, distance: float) -> float:
-        return (camera.horizon + camera.focal * camera.above_ground / distance) / camera.height
-
-    def column(camera: PinholeCamera, lateral: float, distance: float) -> float:
-        return 0.5 + camera.focal * lateral / distance / camera.width
-
     def make(camera: PinholeCamera) -> LaneSettings:
-        view = TopViewSettings(
-            top=row(camera, FAR),
-            bottom=row(camera, NEAR),
-            top_left=column(camera, -1.85, FAR),
-            top_right=column(camera, 1.85, FAR),
-            bottom_left=column(camera, -1.85, NEAR),
-            bottom_right=column(camera, 1.85, NEAR),
-            length=FAR - NEAR,
-        )
-        return LaneSettings(view=view)
+        return LaneSettings(view=lane_view(camera, near=NEAR, far=FAR))
 
     return make
 

@@ -9,7 +9,8 @@ import pytest
 from vdet.geometry import Box
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes, true_places
+from vdet.synthetic.vehicle import STANDS
 
 MakeScene = Callable[..., Scene]
 Parked = Callable[[int, float, float], SceneVehicle]
@@ -118,6 +119,31 @@ def test_a_nearer_vehicle_is_painted_over_a_farther_one_in_any_order(
 def test_boxes_are_ordered_by_id(make_scene: MakeScene, parked: Parked) -> None:
     scene = make_scene(parked(7, 10.0, 0.0), parked(3, 20.0, 3.7), parked(5, 15.0, -3.7))
     assert [box.id for box in true_boxes(scene, 0)] == [3, 5, 7]
+
+
+def test_places_are_those_of_the_rear_tyres_and_lanes_are_counted_by_lines(
+    make_scene: MakeScene, parked: Parked
+) -> None:
+    vehicles = [(5, 10.0, 0.3), (1, 30.0, -3.7), (2, 25.0, 2.0), (7, -8.0, 3.7)]
+    scene = make_scene(*(parked(*vehicle) for vehicle in vehicles))
+    found = {
+        place.id: (place.distance, place.lateral, place.lane) for place in true_places(scene, 0)
+    }
+    assert list(found) == [1, 2, 5, 7]
+    assert found == {
+        number: pytest.approx((ahead + STANDS, lateral, lane))
+        for (number, ahead, lateral), lane in zip(vehicles, (0, -1, 1, 1), strict=True)
+    }
+
+
+@pytest.mark.parametrize("lateral", [-3.7, 0.0, 3.7])
+def test_a_vehicle_stands_on_the_lower_edge_of_its_box(
+    make_scene: MakeScene, parked: Parked, lateral: float
+) -> None:
+    scene = make_scene(parked(1, 15.0, lateral))
+    [box], [place] = true_boxes(scene, 0), true_places(scene, 0)
+    [[_, row]] = scene.camera.project(np.array([[place.lateral, 0.0, place.distance]]))
+    assert box.box.bottom - 0.5 == pytest.approx(row, abs=1.0)
 
 
 @pytest.mark.parametrize(

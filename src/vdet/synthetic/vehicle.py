@@ -31,6 +31,9 @@ _SILL = 0.26  # height of the lower edge of the body
 _REAR_AXLE = 0.85
 _WHEEL = 0.31  # radius
 
+STANDS = _REAR_AXLE - _WHEEL
+"""Metres ahead of its rear at which a vehicle is drawn to stand on the road: its rear tyres."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Facet:
@@ -104,19 +107,18 @@ def _facets(body: Body, color: Color) -> tuple[_Facet, ...]:
 def _footprint(body: Body, sun: float) -> Float64Array:
     """Return the outline of a car's shadow on the ground; with `sun` 0 it stays below the car."""
     left, right = min(0.0, sun) - body.width / 2, max(0.0, sun) + body.width / 2
-    rear, front = _REAR_AXLE - _WHEEL, body.length
-    return _quad((left, 0, rear), (right, 0, rear), (right, 0, front), (left, 0, front))
+    front = body.length
+    return _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
 
 
 def _underside(body: Body) -> list[_Facet]:
     half = body.width / 2
     tyre = 0.24
-    rear = _REAR_AXLE - _WHEEL
     tyres = [
-        _Facet(_upright(left, left + tyre, 0.0, _SILL + 0.05, rear), _TYRE)
+        _Facet(_upright(left, left + tyre, 0.0, _SILL + 0.05, STANDS), _TYRE)
         for left in (-half + 0.04, half - 0.04 - tyre)
     ]
-    below = _upright(-half + 0.1, half - 0.1, 0.1, _SILL + 0.05, rear)
+    below = _upright(-half + 0.1, half - 0.1, 0.1, _SILL + 0.05, STANDS)
     return [_Facet(below, _UNDERSIDE), *tyres]
 
 
