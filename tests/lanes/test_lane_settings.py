@@ -108,7 +108,7 @@ def test_the_lane_is_found_in_all_images(lanes: list[dict[str, Any] | None]) -> 
 
 
 def test_the_effect_of_every_setting_is_tested() -> None:
-    sections = LaneSettings().model_dump().items()
+    sections = LaneSettings().model_dump(exclude={"place"}).items()  # see test_position.py
     assert [f"{name}.{key}" for name, keys in sections for key in keys] == list(CHANGES)
 
 

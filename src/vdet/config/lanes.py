@@ -144,11 +144,32 @@ class LaneTrackSettings(Section):
     )
 
 
+class PlaceSettings(Section):
+    """Of which vehicles the distance and the lane are told."""
+
+    reach: float = Field(
+        1.25, ge=0.1, le=3, description="farthest vehicle, as a multiple of the distance of "
+        "view.top, up to which the lane is fitted"
+    )  # fmt: skip
+    row: float = Field(
+        0.1, gt=0, le=1, description="largest error of the distance, share of it, that one row of "
+        "pixels makes; beyond it, near the horizon, the distance is not told"
+    )  # fmt: skip
+    edge: Fraction = Field(
+        0.005, description="a box that ends this near to the left, right or lower edge of the "
+        "frame, as a share of the frame, is cut off: its distance is not told"
+    )  # fmt: skip
+    lanes: int = Field(
+        3, ge=0, le=20, description="number of lanes to each side of the own one that are told"
+    )  # fmt: skip
+
+
 class LaneSettings(Section):
-    """Finding the lane: top view, paint, search, checks, smoothing."""
+    """Finding the lane: top view, paint, search, checks, smoothing; the place of vehicles."""
 
     view: TopViewSettings = TopViewSettings()
     mask: MaskSettings = MaskSettings()
     search: LaneSearchSettings = LaneSearchSettings()
     check: LaneCheckSettings = LaneCheckSettings()
     track: LaneTrackSettings = LaneTrackSettings()
+    place: PlaceSettings = PlaceSettings()

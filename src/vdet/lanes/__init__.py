@@ -10,5 +10,6 @@ The modules in the order in which data flows through them:
 6. `frame_fit` does steps 4 and 5 for one frame, and checks that the result can be a lane.
 7. `road` does steps 2 to 6 for all frames of a video, and smooths the lane over time.
 
-`lane` is the result for one frame and its JSON form. `drawing` draws it.
+`lane` is the result for one frame and its JSON form. `drawing` draws it. `position` tells where on
+the road a vehicle is.
 """

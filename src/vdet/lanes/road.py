@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.config.lanes import LaneSettings, LaneTrackSettings
+from vdet.config.lanes import LaneSettings, LaneTrackSettings, PlaceSettings
 from vdet.geometry import Box, Float64Array
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves, NormalEquations, solve
@@ -16,6 +16,7 @@ from vdet.lanes.drawing import stage_pictures
 from vdet.lanes.frame_fit import FrameFit, fit_near, fit_new
 from vdet.lanes.lane import Lane
 from vdet.lanes.paint import paint_mask
+from vdet.lanes.position import RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
@@ -49,8 +50,11 @@ class Road:
     """The frame's pictures, from `RoadFinder.observe`."""
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
+    curves: LaneCurves | None
+    """The lines of `lane` on the ground; None if there is no lane."""
     top_view: TopView
     undistorter: Undistorter | None
+    settings: PlaceSettings
 
     @property
     def image(self) -> Image:
@@ -64,6 +68,25 @@ class Road:
     def place_points(self, points: Float64Array) -> Float64Array:
         """Return where points `(n, 2)` of the original frame, x and y, lie in `image`."""
         return self.undistorter.points(points) if self.undistorter else points
+
+    def cuts(self, box: Box) -> bool:
+        """Tell whether the original frame's left, right or lower edge cuts a box in that frame."""
+        height, width = self.image.shape[:2]
+        near = self.settings.edge
+        beside = box.x <= near * width or box.right >= (1 - near) * width
+        return bool(beside or box.bottom >= (1 - near) * height)
+
+    def position(self, foot: tuple[float, float]) -> RoadPosition | None:
+        """Return where on the road a vehicle is that stands at `foot` in the original frame.
+
+        `foot` is `(x, y)` in pixels; whole numbers are the edges of pixels, as in boxes. None
+        without a lane, and where the lane does not reach: see `position_on_road`.
+        """
+        if self.curves is None:
+            return None
+        pixel = np.array([foot]) - 0.5
+        [[x, y]] = self.place_points(pixel)
+        return position_on_road((x, y), self.curves, self.top_view, self.settings)
 
     def pictures(self) -> dict[str, Image]:
         """Return a picture of every stage of finding the lane, as `stage_pictures` makes them."""
@@ -114,8 +137,11 @@ class RoadFinder:
     def update(self, view: FrameView) -> Road:
         """Return the road in the next frame."""
         self._state = self._next_state(view.mask)
-        lane = self._lane(self._state) if self._state else None
-        return Road(view, lane, self._top_view, self._undistorter)
+        lane, curves = (
+            (self._lane(self._state), self._state.curves) if self._state else (None, None)
+        )
+        place = self._settings.place
+        return Road(view, lane, curves, self._top_view, self._undistorter, place)
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""

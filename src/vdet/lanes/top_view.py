@@ -18,6 +18,7 @@ class TopView:
 
     def __init__(self, settings: TopViewSettings, width: int, height: int) -> None:
         self._to_frame = _ground_to_frame(settings, width, height)
+        self._to_ground = np.linalg.inv(self._to_frame)
         near = _nearest(settings)
         rows = round(settings.length * settings.along)
         columns = round((settings.lane_width + 2 * settings.margin) * settings.across)
@@ -40,6 +41,15 @@ class TopView:
     def ground_to_frame(self, x: Float64Array, z: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` in the undistorted frame of ground points, metres `(n,)`."""
         return _transform(self._to_frame, np.asarray(np.column_stack([x, z]), np.float64))
+
+    def sight(self, pixel: tuple[float, float]) -> tuple[float, float]:
+        """Return x / z and 1 / z of the ground point that a pixel of the undistorted frame shows.
+
+        1 / z, in 1/m, is proportional to the rows below the horizon; it is 0 there, and negative
+        above it. x / z does not depend on the scale of the ground, and has no unit.
+        """
+        x, z, one = (self._to_ground @ (*pixel, 1.0)).tolist()
+        return x / z, one / z
 
     def frame_to_top(self, pixels: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the undistorted frame lie in the top view, `(n, 2)`."""

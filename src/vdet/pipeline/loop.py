@@ -17,6 +17,7 @@ from vdet.files import OutputFiles
 from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
 from vdet.media import Frame, VideoInfo, VideoReader
 from vdet.media.images import Image
+from vdet.pipeline.positions import with_positions
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, SinkContext, check_sinks, open_sink, sink_kind
 from vdet.pipeline.stride import Search, follow_frame, search_frame
@@ -245,7 +246,9 @@ def follow_frames(
     threads: int = 1,
     roads: RoadFinder | None = None,
 ) -> Generator[FrameResult]:
-    """Find and follow the vehicles through the frames of a video, and with `roads` the lane.
+    """Find and follow the vehicles through the frames of a video.
+
+    With `roads` the lane is found too, and the distance and the lane of each vehicle.
 
     `threads` frames are searched at once. The results do not depend on their number.
 
@@ -272,8 +275,9 @@ def follow_frames(
             if regions is not None:
                 tracks = tuple(track for track in tracks if regions.contains(track.foot))
             road = roads.update(view) if roads and view else None
+            placed = with_positions(tracks, road)
             yield FrameResult(
-                video.path, frame, detections, tracks, road, detector, searched=searched
+                video.path, frame, detections, placed, road, detector, searched=searched
             )
 
 

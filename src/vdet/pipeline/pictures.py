@@ -19,6 +19,7 @@ from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
 from vdet.pipeline.loop import Progress, no_progress
+from vdet.pipeline.positions import with_positions
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
 from vdet.pipeline.threads import single_threaded_libraries
@@ -184,7 +185,8 @@ def detect_picture(
     with _named(source):
         road = _road(image, settings, lanes) if lanes else None
     frame = Frame(0, Fraction(0), image)
-    return FrameResult(source, frame, detections, _tracks(detections), road, detector)
+    tracks = with_positions(_tracks(detections), road)
+    return FrameResult(source, frame, detections, tracks, road, detector)
 
 
 def search_picture(

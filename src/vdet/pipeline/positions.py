@@ -1,0 +1,23 @@
+"""The distance and the lane of each shown vehicle, from the road in its frame."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from vdet.lanes.road import Road
+from vdet.track.track import Track
+
+
+def with_positions(tracks: Sequence[Track], road: Road | None) -> tuple[Track, ...]:
+    """Return the tracks of a frame with `distance` and `lane`, None where they are not known.
+
+    They are those of the track's foot. They are not known without a lane, of a vehicle whose lower
+    edge the frame's edge cuts, and where `Road.position` does not know them.
+    """
+    return tuple(_with_position(track, road) for track in tracks) if road else tuple(tracks)
+
+
+def _with_position(track: Track, road: Road) -> Track:
+    position = None if road.cuts(track.box) else road.position(track.foot)
+    if position is None:
+        return replace(track, distance=None, lane=None)
+    return replace(track, distance=position.distance, lane=position.lane)

@@ -1,0 +1,207 @@
+"""Where vehicles are on the road: metres and lanes from the pixels at which they stand."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.config.lanes import LaneSettings, PlaceSettings
+from vdet.geometry import Box
+from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.lanes.curves import LaneCurves
+from vdet.lanes.position import RoadPosition, position_on_road
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.lanes.top_view import TopView
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.lane_view import lane_view
+from vdet.synthetic.render import render
+from vdet.synthetic.scene import Scene
+
+CAMERA = PinholeCamera.dashboard(1280, 720)
+STRAIGHT = LaneCurves(bend=0, heading=0, left=-1.85, right=1.85, pitch=0)
+FAR = 42.0
+
+LaneSettingsFor = Callable[[PinholeCamera], LaneSettings]
+
+
+def pixel_of(
+    distance: float, lateral: float, camera: PinholeCamera = CAMERA
+) -> tuple[float, float]:
+    """Return where the camera sees a point of the road."""
+    [[x, y]] = camera.project(np.array([[lateral, 0.0, distance]])).tolist()
+    return x, y
+
+
+def place(
+    foot: tuple[float, float], curves: LaneCurves = STRAIGHT, **settings: float
+) -> RoadPosition | None:
+    view = TopView(lane_view(CAMERA, near=6, far=FAR), CAMERA.width, CAMERA.height)
+    return position_on_road(foot, curves, view, PlaceSettings(**settings))
+
+
+class TestGeometry:
+    @given(
+        distance=st.floats(4, 50),
+        lateral=st.floats(-9, 9),
+        radius=st.sampled_from([np.inf, 1000, -400, 200]),
+        heading=st.floats(-0.02, 0.02),
+        shift=st.floats(-1.2, 1.2),
+        pitch=st.floats(-0.004, 0.004),
+        focal=st.floats(0.9, 2.5),
+        height=st.floats(0.9, 3.0),
+    )
+    def test_a_point_on_a_known_road_gets_its_metres_and_its_lane(
+        self,
+        distance: float,
+        lateral: float,
+        radius: float,
+        heading: float,
+        shift: float,
+        pitch: float,
+        focal: float,
+        height: float,
+    ) -> None:
+        camera = PinholeCamera(1280, 720, focal * 720, 330, height, curvature=1 / radius)
+        view = TopView(lane_view(camera, near=20, far=FAR), 1280, 720)
+        curves = LaneCurves(0.5 / radius, heading, shift - 1.85, shift + 1.85, pitch)
+        pitched = replace(camera, horizon=330 + pitch * camera.focal * height)
+        foot = pixel_of(distance, lateral + heading * distance, pitched)
+        position = position_on_road(foot, curves, view, PlaceSettings())
+        assert position is not None
+        assert position.distance == pytest.approx(distance, rel=1e-3)
+        assert position.lateral == pytest.approx(lateral - shift, abs=0.02)
+        share = (lateral - shift) / 3.7
+        if abs(share - np.floor(share) - 0.5) > 0.01:  # not on a line
+            assert position.lane == round(share)
+
+    def test_distances_are_measured_from_below_the_lens(self) -> None:
+        for metres in (5.0, 10.0, 40.0):
+            rows = CAMERA.focal * CAMERA.above_ground / metres  # a pinhole camera, by similarity
+            position = place((640, CAMERA.horizon + rows))
+            assert position is not None
+            assert position.distance == pytest.approx(metres, rel=1e-4)
+
+    @pytest.mark.parametrize("radius", [120.0, -120.0])
+    def test_lanes_follow_the_bend(self, radius: float) -> None:
+        bend = replace(STRAIGHT, bend=0.5 / radius)
+        camera = replace(CAMERA, curvature=1 / radius)
+        for lane in (-1, 0, 1):
+            position = place(pixel_of(40, 3.7 * lane, camera), bend)
+            assert position is not None
+            assert position.lane == lane
+        straight = place(pixel_of(40, 0, camera))
+        assert straight is not None
+        assert straight.lane == np.sign(radius) * 2, "40 m ahead, the bend has moved by 6.7 m"
+
+    def test_lanes_are_counted_in_the_width_of_the_own_one(self) -> None:
+        narrow = replace(STRAIGHT, left=-1.5, right=1.5)
+        for lateral, lane in ((1.4, 0), (1.6, 1), (4.4, 1), (4.6, 2), (-1.6, -1)):
+            position = place(pixel_of(20, lateral), narrow)
+            assert position is not None
+            assert position.lane == lane
+
+
+class TestWhatIsNotKnown:
+    @pytest.mark.parametrize("row", [-1e6, 0.0, CAMERA.horizon - 30, CAMERA.horizon])
+    def test_nothing_stands_above_the_horizon(self, row: float) -> None:
+        assert place((640, row)) is None
+
+    def test_the_horizon_moves_with_the_pitch(self) -> None:
+        foot = (640.0, CAMERA.horizon + 30)
+        assert place(foot) is not None
+        assert place(foot, replace(STRAIGHT, pitch=30 / (CAMERA.focal * 1.2))) is None
+
+    @pytest.mark.parametrize("reach", [0.5, 1.0, 1.25])
+    def test_the_lane_reaches_only_so_far(self, reach: float) -> None:
+        end = reach * FAR
+        assert place(pixel_of(end - 0.5, 0), reach=reach) is not None
+        assert place(pixel_of(end + 0.5, 0), reach=reach) is None
+
+    def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known(self) -> None:
+        assert place((640, CAMERA.horizon + 41), row=0.025) is not None
+        assert place((640, CAMERA.horizon + 39), row=0.025) is None
+
+    def test_a_vehicle_far_to_the_side_has_a_distance_but_no_lane(self) -> None:
+        for lanes, lane in ((3, 3), (2, None)):
+            position = place(pixel_of(20, 11.1), lanes=lanes)
+            assert position is not None
+            assert position.lane == lane
+            assert position.distance == pytest.approx(20, rel=0.01)
+
+    @pytest.mark.parametrize("foot", [(np.nan, 500.0), (640.0, np.nan)])
+    def test_a_foot_that_is_nowhere_is_not_on_the_road(self, foot: tuple[float, float]) -> None:
+        assert place(foot) is None
+
+
+@pytest.fixture(scope="module")
+def scene(make_road: Callable[..., Scene]) -> Scene:
+    return make_road(curvature=1 / 600, size=(640, 480), frames=1)
+
+
+def road_in(scene: Scene, settings: LaneSettings, camera: CalibratedCamera | None = None) -> Road:
+    finder = RoadFinder(LaneRequest(camera), settings, 640, 480)
+    return finder.update(finder.observe(render(scene, 0)))
+
+
+class TestRoad:
+    def test_a_foot_is_at_the_edge_of_a_pixel_as_boxes_are(
+        self, scene: Scene, settings_for: LaneSettingsFor
+    ) -> None:
+        road = road_in(scene, settings_for(scene.camera))
+        x, y = pixel_of(30, 0, scene.camera)
+        position, [below, above] = (
+            road.position((x + 0.5, y + 0.5)),
+            [road.position((x + 0.5, y + 0.5 + shift)) for shift in (1, -1)],
+        )
+        assert position is not None
+        assert below is not None
+        assert above is not None
+        assert position.distance == pytest.approx(30, rel=0.05)
+        assert below.distance < position.distance < above.distance
+        assert position.lane == 0
+
+    def test_feet_are_undistorted(
+        self, scene: Scene, settings_for: LaneSettingsFor, wide_camera: CalibratedCamera
+    ) -> None:
+        plain = road_in(scene, settings_for(scene.camera))
+        lens = Undistorter(wide_camera, 640, 480)
+        road = replace(plain, undistorter=lens)
+        foot = (560.5, 400.5)
+        [[x, y]] = lens.points(np.array([[560.0, 400.0]])).tolist()
+        assert abs(y - 400) > 5
+        assert road.position(foot) == plain.position((x + 0.5, y + 0.5))
+
+    def test_without_a_lane_nothing_is_known(
+        self, make_road: Callable[..., Scene], settings_for: LaneSettingsFor
+    ) -> None:
+        bare = make_road(lines=(), size=(640, 480))
+        road = road_in(bare, settings_for(bare.camera))
+        assert road.lane is None
+        assert road.position((320, 400)) is None
+
+    @pytest.mark.parametrize(
+        ("box", "cut"),
+        [
+            (Box(100, 300, 80, 60), False),
+            (Box(100, 0, 80, 60), False),  # above, the lower edge is whole
+            (Box(0, 300, 80, 60), True),
+            (Box(560, 300, 80, 60), True),
+            (Box(100, 420, 80, 60), True),
+            (Box(2, 300, 80, 60), True),
+            (Box(5, 300, 80, 60), False),
+        ],
+    )
+    def test_the_edges_beside_and_below_cut_boxes(
+        self, scene: Scene, settings_for: LaneSettingsFor, box: Box, *, cut: bool
+    ) -> None:
+        settings = settings_for(scene.camera)
+        assert road_in(scene, settings).cuts(box) is cut
+
+    def test_how_near_to_the_edge_is_a_setting(
+        self, scene: Scene, settings_for: LaneSettingsFor
+    ) -> None:
+        settings = settings_for(scene.camera).model_copy(update={"place": PlaceSettings(edge=0.1)})
+        assert road_in(scene, settings).cuts(Box(50, 200, 80, 60))
