@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from vdet.config.lanes import LaneSettings, MaskSettings
-from vdet.geometry import Float64Array
+from vdet.geometry import Box, Float64Array
 from vdet.lanes.curves import LaneCurves
-from vdet.lanes.paint import find_base, paint_along, paint_mask, slide_windows
+from vdet.lanes.paint import HIDDEN, PAINT, find_base, hide, paint_along, paint_mask, slide_windows
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
@@ -172,3 +172,42 @@ def test_paint_along_a_line_outside_the_top_view_stays_inside_it(
     mask = np.full((len(top_view.distances), len(top_view.laterals)), 255, np.uint8)
     paint = paint_along(mask, top_view, constant(top_view, lateral)[0], margin=0.3)
     assert ((paint.x >= top_view.laterals[0]) & (paint.x <= top_view.laterals[-1])).all()
+
+
+class TestHiddenPaint:
+    VIEW = TopView(SETTINGS.view, 1280, 720)
+
+    def box_from(self, left: float, right: float, distance: float) -> Box:
+        """Return the box of a thing on the road that rises far above the horizon."""
+        ends = np.array([left, right]), np.array([distance, distance])
+        [[x0, y0], [x1, _]] = self.VIEW.ground_to_frame(*ends)
+        return Box(round(x0), 100, round(x1 - x0), round(y0) - 100)
+
+    def mask(self) -> Image:
+        mask = np.zeros((len(self.VIEW.distances), len(self.VIEW.laterals)), np.uint8)
+        for lateral in (-1.85, 1.85):
+            mask[:, np.abs(self.VIEW.laterals - lateral) < 0.1] = PAINT
+        return mask
+
+    def test_a_vehicle_hides_the_road_behind_it_and_nothing_else(self) -> None:
+        before = self.mask()
+        after = hide(before, self.VIEW, [self.box_from(0.5, 2.5, 20)])
+        changed = (after != before).any(axis=1)
+        assert set(np.unique(after[after != before])) == {HIDDEN}
+        assert not changed[self.VIEW.distances < 19.5].any()
+        assert changed[self.VIEW.distances > 20.5].all()
+        assert (before == self.mask()).all(), "the mask that was given stays"
+
+    def test_above_the_farthest_row_a_vehicle_hides_nothing(self) -> None:
+        box = self.box_from(0.5, 2.5, 20)
+        above = Box(box.x, 0, box.width, int(self.VIEW.outline[:, 1].min()) - 2)
+        assert (hide(self.mask(), self.VIEW, [above]) == self.mask()).all()
+
+    def test_rows_of_which_a_part_is_hidden_are_left_out(self) -> None:
+        whole = np.full(len(self.VIEW.distances), 1.85)
+        # from 20 m on, the box hides the inner half of the right line's paint
+        half = hide(self.mask(), self.VIEW, [self.box_from(-0.5, 1.85, 20)])
+        paint = paint_along(half, self.VIEW, whole, 0.2)
+        assert paint.z.max() < 20.5
+        assert paint.x == pytest.approx(1.85, abs=0.02)
+        assert len(paint_along(half, self.VIEW, -whole, 0.2).z) == len(whole)

@@ -6,13 +6,14 @@ of a shadow, a kerb or pale concrete only one side is darker. Lightness is compa
 road's own, so a line in a shadow is found too. Yellow paint differs from pale concrete by colour.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from vdet.config.lanes import LaneSettings, MaskSettings
-from vdet.geometry import Float64Array
+from vdet.geometry import Box, Float64Array
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
@@ -27,6 +28,9 @@ class LinePaint:
     z: Float64Array
     x: Float64Array
 
+
+PAINT, HIDDEN = 255, 128
+"""Values of a mask of paint: paint, and what a vehicle hides; the rest is 0."""
 
 NO_PAINT = LinePaint(np.empty(0), np.empty(0))
 
@@ -50,7 +54,7 @@ def paint_mask(top: Image, settings: MaskSettings, across: float) -> Image:
     least = np.maximum(road * np.float32(settings.lightness), settings.least_lightness)
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))
     paint = (rise > least) | (tint > settings.yellow)
-    return np.where(paint, np.uint8(255), np.uint8(0))
+    return np.where(paint, np.uint8(PAINT), np.uint8(0))
 
 
 def _larger_side(channel: Image, reach: int) -> Image:
@@ -60,15 +64,36 @@ def _larger_side(channel: Image, reach: int) -> Image:
     return np.maximum(padded[:, :columns], padded[:, 2 * reach :])
 
 
+def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
+    """Return the mask with `HIDDEN` where vehicles, boxes in the undistorted frame, hide the road.
+
+    Seen from above, they stretch over everything behind them.
+    """
+    farthest = top_view.outline[:, 1].min()
+    hidden = mask.copy()
+    for box in boxes:
+        top, bottom = max(box.y - 0.5, farthest), box.bottom - 0.5
+        if top < bottom:
+            left, right = box.x - 0.5, box.right - 0.5
+            corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+            outline = np.rint(top_view.frame_to_top(corners)).astype(np.int32)
+            cv2.fillConvexPoly(hidden, outline, (HIDDEN,))
+    return hidden
+
+
 def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) -> LinePaint:
-    """Return the middle of the paint in each row, within `margin` metres of `x` `(rows,)`."""
+    """Return the middle of the paint in each row, within `margin` metres of `x` `(rows,)`.
+
+    A row is left out if a part of it is hidden there: the middle of the rest would be wrong.
+    """
     half = max(1, round(margin * top_view.across))
     around = np.arange(-half, half + 1)
     middles = np.clip(np.rint(top_view.columns(x)), -half - 1, mask.shape[1] + half).astype(np.intp)
     padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
     columns = (middles + 2 * half + 1)[:, None] + around
-    band = np.take_along_axis(padded, columns, axis=1) != 0
-    counts = band.sum(axis=1)
+    near = np.take_along_axis(padded, columns, axis=1)
+    band = near == PAINT
+    counts = band.sum(axis=1) * (near != HIDDEN).all(axis=1)
     rows = np.flatnonzero(counts)
     middle = middles[rows] + (band[rows] @ around) / counts[rows]
     return LinePaint(top_view.distances[rows], top_view.laterals[0] + middle / top_view.across)
@@ -97,7 +122,7 @@ def find_base(mask: Image, top_view: TopView, settings: LaneSettings) -> tuple[f
 def _histogram(mask: Image, top_view: TopView, settings: LaneSettings) -> Float64Array:
     """Return how many of the nearest rows have paint in each column, smoothed, `(columns,)`."""
     near = top_view.distances < top_view.distances[-1] + settings.search.base
-    counts = np.count_nonzero(mask[near], axis=0).astype(np.float64)
+    counts = np.count_nonzero(mask[near] == PAINT, axis=0).astype(np.float64)
     spread = round(settings.search.fine_margin * top_view.across) | 1
     return np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
 
@@ -127,5 +152,5 @@ def slide_windows(
 def _mean_offset(part: Image, top_view: TopView, middles: Float64Array, margin: float) -> float:
     """Return the mean offset of the paint in both windows from their middles, metres."""
     offsets = top_view.laterals - middles[:, None]
-    counts = np.count_nonzero(part, axis=0) * (np.abs(offsets) <= margin)
+    counts = np.count_nonzero(part == PAINT, axis=0) * (np.abs(offsets) <= margin)
     return float((counts * offsets).sum() / max(1, counts.sum()))

@@ -4,7 +4,8 @@
 order: it fits the lane near the last one, or finds a new one, and smooths it over time.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from vdet.lanes.curves import LaneCurves, NormalEquations, solve
 from vdet.lanes.drawing import stage_pictures
 from vdet.lanes.frame_fit import FrameFit, fit_near, fit_new
 from vdet.lanes.lane import Lane
-from vdet.lanes.paint import paint_mask
+from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.position import RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
@@ -134,8 +135,13 @@ class RoadFinder:
         mask = paint_mask(top, self._settings.mask, self._top_view.across)
         return FrameView(undistorted, top, mask)
 
-    def update(self, view: FrameView) -> Road:
-        """Return the road in the next frame."""
+    def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
+        """Return the road in the next frame.
+
+        `vehicles` are the boxes of those in it, in the original frame. They hide paint.
+        """
+        placed = [self._undistorter.box(box) if self._undistorter else box for box in vehicles]
+        view = replace(view, mask=hide(view.mask, self._top_view, placed))
         self._state = self._next_state(view.mask)
         lane, curves = (
             (self._lane(self._state), self._state.curves) if self._state else (None, None)

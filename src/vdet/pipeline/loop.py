@@ -272,9 +272,10 @@ def follow_frames(
             searched = found is not None
             detections = detector.detect(found.candidates) if found else NO_DETECTIONS
             tracks = follow_frame(tracker, detections, frame, searched=searched)
+            boxes = (track.box for track in tracks)
+            road = roads.update(view, boxes) if roads and view else None
             if regions is not None:
                 tracks = tuple(track for track in tracks if regions.contains(track.foot))
-            road = roads.update(view) if roads and view else None
             placed = with_positions(tracks, road)
             yield FrameResult(
                 video.path, frame, detections, placed, road, detector, searched=searched

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
@@ -182,11 +182,12 @@ def detect_picture(
         with _named(source):
             regions = lay_regions(settings.regions, width, height)
         detector, detections = search_picture(source, image, model, regions)
+    tracks = _tracks(detections)
     with _named(source):
-        road = _road(image, settings, lanes) if lanes else None
+        road = _road(image, tracks, settings, lanes) if lanes else None
     frame = Frame(0, Fraction(0), image)
-    tracks = with_positions(_tracks(detections), road)
-    return FrameResult(source, frame, detections, tracks, road, detector)
+    placed = with_positions(tracks, road)
+    return FrameResult(source, frame, detections, placed, road, detector)
 
 
 def search_picture(
@@ -232,7 +233,7 @@ def _tracks(detections: Detections) -> tuple[Track, ...]:
     )
 
 
-def _road(image: Image, settings: Settings, lanes: LaneRequest) -> Road:
+def _road(image: Image, tracks: Iterable[Track], settings: Settings, lanes: LaneRequest) -> Road:
     height, width = image.shape[:2]
     roads = RoadFinder(lanes, settings.lanes, width, height)
-    return roads.update(roads.observe(image))
+    return roads.update(roads.observe(image), (track.box for track in tracks))

@@ -1,0 +1,124 @@
+"""Distances and lanes of vehicles on drawn roads, where their places are known."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from vdet.config.lanes import LaneSettings
+from vdet.lanes.curves import LaneCurves
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.synthetic import must_be_found, traffic_scene, true_boxes
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.lane_view import lane_view
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import true_places
+
+FRAMES = 14
+SETTLED = 4
+"""Frame from which a lane that is found in the first ones has settled."""
+MOST = 40.0
+"""Metres up to which distances must be right."""
+CAMERAS = {
+    "dashboard": PinholeCamera.dashboard(960, 540),
+    "wide": PinholeCamera(1242, 375, 721, 0.46 * 375, 1.65),
+    "van": PinholeCamera(960, 540, 700, 0.45 * 540, 2.2),
+    "long": PinholeCamera(1280, 720, 1800, 0.5 * 720, 1.3),
+}
+RADII = (np.inf, 800.0, -400.0, 250.0)
+
+
+@dataclass(frozen=True)
+class Told:
+    """A vehicle up to 40 m ahead that is whole in the frame, and what was told of it."""
+
+    error: float | None
+    """Of the distance, share of it."""
+    lane_is_right: bool
+
+
+def scene_of(camera: PinholeCamera, radius: float, lane: int) -> Scene:
+    """Draw a near and a far car in each of three lanes; they drive off."""
+    camera = replace(camera, curvature=1 / radius)
+    scene = traffic_scene(camera, lane=lane, lanes=3, frames=FRAMES, seed=lane + 5)
+    return replace(scene, vehicles=tuple(driving_off(vehicle) for vehicle in scene.vehicles))
+
+
+def driving_off(vehicle: SceneVehicle) -> SceneVehicle:
+    lateral = vehicle.path[0].lateral
+    near = vehicle.id % 2 == 1
+    start, end = (13 + abs(lateral), 22 + abs(lateral)) if near else (28 + abs(lateral), 44)
+    last = vehicle.path[-1].time
+    return replace(vehicle, path=(Waypoint(0, start, lateral), Waypoint(last, end, lateral)))
+
+
+def told_of(scene: Scene, index: int, road: Road) -> Iterable[Told]:
+    places = {place.id: place for place in true_places(scene, index)}
+    for each in true_boxes(scene, index):
+        place = places[each.id]
+        wanted = must_be_found(each, scene.camera.height) and place.distance <= MOST
+        if wanted and not road.cuts(each.box):
+            foot = (each.box.center[0], float(each.box.bottom))
+            position = road.position(foot)
+            error = position.distance / place.distance - 1 if position else None
+            yield Told(error, position is not None and position.lane == place.lane)
+
+
+def finder_of(scene: Scene) -> RoadFinder:
+    camera = scene.camera
+    nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
+    view = lane_view(camera, near=max(6.0, nearest), far=42)
+    return RoadFinder(LaneRequest(), LaneSettings(view=view), camera.width, camera.height)
+
+
+def check(told: list[Told], *, known: float) -> None:
+    errors = [each.error for each in told if each.error is not None]
+    assert len(errors) >= known * len(told)
+    assert max(map(abs, errors)) <= 0.1
+    assert np.mean([each.lane_is_right for each in told if each.error is not None]) >= 0.95
+
+
+@pytest.mark.parametrize("radius", RADII)
+@pytest.mark.parametrize("name", CAMERAS)
+def test_with_the_true_lines_all_distances_are_told_and_right(name: str, radius: float) -> None:
+    told: list[Told] = []
+    for lane in range(3):
+        scene = scene_of(CAMERAS[name], radius, lane)
+        finder, camera = finder_of(scene), scene.camera
+        bare = finder.update(finder.observe(np.zeros((camera.height, camera.width, 3), np.uint8)))
+        road = replace(bare, curves=LaneCurves(0.5 / radius, 0, -1.85, 1.85, 0))
+        for index in (0, FRAMES - 1):
+            told += told_of(scene, index, road)
+    assert len(told) > 10
+    check(told, known=1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "radius", "lane"), [("dashboard", np.inf, 1), ("wide", -400.0, 0), ("van", 250.0, 2)]
+)
+def test_with_the_lines_that_are_found_distances_are_right(
+    name: str, radius: float, lane: int
+) -> None:
+    scene = scene_of(CAMERAS[name], radius, lane)
+    finder, renderer = finder_of(scene), Renderer(scene)
+    told: list[Told] = []
+    for index in range(FRAMES):
+        vehicles = [each.box for each in true_boxes(scene, index)]
+        road = finder.update(finder.observe(renderer.image(index)), vehicles)
+        told += told_of(scene, index, road) if index >= SETTLED else []
+    assert len(told) > 2 * FRAMES
+    check(told, known=0.7)
+
+
+def test_vehicles_do_not_bend_the_lines() -> None:
+    scene = scene_of(CAMERAS["wide"], np.inf, 1)
+    finder, renderer = finder_of(scene), Renderer(scene)
+    pitches = []
+    for index in range(FRAMES):
+        vehicles = [each.box for each in true_boxes(scene, index)]
+        road = finder.update(finder.observe(renderer.image(index)), vehicles)
+        pitches += [road.curves.pitch] if road.curves else []
+    assert len(pitches) > FRAMES // 2
+    assert abs(np.mean(pitches)) < 0.001, "4 % of the distance at 40 m"
