@@ -298,6 +298,13 @@ class TestPictures:
         check_lane(item["lane"], road.camera)
         (reported,) = map(box_of, item["boxes"])
         assert sits_on(reported, CAR)
+        [[x, y]] = undistorter.points(
+            np.array([[reported.center[0], reported.bottom]]) - 0.5
+        ).tolist()
+        camera = road.camera
+        metres = camera.focal * camera.above_ground / (y - camera.horizon)
+        assert item["boxes"][0]["distance"] == pytest.approx(metres, rel=0.1)
+        assert item["boxes"][0]["lane"] == round((x - 320) * metres / camera.focal / 3.7)
         drawn = read_image(out)
         assert has_outline(drawn, undistorter.box(reported), color_of(1))
         assert not has_outline(drawn, reported, color_of(1))

@@ -1,6 +1,7 @@
 """The list of boxes of still pictures."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,10 @@ import pytest
 
 from pipeline.red_runs import result_of, write
 from red_cars import road
+from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
 from vdet.geometry import Box
+from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.pipeline.sinks.protocol import Output
 from vdet.track.track import Track
 
@@ -43,6 +46,18 @@ def test_there_is_an_item_a_picture_with_a_list_of_boxes(tmp_path: Path) -> None
     path = tmp_path / "boxes.json"
     write(Output("json", path), RESULTS, video=None)
     assert read(path.read_text(encoding="utf-8")) == list(ITEMS)
+
+
+def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.json"
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 320, 240)
+    bare = finder.update(finder.observe(road()))
+    near = Track(1, Box(1, 2, 3, 4), 0.5, predicted=False, distance=23.4567, lane=-1)
+    vehicles = (near, replace(near, distance=None, lane=None))
+    write(Output("json", path), [result_of(*vehicles, found=bare)], video=None)
+    [item] = read(path.read_text(encoding="utf-8"))
+    assert item["lane"] is None
+    assert [(box["distance"], box["lane"]) for box in item["boxes"]] == [(23.46, -1), (None, None)]
 
 
 def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:

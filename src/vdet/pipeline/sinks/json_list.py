@@ -8,6 +8,7 @@ from vdet.files import print_now
 from vdet.lanes.lane import lane_record
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
+from vdet.track.track import Track
 
 
 class JsonSink:
@@ -15,7 +16,8 @@ class JsonSink:
 
     Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
     `height` (pixels of the input picture) and `score`. If lanes are searched for, it also has
-    `lane`, as in `.jsonl` tracks.
+    `lane`, as in `.jsonl` tracks, and each box has `distance` (metres, two decimals) and `lane`, as
+    in `Track`, null where they are not known.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -42,20 +44,27 @@ class JsonSink:
             "image": str(result.source),
             "width": width,
             "height": height,
-            "boxes": [
-                {
-                    "x": track.box.x,
-                    "y": track.box.y,
-                    "width": track.box.width,
-                    "height": track.box.height,
-                    "score": round(track.score, 4),
-                }
-                for track in result.tracks
-            ],
+            "boxes": [_box(track, on_road=result.road is not None) for track in result.tracks],
         }
         if result.road:
             item["lane"] = lane_record(result.road.lane)
         self._items.append(item)
+
+
+def _box(track: Track, *, on_road: bool) -> dict[str, Any]:
+    """Return the values of a vehicle; with `on_road` also its place on the road."""
+    values: dict[str, Any] = {
+        "x": track.box.x,
+        "y": track.box.y,
+        "width": track.box.width,
+        "height": track.box.height,
+        "score": round(track.score, 4),
+    }
+    if on_road:
+        metres = track.distance
+        values["distance"] = None if metres is None else round(metres, 2)
+        values["lane"] = track.lane
+    return values
 
 
 JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")
