@@ -6,6 +6,7 @@ import pytest
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.frame_fit import fit_near, fit_new
+from vdet.lanes.paint import HIDDEN
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
@@ -51,6 +52,26 @@ def test_a_dash_of_four_metres_is_enough_to_see_a_line() -> None:
     fit = fit_new(masked(LAST, right=DASHED), TOP_VIEW, SETTINGS)
     assert fit is not None
     assert fit.seen == (True, True)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "rows", "seen"),
+    [
+        (0, 28, False),
+        (150, 28, True),  # half of the line is hidden: 2 m of paint are enough
+        (150, 12, False),
+        (240, 6, False),  # of less than a quarter no less than 1 m is enough
+        (240, 10, True),
+    ],
+)
+def test_of_a_line_that_vehicles_hide_in_part_less_paint_is_enough(
+    hidden: int, rows: int, *, seen: bool
+) -> None:
+    mask = masked(LAST, right=np.s_[260 : 260 + rows])
+    mask[:hidden] = HIDDEN
+    fit = fit_near(mask, TOP_VIEW, LAST, SETTINGS)
+    assert fit is not None
+    assert fit.seen == (True, seen)
 
 
 @pytest.mark.parametrize(

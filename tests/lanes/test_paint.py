@@ -210,4 +210,7 @@ class TestHiddenPaint:
         paint = paint_along(half, self.VIEW, whole, 0.2)
         assert paint.z.max() < 20.5
         assert paint.x == pytest.approx(1.85, abs=0.02)
-        assert len(paint_along(half, self.VIEW, -whole, 0.2).z) == len(whole)
+        assert paint.visible == pytest.approx(len(paint.z) / len(whole))
+        other = paint_along(half, self.VIEW, -whole, 0.2)
+        assert len(other.z) == len(whole)
+        assert other.visible == 1

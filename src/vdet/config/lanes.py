@@ -116,8 +116,9 @@ class LaneCheckSettings(Section):
     )  # fmt: skip
     radius: float = Field(150.0, gt=0, description="smallest radius of a bend, metres")
     marking: float = Field(
-        4.0, gt=0, description="shortest length of paint by which a line is seen, metres"
-    )
+        4.0, gt=0, description="shortest length of paint by which a line is seen, metres; less in "
+        "proportion where vehicles hide a part of it"
+    )  # fmt: skip
     scatter: float = Field(
         0.08, gt=0, le=1, description="largest root mean square distance of paint from its curve, "
         "metres"
@@ -158,6 +159,10 @@ class PlaceSettings(Section):
     edge: Fraction = Field(
         0.005, description="a box that ends this near to the left, right or lower edge of the "
         "frame, as a share of the frame, is cut off: its distance is not told"
+    )  # fmt: skip
+    foot: float = Field(
+        0.0, ge=-0.5, le=0.5, description="how far boxes end below the tyres, share of their "
+        "height; it is taken off before the distance is measured"
     )  # fmt: skip
     lanes: int = Field(
         3, ge=0, le=20, description="number of lanes to each side of the own one that are told"

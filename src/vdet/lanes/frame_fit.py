@@ -18,6 +18,9 @@ from vdet.lanes.paint import (
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
+_LEAST_VISIBLE = 0.25
+"""Less of a line asks for no less paint: a little paint can be anything."""
+
 
 @dataclass(frozen=True, slots=True)
 class FrameFit:
@@ -87,7 +90,8 @@ def _is_seen(
     paint: LinePaint, top_view: TopView, x: Float64Array, check: LaneCheckSettings
 ) -> bool:
     """Check that a line has enough paint, close enough to its curve x `(rows,)`."""
-    if len(paint.z) < check.marking * top_view.along:
+    share = max(paint.visible, _LEAST_VISIBLE)
+    if len(paint.z) < share * check.marking * top_view.along:
         return False
     distance = paint.x - np.interp(-paint.z, -top_view.distances, x)
     return float(np.sqrt(np.mean(distance**2))) <= check.scatter

@@ -27,6 +27,8 @@ class LinePaint:
 
     z: Float64Array
     x: Float64Array
+    visible: float = 1.0
+    """Share of all rows in which no vehicle hides the line."""
 
 
 PAINT, HIDDEN = 255, 128
@@ -93,10 +95,12 @@ def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) 
     columns = (middles + 2 * half + 1)[:, None] + around
     near = np.take_along_axis(padded, columns, axis=1)
     band = near == PAINT
-    counts = band.sum(axis=1) * (near != HIDDEN).all(axis=1)
+    visible = (near != HIDDEN).all(axis=1)
+    counts = band.sum(axis=1) * visible
     rows = np.flatnonzero(counts)
     middle = middles[rows] + (band[rows] @ around) / counts[rows]
-    return LinePaint(top_view.distances[rows], top_view.laterals[0] + middle / top_view.across)
+    x = top_view.laterals[0] + middle / top_view.across
+    return LinePaint(top_view.distances[rows], x, float(visible.mean()))
 
 
 def find_base(mask: Image, top_view: TopView, settings: LaneSettings) -> tuple[float, float] | None:
