@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.red_runs import video_info
-from vdet.config.lanes import LaneSettings
+from vdet.config.lanes import LaneSettings, PlaceSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.detections import Detections
 from vdet.geometry import Box
@@ -116,6 +116,15 @@ def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
     assert plain.distance is not None
     assert lower.distance is not None
     assert lower.distance < plain.distance
+
+
+def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road) -> None:
+    low, right = track_at(Box(300, 200, 60, 50)), track_at(Box(300, 200, 60, 45))
+    shortening = replace(road, settings=PlaceSettings(foot=0.1))
+    [shortened], [expected] = with_positions([low], shortening), with_positions([right], road)
+    assert expected.distance is not None
+    assert shortened.distance == pytest.approx(expected.distance)
+    assert shortened.box == low.box
 
 
 @pytest.mark.parametrize(

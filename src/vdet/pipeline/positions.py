@@ -17,7 +17,9 @@ def with_positions(tracks: Sequence[Track], road: Road | None) -> tuple[Track, .
 
 
 def _with_position(track: Track, road: Road) -> Track:
-    position = None if road.cuts(track.box) else road.position(track.foot)
+    x, y = track.foot
+    foot = x, y - road.settings.foot * track.box.height
+    position = None if road.cuts(track.box) else road.position(foot)
     if position is None:
         return replace(track, distance=None, lane=None)
     return replace(track, distance=position.distance, lane=position.lane)
