@@ -97,6 +97,21 @@ def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> Non
     assert len(one) == 9
 
 
+def test_follow_searches_the_frames_that_the_settings_ask_for(clip_path: Path) -> None:
+    settings = vdet.load_settings(assignments=["detector.stride=4"])
+    results = list(vdet.follow(clip_path, settings=settings, frames=9))
+    assert [result.searched for result in results] == [n % 4 == 0 for n in range(9)]
+
+
+def test_a_tracker_is_carried_through_frames_in_which_nobody_looked() -> None:
+    tracker = vdet.Tracker(1280, 720)
+    found = vdet.Detections([[600, 400, 700, 480]], [0.9])
+    for number in range(40):
+        looks = number % 4 == 0
+        tracks = tracker.update(found, number / 25) if looks else tracker.carry(number / 25)
+    assert [(track.id, track.predicted) for track in tracks] == [(1, True)]
+
+
 def test_follow_can_be_left_early(clip_path: Path) -> None:
     results = vdet.follow(clip_path)
     assert next(results).frame.index == 0

@@ -37,7 +37,7 @@ from red_cars import (
 )
 from running import write_drive
 from vdet.config.loading import load_settings
-from vdet.config.schema import OutputSettings, Settings
+from vdet.config.schema import DrawSettings, OutputSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.media import Frame, VideoWriter
@@ -274,8 +274,8 @@ class TestRun:
 
     def test_boxes_are_drawn_where_the_tracks_say(self, red_clip: Path, tmp_path: Path) -> None:
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        fine = SETTINGS.model_copy(update={"output": OutputSettings(crf=1)})
-        run_red(VideoJob(red_clip, wanted, frames=20), fine)
+        exact = {"output": OutputSettings(crf=1), "draw": DrawSettings(smoothing=0)}
+        run_red(VideoJob(red_clip, wanted, frames=20), SETTINGS.model_copy(update=exact))
         records = [json.loads(line) for line in (tmp_path / "out.jsonl").read_text().splitlines()]
         before, after = read(red_clip)[:20], read(tmp_path / "out.mp4")
         for old, new, record in zip(before, after, records, strict=True):

@@ -286,6 +286,20 @@ def test_trails_lie_under_the_boxes() -> None:
     assert (last[box.bottom - 1, box.x : box.right] == color_of(1)).all()
 
 
+def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
+    seen = road_seen(LENS)
+    foot = np.array([[CAR.x + CAR.width / 2, float(CAR.bottom)]])
+    ((x, y),) = seen.place_points(foot).tolist()
+    assert abs(y - CAR.bottom) > 1, "the lens moves the foot"
+    overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=0.0)
+    for number in range(10):
+        start = CAR.moved_to(CAR.x - 4 * (9 - number), CAR.y)
+        drawn = overlay.draw(result_of(start, found=seen, time=Fraction(number, 25)))
+    rows, columns = np.nonzero((drawn != seen.image).any(axis=2))
+    assert abs(columns.max() - x) <= 2
+    assert abs(rows[columns == columns.max()].mean() - y) <= 2
+
+
 def test_trails_of_vehicles_that_are_gone_are_forgotten() -> None:
     overlay = overlay_with(trails=1.0)
     for result in passing(50):
