@@ -27,8 +27,10 @@ class DrawSettings(Section):
         "(those that are known); [] for no labels; [auto]: id in a video, id and score in a "
         "picture",
     )
-    colors: Literal["id", "class", "one"] = Field(
-        "id", description="what has a colour of its own: each id, each class; one: all are alike"
+    colors: Literal["id", "class", "region", "one"] = Field(
+        "id",
+        description="what has a colour of its own: each id, each class, each polygon of the "
+        "section regions; one: all are alike",
     )
     thickness: float = Field(
         1.0, gt=0, le=20, description="factor of the width of lines, which follows from the frame"

@@ -12,7 +12,9 @@ from pipeline.red_runs import VIDEO, result_of
 from red_cars import CAR, HEIGHT, WIDTH, road
 from vdet.config.draw import DrawSettings
 from vdet.config.lanes import LaneSettings
-from vdet.draw.boxes import BLACK, GREEN, color_of, draw_box, draw_label
+from vdet.config.regions import RegionSettings, RegionsSettings
+from vdet.config.schema import Settings
+from vdet.draw.boxes import BLACK, GREEN, WHITE, color_of, draw_box, draw_label
 from vdet.geometry import Box
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
@@ -36,7 +38,7 @@ LANE = Lane(
 
 
 def overlay_with(*, video: VideoInfo | None = VIDEO, **settings: Any) -> Overlay:
-    return Overlay(DrawSettings(**settings), video)
+    return Overlay(Settings(draw=DrawSettings(**settings)), video)
 
 
 def drawn_on(result: FrameResult, *, video: VideoInfo | None = VIDEO, **settings: Any) -> Image:
@@ -236,6 +238,23 @@ def test_colors_can_be_those_of_the_classes() -> None:
     colors = [tuple(image[149, box.x + 25].tolist()) for box in boxes]
     assert colors[0] == colors[1]
     assert len(set(colors)) == 4
+
+
+def test_colors_can_be_those_of_the_regions() -> None:
+    halves = {
+        "left": ((0, 0), (0.5, 0), (0.5, 1), (0, 1)),
+        "middle": ((0.5, 0), (0.7, 0), (0.7, 1), (0.5, 1)),
+    }
+    polygons = [RegionSettings(name=name, points=points) for name, points in halves.items()]
+    settings = Settings(
+        draw=DrawSettings(colors="region"), regions=RegionsSettings(polygons=tuple(polygons))
+    )
+    boxes = [Box(x, 100, 40, 40) for x in (10, 80, 170, 260)]
+    image = Overlay(settings, None).draw(result_of(*boxes, image=white(320, 240) // 2))
+    one, same, other, outside = (tuple(image[139, box.x + 20].tolist()) for box in boxes)
+    assert one == same
+    assert len({one, other, outside}) == 3
+    assert outside == WHITE
 
 
 def test_all_vehicles_can_have_one_color() -> None:

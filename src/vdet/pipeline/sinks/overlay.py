@@ -8,7 +8,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from vdet.config.draw import AUTO, DrawSettings
+from vdet.config.draw import AUTO
+from vdet.config.schema import Settings
 from vdet.detect.classes import OUR_NAMES
 from vdet.draw.boxes import (
     BLACK,
@@ -26,6 +27,7 @@ from vdet.lanes.road import Road
 from vdet.media import VideoInfo
 from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
+from vdet.regions import Regions
 from vdet.track.steady import SteadyBoxes
 from vdet.track.track import Track
 
@@ -47,12 +49,16 @@ class Overlay:
         The video; None for a picture, which has no trails, no time and no smoothing.
     """
 
-    def __init__(self, settings: DrawSettings, video: VideoInfo | None) -> None:
-        self._settings = settings
+    def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
+        self._settings = settings.draw
+        self._region_settings = settings.regions
+        self._regions: Regions | None = None
         self._start = video.start if video else None
         automatic = VIDEO_LABEL if video else PICTURE_LABEL
-        self._label = automatic if AUTO in settings.label else settings.label
-        self._steady = SteadyBoxes(settings.smoothing) if video and settings.smoothing else None
+        self._label = automatic if AUTO in settings.draw.label else settings.draw.label
+        self._steady = (
+            SteadyBoxes(settings.draw.smoothing) if video and settings.draw.smoothing else None
+        )
         self._trails: dict[int, Points] = {}
         self._missed: set[int] = set()
 
@@ -68,9 +74,11 @@ class Overlay:
         image = (result.road or result.frame).image.copy()
         if result.road and result.road.lane:
             draw_lane(image, result.road.lane)
+        height, width = result.frame.image.shape[:2]
+        colors = {track.id: self._color(track, width, height) for track in shown}
         shown = _placed(shown, result.road, image)
-        self._draw_trails(image, shown, float(result.frame.time))
-        self._draw_vehicles(image, shown)
+        self._draw_trails(image, shown, colors, float(result.frame.time))
+        self._draw_vehicles(image, shown, colors)
         if self._settings.time and self._start is not None:
             draw_label(image, time_text(result.frame.time - self._start), (0, len(image)), BLACK)
         return image
@@ -86,7 +94,9 @@ class Overlay:
             tracks = [track for track in tracks if track.id not in self._missed]
         return sorted(tracks, key=lambda track: track.box.bottom)
 
-    def _draw_trails(self, image: Image, shown: Sequence[Track], now: float) -> None:
+    def _draw_trails(
+        self, image: Image, shown: Sequence[Track], colors: Mapping[int, Color], now: float
+    ) -> None:
         longest = self._settings.trails
         if self._start is None or not longest:
             return
@@ -99,27 +109,38 @@ class Overlay:
         width = line_width(image, self._settings.thickness)
         for track in shown:
             path = [(x, y) for _, x, y in self._trails[track.id]]
-            draw_trail(image, path, self._color(track), width)
+            draw_trail(image, path, colors[track.id], width)
 
-    def _draw_vehicles(self, image: Image, shown: Sequence[Track]) -> None:
+    def _draw_vehicles(
+        self, image: Image, shown: Sequence[Track], colors: Mapping[int, Color]
+    ) -> None:
         settings = self._settings
         if settings.boxes:
             for track in shown:
                 dashed = settings.predicted == "dashed" and track.id in self._missed
-                color, thickness = self._color(track), settings.thickness
+                color, thickness = colors[track.id], settings.thickness
                 draw_box(image, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:
             if text := label_text(track, self._label):
-                draw_label(image, text, (track.box.x, track.box.y), self._color(track))
+                draw_label(image, text, (track.box.x, track.box.y), colors[track.id])
 
-    def _color(self, track: Track) -> Color:
+    def _color(self, track: Track, width: int, height: int) -> Color:
         match self._settings.colors:
             case "id":
                 return color_of(track.id)
             case "class":
                 return _class_color(track.class_name)
+            case "region":
+                return self._region_color(track, width, height)
             case "one":
                 return GREEN
+
+    def _region_color(self, track: Track, width: int, height: int) -> Color:
+        """Return the colour of the first polygon in which a vehicle stands; white in none."""
+        if self._regions is None:
+            self._regions = Regions(self._region_settings, width, height)
+        name = self._regions.name_at(track.foot)
+        return WHITE if name is None else color_of(list(self._regions.included).index(name) + 1)
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:

@@ -16,7 +16,7 @@ class PictureSink:
     def __init__(self, path: Path, context: SinkContext) -> None:
         self._path = path
         self._context = context
-        self._overlay = Overlay(context.settings.draw, None)
+        self._overlay = Overlay(context.settings, None)
         self._is_done = False
 
     def __enter__(self) -> Self:

@@ -24,7 +24,7 @@ class VideoSink:
         self._path = path
         self._context = context
         self._video = context.video
-        self._overlay = Overlay(context.settings.draw, context.video)
+        self._overlay = Overlay(context.settings, context.video)
         counts = context.settings.counts
         self._counts = CountsPicture(layout_of(context)) if counts and counts.drawn else None
         self._stack = ExitStack()
