@@ -6,7 +6,11 @@ from pathlib import Path
 
 from benchmarks.material import ShippedConfig
 from benchmarks.rounds import Task, measure
+from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
+from vdet.config.draw import DrawSettings
+from vdet.config.regions import RegionSettings, RegionsSettings
 from vdet.config.schema import NetworkSettings
+from vdet.config.section import Section
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
@@ -21,11 +25,31 @@ CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0,
 """Similar to the project video's camera; the numbers do not change the time of undistortion."""
 
 
+ANSWERS: dict[str, Section] = {
+    "regions": RegionsSettings(
+        polygons=(RegionSettings(name="all", points=((0, 0), (1, 0), (1, 1), (0, 1))),)
+    ),
+    "counts": CountSettings(
+        lines=tuple(
+            LineSettings(name=f"row {row}", start=(0, row), end=(1, row), left="up", right="down")
+            for row in (0.65, 0.7, 0.75)
+        ),
+        zones=(
+            ZoneSettings(name="near", points=((0.5, 0.6), (1, 0.6), (1, 1), (0.7, 1))),
+            ZoneSettings(name="left", points=((0, 0.6), (0.5, 0.6), (0.3, 1), (0, 1))),
+        ),
+    ),
+    "draw": DrawSettings(trails=2),
+}
+"""A region that leaves nothing out, three lines and two zones, and trails."""
+
+
 def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> dict[str, float]:
     """Return the seconds that the first `FRAMES` frames take.
 
     Keys: `pass through` (read and written), `detect` (vehicles detected, drawn and written),
-    `detect with lanes`, `detect with network`, `detect only` (nothing written).
+    `detect with lanes`, `detect with network`, `detect with answers` (`ANSWERS`, counts and records
+    of vehicles too), `detect only` (nothing written).
     """
     out = folder / "out.mp4"
     model = default.detector
@@ -52,6 +76,13 @@ def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> 
     def detect_with_network() -> None:
         detect(network)
 
+    answering = default.settings.model_copy(update=ANSWERS)
+    answers = (Output("counts", folder / "counts.csv"), Output("summary", folder / "cars.csv"))
+
+    def detect_with_answers() -> None:
+        outputs = (Output("video", out), *answers)
+        run_video(VideoJob(path, outputs, frames=FRAMES, overwrite=True), model, answering)
+
     def detect_only() -> None:
         run_video(VideoJob(path, frames=FRAMES), model, default.settings)
 
@@ -60,6 +91,7 @@ def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> 
         "detect": detect,
         "detect with lanes": detect_with_lanes,
         "detect with network": detect_with_network,
+        "detect with answers": detect_with_answers,
         "detect only": detect_only,
     }
     return measure(tasks, rounds)
