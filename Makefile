@@ -69,7 +69,7 @@ unseen: $(READY)  ## measure the network on cameras that it has not seen (hours)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH)
 
-picture: $(READY)  ## draw the picture of the README
+picture: $(READY)  ## draw the pictures of the README
 	$(BIN)/python -m docs.picture
 
 # The versions in constraints.txt are the ones that the tests were last run with.
