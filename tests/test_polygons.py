@@ -93,12 +93,12 @@ class TestPolygons:
         assert not crosses_itself(corners)
         assert area_of(corners) > 0
 
-    @given(stars(), points, points)
+    @given(stars(), st.floats(0, 6), st.floats(41, 90), st.booleans())
     def test_a_path_from_outside_to_inside_meets_the_border(
-        self, corners: list[Point], start: Point, end: Point
+        self, corners: list[Point], angle: float, far: float, outwards: bool
     ) -> None:
-        assume(contains(corners, start) != contains(corners, end))
-        outline = Outline(tuple(corners), tuple(sides(corners)), (1e9, 1e9))
+        start, end = (0.0, 0.0), (far * math.cos(angle), far * math.sin(angle))
+        start, end = (start, end) if outwards else (end, start)
         shifted = [(x + 500, y + 500) for x, y in corners]
         outline = Outline(tuple(shifted), tuple(sides(shifted)), (1e4, 1e4))
         path = ((start[0] + 500, start[1] + 500), (end[0] + 500, end[1] + 500))

@@ -151,7 +151,7 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
     assert result.code == 0, result.err
     own = events_of(out / "day" / "a.counts.csv")
     assert own == events_of(out / "day" / "b.counts.csv")
-    with (out / "counts.counts.csv").open() as file:
+    with (out / "all.counts.csv").open() as file:
         videos = [row["video"] for row in csv.DictReader(file)]
     assert videos == ["day/a"] * len(own) + ["day/b"] * len(own)
 

@@ -21,7 +21,7 @@ from vdet.pipeline.sinks.tracks import TrackSink
 from vdet.pipeline.sinks.video import VideoSink
 
 FRAMES = 15
-KNOWN = "known are video, tracks, stages, picture, json, counts"
+KNOWN = "known are video, tracks, stages, picture, json, summary, crops, report, counts"
 
 
 @pytest.fixture(scope="module")
