@@ -49,7 +49,7 @@ def stage_pictures(
     top
         The top view of the frame, BGR uint8 `(rows, columns, 3)`; `above`, and `fit` with the lane.
     mask
-        The paint in the top view, uint8 `(rows, columns)`.
+        The paint in the top view, uint8 `(rows, columns)`; what vehicles hide is grey.
     """
     road = image.copy()
     outline = _fixed_point(top_view.outline)

@@ -48,7 +48,7 @@ class Road:
     """The road in one frame of a video."""
 
     view: FrameView
-    """The frame's pictures, from `RoadFinder.observe`."""
+    """The frame's pictures, from `RoadFinder.observe`; in `mask`, vehicles are `paint.HIDDEN`."""
     lane: Lane | None
     """The lane, smoothed over this frame and those before; None if it is not reliably known."""
     curves: LaneCurves | None

@@ -1,0 +1,245 @@
+"""Errors of the distance and the lane of vehicles, on drawn roads where their places are known.
+
+Each step has one more source of error: `truth` has the true lines and the true boxes, `lane` the
+lines that are found in the drawn frames, `tracks` also the boxes that the detector and the tracker
+show (in a third of the scenes).
+"""
+
+import argparse
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import pairwise, product
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.lanes import LaneSettings, PlaceSettings
+from vdet.config.loading import find_config, load_settings
+from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
+from vdet.lanes.curves import LaneCurves
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.media import Frame, VideoInfo
+from vdet.media.images import Image
+from vdet.pipeline.loop import follow_frames, peek
+from vdet.pipeline.positions import with_positions
+from vdet.pipeline.threads import single_threaded_libraries
+from vdet.synthetic import must_be_found, traffic_scene, true_boxes
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.lane_view import lane_view
+from vdet.synthetic.render import Renderer
+from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import TruePlace, true_places
+from vdet.track.track import Track
+
+FRAMES = 100
+COUNTED = range(15, FRAMES, 2)
+"""Frames that are counted; before them, the lane and the tracks begin."""
+CAMERAS = (
+    PinholeCamera.dashboard(1280, 720),
+    PinholeCamera.dashboard(960, 540),
+    PinholeCamera(1242, 375, 721, 0.46 * 375, 1.65),
+    PinholeCamera(1920, 1080, 1500, 0.45 * 1080, 1.4),
+    PinholeCamera(640, 360, 560, 0.52 * 360, 1.3),
+    PinholeCamera(1280, 720, 900, 0.45 * 720, 2.2),
+    PinholeCamera(1280, 720, 1800, 0.5 * 720, 1.3),
+)
+RADII = (np.inf, 800.0, -400.0, 250.0)
+PITCH = (0, 2, 4, 5, 3, 0, -3, -4, -2)
+"""Rows of 720 by which the horizon of a camera that pitches lies lower, for two frames each."""
+EDGES = (0, 10, 20, 30, 40, 55)
+"""Ranges of the true distance, metres."""
+MOST = 40
+RIGHT = 0.1
+"""Largest error of a distance that counts as right, share of it."""
+LEAST_IOU = 0.5
+"""Of a shown box with the vehicle whose place it is compared with."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A scene, whether its camera pitches, and a setting."""
+
+    scene: Scene
+    pitches: bool = False
+    foot: float = 0.0
+    """Setting `lanes.place.foot`."""
+
+    def at(self, index: int) -> Scene:
+        """Return the scene as the camera sees it in a frame."""
+        camera = self.scene.camera
+        rows = PITCH[index // 2 % len(PITCH)] * camera.height / 720 if self.pitches else 0
+        return replace(self.scene, camera=replace(camera, horizon=camera.horizon + rows))
+
+    def images(self) -> Iterator[Image]:
+        """Draw the frames."""
+        renderer = Renderer(self.scene)
+        for index in range(FRAMES):
+            drawn = Renderer(self.at(index)) if self.pitches else renderer
+            yield drawn.image(index)
+
+    def finder(self) -> RoadFinder:
+        """Return the lane finder, set to the road from 6 m, or the nearest seen, to 42 m."""
+        camera = self.scene.camera
+        nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
+        view = lane_view(camera, near=max(6.0, nearest), far=42.0)
+        settings = LaneSettings(view=view, place=PlaceSettings(foot=self.foot))
+        return RoadFinder(LaneRequest(), settings, camera.width, camera.height)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A vehicle in a frame, and what was told of it."""
+
+    truth: TruePlace
+    told: Track
+
+    @property
+    def error(self) -> float:
+        """Of the distance, share of it."""
+        assert self.told.distance is not None
+        return self.told.distance / self.truth.distance - 1
+
+
+Step = Callable[[Drive], Iterator[Sample]]
+
+
+def main() -> None:
+    """Run the steps, and print a table of each."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.distances", description=__doc__)
+    parser.add_argument("steps", nargs="*", help="truth, lane, tracks (default: all)")
+    parser.add_argument("--foot", type=float, default=0.0, help="the setting lanes.place.foot")
+    parser.add_argument(
+        "-c", "--config", default="default", help="settings of the detector: default, seed, net"
+    )
+    options = parser.parse_args()
+    settings = load_settings(find_config(options.config))
+    steps: dict[str, Step] = {"truth": true_lines, "lane": found_lines, "tracks": Shown(settings)}
+    for name in options.steps or steps:
+        every = 3 if name == "tracks" else 1
+        chosen = [replace(drive, foot=options.foot) for drive in [*drives()][::every]]
+        by_drive = [[*steps[name](drive)] for drive in chosen]
+        print_table(name, [sample for samples in by_drive for sample in samples])
+        worst = min(_right(samples) for samples in by_drive)
+        print(f"worst of {len(by_drive)} scenes, to {MOST} m: {worst:.1%} within {RIGHT:.0%}\n")
+
+
+def drives() -> Iterator[Drive]:
+    """Give the scenes: each camera on each road, and cameras that pitch."""
+    for number, (camera, radius) in enumerate(product(CAMERAS, RADII)):
+        yield Drive(scene_of(camera, radius, number))
+    for number, radius in enumerate((np.inf, 500.0)):
+        yield Drive(scene_of(CAMERAS[number], radius, 101 + number), pitches=True)
+
+
+def scene_of(camera: PinholeCamera, radius: float, seed: int) -> Scene:
+    """Return a road with three lanes, a near and a far car in each; they drive off or come near."""
+    bent = replace(camera, curvature=1 / radius)
+    scene = traffic_scene(bent, lane=seed % 3, lanes=3, frames=FRAMES, seed=seed)
+    return replace(
+        scene, vehicles=tuple(moving(each, off=seed % 2 == 0) for each in scene.vehicles)
+    )
+
+
+def moving(vehicle: SceneVehicle, *, off: bool) -> SceneVehicle:
+    """Give a car of `traffic_scene` another path: between 6 and 26 m, or between 27 and 55 m."""
+    last, lateral = vehicle.path[-1].time, vehicle.path[0].lateral
+    near = vehicle.id % 2 == 1
+    ends = (6 + 0.6 * abs(lateral), 26.0) if near else (27 + abs(lateral), 55.0)
+    start, end = ends if off else reversed(ends)
+    return replace(vehicle, path=(Waypoint(0, start, lateral), Waypoint(last, end, lateral)))
+
+
+def true_lines(drive: Drive) -> Iterator[Sample]:
+    """Place the true boxes by the true lines."""
+    camera = drive.scene.camera
+    finder = drive.finder()
+    bare = finder.update(finder.observe(np.zeros((camera.height, camera.width, 3), np.uint8)))
+    for index in COUNTED:
+        scene = drive.at(index)
+        pitch = (scene.camera.horizon - camera.horizon) / (camera.focal * camera.above_ground)
+        curves = LaneCurves(camera.curvature / 2, 0, -1.85, 1.85, pitch)
+        yield from by_true_boxes(scene, index, replace(bare, curves=curves))
+
+
+def found_lines(drive: Drive) -> Iterator[Sample]:
+    """Place the true boxes by the lines that are found."""
+    finder = drive.finder()
+    for index, image in enumerate(drive.images()):
+        scene = drive.at(index)
+        vehicles = [each.box for each in true_boxes(scene, index)]
+        road = finder.update(finder.observe(image), vehicles)
+        if index in COUNTED:
+            yield from by_true_boxes(scene, index, road)
+
+
+def by_true_boxes(scene: Scene, index: int, road: Road) -> Iterator[Sample]:
+    """Give the vehicles that must be found."""
+    places = {place.id: place for place in true_places(scene, index)}
+    for each in true_boxes(scene, index):
+        if must_be_found(each, scene.camera.height):
+            [track] = with_positions([Track(each.id, each.box, 1.0, predicted=False)], road)
+            yield Sample(places[each.id], track)
+
+
+class Shown:
+    """Place the boxes that a detector and a tracker show, by the lines that are found."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.model = load_detector(settings.detector)
+
+    def __call__(self, drive: Drive) -> Iterator[Sample]:
+        """Give the shown vehicles that must be found."""
+        camera, rate = drive.scene.camera, drive.scene.rate
+        video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
+        clip = (Frame(i, Fraction(i) / rate, image) for i, image in enumerate(drive.images()))
+        first, all_frames = peek(clip)
+        with single_threaded_libraries():
+            detector = self.model.for_video(camera.width, camera.height, first)
+            results = follow_frames(
+                all_frames, detector, self.settings, video, roads=drive.finder()
+            )
+            for result in results:
+                if result.frame.index in COUNTED:
+                    yield from _matched(
+                        drive.at(result.frame.index), result.frame.index, result.tracks
+                    )
+
+
+def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Sample]:
+    places = {place.id: place for place in true_places(scene, index)}
+    boxes = true_boxes(scene, index)
+    for track in tracks:
+        best = max(boxes, key=lambda each: each.box.iou(track.box))
+        counts = must_be_found(best, scene.camera.height)
+        if counts and best.box.iou(track.box) > LEAST_IOU:
+            yield Sample(places[best.id], track)
+
+
+def _right(samples: Sequence[Sample]) -> float:
+    known = [s for s in samples if s.told.distance is not None and s.truth.distance <= MOST]
+    return float(np.mean([abs(sample.error) <= RIGHT for sample in known])) if known else 1.0
+
+
+def print_table(name: str, samples: Sequence[Sample]) -> None:
+    """Print a row for each range of the distance, and one for all up to `MOST`."""
+    print(f"| {name}: metres | boxes | none | mean | median | 95 % | within 10 % | lane right |")
+    print("|---|---|---|---|---|---|---|---|")
+    for low, high in (*pairwise(EDGES), (0, MOST)):
+        inside = [sample for sample in samples if low < sample.truth.distance <= high]
+        known = [sample for sample in inside if sample.told.distance is not None]
+        if known:
+            errors = np.array([sample.error for sample in known])
+            lanes = np.mean([sample.told.lane == sample.truth.lane for sample in known])
+            print(
+                f"| {low}–{high} | {len(inside)} | {1 - len(known) / len(inside):.0%} | "
+                f"{errors.mean():+.1%} | {np.median(abs(errors)):.1%} | "
+                f"{np.quantile(abs(errors), 0.95):.1%} | {(abs(errors) <= RIGHT).mean():.1%} | "
+                f"{lanes:.1%} |"
+            )
+
+
+if __name__ == "__main__":
+    main()
