@@ -28,7 +28,7 @@ WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 SETTINGS = Settings(
-    lanes=LaneSettings(view=lane_view(CAMERA, near=6, far=42)),
+    lanes=LaneSettings(view=lane_view(CAMERA, near=6, far=42), place=PlaceSettings(foot=0)),
     tracker=MotionTrackerSettings(needed=0.05),
 )
 SCENE = Scene(
