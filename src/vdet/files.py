@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-import shutil
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -13,7 +12,7 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from vdet.errors import OutputError, VdetError
-from vdet.temporary import create_file, create_folder, remove_stale, sync
+from vdet.temporary import create_file, create_folder, remove_stale, sync, try_to_remove
 
 _CHUNK = 1_000_000  # bytes
 _MAX_SHOWN = 80  # characters of a name
@@ -156,13 +155,10 @@ class OutputFiles:
         """
         with output_errors(path):
             remove_stale(path.parent)
-            temporary, descriptor = create_file(path)
+            temporary = create_file(path, self._cleanup)
             if self._overwrite and path.is_file() and not path.is_symlink():
                 # What replaces a private file is private from the beginning.
                 temporary.chmod(stat.S_IMODE(path.stat().st_mode) | stat.S_IRUSR | stat.S_IWUSR)
-        if descriptor is not None:
-            self._cleanup.callback(os.close, descriptor)
-        self._cleanup.callback(_try_to_remove, temporary)
         self._staged.append(_Staged(temporary, path, may_replace))
         return temporary
 
@@ -175,10 +171,7 @@ class OutputFiles:
         """
         with output_errors(path):
             remove_stale(path)
-            temporary, descriptor = create_folder(path)
-        if descriptor is not None:
-            self._cleanup.callback(os.close, descriptor)
-        self._cleanup.callback(shutil.rmtree, temporary, ignore_errors=True)
+            temporary = create_folder(path, self._cleanup)
         self._staged.append(_StagedFolder(temporary, path, pattern))
         return temporary
 
@@ -204,12 +197,12 @@ class OutputFiles:
                         _replace(file)
                     else:
                         _add_name(file.temporary, file.path)
-                        undo.callback(_try_to_remove, file.path)
+                        undo.callback(try_to_remove, file.path)
             undo.pop_all()
         if self._overwrite:
             found = {path for staged in self._staged for path in staged.earlier()}
             for old in found - {file.path for file in files}:
-                _try_to_remove(old)
+                try_to_remove(old)
 
 
 def _replace(file: _Staged) -> None:
@@ -247,7 +240,7 @@ def _take_name(temporary: Path, path: Path) -> None:
     try:
         temporary.replace(path)
     except BaseException:
-        _try_to_remove(path)
+        try_to_remove(path)
         raise
 
 
@@ -298,11 +291,6 @@ def write_json(values: Any, target: str, *, overwrite: bool = False) -> None:
         return
     with staged(Path(target), overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _try_to_remove(path: Path) -> None:
-    with contextlib.suppress(OSError):
-        path.unlink()
 
 
 def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> bytes:

@@ -1,7 +1,7 @@
 """Temporary files and folders, which outputs are written into before they appear.
 
-A temporary file lies beside its output and is named `.name.vdet-1a2b3c4d.suffix`; a temporary
-folder lies in the folder that its files go into. The writer holds a lock on it, which the system
+A temporary file lies beside its output and is named `.name.vdet-`, 16 digits and the suffix; a
+temporary folder lies in the folder that its files go into. The writer holds a lock on it, which the system
 releases when the process ends, in whatever way. So what a killed run left can be told from what
 another run is writing at the moment, also from other machines on a shared file system.
 """
@@ -19,47 +19,55 @@ try:
 except ImportError:  # Windows: files are not locked, and none is taken for stale
     fcntl = None  # type: ignore[assignment]
 
-_NAME = re.compile(r"\..*\.vdet-[0-9a-f]{8}(\.[^.]*)?", re.DOTALL)
+_NAME = re.compile(r"\..*\.vdet-([0-9a-f]{8}){1,2}(\.[^.]*)?", re.DOTALL)
 _MAX_STEM = 200  # bytes; a whole name may have 255
 _NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
 _FLAGS = os.O_RDWR | _NOT_A_LINK | getattr(os, "O_BINARY", 0)
 _FOLDER_FLAGS = os.O_RDONLY | _NOT_A_LINK | getattr(os, "O_DIRECTORY", 0)
 
 
-def create_file(path: Path) -> tuple[Path, int | None]:
-    """Make an empty file beside `path`; return it, and the open descriptor that holds its lock.
+def create_file(path: Path, cleanup: contextlib.ExitStack) -> Path:
+    """Make an empty file beside `path` and return it; `cleanup` unlocks and removes it.
 
-    The descriptor is None where there are no locks.
+    It would also remove another file of that name, but no two get the same one.
     """
     while True:
         candidate = _candidate(path, path.parent)
+        cleanup.callback(try_to_remove, candidate)  # an interrupt may come as soon as it is there
         descriptor = os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
         if fcntl is None:
             os.close(descriptor)
-            return candidate, None
+            return candidate
+        cleanup.callback(os.close, descriptor)
         # Another run may have taken it for stale and removed it before it was locked.
         if try_to_lock(descriptor) and os.fstat(descriptor).st_nlink:
-            return candidate, descriptor
-        os.close(descriptor)
+            return candidate
 
 
-def create_folder(path: Path) -> tuple[Path, int | None]:
-    """Make an empty folder in the folder `path`; return as `create_file` does."""
+def create_folder(path: Path, cleanup: contextlib.ExitStack) -> Path:
+    """Make an empty folder in the folder `path` and return it, as `create_file` does."""
     while True:
         candidate = _candidate(path, path)
+        cleanup.callback(shutil.rmtree, candidate, ignore_errors=True)
         candidate.mkdir()
         if fcntl is None:
-            return candidate, None
+            return candidate
         with contextlib.suppress(FileNotFoundError):  # as above
             descriptor = os.open(candidate, _FOLDER_FLAGS)
+            cleanup.callback(os.close, descriptor)
             if try_to_lock(descriptor) and candidate.is_dir():
-                return candidate, descriptor
-            os.close(descriptor)
+                return candidate
 
 
 def _candidate(path: Path, folder: Path) -> Path:
     stem = os.fsencode(path.stem)[:_MAX_STEM].decode(errors="ignore")
-    return folder / f".{stem}.vdet-{secrets.token_hex(4)}{path.suffix}"
+    return folder / f".{stem}.vdet-{secrets.token_hex(8)}{path.suffix}"
+
+
+def try_to_remove(path: Path) -> None:
+    """Remove a file if it is there and can be removed."""
+    with contextlib.suppress(OSError):
+        path.unlink()
 
 
 def remove_stale(folder: Path) -> None:
