@@ -1,9 +1,9 @@
 """Temporary files and folders, which outputs are written into before they appear.
 
 A temporary file lies beside its output and is named `.name.vdet-`, 16 digits and the suffix; a
-temporary folder lies in the folder that its files go into. The writer holds a lock on it, which the system
-releases when the process ends, in whatever way. So what a killed run left can be told from what
-another run is writing at the moment, also from other machines on a shared file system.
+temporary folder lies in the folder that its files go into. The writer holds a lock on it, which the
+system releases when the process ends, in whatever way. So what a killed run left can be told from
+what another run is writing at the moment, also from other machines on a shared file system.
 """
 
 import contextlib
