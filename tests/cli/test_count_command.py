@@ -179,6 +179,22 @@ class TestRegions:
         assert found["roi.yaml"] == found["mask.png"]
 
     @pytest.mark.parametrize(
+        "command",
+        [
+            ("eval", "video", "red.mp4", "--truth", "gt.txt"),
+            ("eval", "images", "pictures"),
+            ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip"),
+        ],
+    )
+    def test_a_command_that_looks_at_whole_frames_refuses_them(
+        self, run: Run, command: tuple[str, ...]
+    ) -> None:
+        outline = "points: [[0, 0], [1, 0], [1, 1]]"
+        result = run(*command, "--set", f"regions.polygons=[{{name: a, {outline}}}]")
+        assert result.code == 1
+        assert "regions: this command looks at whole frames" in result.err
+
+    @pytest.mark.parametrize(
         ("text", "message"),
         [
             ("{name: a, points: [[0, 0], [1, 1]]}", "roi.yaml:1:22: regions.polygons[0].points: h"),

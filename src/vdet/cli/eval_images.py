@@ -10,7 +10,7 @@ from vdet.cli.options import (
     PATH,
     model_option,
     print_results,
-    read_settings,
+    read_whole_frame_settings,
     results_options,
     settings_options,
 )
@@ -72,7 +72,7 @@ def images(
     from vdet.evaluate.images.text import lines, plain
     from vdet.evaluate.report.images_page import images_page
 
-    detector = read_settings(config_name, assignments, model_path).detector
+    detector = read_whole_frame_settings(config_name, assignments, model_path).detector
     model = load_detector(detector.showing_all(), model_path)
     file = model_file(detector, model_path)
     check_outputs(

@@ -11,8 +11,8 @@ from vdet.cli.options import (
     POSITIVE,
     model_option,
     print_results,
-    read_settings,
     read_sinks,
+    read_whole_frame_settings,
     results_options,
     settings_options,
     sink_option,
@@ -87,14 +87,14 @@ def video(
 
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
-    base = read_settings(config_name, assignments, model_path)
+    base = read_whole_frame_settings(config_name, assignments, model_path)
     swept = grid(with_values_in_force(sweeps, base))
     outputs = read_sinks(sinks)
     if outputs and (len(swept) > 1 or len(videos) > 1):
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
     variants = []
     for extra in swept:
-        settings = read_settings(config_name, (*assignments, *extra), model_path)
+        settings = read_whole_frame_settings(config_name, (*assignments, *extra), model_path)
         variants.append(Variant(settings, load_detector(settings.detector, model_path), extra))
     detectors = [variant.settings.detector for variant in variants]
     files = [path for each in detectors if (path := model_file(each, model_path))]

@@ -11,7 +11,7 @@ from vdet.cli.options import (
     POSITIVE,
     model_option,
     overwrite_option,
-    read_settings,
+    read_whole_frame_settings,
     settings_options,
 )
 from vdet.detect.factory import model_file
@@ -87,7 +87,7 @@ def mine(
         raise click.UsageError("--until must not be before --from")
     if output.suffix.lower() != ".zip":
         raise OutputError(f"{output}: patches are written as .zip; name it so")
-    settings = read_settings(config_name, assignments, model_path)
+    settings = read_whole_frame_settings(config_name, assignments, model_path)
     file = model_file(settings.detector, model_path)
     inputs = [video, truth, *([file] if file else [])]
     check_output(output, overwrite=overwrite, inputs=inputs)

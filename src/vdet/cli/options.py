@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.config.loading import find_config, load_settings, shipped_configs
 from vdet.config.schema import Settings
+from vdet.errors import ConfigError
 from vdet.evaluate.output import write_page
 from vdet.files import write_json
 from vdet.lanes.camera_file import load_camera
@@ -123,6 +124,22 @@ def read_settings(
     path = find_config(config_name) if config_name else None
     named = {"regions": roi, "counts": lines}
     return load_settings(path, assignments, {name: file for name, file in named.items() if file})
+
+
+def read_whole_frame_settings(
+    config_name: str | None, assignments: tuple[str, ...], model_path: Path | None = None
+) -> Settings:
+    """Read the settings of a command that looks at whole frames.
+
+    Raises
+    ------
+    ConfigError
+        They have regions, which would not have an effect.
+    """
+    settings = read_settings(config_name, assignments, model_path)
+    if settings.regions:
+        raise ConfigError("regions: this command looks at whole frames; leave the regions out")
+    return settings
 
 
 roi_option = click.option(
