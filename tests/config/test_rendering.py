@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 
 from seed import SEED
 from vdet.config.document import parse_document
+from vdet.config.lanes import LaneSettings, PlaceSettings
 from vdet.config.loading import load_settings
 from vdet.config.rendering import render
 from vdet.config.schema import (
@@ -132,8 +133,9 @@ def test_the_seed_config_is_printed_but_for_its_first_line() -> None:
     assert rest == render(load_settings(path)).splitlines()[1:]
 
 
-def test_the_config_net_is_the_default_with_a_network() -> None:
-    assert load_settings(CONFIGS / "net.yaml") == Settings(detector=NetworkSettings())
+def test_the_config_net_is_the_default_with_a_network_whose_boxes_end_at_the_tyres() -> None:
+    lanes = LaneSettings(place=PlaceSettings(foot=0))
+    assert load_settings(CONFIGS / "net.yaml") == Settings(detector=NetworkSettings(), lanes=lanes)
 
 
 def test_no_other_config_ships() -> None:
