@@ -53,6 +53,11 @@ class Box:
         """The middle, `(x, y)` in pixels."""
         return self.x + self.width / 2, self.y + self.height / 2
 
+    @property
+    def foot(self) -> tuple[float, float]:
+        """The middle of the lower edge, `(x, y)` in pixels."""
+        return self.x + self.width / 2, float(self.bottom)
+
     def contains(self, point: tuple[float, float]) -> bool:
         """Tell whether `point`, `(x, y)` in pixels, lies in the box."""
         x, y = point

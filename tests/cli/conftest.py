@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from red_cars import SETTINGS, red_finder
+from vdet.config.rendering import render
+from vdet.detect.svm.model import save_model
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
@@ -15,3 +18,12 @@ def truth_path(scene: Scene, tmp_path: Path) -> Path:
     path = tmp_path / "gt.txt"
     write_truth(path, replace(scene, frames=8))
     return path
+
+
+@pytest.fixture(scope="module")
+def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
+    """Options with which red cars are found, by the names of files."""
+    folder = tmp_path_factory.mktemp("red")
+    save_model(red_finder(), folder / "red.npz")
+    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
+    return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))

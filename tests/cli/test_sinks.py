@@ -10,10 +10,8 @@ import pytest
 
 from conftest import Run
 from quick import QUICK_OPTIONS
-from red_cars import CAR, SETTINGS, red_finder, road
+from red_cars import CAR, road
 from running import frames_of, names, write_drive
-from vdet.config.rendering import render
-from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.media import VideoReader
 from vdet.media.images import read_image, write_image
@@ -22,15 +20,6 @@ from vdet.pipeline.sinks.video import VideoSink
 
 FRAMES = 15
 KNOWN = "known are video, tracks, stages, picture, json, summary, crops, report, counts"
-
-
-@pytest.fixture(scope="module")
-def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
-    """Options with which red cars are found, by the names of files."""
-    folder = tmp_path_factory.mktemp("red")
-    save_model(red_finder(), folder / "red.npz")
-    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
-    return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))
 
 
 @pytest.fixture

@@ -7,22 +7,10 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from red_cars import SETTINGS, red_finder
 from running import names, write_drive
-from vdet.config.rendering import render
-from vdet.detect.svm.model import save_model
 
 NASTY = "<img src=x onerror=alert(1)>"
 ENDS = ("--summary", ".cars.csv", "--crops", ".crops", "--report", ".report")
-
-
-@pytest.fixture(scope="module")
-def red(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, ...]:
-    """Options with which red cars are found, by the names of files."""
-    folder = tmp_path_factory.mktemp("red")
-    save_model(red_finder(), folder / "red.npz")
-    (folder / "red.yaml").write_text(render(SETTINGS), encoding="utf-8")
-    return ("--model", str(folder / "red.npz"), "-c", str(folder / "red.yaml"))
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from vdet.count.layout import Border
 from vdet.polygons import Point
 
-_CLOCK = 1e-4
+CLOCK = 1e-4
 """Seconds by which a duration may be shorter than is asked for: times are rounded."""
 
 
@@ -77,7 +77,7 @@ class BorderState:
             return self._settle(sign, sighting, is_far=True) if was_far and sign else None
         if self._beyond != sign:
             self._beyond, self._since = sign, sighting.time
-        if was_far or sighting.time - self._since >= settled - _CLOCK:
+        if was_far or sighting.time - self._since >= settled - CLOCK:
             return self._settle(sign, sighting, is_far=is_far or was_far)
         return None
 

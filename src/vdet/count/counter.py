@@ -5,9 +5,10 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from vdet.count.border import BorderState, Change, Sighting
+from vdet.count.border import CLOCK, BorderState, Change, Sighting
 from vdet.count.events import Event
 from vdet.count.layout import APPEAR, VANISH, Layout, Zone
+from vdet.detect.classes import ClassScores
 from vdet.geometry import Box
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
@@ -15,7 +16,6 @@ from vdet.track.track import FrameTracks, Track
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
 
-_CLOCK = 1e-4
 _LEAVES = 0.1
 """Heights of its box a second that a vehicle moves at least to leave the frame."""
 _MOST_GROWTH = 2.0
@@ -48,15 +48,10 @@ class _Vehicle:
     states: list[BorderState]
     entered: dict[int, float] = field(default_factory=dict)  # by the number of the zone
     velocity: Point = (0.0, 0.0)
-    classes: dict[str, float] = field(default_factory=dict)
+    classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
     tallied: int = 0
     is_taken_over: bool = False
-
-    @property
-    def class_name(self) -> str | None:
-        """The class with the highest sum of scores."""
-        return max(self.classes, key=self.classes.__getitem__, default=None)
 
     @property
     def is_leaving(self) -> bool:
@@ -98,12 +93,6 @@ class _Vehicle:
             Event(at.time, at.frame, name, direction, self.id, None, at.score, stitched, seconds)
         )
 
-    def vote(self, track: Track) -> None:
-        """Add what a frame says of its class."""
-        if track.class_name is not None:
-            weight = self.classes.get(track.class_name, 0.0)
-            self.classes[track.class_name] = weight + track.score
-
 
 class VehicleCounter:
     """Counts the vehicles of one video; make a new one for every video."""
@@ -131,7 +120,7 @@ class VehicleCounter:
             if not track.predicted:
                 sighting = _sighting(track, frame)
                 vehicle = known or self._begin(track.id, sighting, shown)
-                vehicle.vote(track)
+                vehicle.classes.add(track.class_name, track.score)
                 vehicle.outward = _touched_sides(track.box, self._layout.size)
                 self._see(vehicle, sighting)
 
@@ -178,7 +167,7 @@ class VehicleCounter:
                 [state.taken_over() for state in before.states],
                 dict(before.entered),
                 before.velocity,
-                dict(before.classes),
+                ClassScores(before.classes),
             )
         self._vehicles[number] = vehicle
         return vehicle
@@ -226,7 +215,7 @@ class VehicleCounter:
 
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
         seen = vehicle.last.time - vehicle.first.time
-        return seen >= self._layout.settings.confirmed - _CLOCK
+        return seen >= self._layout.settings.confirmed - CLOCK
 
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""
@@ -243,7 +232,7 @@ class VehicleCounter:
             self._end(vehicle)
         self._confirm(vehicle)
         for event in vehicle.events[: vehicle.tallied]:
-            self._events.append(_finished(event, vehicle.class_name))
+            self._events.append(_finished(event, vehicle.classes.best))
 
     def _end(self, vehicle: _Vehicle) -> None:
         for number, state in enumerate(vehicle.states):

@@ -24,3 +24,17 @@ _NAMES = {letters(word): name for name, words in WORDS.items() for word in words
 def our_name(label: str) -> str | None:
     """Return which of `OUR_NAMES` a label means; None where it means none of them."""
     return _NAMES.get(letters(label))
+
+
+class ClassScores(dict[str, float]):
+    """The sum of the scores with which a vehicle was taken for each class."""
+
+    def add(self, name: str | None, score: float) -> None:
+        """Add what one frame says; a name of None says nothing."""
+        if name is not None:
+            self[name] = self.get(name, 0.0) + score
+
+    @property
+    def best(self) -> str | None:
+        """The class with the highest sum, the earliest one among equals; None if none was told."""
+        return max(self, key=self.__getitem__, default=None)

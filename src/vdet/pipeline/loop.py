@@ -270,8 +270,7 @@ def follow_frames(
     with map_ordered(search, enumerate(frames), threads) as results:
         for (_, frame), (found, view) in results:
             searched = found is not None
-            detections = detector.detect(found.candidates) if found else NO_DETECTIONS
-            tracks = follow_frame(tracker, detections, frame, searched=searched)
+            detections, tracks = follow_frame(detector, tracker, found, frame)
             boxes = (track.box for track in tracks)
             road = roads.update(view, boxes) if roads and view else None
             if regions is not None:

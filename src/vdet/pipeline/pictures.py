@@ -205,8 +205,8 @@ def search_picture(
         detections = detector.detect(detector.search(image, None))
     if regions is None:
         return detector, detections
-    feet = [(box.x + box.width / 2, float(box.bottom)) for box in detections.rounded]
-    return detector, detections[[n for n, foot in enumerate(feet) if regions.contains(foot)]]
+    boxes = detections.rounded
+    return detector, detections[[n for n, box in enumerate(boxes) if regions.contains(box.foot)]]
 
 
 @contextlib.contextmanager

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from vdet.detect.detections import Detections
+from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import VideoDetector
 from vdet.media import Frame
 from vdet.track.protocol import CarryingTracker
@@ -35,10 +35,14 @@ def search_frame(
 
 
 def follow_frame(
-    tracker: CarryingTracker, detections: Detections, frame: Frame, *, searched: bool
-) -> tuple[Track, ...]:
-    """Follow the vehicles into a frame; where it was not searched, `detections` do not count."""
+    detector: VideoDetector, tracker: CarryingTracker, found: Search | None, frame: Frame
+) -> tuple[Detections, tuple[Track, ...]]:
+    """Follow the vehicles into a frame; return its detections, if it was searched, and its tracks.
+
+    `found` is what `search_frame` returned for it.
+    """
     time = float(frame.time)
-    if searched:
-        return tuple(tracker.update(detections, time, frame.image))
-    return tuple(tracker.carry(time, frame.image))
+    if found is None:
+        return NO_DETECTIONS, tuple(tracker.carry(time, frame.image))
+    detections = detector.detect(found.candidates)
+    return detections, tuple(tracker.update(detections, time, frame.image))

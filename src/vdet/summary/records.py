@@ -1,11 +1,11 @@
 """A record of each vehicle, from the tracks of each frame."""
 
 import math
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from vdet.config.summary import SummarySettings
+from vdet.detect.classes import ClassScores
 from vdet.geometry import Box
 from vdet.track.track import FrameTracks, Track
 
@@ -115,7 +115,7 @@ class _Vehicle:
         self._seen = self._predicted = 0
         self._scores = 0.0
         self._best = 0.0
-        self._classes: Counter[str] = Counter()
+        self._classes = ClassScores()
         self._largest = track.box
         self._points: list[Point] = []
         self._end: Point = track.foot
@@ -124,8 +124,7 @@ class _Vehicle:
         self._last = time
         self._scores += track.score
         self._best = max(self._best, track.score)
-        if track.class_name is not None:
-            self._classes[track.class_name] += track.score  # type: ignore[assignment]  # a float
+        self._classes.add(track.class_name, track.score)
         if track.box.area > self._largest.area:
             self._largest = track.box
         self._go(track, step)
@@ -152,7 +151,7 @@ class _Vehicle:
         frames = self._seen + self._predicted
         return VehicleRecord(
             id=self._id,
-            class_name=max(self._classes, key=self._classes.__getitem__, default=None),
+            class_name=self._classes.best,
             first=self._first,
             last=self._last,
             seconds=self.seconds,

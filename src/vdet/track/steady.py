@@ -83,7 +83,5 @@ class SteadyBoxes:
 
 
 def _with_box(track: Track, box: Box) -> Track:
-    x, y = track.foot
-    old = track.box
-    across = box.x + box.width / 2 - (old.x + old.width / 2)
-    return replace(track, box=box, whole_foot=(x + across, y + box.bottom - old.bottom))
+    (x, y), (old_x, old_y), (new_x, new_y) = track.foot, track.box.foot, box.foot
+    return replace(track, box=box, whole_foot=(x + (new_x - old_x), y + (new_y - old_y)))

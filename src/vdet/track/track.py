@@ -47,7 +47,7 @@ class Track:
     @property
     def foot(self) -> tuple[float, float]:
         """Where the vehicle stands: the middle of its lower edge, x and y in pixels."""
-        return self.whole_foot or (self.box.x + self.box.width / 2, float(self.box.bottom))
+        return self.whole_foot or self.box.foot
 
 
 @dataclass(frozen=True, slots=True)

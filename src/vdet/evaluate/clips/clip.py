@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.schema import Settings
-from vdet.detect.detections import NO_DETECTIONS
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import ImageError, VideoError
 from vdet.evaluate.labelled_video import LabelledVideo
@@ -154,8 +153,7 @@ def follow_variants(
             for key, detector, tracker in zip(keys, detectors, trackers, strict=True):
                 found = searches[key]
                 searched = found is not None
-                detections = detector.detect(found.candidates) if found else NO_DETECTIONS
-                tracks = follow_frame(tracker, detections, frame, searched=searched)
+                detections, tracks = follow_frame(detector, tracker, found, frame)
                 results.append(
                     FrameResult(
                         video.path, frame, detections, tracks, None, detector, searched=searched

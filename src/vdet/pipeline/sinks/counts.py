@@ -102,7 +102,6 @@ class CountsPicture:
 
 def _placed(points: Sequence[Point], road: Road | None) -> list[Point]:
     """Return where points of the frame lie in the picture that is drawn into."""
-    if road is None or road.undistorter is None:
+    if road is None:
         return list(points)
-    placed = road.undistorter.points(np.array(points, np.float64))
-    return [(x, y) for x, y in placed.tolist()]
+    return [(x, y) for x, y in road.place_points(np.array(points, np.float64)).tolist()]

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field
 
 from vdet.config.schema import MotionTrackerSettings
+from vdet.detect.classes import ClassScores
 from vdet.geometry import Float64Array
 from vdet.track.motion.state import MotionState, measure
 
@@ -82,7 +83,7 @@ class Vehicle:
     hidden: float = 0.0
     _scores: _RecentMean = field(default_factory=_RecentMean)
     _detection_scores: _RecentMean = field(default_factory=_RecentMean)
-    _class_scores: dict[str, float] = field(default_factory=dict)
+    _class_scores: ClassScores = field(default_factory=ClassScores)
 
     @classmethod
     def new(
@@ -109,7 +110,7 @@ class Vehicle:
     @property
     def class_name(self) -> str | None:
         """The class with the highest sum of scores."""
-        return max(self._class_scores, key=self._class_scores.__getitem__, default=None)
+        return self._class_scores.best
 
     def predict(self, seconds: float, settings: MotionTrackerSettings) -> None:
         """Move on to the next frame, `seconds` later."""
@@ -153,9 +154,7 @@ class Vehicle:
     ) -> None:
         self._weigh(observation.score, seconds, settings)
         self._detection_scores.add(observation.score, seconds)
-        if observation.class_name is not None:
-            sums, name = self._class_scores, observation.class_name
-            sums[name] = sums.get(name, 0.0) + observation.score
+        self._class_scores.add(observation.class_name, observation.score)
 
     def _weigh(self, score: float, seconds: float, settings: MotionTrackerSettings) -> None:
         gained = (score - settings.leak) * min(seconds, LONGEST_LOOK)
