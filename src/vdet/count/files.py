@@ -9,7 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from vdet.count.events import Event
 from vdet.count.totals import Counts, Total
@@ -24,8 +24,7 @@ def write_counts(path: Path, counts: Counts) -> None:
     if path.suffix.lower() == ".json":
         _write_json(path, _plain(counts))
     else:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            _table(file, _COLUMNS, (_cells(event) for event in counts.events))
+        _write_table(path, _COLUMNS, (_cells(event) for event in counts.events))
 
 
 def write_counts_of_all(path: Path, videos: Mapping[str, Counts]) -> None:
@@ -35,11 +34,10 @@ def write_counts_of_all(path: Path, videos: Mapping[str, Counts]) -> None:
         sums = [asdict(each) for each in sum_totals(videos.values())]
         _write_json(path, {"totals": sums, "videos": by_name})
     else:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            rows = (
-                (name, *_cells(event)) for name, counts in videos.items() for event in counts.events
-            )
-            _table(file, ("video", *_COLUMNS), rows)
+        rows = (
+            (name, *_cells(event)) for name, counts in videos.items() for event in counts.events
+        )
+        _write_table(path, ("video", *_COLUMNS), rows)
 
 
 def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
@@ -52,8 +50,7 @@ def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
         )
         _write_json(path, {"totals": [asdict(each) for each in sums], "videos": values})
         return
-    with path.open("w", encoding="utf-8", newline="") as file:
-        _table(file, ("video", *_COLUMNS), _rows_of(outputs))
+    _write_table(path, ("video", *_COLUMNS), _rows_of(outputs))
 
 
 def sum_totals(videos: Iterable[Counts]) -> tuple[Total, ...]:
@@ -99,12 +96,14 @@ def _cells(event: Event) -> tuple[Any, ...]:
     return f"{time:.3f}", *middle, f"{score:.4f}", int(stitched), shown
 
 
-def _table(file: TextIO, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-    table = csv.writer(file, lineterminator="\n")
-    table.writerow(columns)
-    table.writerows(rows)
+def _write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    # The name of a video may be no valid text.
+    with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(columns)
+        table.writerows(rows)
 
 
 def _write_json(path: Path, values: Any) -> None:
     text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")

@@ -128,6 +128,15 @@ def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_pat
         assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".json"])
+def test_a_name_of_a_video_that_is_no_text_is_escaped(
+    suffix: str, red_clip: Path, tmp_path: Path
+) -> None:
+    run_red(VideoJob(red_clip, outputs(counts=tmp_path / f"a{suffix}")), with_counts())
+    join_counts({"clip\udcff": tmp_path / f"a{suffix}"}, tmp_path / f"all{suffix}")
+    assert "\\udcff" in (tmp_path / f"all{suffix}").read_text(encoding="utf-8")
+
+
 def test_a_report_shows_the_counts_by_minute(red_clip: Path, tmp_path: Path) -> None:
     run_red(VideoJob(red_clip, outputs(report=tmp_path / "page")), with_counts())
     facts = read_facts(tmp_path / "page" / PAGE)

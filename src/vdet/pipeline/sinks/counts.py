@@ -78,8 +78,9 @@ class CountsPicture:
         self._counter = VehicleCounter(layout)
 
     def draw(self, image: Image, result: FrameResult) -> Image:
-        """Count in the next frame, and return a copy of its picture with lines, zones and counts.
+        """Count in the next frame, and return its picture with lines, zones and counts.
 
+        `image` is changed, but not if it is the frame's own image: then that is copied.
         In an undistorted picture they lie on the same places of the road.
         """
         self._counter.update(result.frame_tracks)
@@ -92,7 +93,8 @@ class CountsPicture:
             )
             for zone in self._layout.zones
         ]
-        return draw_counts(image.copy(), lines, zones)
+        own = image.copy() if image is result.frame.image else image
+        return draw_counts(own, lines, zones)
 
     def _line(self, line: Line, road: Road | None) -> DrawnLine:
         start, end = _placed((line.start, line.end), road)
