@@ -69,6 +69,21 @@ def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
     assert os.getpid() not in {process for _, process in results}
 
 
+def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> None:
+    (tmp_path / "left").touch()
+    code = f"""if True:
+        from joblib.externals.loky.backend import resource_tracker
+        from vdet.workers import LocalProcesses
+        assert len(list(LocalProcesses(2).map(abs, [1, 2]))) == 2
+        resource_tracker.register({str(tmp_path / "left")!r}, "file")
+    """
+    result = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True
+    )
+    assert result.stderr == ""
+    until(lambda: not (tmp_path / "left").exists())
+
+
 def test_the_items_that_were_in_work_when_a_process_was_killed_are_lost(tmp_path: Path) -> None:
     file = tmp_path / "item 1 has arrived"
     results = LocalProcesses(1).map(partial(kill_process_at_2, file), range(5))
