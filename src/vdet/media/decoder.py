@@ -20,7 +20,7 @@ from vdet.media.seek import Entry, find_entry
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
 _MAX_RECENT = 500  # packets; key frames further apart than that are rare
-_WITHOUT_FRAME_THREADS = ("vp8", "vp9")  # they would hide some errors
+_WITHOUT_FRAME_THREADS = ("vp8", "vp9", "mpeg4")  # they would hide some errors
 
 
 class Decoder:
