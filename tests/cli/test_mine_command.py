@@ -47,17 +47,22 @@ def truth_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def options(truth_path: Path, model_path: Path) -> tuple[str | Path, ...]:
+def options(model_path: Path) -> tuple[str | Path, ...]:
     # Of a model this small, whatever it finds likely is worth a look.
     lenient = ("--set", "mining.probability=0.05")
-    return ("--truth", truth_path, "--model", model_path, *WINDOWS, *lenient)
+    return ("--model", model_path, *WINDOWS, *lenient)
 
 
 def test_mines_patches_that_train_learns_from(
-    run: Run, clip_path: Path, patches_path: Path, options: tuple[str, ...], tmp_path: Path
+    run: Run,
+    clip_path: Path,
+    truth_path: Path,
+    patches_path: Path,
+    options: tuple[str, ...],
+    tmp_path: Path,
 ) -> None:
     target, model_path = tmp_path / "mined.zip", tmp_path / "m.npz"
-    result = run("mine", clip_path, "-o", target, *options)
+    result = run("mine", clip_path, "--truth", truth_path, "-o", target, *options)
     assert result.code == 0, result.err
     files = [*find_patches([target]), *find_boxed([target])]
     counts = Counter(file.group for file in files)
@@ -106,8 +111,8 @@ def test_the_same_truth_in_another_format_gives_the_same_patches(
     other = tmp_path / "truth.coco.json"
     other.write_bytes(written(COCO, frames))
     few = ("--from", "5", "--until", "5")
-    for name, extra in (("a.zip", ()), ("b.zip", ("--truth", other))):
-        result = run("mine", clip_path, "-o", tmp_path / name, *options, *few, *extra)
+    for name, truth in (("a.zip", truth_path), ("b.zip", other)):
+        result = run("mine", clip_path, "-o", tmp_path / name, "--truth", truth, *options, *few)
         assert result.code == 0, result.err
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
@@ -116,7 +121,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
     run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     target = tmp_path / "mined.zip"
-    assert run("mine", clip_path, "-o", target, *options).code == 0
+    assert run("mine", clip_path, "--truth", truth_path, "-o", target, *options).code == 0
     with VideoReader(clip_path) as reader:
         frames = [frame.image for frame in reader]
     truth = read_truth(truth_path)
@@ -141,7 +146,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
 
 
 def test_a_frame_gives_the_same_patches_whatever_other_frames_are_used(
-    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
+    run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     for name, chosen in (
         ("a.zip", ()),
@@ -149,7 +154,9 @@ def test_a_frame_gives_the_same_patches_whatever_other_frames_are_used(
         ("c.zip", ("--from", "5", "--until", "8")),
         ("d.zip", ("--every", "1", "--from", "5", "--until", "6")),
     ):
-        result = run("mine", clip_path, "-o", tmp_path / name, *options, *chosen)
+        result = run(
+            "mine", clip_path, "--truth", truth_path, "-o", tmp_path / name, *options, *chosen
+        )
         assert result.code == 0, result.err
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
     whole, fifth, both = (_patches(tmp_path / f"{name}.zip") for name in "acd")
@@ -164,7 +171,7 @@ def test_frames_that_cut_a_vehicle_off_are_used_too(
     truth, target = tmp_path / "cut.txt", tmp_path / "mined.zip"
     rows = ["3,99,1,101,30,25,1,3,1", "4,99,9,101,30,25,1,3,1", "5,99,291,101,30,25,1,3,1"]
     truth.write_text("\n".join([truth_path.read_text().strip(), *rows]) + "\n")
-    result = run("mine", clip_path, "-o", target, *options, "--truth", truth, "--from", "2")
+    result = run("mine", clip_path, "--truth", truth, "-o", target, *options, "--from", "2")
     assert result.code == 0, result.err
     assert result.out.endswith("from 4 frames\n")
     numbers = {int(name.partition("/frame")[2][:6]) for name in _patches(target)}
@@ -184,6 +191,7 @@ def _patches(path: Path) -> dict[str, bytes]:
         (("--from", "10"), 1, "gt.txt: covers the frames up to 9; mine some of these"),
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
+        (("--truth", "a.txt", "--truth", "b.txt"), 2, "1 videos, 2 --truth; give one for each"),
         (("--set", "mining.parts=-1"), 1, "mining.parts"),
         (
             ("--set", "mining={false_alarms: 0, parts: 0, per_vehicle: 0}"),
@@ -196,6 +204,7 @@ def _patches(path: Path) -> dict[str, bytes]:
 def test_what_cannot_be_leaves_nothing_behind(
     run: Run,
     clip_path: Path,
+    truth_path: Path,
     options: tuple[str, ...],
     tmp_path: Path,
     arguments: tuple[str, ...],
@@ -203,6 +212,8 @@ def test_what_cannot_be_leaves_nothing_behind(
     words: str,
 ) -> None:
     named = [tmp_path / a if a.endswith((".npz", ".txt")) else a for a in arguments]
+    if "--truth" not in arguments:
+        named += ["--truth", truth_path]
     result = run("mine", clip_path, "-o", tmp_path / "mined.zip", *options, *named)
     assert (result.code, result.out) == (code, "")
     assert words in result.err
@@ -210,15 +221,18 @@ def test_what_cannot_be_leaves_nothing_behind(
 
 
 def test_an_earlier_archive_is_not_lost(
-    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
+    run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
     target = tmp_path / "mined.zip"
     target.write_bytes(b"precious")
-    result = run("mine", clip_path, "-o", target, *options)
+    result = run("mine", clip_path, "--truth", truth_path, "-o", target, *options)
     assert result.code == 1
     assert "--overwrite" in result.err
     assert target.read_bytes() == b"precious"
-    assert run("mine", clip_path, "-o", target, *options, "--overwrite").code == 0
+    assert (
+        run("mine", clip_path, "--truth", truth_path, "-o", target, *options, "--overwrite").code
+        == 0
+    )
     assert len(find_patches([target])) > 10
 
 
@@ -227,7 +241,7 @@ def test_truth_of_a_longer_video(
 ) -> None:
     truth = tmp_path / "long.txt"
     truth.write_text("40,1,10,10,50,50,1,3,1\n")
-    result = run("mine", clip_path, "-o", tmp_path / "mined.zip", *options, "--truth", truth)
+    result = run("mine", clip_path, "--truth", truth, "-o", tmp_path / "mined.zip", *options)
     assert result.code == 1
     assert "long.txt:1: the frame is number 40 of a video of 30" in result.err
     assert not (tmp_path / "mined.zip").exists()
@@ -236,6 +250,7 @@ def test_truth_of_a_longer_video(
 def test_input_settings_apply(
     run: Run,
     clip_path: Path,
+    truth_path: Path,
     options: tuple[str, ...],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -246,7 +261,12 @@ def test_input_settings_apply(
         given.append(settings)
         return VideoReader(*arguments, settings=settings, **others)
 
-    monkeypatch.setattr("vdet.learn.mining.mining.VideoReader", reader)
+    monkeypatch.setattr("vdet.learn.mining.sources.VideoReader", reader)
     tolerant = ("--set", "input.max_damaged=0.5")
-    assert run("mine", clip_path, "-o", tmp_path / "m.zip", *options, *tolerant).code == 0
+    assert (
+        run(
+            "mine", clip_path, "--truth", truth_path, "-o", tmp_path / "m.zip", *options, *tolerant
+        ).code
+        == 0
+    )
     assert [each.max_damaged for each in given] == [0.5]

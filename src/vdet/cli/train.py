@@ -1,5 +1,6 @@
-"""`vdet train`: from labelled patches to a model."""
+"""`vdet train`: from labelled patches or pictures to a model."""
 
+import tempfile
 from pathlib import Path
 
 import click
@@ -53,13 +54,16 @@ def train(
     scheduler: str | None,
     overwrite: bool,
 ) -> None:
-    """Train a model on labelled patches.
+    """Train a model on labelled patches or pictures.
 
-    Each DATA is a folder or a zip file. Patches lie in vehicles/<group>/ and non-vehicles/<group>/.
-    A file boxes.csv beside these folders says where in a patch the vehicle is; vdet mine writes
-    it. With it the model learns where the sides of vehicles are. A report is printed, and written
-    beside the model as JSON.
+    Each DATA is a folder or a zip file of patches, or labelled pictures (COCO, KITTI, YOLO or
+    Pascal VOC), out of which patches of vehicles and of other things are cut. Patches lie in
+    vehicles/<group>/ and non-vehicles/<group>/. A file boxes.csv beside these folders says where in
+    a patch the vehicle is; vdet mine writes it. With it the model learns where the sides of
+    vehicles are. A report is printed, and written beside the model as JSON.
     """
+    from vdet.evaluate.images.reading import holds_labelled_images
+    from vdet.learn.mining import MiningJob, PictureSource, mine
     from vdet.learn.training import train as fit_model
 
     if jobs and scheduler:
@@ -72,8 +76,18 @@ def train(
         check_output(path, overwrite=overwrite, inputs=data)
     if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
-    files, boxed = find_patches(data), find_boxed(data)
-    with progress_steps(" patches", quiet=quiet) as steps:
+    pictures = [path for path in data if holds_labelled_images(path)]
+    patches = [path for path in data if path not in pictures]
+    with (
+        tempfile.TemporaryDirectory(prefix="vdet-") as folder,
+        progress_steps("", quiet=quiet) as steps,
+    ):
+        if pictures:
+            archive = Path(folder) / "pictures.zip"
+            sources = tuple(PictureSource(path) for path in pictures)
+            mine(MiningJob(sources, archive), settings, None, steps=steps)
+            patches.append(archive)
+        files, boxed = find_patches(patches), find_boxed(patches)
         model, report = fit_model(
             files,
             settings,

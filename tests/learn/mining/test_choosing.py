@@ -8,11 +8,10 @@ from hypothesis import strategies as st
 
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.formats.rows import Row
 from vdet.geometry import Box
 from vdet.learn.mining.choosing import (
     ChosenWindow,
+    FrameLabels,
     PatchKind,
     WindowComparison,
     choose_windows,
@@ -25,13 +24,12 @@ OTHER = Box(700, 300, 100, 70)
 GENEROUS = MiningSettings(probability=0.2, per_vehicle=1000, false_alarms=1000, parts=1000)
 
 
-def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> LabelledVideo:
-    rows = [(i, box, False) for i, box in enumerate(vehicles)]
-    rows += [(-1, box, True) for box in ignored]
-    return LabelledVideo.from_rows(
-        Row(0, 1, number, box.x, box.y, box.width, box.height, ignored=flag)
-        for number, box, flag in rows
-    )
+def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> FrameLabels:
+    tables = [
+        np.array([(box.x, box.y, box.width, box.height) for box in boxes], np.float64)
+        for boxes in (vehicles, ignored)
+    ]
+    return FrameLabels(*(table.reshape(-1, 4) for table in tables))
 
 
 def about(x: float, side: int = 100, y: float = 335) -> Box:
@@ -50,7 +48,7 @@ def windows(*boxes: Box, probability: float = 1.0) -> Windows:
 
 
 def chosen(
-    found: Windows, labels: LabelledVideo, settings: MiningSettings = GENEROUS, seed: int = 0
+    found: Windows, labels: FrameLabels, settings: MiningSettings = GENEROUS, seed: int = 0
 ) -> list[ChosenWindow]:
     return list(choose_windows(found, labels, WIDTH, settings, np.random.default_rng(seed)))
 

@@ -15,15 +15,15 @@ from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.errors import DataError, VideoError
 from vdet.geometry import Box
 from vdet.learn.dataset import find_boxed, find_patches, read_patches
-from vdet.learn.mining import MiningJob, MiningResult, mine
+from vdet.learn.mining import MiningJob, MiningResult, PictureSource, VideoSource, mine
 from vdet.media import Frame, VideoInfo, VideoWriter
-from vdet.media.images import Image
+from vdet.media.images import Image, write_image
 
 WIDTH, HEIGHT, FRAMES = 640, 360, 5
 CAR = Box(270, 190, 100, 70)
 TREE = Box(60, 190, 96, 70)  # what the detector takes for a vehicle
 RED, GREEN = (0, 0, 255), (0, 160, 0)
-NAME = re.compile(r"frame(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
+NAME = re.compile(r"(?:frame|picture)(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
 
 def draw() -> Image:
@@ -76,7 +76,7 @@ Mine = Callable[..., MiningResult]
 
 
 @pytest.fixture
-def mined(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mine:
+def mined(clip: Path, tmp_path: Path) -> Mine:
     """Mine the clip, in which the truth has the car, with a detector that finds these boxes."""
     truth = tmp_path / "gt.txt"
     box = f"{CAR.x + 1},{CAR.y + 1},{CAR.width},{CAR.height}"
@@ -89,9 +89,8 @@ def mined(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mine:
         **settings: float,
     ) -> MiningResult:
         model = detector(found(*boxes, score=score))
-        monkeypatch.setattr("vdet.learn.mining.mining.load_detector", lambda *_: model)
-        job = MiningJob(clip, truth, tmp_path / "mined.zip", every=2)
-        return mine(job, Settings(mining=MiningSettings(**settings)))
+        job = MiningJob((VideoSource(clip, truth, every=2),), tmp_path / "mined.zip")
+        return mine(job, Settings(mining=MiningSettings(**settings)), model)
 
     return run
 
@@ -185,15 +184,60 @@ def test_every_frame_is_searched_for_itself(mined: Mine) -> None:
 
 
 def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path,
 ) -> None:
     source, truth = tmp_path / "tiny.mp4", tmp_path / "gt.txt"
     info = VideoInfo(source, 8, 8, rate := Fraction(25), 1 / rate, frames=1)
     with VideoWriter(source, info, OutputSettings()) as writer:
         writer.write(Frame(0, Fraction(0), np.zeros((8, 8, 3), np.uint8)))
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
-    detector = FixedBoxes(NO_DETECTIONS)
-    monkeypatch.setattr("vdet.learn.mining.mining.load_detector", lambda *_: detector)
+    job = MiningJob((VideoSource(source, truth),), tmp_path / "mined.zip")
     with pytest.raises(VideoError, match=r"tiny\.mp4: no window fits into a frame of 8×8 pixels"):
-        mine(MiningJob(source, truth, tmp_path / "mined.zip"), Settings())
+        mine(job, Settings(), FixedBoxes(NO_DETECTIONS))
     assert not (tmp_path / "mined.zip").exists()
+
+
+class TestPictures:
+    """Labelled pictures: a folder in YOLO form, with the car in it."""
+
+    @pytest.fixture
+    def folder(self, tmp_path: Path) -> Path:
+        folder = tmp_path / "city"
+        for name in ("images", "labels"):
+            (folder / name).mkdir(parents=True)
+        write_image(folder / "images" / "a.png", draw())
+        middle = CAR.center[0] / WIDTH, CAR.center[1] / HEIGHT
+        size = CAR.width / WIDTH, CAR.height / HEIGHT
+        row = " ".join(f"{value:.6f}" for value in (*middle, *size))
+        (folder / "labels" / "a.txt").write_text(f"0 {row}\n")
+        (folder / "data.yaml").write_text("names: [car]\n")
+        return folder
+
+    def test_they_are_mined_like_the_frames_of_a_video(
+        self, folder: Path, clip: Path, tmp_path: Path
+    ) -> None:
+        truth = tmp_path / "gt.txt"
+        box = f"{CAR.x + 1},{CAR.y + 1},{CAR.width},{CAR.height}"
+        truth.write_text(f"1,1,{box},1,3,1\n")
+        sources = (PictureSource(folder), VideoSource(clip, truth))
+        job = MiningJob(sources, tmp_path / "mined.zip")
+        result = mine(job, Settings(), FixedBoxes(found(TREE)))
+        assert result.frames == 2
+        for kind in ("vehicles", "non-vehicles"):
+            boxes = boxes_of(job.output, f"{kind}/mined_city")
+            assert boxes == boxes_of(job.output, f"{kind}/mined_road") != []
+
+    def test_without_a_detector_windows_without_a_vehicle_are_taken(
+        self, folder: Path, tmp_path: Path
+    ) -> None:
+        job = MiningJob((PictureSource(folder),), tmp_path / "mined.zip")
+        result = mine(job, Settings(), None)
+        assert result.vehicles > 0
+        assert result.false_alarms == Settings().mining.false_alarms
+        for box in boxes_of(job.output, "non-vehicles/mined_city"):
+            assert box.iou(CAR) < 0.5
+
+    def test_two_sources_of_one_name_are_refused(self, folder: Path, tmp_path: Path) -> None:
+        job = MiningJob((PictureSource(folder), PictureSource(folder)), tmp_path / "mined.zip")
+        with pytest.raises(DataError, match="2 sources are named city; rename them"):
+            mine(job, Settings(), None)

@@ -37,6 +37,19 @@ def read_labelled_images(path: Path) -> LabelledImages:
     return checked_images(str(path), _labels(path))
 
 
+def holds_labelled_images(path: Path) -> bool:
+    """Tell whether a path looks like labelled pictures, and not like a folder of patches."""
+    if not path.is_dir():
+        return path.suffix.lower() == ".json"
+    return any(all((path / name).is_dir() for name in folders) for folders in _FOLDERS) or bool(
+        _coco_files(path)
+    )
+
+
+def _coco_files(folder: Path) -> list[Path]:
+    return sorted([*folder.glob("*.json"), *folder.glob("annotations/*.json")])
+
+
 def _labels(path: Path) -> Iterable[ImageLabels]:
     if not path.is_dir():
         if path.suffix.lower() != ".json":
@@ -45,7 +58,7 @@ def _labels(path: Path) -> Iterable[ImageLabels]:
     for folders, read in _FOLDERS.items():
         if all((path / name).is_dir() for name in folders):
             return read(path)
-    files = sorted([*path.glob("*.json"), *path.glob("annotations/*.json")])
+    files = _coco_files(path)
     if len(files) == 1:
         return coco_labels(files[0])
     if files:

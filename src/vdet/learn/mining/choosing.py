@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.geometry import BoolArray, Box, Float64Array, coverage
 from vdet.learn.dataset import Sides
 
@@ -29,6 +28,17 @@ _MAX_COVERED = 0.3
 _EDGE = 0.002  # of the frame's width: a box this close to a side of the frame is cut off by it
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameLabels:
+    """The true vehicles and the ignore regions of a frame.
+
+    Both are float64 `(n, 4)`: x, y, width, height, pixels.
+    """
+
+    vehicles: Float64Array
+    ignored: Float64Array
+
+
 @dataclass(frozen=True, slots=True)
 class ChosenWindow:
     """A window that becomes a patch, and the sides of the vehicle in it."""
@@ -40,7 +50,7 @@ class ChosenWindow:
 
 def choose_windows(
     windows: Windows,
-    truth: LabelledVideo,
+    labels: FrameLabels,
     frame_width: int,
     settings: MiningSettings,
     rng: np.random.Generator,
@@ -51,17 +61,14 @@ def choose_windows(
     ----------
     windows
         All windows of the frame, with the probabilities of the model that is to be improved.
-    truth
-        The rows of this frame.
     frame_width
         Width of the frame, pixels.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
     boxes = windows.boxes[first].astype(np.float64)
     is_hit = windows.probabilities[first] >= settings.probability
-    vehicles = truth.boxes[~truth.ignored]
-    comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
-    covered = coverage(boxes, np.concatenate([vehicles, truth.boxes[truth.ignored]]))
+    comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in labels.vehicles]
+    covered = coverage(boxes, np.concatenate([labels.vehicles, labels.ignored]))
     nearest = _nearest_vehicles(comparisons, len(boxes))
     is_alarm = is_hit & (nearest < 0) & (covered <= _MAX_COVERED).all(axis=1)
     is_part = np.zeros(len(boxes), np.bool_)
