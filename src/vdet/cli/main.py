@@ -9,6 +9,7 @@ from typing import NoReturn
 import click
 
 import vdet
+from vdet.cli.adapt import adapt
 from vdet.cli.calibrate import calibrate
 from vdet.cli.command import Command
 from vdet.cli.count import count
@@ -64,7 +65,8 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
 
 
 _COMMANDS = (
-    *(calibrate, count, demo, detect_image, detect_video, doctor, info, mine, train, train_net),
+    *(adapt, calibrate, count, demo, detect_image, detect_video, doctor, info, mine),
+    *(train, train_net),
 )
 for _command in _COMMANDS:
     cli.add_command(_command)

@@ -5,6 +5,7 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from pydantic import SerializeAsAny
 
+from vdet.config.adapt import AdaptSettings
 from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
 from vdet.config.detector import (
     DetectorSettings,
@@ -42,6 +43,7 @@ from vdet.config.training import (
 from vdet.errors import ConfigError
 
 __all__ = [
+    "AdaptSettings",
     "AugmentationSettings",
     "BoxSettings",
     "CalibrationSettings",
@@ -93,6 +95,7 @@ class Settings(Section):
     lanes: LaneSettings = LaneSettings()
     training: TrainingSettings = TrainingSettings()
     mining: MiningSettings = MiningSettings()
+    adapt: AdaptSettings = AdaptSettings()
     network: NetworkTrainingSettings = NetworkTrainingSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()

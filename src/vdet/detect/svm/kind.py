@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from vdet.config.schema import FeatureSettings, SvmSettings
+from vdet.config.schema import FeatureSettings, PerspectiveSettings, SvmSettings
 from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.model import load_model
+from vdet.detect.svm.model import LinearModel, load_model
 from vdet.errors import ModelError
 
 _MODELS = Path(__file__).parents[2] / "models"
@@ -40,7 +40,19 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    return SvmModel(model, settings)
+    return SvmModel(model, with_windows_of(model, settings))
+
+
+def with_windows_of(model: LinearModel, settings: SvmSettings) -> SvmSettings:
+    """Return settings with the window sets of the camera that a model was adapted to.
+
+    They are taken where the settings leave the default ones.
+    """
+    search = settings.search
+    if model.perspective is None or search.perspective != PerspectiveSettings():
+        return settings
+    fitted = search.model_copy(update={"perspective": model.perspective})
+    return settings.model_copy(update={"search": fitted})
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:

@@ -1,0 +1,102 @@
+"""`vdet adapt`: a small model learns the road of a drawn clip."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from vdet.detect.svm.model import load_model
+from vdet.synthetic.clip import write_truth
+from vdet.synthetic.scene import Scene
+
+FEW = ("--set", "adapt.rounds=1", "--set", "adapt.frames=8", "--jobs", "1")
+
+
+@pytest.fixture(scope="module")
+def truth_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("truth") / "gt.txt"
+    write_truth(path, replace(scene))
+    return path
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    return tmp_path / "mine.npz"
+
+
+def test_the_adapted_model_is_better_in_what_was_kept_back(
+    run: Run, clip_path: Path, truth_path: Path, model_path: Path, out: Path
+) -> None:
+    result = run(
+        *("adapt", clip_path, "-o", out, "--model", model_path),
+        *("--teacher", "truth", "--truth", truth_path, *FEW),
+    )
+    assert result.code == 0, result.err
+    report = json.loads(out.with_suffix(".json").read_text())
+    f1 = {each["detector"]: each["f1"] for each in report["checks"]}
+    assert tuple(f1) == ("base", "adapted, 0.5", "adapted, 1")
+    assert f1[report["chosen"]] == max(f1.values()) > f1["base"]
+    assert report["clips"][0]["learnt"] + report["clips"][0]["checked"] == 30
+    assert report["clips"][0]["checked"] == 6
+    assert report["rounds"][0]["vehicles"] > 10
+    assert "frames kept back, as video:" in result.out
+    provenance = load_model(out).provenance
+    assert provenance["report"]["clips"][0]["sha256"] == report["clips"][0]["sha256"]
+    assert "base" in provenance
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (("-o", "mine.onnx"), 1, "mine.onnx: models are written as .npz; name it so"),
+        (("-o", "m.npz", "--teacher", "truth"), 2, "give them with --truth"),
+        (("-o", "m.npz", "--truth", "a.txt", "--truth", "b.txt"), 2, "1 videos, 2 --truth"),
+        (("-o", "m.npz", "--teacher", "none.npz"), 1, "none.npz: cannot be read"),
+        (("-o", "m.npz", "--minutes", "0"), 2, "--minutes"),
+        (("-o", "m.npz", "--set", "adapt.rounds=0"), 1, "adapt.rounds"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_any_work(
+    run: Run,
+    clip_path: Path,
+    model_path: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    code: int,
+    words: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("adapt", clip_path, "--model", model_path, *arguments)
+    assert (result.code, result.out) == (code, "")
+    assert words in result.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_model_that_is_no_better_is_not_written(
+    run: Run, clip_path: Path, truth_path: Path, model_path: Path, out: Path
+) -> None:
+    nothing_shown = ("--set", "tracker.least_score=1", "--set", "tracker.smallest=0.9")
+    result = run(
+        *("adapt", clip_path, "-o", out, "--model", model_path),
+        *("--teacher", "truth", "--truth", truth_path, *FEW, *nothing_shown),
+    )
+    assert result.code == 1
+    assert "mine.npz: is not written: in the frames kept back" in result.err
+    assert list(out.parent.iterdir()) == []
+
+
+def test_footage_without_a_vehicle_is_refused(
+    run: Run, clip_path: Path, model_path: Path, out: Path, tmp_path: Path
+) -> None:
+    truth = tmp_path / "gt.txt"
+    truth.write_text("1,1,1,1,9,9,0,3,1\n")  # an ignore region
+    result = run(
+        *("adapt", clip_path, "-o", out, "--model", model_path),
+        *("--teacher", "truth", "--truth", truth, *FEW),
+    )
+    assert result.code == 1
+    assert result.err.count("\n") == 1
+    assert not out.exists()
