@@ -154,12 +154,14 @@ def _sweep(
     variants = [load_settings(None, [f"{key}={value}"]) for value in values]
     found = [_tracks(searched, model, settings) for settings in variants]
     by_block = np.array([_f1_by_block(each, truth) for each in found])
-    yield f"\n{key}: F1, id switches, false tracks; F1 of the blocks"
+    yield f"\n{key}: F1, id switches, false tracks, frames until shown; F1 of the blocks"
     for value, each, blocks in zip(values, found, by_block, strict=True):
         whole = score(each, truth)
         numbers = "  ".join(f"{f1:.3f}" for f1 in blocks)
+        delay = "-" if whole.mean_delay is None else f"{whole.mean_delay:.1f}"
         yield (
-            f"  {value:6}  {whole.f1:.3f} {whole.id_switches:2} {whole.false_tracks:2}   {numbers}"
+            f"  {value:6}  {whole.f1:.3f} {whole.id_switches:2} {whole.false_tracks:2} {delay:>5}"
+            f"   {numbers}"
         )
     chosen = [int((by_block.sum(axis=1) - by_block[:, block]).argmax()) for block in range(BLOCKS)]
     held = np.mean([by_block[value, block] for block, value in enumerate(chosen)])
