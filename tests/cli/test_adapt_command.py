@@ -11,7 +11,10 @@ from vdet.detect.svm.model import load_model
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 
-FEW = ("--set", "adapt.rounds=1", "--set", "adapt.frames=8", "--jobs", "1")
+FEW = (
+    *("--set", "adapt.rounds=1", "--set", "adapt.frames=8", "--set", "mining.per_vehicle=4"),
+    *("--set", "training.augmentation.mirror=false", "--jobs", "1"),
+)
 
 
 @pytest.fixture(scope="module")

@@ -64,8 +64,10 @@ def test_a_high_penalty_leaves_the_mean() -> None:
     np.testing.assert_allclose(found.sides(hogs), np.tile(sides.mean(axis=0), (400, 1)), atol=1e-3)
 
 
-def test_the_penalty_is_per_patch_so_that_a_set_given_twice_gives_the_same() -> None:
-    hogs, sides = scene()
+@pytest.mark.parametrize("count", [400, 8])
+def test_the_penalty_is_per_patch_so_that_a_set_given_twice_gives_the_same(count: int) -> None:
+    """A set of 8 patches has fewer rows than features; given twice, it has more."""
+    hogs, sides = scene(count)
     once = fit_sides([BoxRows(hogs, sides)], penalty=0.5)
     twice = fit_sides([BoxRows(hogs, sides), BoxRows(hogs, sides)], penalty=0.5)
     np.testing.assert_allclose(once.weights, twice.weights, atol=1e-4)

@@ -36,7 +36,6 @@ _TRUTH = "truth"
     examples=(
         "vdet adapt clips/ -o mycamera.npz",
         "vdet adapt clips/ -o mycamera.npz --minutes 3 --teacher their.onnx",
-        "vdet detect-video new.mp4 out.mp4 --model mycamera.npz",
     ),
 )
 @click.argument("clips", nargs=-1, required=True, type=PATH, metavar="CLIP...")

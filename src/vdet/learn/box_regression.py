@@ -229,19 +229,20 @@ class _Ridge:
         self, parts: Sequence[BoxRows], columns: Sequence[int], rows: Sequence[BoolArray]
     ) -> None:
         self._parts, self._columns, self._rows = parts, list(columns), rows
-        count, self._weight = 0, 0.0
+        self._count, self._weight = 0, 0.0
         width = parts[0].hogs.shape[1]
         sums, squares, weighted = np.zeros((3, width))
         targets = np.zeros(len(self._columns))
         for hogs, sides, weight in self._blocks():
-            count += len(hogs)
+            self._count += len(hogs)
             self._weight += weight * len(hogs)
             total = hogs.sum(axis=0, dtype=np.float64)
             sums += total
             weighted += weight * total
             squares += np.square(hogs, dtype=np.float64).sum(axis=0)
             targets += weight * sides.sum(axis=0, dtype=np.float64)
-        spread = np.sqrt(np.maximum(squares / count - np.square(sums / count), 0))
+        mean = sums / self._count
+        spread = np.sqrt(np.maximum(squares / self._count - np.square(mean), 0))
         self._spread = spread + _LEAST_SPREAD * spread.mean() + np.finfo(np.float32).tiny
         self._mean = weighted / self._weight
         self._target = targets / self._weight
@@ -258,11 +259,24 @@ class _Ridge:
         """Return weights `(columns, h)` and biases `(columns,)` for features as they are."""
         from scipy.linalg import solve  # type: ignore[import-untyped]
 
-        gram = np.diag(np.full(len(self._mean), penalty * self._weight))
-        product = np.zeros((len(self._mean), len(self._columns)))
-        for hogs, sides, weight in self._blocks():
-            scaled = ((hogs - self._mean) / self._spread * weight**0.5).astype(np.float32)
-            gram += scaled.T @ scaled
-            product += scaled.T @ ((sides - self._target) * weight**0.5)
-        weights = solve(gram, product, assume_a="pos", overwrite_a=True).T / self._spread
+        ridge = penalty * self._weight
+        if self._count < len(self._mean):  # the products of the rows are fewer
+            blocks = list(self._scaled())
+            hogs, sides = (np.concatenate(each) for each in zip(*blocks, strict=True))
+            products = (hogs @ hogs.T).astype(np.float64) + ridge * np.identity(self._count)
+            scaled = hogs.T @ solve(products, sides, assume_a="pos", overwrite_a=True)
+        else:
+            gram = np.diag(np.full(len(self._mean), ridge))
+            product = np.zeros((len(self._mean), len(self._columns)))
+            for hogs, sides in self._scaled():
+                gram += hogs.T @ hogs
+                product += hogs.T @ sides
+            scaled = solve(gram, product, assume_a="pos", overwrite_a=True)
+        weights = scaled.T / self._spread
         return weights, self._target - weights @ self._mean
+
+    def _scaled(self) -> Iterator[tuple[Float32Array, Float64Array]]:
+        """Yield the rows block by block, both centred, the HOG scaled too."""
+        for hogs, sides, weight in self._blocks():
+            scaled = (hogs - self._mean) / self._spread * weight**0.5
+            yield scaled.astype(np.float32), (sides - self._target) * weight**0.5
