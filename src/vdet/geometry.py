@@ -166,11 +166,18 @@ def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
 
 
 def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
-    first, second = a[:, np.newaxis, :], b[np.newaxis, :, :]
-    near = np.maximum(first[..., :2], second[..., :2])
-    far = np.minimum(first[..., :2] + first[..., 2:], second[..., :2] + second[..., 2:])
-    sides = np.maximum(far - near, 0)
-    return np.asarray(sides[..., 0] * sides[..., 1])
+    width, height = (
+        _common_length(a[:, [axis, axis + 2]], b[:, [axis, axis + 2]]) for axis in (0, 1)
+    )
+    width *= height
+    return width
+
+
+def _common_length(a: Float64Array, b: Float64Array) -> Float64Array:
+    """Return how long `(n, m)` the parts are that sections `(n, 2)`, `(m, 2)` of an axis share."""
+    common: Float64Array = np.minimum.outer(a.sum(axis=1), b.sum(axis=1))
+    common -= np.maximum.outer(a[:, 0], b[:, 0])
+    return np.maximum(common, 0, out=common)
 
 
 def _area(boxes: Float64Array) -> Float64Array:

@@ -103,3 +103,17 @@ def test_footage_without_a_vehicle_is_refused(
     assert result.code == 1
     assert result.err.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_truth_that_ends_before_the_check_is_refused_before_the_learning(
+    run: Run, clip_path: Path, model_path: Path, out: Path, tmp_path: Path
+) -> None:
+    truth = tmp_path / "gt.txt"
+    truth.write_text("3,1,1,1,90,90,1,1,1\n")
+    result = run(
+        *("adapt", clip_path, "-o", out, "--model", model_path),
+        *("--teacher", "truth", "--truth", truth, *FEW),
+    )
+    assert result.code == 1
+    assert "covers the frames up to 3, the check begins with 25; give --minutes" in result.err
+    assert result.err.count("\n") == 1

@@ -130,7 +130,8 @@ def _vehicles(votes: Votes, settings: VoteSettings) -> list[_VotedBox]:
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
     found: list[_VotedBox] = []
-    while position.any():
+    # Presence only falls: once no box has enough, none will be found any more.
+    while position.any() and (overlaps @ presence).max() >= settings.least:
         agreed = np.where(position > 0, overlaps @ position, 0)
         mode = int(agreed.argmax())
         box = _average(votes.boxes, position, overlaps[mode], settings.agreement)

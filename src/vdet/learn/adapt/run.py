@@ -13,10 +13,11 @@ import vdet
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.model import LinearModel
+from vdet.errors import TruthError
 from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.geometry import Float64Array
 from vdet.learn.adapt.check import check
-from vdet.learn.adapt.footage import watch
+from vdet.learn.adapt.footage import WatchedClip, watch
 from vdet.learn.adapt.report import AdaptReport, CheckReport, ClipReport, RoundReport
 from vdet.learn.adapt.rounds import Lesson, learn_in_rounds
 from vdet.learn.adapt.student import between
@@ -77,6 +78,8 @@ def adapt_model(
     ------
     VideoError
         A clip cannot be read or searched.
+    TruthError
+        A truth has nothing about the frames kept back.
     DataError
         The teacher finds too few vehicles to learn from.
     """
@@ -88,6 +91,8 @@ def adapt_model(
         clips.append(
             watch(path, model, settings, seconds=job.seconds, threads=threads, progress=progress)
         )
+    for truth, clip in zip(job.truths, clips, strict=bool(job.truths)):
+        _check_covered(truth, clip)
     if teacher:
         lessons = [Lesson(clip, clip.labels(settings)) for clip in clips]
     else:
@@ -121,6 +126,15 @@ def adapt_model(
         seconds=round(time.monotonic() - began, 1),
     )
     return replace(learnt[best], provenance=_provenance(report, base, settings)), report
+
+
+def _check_covered(truth: LabelledVideo, clip: WatchedClip) -> None:
+    kept_back = clip.frames[clip.learnt :]
+    if kept_back and truth.last_frame < kept_back[0].number:
+        raise TruthError(
+            f"{clip.path}: its truth covers the frames up to {truth.last_frame}, the check begins "
+            f"with {kept_back[0].number}; give --minutes, or more labels"
+        )
 
 
 def _best(checks: Sequence[CheckReport], names: Sequence[str]) -> str:
