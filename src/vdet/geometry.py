@@ -166,9 +166,7 @@ def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
 
 
 def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
-    width, height = (
-        _common_length(a[:, [axis, axis + 2]], b[:, [axis, axis + 2]]) for axis in (0, 1)
-    )
+    width, height = (_common_length(a[:, axis::2], b[:, axis::2]) for axis in (0, 1))
     width *= height
     return width
 

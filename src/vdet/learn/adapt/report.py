@@ -1,8 +1,9 @@
 """The report of `vdet adapt`: numbers, printed and written as JSON."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from vdet.config.schema import PerspectiveSettings
 from vdet.evaluate.output import table
@@ -58,6 +59,11 @@ class CheckReport:
         )
 
 
+def f1_against(checks: Sequence[CheckReport], against: str) -> dict[str, float]:
+    """Return the F1 of each detector that was compared with these labels."""
+    return {each.detector: each.f1 for each in checks if each.against == against}
+
+
 @dataclass(frozen=True, slots=True)
 class AdaptReport:
     """The report: the footage, the labels, the rounds, the window sets, and the check.
@@ -78,9 +84,12 @@ class AdaptReport:
     @property
     def gain(self) -> float:
         """By how much the F1 of the adapted model is higher, against the truth if there is one."""
-        against = self.checks[-1].against
-        f1 = {each.detector: each.f1 for each in self.checks if each.against == against}
+        f1 = f1_against(self.checks, self.checks[-1].against)
         return f1[self.chosen] - f1["base"]
+
+    def values(self) -> dict[str, Any]:
+        """Return the report as JSON values."""
+        return asdict(self) | {"perspective": self.perspective.model_dump(mode="json")}
 
     def lines(self) -> Iterator[str]:
         """Yield the report as lines of text."""
@@ -111,5 +120,4 @@ class AdaptReport:
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the report as JSON. Raises `OutputError`."""
-        values = asdict(self) | {"perspective": self.perspective.model_dump(mode="json")}
-        write_json(values, str(path), overwrite=overwrite)
+        write_json(self.values(), str(path), overwrite=overwrite)

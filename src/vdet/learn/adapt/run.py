@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,7 @@ from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.geometry import Float64Array
 from vdet.learn.adapt.check import check
 from vdet.learn.adapt.footage import WatchedClip, watch
-from vdet.learn.adapt.report import AdaptReport, CheckReport, ClipReport, RoundReport
+from vdet.learn.adapt.report import AdaptReport, CheckReport, ClipReport, RoundReport, f1_against
 from vdet.learn.adapt.rounds import Lesson, learn_in_rounds
 from vdet.learn.adapt.student import between
 from vdet.learn.adapt.windows import fit_windows
@@ -139,7 +139,7 @@ def _check_covered(truth: LabelledVideo, clip: WatchedClip) -> None:
 
 def _best(checks: Sequence[CheckReport], names: Sequence[str]) -> str:
     """Return the name with the highest F1 against what was learnt; of equal ones the first."""
-    f1 = {each.detector: each.f1 for each in checks if each.against == checks[0].against}
+    f1 = f1_against(checks, checks[0].against)
     return max(names, key=lambda name: f1[name])
 
 
@@ -155,11 +155,10 @@ def _whole_vehicles(lesson: Lesson) -> Float64Array:
 
 def _provenance(report: AdaptReport, base: LinearModel, settings: Settings) -> dict[str, object]:
     """Return what the header of the model says of its origin, as JSON values."""
-    values = asdict(report) | {"perspective": report.perspective.model_dump(mode="json")}
     return {
         "program": f"vdet {vdet.__version__}",
         "adapt": settings.adapt.model_dump(mode="json"),
-        "report": {"groups": _groups(report.clips, base), **values},
+        "report": {"groups": _groups(report.clips, base), **report.values()},
         "base": base.provenance,
     }
 
