@@ -39,13 +39,22 @@ def test_the_adapted_model_is_better_in_what_was_kept_back(
     assert result.code == 0, result.err
     report = json.loads(out.with_suffix(".json").read_text())
     f1 = {each["detector"]: each["f1"] for each in report["checks"]}
-    assert tuple(f1) == ("base", "adapted, 0.5", "adapted, 1")
+    assert tuple(f1) == (
+        "base",
+        "0.5 of the change, hits from 0.7",
+        "1 of the change, hits from 0.7",
+        "0.5 of the change, hits from 0.3",
+        "1 of the change, hits from 0.3",
+    )
     assert f1[report["chosen"]] == max(f1.values()) > f1["base"]
     assert report["clips"][0]["learnt"] + report["clips"][0]["checked"] == 30
     assert report["clips"][0]["checked"] == 6
     assert report["rounds"][0]["vehicles"] > 10
     assert "frames kept back, as video:" in result.out
-    provenance = load_model(out).provenance
+    model = load_model(out)
+    assert model.camera is not None
+    assert report["chosen"].endswith(f"hits from {model.camera.probability:g}")
+    provenance = model.provenance
     assert provenance["report"]["clips"][0]["sha256"] == report["clips"][0]["sha256"]
     assert "base" in provenance
 

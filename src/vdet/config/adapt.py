@@ -44,6 +44,13 @@ class AdaptSettings(Section):
         description="shares of the change of the weights that are tried; that with the highest F1 "
         "in the footage that was kept back is taken, of equal ones the first",
     )
+    probabilities: tuple[Fraction, ...] = Field(
+        (0.7, 0.3),
+        min_length=1,
+        max_length=20,
+        description="least probabilities of a hit that are tried with each of the shares; with a "
+        "higher one, the search is faster",
+    )
     penalty: float = Field(
         30.0,
         gt=0,

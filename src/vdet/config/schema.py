@@ -30,7 +30,7 @@ from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
 from vdet.config.regions import RegionSettings, RegionsSettings
 from vdet.config.report import ReportSettings
-from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
+from vdet.config.search import CameraSearch, PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
 from vdet.config.summary import CropSettings, SummarySettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
@@ -47,6 +47,7 @@ __all__ = [
     "AugmentationSettings",
     "BoxSettings",
     "CalibrationSettings",
+    "CameraSearch",
     "ColorSpace",
     "CountSettings",
     "CropSettings",

@@ -108,8 +108,24 @@ class SearchSettings(Section):
         "every other set in each frame",
     )
 
+    def fitted(self, camera: "CameraSearch | None") -> "SearchSettings":
+        """Return these settings with those of a camera, where these are the default ones."""
+        if camera is None:
+            return self
+        default = SearchSettings()
+        own = {name: getattr(self, name) for name in CameraSearch.model_fields}
+        left = {name: own[name] == getattr(default, name) for name in own}
+        return self.model_copy(update={n: getattr(camera, n) for n in left if left[n]})
+
     @model_validator(mode="after")
     def _has_windows(self) -> "SearchSettings":
         if not (self.windows or self.perspective.sizes):
             raise ValueError("windows or perspective.sizes must be given")
         return self
+
+
+class CameraSearch(Section):
+    """What `vdet adapt` fits of a search to a camera; each is as in `SearchSettings`."""
+
+    probability: Fraction
+    perspective: PerspectiveSettings

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from vdet.config.schema import FeatureSettings, PerspectiveSettings, SvmSettings
+from vdet.config.schema import FeatureSettings, SvmSettings
 from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, load_model
@@ -40,19 +40,12 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    return SvmModel(model, with_windows_of(model, settings))
+    return SvmModel(model, with_search_of(model, settings))
 
 
-def with_windows_of(model: LinearModel, settings: SvmSettings) -> SvmSettings:
-    """Return settings with the window sets of the camera that a model was adapted to.
-
-    They are taken where the settings leave the default ones.
-    """
-    search = settings.search
-    if model.perspective is None or search.perspective != PerspectiveSettings():
-        return settings
-    fitted = search.model_copy(update={"perspective": model.perspective})
-    return settings.model_copy(update={"search": fitted})
+def with_search_of(model: LinearModel, settings: SvmSettings) -> SvmSettings:
+    """Return settings with the search of the camera that a model was adapted to."""
+    return settings.model_copy(update={"search": settings.search.fitted(model.camera)})
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.kind import with_windows_of
+from vdet.detect.svm.kind import with_search_of
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import ImageError, VideoError
 from vdet.evaluate.clips.clip import Variant, follow_variants
@@ -41,7 +41,7 @@ def check(
     variants = [
         Variant(settings.model_copy(update={"detector": own}), SvmModel(model, own), (name,))
         for name, model in models.items()
-        for own in [with_windows_of(model, settings.svm)]
+        for own in [with_search_of(model, settings.svm)]
     ]
     frames = sum(len(clip.frames) - clip.learnt for clip in clips)
     advance = steps("checking", len(variants) * frames)

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vdet.config.schema import PerspectiveSettings
+from vdet.config.schema import CameraSearch
 from vdet.evaluate.output import table
 from vdet.evaluate.scores import Scores
 from vdet.files import write_json
@@ -66,7 +66,7 @@ def f1_against(checks: Sequence[CheckReport], against: str) -> dict[str, float]:
 
 @dataclass(frozen=True, slots=True)
 class AdaptReport:
-    """The report: the footage, the labels, the rounds, the window sets, and the check.
+    """The report: the footage, the labels, the rounds, the search, and the check.
 
     `vehicles` is the number of labelled boxes of vehicles. `chosen` names the detector of `checks`
     that became the adapted model. `seconds` is the wall time.
@@ -75,7 +75,7 @@ class AdaptReport:
     clips: tuple[ClipReport, ...]
     teacher: str
     vehicles: int
-    perspective: PerspectiveSettings
+    camera: CameraSearch
     rounds: tuple[RoundReport, ...]
     checks: tuple[CheckReport, ...]
     chosen: str
@@ -89,7 +89,7 @@ class AdaptReport:
 
     def values(self) -> dict[str, Any]:
         """Return the report as JSON values."""
-        return asdict(self) | {"perspective": self.perspective.model_dump(mode="json")}
+        return asdict(self) | {"camera": self.camera.model_dump(mode="json")}
 
     def lines(self) -> Iterator[str]:
         """Yield the report as lines of text."""
@@ -116,7 +116,7 @@ class AdaptReport:
                 for each in self.checks
             ],
         )
-        yield f"taken: {self.chosen} of the change; {self.seconds:.0f} s"
+        yield f"taken: {self.chosen}; {self.seconds:.0f} s"
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the report as JSON. Raises `OutputError`."""

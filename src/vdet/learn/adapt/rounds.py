@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.kind import with_windows_of
+from vdet.detect.svm.kind import with_search_of
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.evaluate.labelled_video import LabelledVideo
@@ -82,7 +82,7 @@ def _mine_round(
     if number:
         mining = settings.mining.model_copy(update={"per_vehicle": 0})
         settings = settings.model_copy(update={"mining": mining})
-    detector = SvmModel(model, with_windows_of(model, settings.svm))
+    detector = SvmModel(model, with_search_of(model, settings.svm))
     most = max(1, settings.adapt.frames // len(lessons))
     mined = []
     for each, lesson in enumerate(lessons):

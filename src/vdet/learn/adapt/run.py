@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import vdet
-from vdet.config.schema import Settings
+from vdet.config.schema import AdaptSettings, CameraSearch, Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import TruthError
@@ -103,29 +103,43 @@ def adapt_model(
         settings.svm.search.perspective,
         clips[0].horizon,
     )
-    start = replace(base, perspective=perspective)
+    camera = CameraSearch(probability=settings.svm.search.probability, perspective=perspective)
+    start = replace(base, camera=camera)
     rounds = learn_in_rounds(start, lessons, settings, workers=make_workers(jobs), steps=steps)
-    learnt = {
-        f"adapted, {share:g}": between(start, rounds[-1].model, share)
-        for share in settings.adapt.shares
-    }
+    learnt = _candidates(start, rounds[-1].model, camera, settings.adapt)
     checks = check(
         *(clips, job.truths, {"base": base, **learnt}, settings, steps), taught=teacher is not None
     )
     best = _best(checks, tuple(learnt))
+    adapted = learnt[best]
+    assert adapted.camera is not None
     report = AdaptReport(
         clips=tuple(
             ClipReport(c.path.name, c.sha256, c.learnt, len(c.frames) - c.learnt) for c in clips
         ),
         teacher=teacher.name if teacher else "the truth",
         vehicles=sum(int(np.count_nonzero(~each.labels.ignored)) for each in lessons),
-        perspective=perspective,
+        camera=adapted.camera,
         rounds=tuple(RoundReport(r.vehicles, r.non_vehicles, r.boxes) for r in rounds),
         checks=checks,
         chosen=best,
         seconds=round(time.monotonic() - began, 1),
     )
-    return replace(learnt[best], provenance=_provenance(report, base, settings)), report
+    return replace(adapted, provenance=_provenance(report, base, settings)), report
+
+
+def _candidates(
+    start: LinearModel, learnt: LinearModel, camera: CameraSearch, settings: AdaptSettings
+) -> dict[str, LinearModel]:
+    """Return models with all or a part of what was learnt, and with more or fewer hits."""
+    return {
+        f"{share:g} of the change, hits from {probability:g}": replace(
+            between(start, learnt, share),
+            camera=camera.model_copy(update={"probability": probability}),
+        )
+        for probability in settings.probabilities
+        for share in settings.shares
+    }
 
 
 def _check_covered(truth: LabelledVideo, clip: WatchedClip) -> None:

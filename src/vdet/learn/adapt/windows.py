@@ -12,7 +12,7 @@ from vdet.geometry import Float64Array
 
 _FILLED = 0.94  # share of a window's width that its vehicle fills
 _RATIO = 1.43  # of a size and the next smaller one, at most
-_SLOWER = 1.05  # how much longer the search may take
+_SLOWER = 1.1  # how much longer the search may take
 _TRIES = 30  # smallest sizes that are tried
 _TAIL = 0.02  # share of the vehicles that may be smaller, or larger, than any window
 _MAX_OUTSIDE = 0.05  # share of the vehicles outside the rows of the base that is no matter
