@@ -41,15 +41,20 @@ class AdaptSettings(Section):
         (0.5, 1.0),
         min_length=1,
         max_length=20,
-        description="shares of the change of the weights that are tried; that with the highest F1 "
-        "in the footage that was kept back is taken, of equal ones the first",
+        description="shares of the change of the weights that are tried in the footage that was "
+        "kept back",
     )
     probabilities: tuple[Fraction, ...] = Field(
         (0.7, 0.3),
         min_length=1,
         max_length=20,
         description="least probabilities of a hit that are tried with each of the shares; with a "
-        "higher one, the search is faster",
+        "higher one, detection is faster",
+    )
+    tolerance: Fraction = Field(
+        0.01,
+        description="the first of these models is taken whose F1 is at most so much below the "
+        "highest; a smaller difference may be chance",
     )
     penalty: float = Field(
         30.0,

@@ -110,7 +110,7 @@ def adapt_model(
     checks = check(
         *(clips, job.truths, {"base": base, **learnt}, settings, steps), taught=teacher is not None
     )
-    best = _best(checks, tuple(learnt))
+    best = choose(checks, tuple(learnt), tolerance=settings.adapt.tolerance)
     adapted = learnt[best]
     assert adapted.camera is not None
     report = AdaptReport(
@@ -151,10 +151,15 @@ def _check_covered(truth: LabelledVideo, clip: WatchedClip) -> None:
         )
 
 
-def _best(checks: Sequence[CheckReport], names: Sequence[str]) -> str:
-    """Return the name with the highest F1 against what was learnt; of equal ones the first."""
+def choose(checks: Sequence[CheckReport], names: Sequence[str], *, tolerance: float) -> str:
+    """Return the first name whose F1 against what was learnt is about the highest.
+
+    It is above that of the base, if any is.
+    """
     f1 = f1_against(checks, checks[0].against)
-    return max(names, key=lambda name: f1[name])
+    highest = max(f1[name] for name in names)
+    near = (name for name in names if f1[name] >= highest - tolerance)
+    return next(name for name in near if f1[name] > f1["base"] or f1[name] == highest)
 
 
 def _whole_vehicles(lesson: Lesson) -> Float64Array:
