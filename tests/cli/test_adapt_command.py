@@ -100,16 +100,24 @@ def test_a_model_that_is_no_better_is_not_written(
     assert list(out.parent.iterdir()) == []
 
 
-def test_footage_without_a_vehicle_is_refused(
-    run: Run, clip_path: Path, model_path: Path, out: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    "row",
+    [
+        "1,1,1,9,9,0,3,1",  # an ignore region
+        "1,300,200,9,9,1,1,1",  # a vehicle that is smaller than any window
+    ],
+)
+def test_footage_without_a_vehicle_that_a_window_fits_is_refused(
+    run: Run, clip_path: Path, model_path: Path, out: Path, tmp_path: Path, row: str
 ) -> None:
     truth = tmp_path / "gt.txt"
-    truth.write_text("1,1,1,1,9,9,0,3,1\n")  # an ignore region
+    truth.write_text("".join(f"{frame},{row}\n" for frame in range(1, 31)))
     result = run(
         *("adapt", clip_path, "-o", out, "--model", model_path),
         *("--teacher", "truth", "--truth", truth, *FEW),
     )
     assert result.code == 1
+    assert "no vehicle to learn from: the teacher finds none, or none that a window" in result.err
     assert result.err.count("\n") == 1
     assert not out.exists()
 

@@ -56,6 +56,11 @@ def learn_in_rounds(
             alarms = sum(each.false_alarms for each in new)
             if rounds and alarms < settings.adapt.fewest * rounds[-1].non_vehicles:
                 break
+            if not rounds and not sum(each.vehicles for each in new):
+                raise DataError(
+                    "no vehicle to learn from: the teacher finds none, or none that a window fits; "
+                    "give more footage, or smaller windows in detector.search.perspective.sizes"
+                )
             archives += [each.archive for each in new]
             learnt = learn(start, archives, settings, workers=workers, steps=steps)
             rounds.append(learnt)
@@ -66,6 +71,7 @@ def learn_in_rounds(
 @dataclass(frozen=True, slots=True)
 class _Mined:
     archive: Path
+    vehicles: int
     false_alarms: int
 
 
@@ -96,5 +102,5 @@ def _mine_round(
                 detector,
                 steps=lambda name, total: steps(f"round {number + 1}, mining {name}", total),
             )
-            mined.append(_Mined(archive, found.false_alarms + found.parts))
+            mined.append(_Mined(archive, found.vehicles, found.false_alarms + found.parts))
     return mined
