@@ -12,8 +12,8 @@ class NetworkScoreSettings(Section):
     left out of the training; written into the network's header.
     """
 
-    slope: float = Field(1.0, gt=0, le=100, description="how steeply the score rises with x")
-    offset: float = Field(0.0, ge=-100, le=100, description="added to x times slope")
+    slope: float = Field(2.675, gt=0, le=100, description="how steeply the score rises with x")
+    offset: float = Field(0.61, ge=-100, le=100, description="added to x times slope")
 
 
 class NetworkTrainingSettings(Section):
