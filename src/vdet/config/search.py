@@ -113,9 +113,8 @@ class SearchSettings(Section):
         if camera is None:
             return self
         default = SearchSettings()
-        own = {name: getattr(self, name) for name in CameraSearch.model_fields}
-        left = {name: own[name] == getattr(default, name) for name in own}
-        return self.model_copy(update={n: getattr(camera, n) for n in left if left[n]})
+        left = [n for n in CameraSearch.model_fields if getattr(self, n) == getattr(default, n)]
+        return self.model_copy(update={name: getattr(camera, name) for name in left})
 
     @model_validator(mode="after")
     def _has_windows(self) -> "SearchSettings":
