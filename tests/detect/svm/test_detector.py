@@ -27,9 +27,12 @@ DEFAULT = PERSPECTIVE.svm
 """Window sets by perspective, alternating; boxes from votes."""
 
 
-def detect_video(*images: Image, settings: SvmSettings = ROWS) -> list[Detections]:
+def detect_video(
+    *images: Image, settings: SvmSettings = ROWS, is_shipped: bool = False
+) -> list[Detections]:
     """Give the detections in consecutive frames of a video."""
-    detector = SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, images[:1])
+    model = SvmModel(MODEL, settings, is_shipped=is_shipped)
+    detector = model.for_video(WIDTH, HEIGHT, images[:1])
     return [detector.detect(detector.search(image, i)) for i, image in enumerate(images)]
 
 
@@ -374,15 +377,22 @@ class TestScores:
 
 
 class TestUnknownRoad:
-    """A road on which many detections are doubtful is told, once."""
+    """A road on which many detections of the shipped model are doubtful is told, once."""
 
     WARNING = "does not seem to know this road: 150 of 150 detections are doubtful"
 
-    def drive(self, middle: float, caplog: pytest.LogCaptureFixture, frames: int = 160) -> str:
+    def drive(
+        self,
+        middle: float,
+        caplog: pytest.LogCaptureFixture,
+        frames: int = 160,
+        *,
+        is_shipped: bool = True,
+    ) -> str:
         *_, seen = detect_video(road(CAR), road(CAR))
         settings = but(ROWS, "score", middle=middle * float(seen.strengths[0]))
         caplog.clear()
-        detect_video(*[road(CAR)] * frames, settings=settings)
+        detect_video(*[road(CAR)] * frames, settings=settings, is_shipped=is_shipped)
         return caplog.text
 
     def test_doubtful_detections_are_told_once(self, caplog: pytest.LogCaptureFixture) -> None:
@@ -390,6 +400,11 @@ class TestUnknownRoad:
 
     def test_sure_detections_are_not(self, caplog: pytest.LogCaptureFixture) -> None:
         assert "know this road" not in self.drive(0.5, caplog)
+
+    def test_how_sure_another_model_is_tells_nothing(
+        self, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        assert "know this road" not in self.drive(1.2, caplog, is_shipped=False)
 
     def test_a_few_detections_tell_nothing(self, caplog: pytest.LogCaptureFixture) -> None:
         assert "know this road" not in self.drive(1.2, caplog, frames=100)

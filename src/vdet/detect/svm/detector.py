@@ -31,8 +31,8 @@ COUNTED = 150
 """So many detections are counted."""
 
 LEAST_STRONG = 0.75
-"""The share of strong ones among them on a road that the model knows; it is 0.87 to 0.97 on the
-project video, and 0.33 to 0.74 in nine sets of pictures of other roads."""
+"""The share of strong ones among them on a road that the shipped model knows; it is 0.87 to 0.97 on
+the project video, and 0.33 to 0.74 in nine sets of pictures of other roads."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,18 +51,31 @@ class Candidates:
 
 
 class SvmModel:
-    """A linear model with its settings: a `DetectorModel`."""
+    """A linear model with its settings: a `DetectorModel`.
 
-    def __init__(self, model: LinearModel, settings: SvmSettings) -> None:
+    Parameters
+    ----------
+    is_shipped
+        Its detectors warn of roads that the shipped model does not know. How sure another model is
+        on the roads that it knows is not known.
+    """
+
+    def __init__(
+        self, model: LinearModel, settings: SvmSettings, *, is_shipped: bool = False
+    ) -> None:
         self._model = model
         self._settings = settings
+        self._is_shipped = is_shipped
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
         """Return a detector for frames of one size; `images` show where the horizon is."""
         horizon = horizon_of(self._settings, images)
         if self._settings.search.perspective.sizes:
             log.info("the horizon lies at %.2f of the height", horizon)
-        return SvmDetector(self._model, self._settings, width, height, horizon=horizon)
+        shipped = self._is_shipped
+        return SvmDetector(
+            self._model, self._settings, width, height, horizon=horizon, is_shipped=shipped
+        )
 
 
 class SvmDetector:
@@ -76,6 +89,8 @@ class SvmDetector:
         Row of the horizon, share of the frames' height (`horizon_of`).
     area
         Where vehicles are looked for; None for the whole frame.
+    is_shipped
+        As of `SvmModel`.
 
     Raises
     ------
@@ -96,7 +111,9 @@ class SvmDetector:
         *,
         horizon: float = DEFAULT_HORIZON,
         area: SearchArea | None = None,
+        is_shipped: bool = False,
     ) -> None:
+        self._is_shipped = is_shipped
         self._search = FrameSearch(model, settings, width, height, horizon=horizon, area=area)
         self._model = model
         self._horizon = horizon
@@ -110,8 +127,14 @@ class SvmDetector:
 
     def limited_to(self, area: SearchArea) -> "SvmDetector":
         """Return a detector that leaves out windows far from an area. Raises `ImageError`."""
-        size, horizon = self._size, self._horizon
-        return SvmDetector(self._model, self._settings, *size, horizon=horizon, area=area)
+        return SvmDetector(
+            self._model,
+            self._settings,
+            *self._size,
+            horizon=self._horizon,
+            area=area,
+            is_shipped=self._is_shipped,
+        )
 
     def search(self, image: Image, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
@@ -181,8 +204,8 @@ class SvmDetector:
         )
 
     def _count(self, detections: Detections) -> None:
-        """Warn once of a road that looks unlike those that the model has learnt."""
-        if self._weak >= COUNTED:
+        """Warn once of a road that looks unlike those that the shipped model has learnt."""
+        if not self._is_shipped or self._weak >= COUNTED:
             return
         self._weak += int(np.count_nonzero(detections.scores >= WEAK))
         self._strong += int(np.count_nonzero(detections.scores >= STRONG))

@@ -40,7 +40,7 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    return SvmModel(model, with_search_of(model, settings))
+    return SvmModel(model, with_search_of(model, settings), is_shipped=path is None)
 
 
 def with_search_of(model: LinearModel, settings: SvmSettings) -> SvmSettings:
