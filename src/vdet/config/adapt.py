@@ -1,8 +1,12 @@
 """The section `adapt`: how `vdet adapt` fits the linear model to a camera."""
 
+from typing import Annotated
+
 from pydantic import Field
 
 from vdet.config.section import Fraction, Section
+
+_Tried = Annotated[tuple[Fraction, ...], Field(min_length=1, max_length=20)]
 
 
 class AdaptSettings(Section):
@@ -37,17 +41,13 @@ class AdaptSettings(Section):
         le=1000,
         description="factor of training.C: how much the patches change the model",
     )
-    shares: tuple[Fraction, ...] = Field(
+    shares: _Tried = Field(
         (0.5, 1.0),
-        min_length=1,
-        max_length=20,
         description="shares of the change of the weights that are tried in the footage that was "
         "kept back",
     )
-    probabilities: tuple[Fraction, ...] = Field(
+    probabilities: _Tried = Field(
         (0.7, 0.3),
-        min_length=1,
-        max_length=20,
         description="least probabilities of a hit that are tried with each of the shares; with a "
         "higher one, detection is faster",
     )

@@ -72,9 +72,13 @@ class SvmModel:
         horizon = horizon_of(self._settings, images)
         if self._settings.search.perspective.sizes:
             log.info("the horizon lies at %.2f of the height", horizon)
-        shipped = self._is_shipped
         return SvmDetector(
-            self._model, self._settings, width, height, horizon=horizon, is_shipped=shipped
+            self._model,
+            self._settings,
+            width,
+            height,
+            horizon=horizon,
+            is_shipped=self._is_shipped,
         )
 
 
