@@ -1,7 +1,8 @@
-"""Commands whose help groups its options, ends with examples, and which take -q and -v."""
+"""Commands whose help groups its options, and groups that import a command when it is asked for."""
 
 import re
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from typing import Any
 
 import click
@@ -28,7 +29,7 @@ HEADINGS: Mapping[str, Sequence[str]] = {
 
 
 class Command(click.Command):
-    """A command of the program.
+    """A command of the program; its help ends with examples, and it takes `-q` and `-v`.
 
     Parameters
     ----------
@@ -59,6 +60,33 @@ class Command(click.Command):
             with formatter.section("Examples"):
                 for line in self.examples:
                     formatter.write(f"{'':{formatter.current_indent}}{line}\n")
+
+
+class LazyGroup(click.Group):
+    """A group that imports the module of a command when it is asked for: the program starts sooner.
+
+    Parameters
+    ----------
+    modules
+        The module of each command, by the command's name. In it the command has this name too, with
+        underscores.
+    """
+
+    def __init__(self, *arguments: Any, modules: Mapping[str, str], **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._modules = modules
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """Return the names of all commands in the order of the alphabet."""
+        return sorted([*super().list_commands(context), *self._modules])
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        """Return a command; None if there is none of that name."""
+        if name not in self._modules:
+            return super().get_command(context, name)
+        module = import_module(self._modules[name])
+        command: click.Command = getattr(module, name.replace("-", "_"))
+        return command
 
 
 def _verbosity_option(name: str) -> click.Option:

@@ -9,30 +9,25 @@ from typing import NoReturn
 import click
 
 import vdet
-from vdet.cli.adapt import adapt
-from vdet.cli.calibrate import calibrate
-from vdet.cli.command import Command
-from vdet.cli.count import count
-from vdet.cli.demo import demo
-from vdet.cli.detect_image import detect_image
-from vdet.cli.detect_video import detect_video
-from vdet.cli.doctor import doctor
-from vdet.cli.eval_images import images
-from vdet.cli.eval_patches import patches
-from vdet.cli.eval_tracks import tracks
-from vdet.cli.eval_video import video
-from vdet.cli.info import info
+from vdet.cli.command import Command, LazyGroup
 from vdet.cli.messages import print_lines, set_up_logs
-from vdet.cli.mine import mine
 from vdet.cli.options import read_settings, settings_options
-from vdet.cli.train import train
-from vdet.cli.train_net import train_net
 from vdet.config.rendering import render
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
 
+_COMMANDS = (
+    *("adapt", "calibrate", "count", "demo", "detect-image", "detect-video", "doctor", "info"),
+    *("mine", "train", "train-net"),
+)
+_EVALUATIONS = "images", "patches", "tracks", "video"
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+
+@click.group(
+    cls=LazyGroup,
+    modules={name: f"vdet.cli.{name.replace('-', '_')}" for name in _COMMANDS},
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(vdet.__version__, prog_name="vdet")
 @click.option("-v", "--verbose", is_flag=True, help="Print more about what is done.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no progress and no warnings, only errors.")
@@ -43,7 +38,12 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     context.obj = quiet
 
 
-@cli.group("eval", short_help="Measure detection, tracking or the classifier.")
+@cli.group(
+    "eval",
+    cls=LazyGroup,
+    modules={name: f"vdet.cli.eval_{name}" for name in _EVALUATIONS},
+    short_help="Measure detection, tracking or the classifier.",
+)
 def evaluate() -> None:
     """Measure detection, tracking or the classifier."""
 
@@ -62,16 +62,6 @@ def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     Save them, change what you like, and give the file to a command with -c.
     """
     print_lines(*render(read_settings(config_name, assignments)).splitlines())
-
-
-_COMMANDS = (
-    *(adapt, calibrate, count, demo, detect_image, detect_video, doctor, info, mine),
-    *(train, train_net),
-)
-for _command in _COMMANDS:
-    cli.add_command(_command)
-for _command in (images, patches, tracks, video):
-    evaluate.add_command(_command)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

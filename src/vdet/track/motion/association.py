@@ -1,20 +1,19 @@
 """Which detection belongs to which vehicle, and which vehicles are the same one.
 
-Source: Kuhn, "The Hungarian Method for the Assignment Problem", 1955; the order of the rounds is
-the matching cascade of Wojke, Bewley and Paulus, "Simple Online and Realtime Tracking with a Deep
-Association Metric", 2017; the buffered intersection over union is that of Yang et al., "Hard to
-Track Objects with Irregular Motions and Similar Appearances? Make It Easier by Buffering the
-Matching Space", 2023.
+Source: the order of the rounds is the matching cascade of Wojke, Bewley and Paulus, "Simple Online
+and Realtime Tracking with a Deep Association Metric", 2017; the buffered intersection over union is
+that of Yang et al., "Hard to Track Objects with Irregular Motions and Similar Appearances? Make It
+Easier by Buffering the Matching Space", 2023.
 """
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
 from vdet.config.schema import MotionTrackerSettings
 from vdet.geometry import Float64Array, iou_matrix, visible
+from vdet.track.motion.assignment import assign
 from vdet.track.motion.overlapping import CLEAR, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
 
@@ -74,15 +73,9 @@ def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> Pairs:
     left = values.copy()
     pairs: Pairs = {}
     for rows in rounds:
-        pairs |= {rows[row]: column for row, column in _assign(left[list(rows)])}
+        pairs |= {rows[row]: column for row, column in assign(left[list(rows)])}
         left[:, list(pairs.values())] = 0
     return pairs
-
-
-def _assign(values: Float64Array) -> list[tuple[int, int]]:
-    rows, columns = linear_sum_assignment(values, maximize=True)
-    kept = values[rows, columns] > 0
-    return list(zip(rows[kept].tolist(), columns[kept].tolist(), strict=True))
 
 
 def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
