@@ -20,7 +20,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.media import Frame, VideoInfo
+from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
 from vdet.pipeline.loop import follow_frames, peek
 from vdet.pipeline.positions import with_positions
@@ -194,7 +194,9 @@ class Shown:
         """Give the shown vehicles that must be found."""
         camera, rate = drive.scene.camera, drive.scene.rate
         video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
-        clip = (Frame(i, Fraction(i) / rate, image) for i, image in enumerate(drive.images()))
+        clip = (
+            Frame(i, Fraction(i) / rate, Picture(image)) for i, image in enumerate(drive.images())
+        )
         first, all_frames = peek(clip)
         with single_threaded_libraries():
             detector = self.model.for_video(camera.width, camera.height, first)

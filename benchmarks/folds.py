@@ -138,7 +138,7 @@ def _search(
         ]
         for frame in frames:
             block = int(_block_of(np.array([frame.index + 1]), last)[0])
-            candidates = detectors[block].search(frame.image, frame.index)
+            candidates = detectors[block].search(frame.picture, frame.index)
             found.append(candidates.windows.hits(LEAST))
     return SearchedVideo(info.width, info.height, float(info.rate), found)
 

@@ -9,8 +9,7 @@ from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.media import VideoReader
-from vdet.media.images import Image
+from vdet.media import Picture, VideoReader
 from vdet.synthetic import demo_scene, write_clip
 
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
@@ -51,8 +50,8 @@ def find_video(folder: Path) -> Path:
     return path
 
 
-def read_frames(path: Path) -> list[Image]:
-    """Return the images of the frames that are searched."""
+def read_pictures(path: Path) -> list[Picture]:
+    """Return the frames that are searched, as they were decoded."""
     with VideoReader(path, frames=max(FRAMES_SEARCHED) + 1) as reader:
-        read = [frame.image for frame in reader if frame.index % 10 == 0]
+        read = [frame.picture for frame in reader if frame.index % 10 == 0]
     return [read[index // 10 % len(read)] for index in FRAMES_SEARCHED]

@@ -1,24 +1,29 @@
 """Whole runs of detect-video: wall time with and without outputs and lanes, and peak memory."""
 
+import itertools
 import subprocess
 import sys
+import time
+from functools import partial
 from pathlib import Path
+
+import av
+from av.video.frame import PictureType
 
 from benchmarks.material import ShippedConfig
 from benchmarks.rounds import Task, measure
 from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
 from vdet.config.draw import DrawSettings
 from vdet.config.regions import RegionSettings, RegionsSettings
-from vdet.config.schema import NetworkSettings
+from vdet.config.schema import NetworkSettings, OutputSettings, Settings
 from vdet.config.section import Section
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
-from vdet.media import VideoReader, VideoWriter
+from vdet.media import VideoReader
 from vdet.pipeline.loop import VideoJob, run_video
 from vdet.pipeline.sinks.protocol import Output
-from vdet.pipeline.threads import prefetch, write_async
 
 FRAMES = 250
 CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
@@ -47,54 +52,50 @@ ANSWERS: dict[str, Section] = {
 def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> dict[str, float]:
     """Return the seconds that the first `FRAMES` frames take.
 
-    Keys: `pass through` (read and written), `detect` (vehicles detected, drawn and written),
-    `detect with lanes`, `detect with network`, `detect with answers` (`ANSWERS`, counts and records
-    of vehicles too), `detect only` (nothing written).
+    Keys: `transcode` (decoded, and encoded with the same settings), `detect` (vehicles detected,
+    drawn and written), `detect with lanes`, `detect with network`, `detect with answers`
+    (`ANSWERS`, counts and records of vehicles too), `detect only` and `detect only with network`
+    (nothing written).
     """
     out = folder / "out.mp4"
-    model = default.detector
-    network = load_detector(NetworkSettings())
-
-    def pass_through() -> None:
-        with (
-            VideoReader(path, frames=FRAMES) as reader,
-            VideoWriter(out, reader.info, default.settings.output) as writer,
-            write_async(writer.write) as encode,
-            prefetch(reader) as frames,
-        ):
-            for frame in frames:
-                encode(frame)
-
-    def detect(detector: DetectorModel = model, lanes: LaneRequest | None = None) -> None:
-        outputs = (Output("video", out),)
-        job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True)
-        run_video(job, detector, default.settings)
-
-    def detect_with_lanes() -> None:
-        detect(lanes=LaneRequest(CAMERA))
-
-    def detect_with_network() -> None:
-        detect(network)
-
+    video = (Output("video", out),)
+    files = Output("counts", folder / "counts.csv"), Output("summary", folder / "cars.csv")
+    model, network = default.detector, load_detector(NetworkSettings())
     answering = default.settings.model_copy(update=ANSWERS)
-    answers = (Output("counts", folder / "counts.csv"), Output("summary", folder / "cars.csv"))
 
-    def detect_with_answers() -> None:
-        outputs = (Output("video", out), *answers)
-        run_video(VideoJob(path, outputs, frames=FRAMES, overwrite=True), model, answering)
-
-    def detect_only() -> None:
-        run_video(VideoJob(path, frames=FRAMES), model, default.settings)
+    def detect(
+        detector: DetectorModel,
+        outputs: tuple[Output, ...] = video,
+        settings: Settings = default.settings,
+        lanes: LaneRequest | None = None,
+    ) -> None:
+        job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True)
+        run_video(job, detector, settings)
 
     tasks: dict[str, Task] = {
-        "pass through": pass_through,
-        "detect": detect,
-        "detect with lanes": detect_with_lanes,
-        "detect with network": detect_with_network,
-        "detect with answers": detect_with_answers,
-        "detect only": detect_only,
+        "transcode": partial(_transcode, path, folder / "transcoded.mp4", default.settings.output),
+        "detect": partial(detect, model),
+        "detect with lanes": partial(detect, model, lanes=LaneRequest(CAMERA)),
+        "detect with network": partial(detect, network),
+        "detect with answers": partial(detect, model, (*video, *files), answering),
+        "detect only": partial(detect, model, ()),
+        "detect only with network": partial(detect, network, ()),
     }
     return measure(tasks, rounds)
+
+
+def _transcode(path: Path, out: Path, settings: OutputSettings) -> None:
+    """Encode the planes of a video as they are decoded."""
+    options = {"preset": settings.preset, "crf": str(settings.crf)}
+    with av.open(str(path)) as source, av.open(str(out), "w") as target:
+        stream = source.streams.video[0]
+        stream.thread_type = "AUTO"
+        encoder = target.add_stream(settings.codec, rate=stream.average_rate, options=options)
+        encoder.width, encoder.height = stream.width, stream.height
+        for frame in itertools.islice(source.decode(stream), FRAMES):
+            frame.pict_type = PictureType.NONE  # the encoder chooses its own
+            target.mux(encoder.encode(frame))
+        target.mux(encoder.encode())
 
 
 def seconds_of_video(path: Path) -> float:
@@ -119,3 +120,13 @@ def peak_memory(path: Path, folder: Path, *options: str) -> float:
     command = [sys.executable, "-c", code, "--quiet", *arguments]
     result = subprocess.run(command, capture_output=True, text=True, check=True)
     return int(result.stdout.split()[-1]) / 1024
+
+
+def seconds_of_program(path: Path, folder: Path, seconds: float) -> float:
+    """Return how long the whole program takes for the first seconds of a video."""
+    options = ["--end", str(seconds), "--overwrite"]
+    arguments = ["detect-video", str(path), str(folder / "short.mp4"), *options]
+    command = [sys.executable, "-m", "vdet", "--quiet", *arguments]
+    began = time.perf_counter()
+    subprocess.run(command, check=True)
+    return time.perf_counter() - began

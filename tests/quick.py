@@ -14,7 +14,7 @@ QUICK = (
     "detector.score.middle=0.1",
     "detector.stills={strength: 0, width: 0.04, height: 0.07}",
     "tracker.method=rules",
-    "tracker.confident_peak=0.3",
+    "tracker.confident_peak=0.35",
     "tracker.confident_detections_needed=2",
 )
 QUICK_OPTIONS = tuple(word for assignment in QUICK for word in ("--set", assignment))

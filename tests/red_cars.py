@@ -25,7 +25,7 @@ from vdet.config.schema import (
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
 from vdet.geometry import Box
-from vdet.media import Frame
+from vdet.media import Frame, Picture
 from vdet.media.images import Image
 
 WIDTH, HEIGHT = 320, 240
@@ -67,9 +67,9 @@ def by_perspective(horizon: float) -> Settings:
         detector=SvmSettings(
             features=COLOUR,
             search=SearchSettings(probability=0.5, perspective=perspective),
-            heat=HeatSettings(votes=VoteSettings(least=0.25)),
-            score=ScoreSettings(middle=0.1, slope=4),
-            stills=StillSettings(strength=0.15),
+            heat=HeatSettings(votes=VoteSettings(least=0.5)),
+            score=ScoreSettings(middle=0.2, slope=4),
+            stills=StillSettings(strength=0.3),
         )
     )
 
@@ -117,4 +117,4 @@ def car_at(index: int) -> Box:
 def drive(count: int) -> Iterator[Frame]:
     """Give frames of a car that drives from left to right, 25 a second."""
     for index in range(count):
-        yield Frame(index, Fraction(index, 25), road(car_at(index)))
+        yield Frame(index, Fraction(index, 25), Picture(road(car_at(index))))

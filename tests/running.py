@@ -18,7 +18,7 @@ import pytest
 from conftest import Outcome
 from red_cars import HEIGHT, WIDTH, car_at, road
 from vdet.config.schema import OutputSettings
-from vdet.media import Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.media import Frame, Picture, VideoInfo, VideoReader, VideoWriter
 
 SOON = 300.0  # seconds; a limit for what takes a moment, on a very busy machine
 
@@ -51,7 +51,7 @@ def write_drive(path: Path, frames: int, *, noise: bool = False) -> Path:
             image = road(car_at(index % 200))
             if noise:
                 image += random.integers(0, 100, image.shape, np.uint8)
-            writer.write(Frame(index, Fraction(index, 25), image))
+            writer.write(Frame(index, Fraction(index, 25), Picture(image)))
     return path
 
 

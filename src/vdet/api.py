@@ -18,7 +18,7 @@ from vdet.detect.factory import DetectorKind, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ImageError, VdetError, VideoError
 from vdet.geometry import Box
-from vdet.media import Frame, VideoReader
+from vdet.media import Frame, Picture, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.loop import Summary, VideoJob, check_job, follow_frames, peek, run_video
 from vdet.pipeline.pictures import PictureJob, detect_picture, run_picture
@@ -135,14 +135,14 @@ class Tracker:
         image
             The frame; only the tracker `rules` needs it.
         """
-        return self._tracker.update(detections, time, image)
+        return self._tracker.update(detections, time, _picture(image))
 
     def carry(self, time: float, image: Image | None = None) -> list[Track]:
         """Follow the vehicles into a frame in which no detector looked for them.
 
         Nothing is missed there. The tracks are predicted. Arguments as of `update`.
         """
-        return self._tracker.carry(time, image)
+        return self._tracker.carry(time, _picture(image))
 
 
 def follow(
@@ -268,3 +268,7 @@ def _path(path: PathName | None) -> Path | None:
 
 def _exact(seconds: float | Fraction | None) -> Fraction | None:
     return None if seconds is None else Fraction(seconds)
+
+
+def _picture(image: Image | None) -> Picture | None:
+    return None if image is None else Picture(image)

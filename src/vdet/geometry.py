@@ -160,22 +160,16 @@ def to_sides(corners: npt.NDArray[np.floating[Any]]) -> Float64Array:
 
 def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
     """Return the parts of boxes `(n, 4)` that lie in a frame of `size`; sides may be 0."""
-    near = np.clip(boxes[:, :2], 0, size)
-    far = np.clip(boxes[:, :2] + boxes[:, 2:], 0, size)
+    near = np.minimum(np.maximum(boxes[:, :2], 0), size)  # np.clip takes thrice as long
+    far = np.minimum(np.maximum(boxes[:, :2] + boxes[:, 2:], 0), size)
     return np.concatenate([near, far - near], axis=1)
 
 
 def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
-    width, height = (_common_length(a[:, axis::2], b[:, axis::2]) for axis in (0, 1))
-    width *= height
-    return width
-
-
-def _common_length(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return how long `(n, m)` the parts are that sections `(n, 2)`, `(m, 2)` of an axis share."""
-    common: Float64Array = np.minimum.outer(a.sum(axis=1), b.sum(axis=1))
-    common -= np.maximum.outer(a[:, 0], b[:, 0])
-    return np.maximum(common, 0, out=common)
+    near = np.maximum(a[:, np.newaxis, :2], b[:, :2])
+    far = np.minimum((a[:, :2] + a[:, 2:])[:, np.newaxis], b[:, :2] + b[:, 2:])
+    common = np.maximum(far - near, 0)
+    return np.asarray(common[..., 0] * common[..., 1])
 
 
 def _area(boxes: Float64Array) -> Float64Array:

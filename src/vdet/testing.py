@@ -16,7 +16,7 @@ from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.files import OutputFiles
 from vdet.geometry import Box
-from vdet.media import Frame, VideoInfo
+from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
 from vdet.pipeline.loop import NullDetector
 from vdet.pipeline.result import FrameResult
@@ -47,23 +47,27 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
         _check_detections(found, width, height)
     detector, other = (model.for_video(width, height, images) for _ in range(2))
     with ThreadPoolExecutor(2) as pool:
-        candidates = list(pool.map(detector.search, images, range(len(images))))
+        pictures = [Picture(image) for image in images]
+        candidates = list(pool.map(detector.search, pictures, range(len(images))))
     for index, (one, image, expected) in enumerate(zip(candidates, images, alone, strict=True)):
-        other.detect(other.search(255 - image, index))
+        other.detect(other.search(Picture(255 - image), index))
         _check_equal(detector.detect(one), expected)
     still = model.for_video(width, height, images[:1])
-    found = still.detect(still.search(images[0], None))
+    found = still.detect(still.search(Picture(images[0]), None))
     _check_detections(found, width, height)
     for name, picture in still.stage_pictures(images[0], found).items():
         assert picture.dtype == np.uint8, f"stage picture {name} is {picture.dtype}, not uint8"
         assert picture.ndim == 3, f"stage picture {name} has the shape {picture.shape}"
     plain = np.full_like(images[0], 128)
     blank = model.for_video(width, height, [plain])
-    _check_detections(blank.detect(blank.search(plain, 0)), width, height)
+    _check_detections(blank.detect(blank.search(Picture(plain), 0)), width, height)
 
 
 def _detect_all(detector: VideoDetector, images: Sequence[Image]) -> list[Detections]:
-    return [detector.detect(detector.search(image, index)) for index, image in enumerate(images)]
+    return [
+        detector.detect(detector.search(Picture(image), index))
+        for index, image in enumerate(images)
+    ]
 
 
 def _check_detections(found: Detections, width: int, height: int) -> None:
@@ -94,8 +98,8 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     for index in range(3 * RATE):
         image = _scene(index)
         found, before = _detections(index), image.copy()
-        shown.append(list(first.update(found, index / RATE, image)))
-        again = list(second.update(_detections(index), index / RATE, image))
+        shown.append(list(first.update(found, index / RATE, Picture(image))))
+        again = list(second.update(_detections(index), index / RATE, Picture(image)))
         assert again == shown[-1], "two trackers with the same input differ: they share something"
         assert np.array_equal(image, before), "the tracker changed the frame"
         _check_tracks(shown[-1])
@@ -107,18 +111,18 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     if isinstance(first, CarryingTracker):
         _check_carrying(make(640, 360))
     for index in range(3 * RATE, 30 * RATE):
-        last = list(first.update(NO_DETECTIONS, index / RATE, _scene(0) // 2))
+        last = list(first.update(NO_DETECTIONS, index / RATE, Picture(_scene(0) // 2)))
     assert last == [], "vehicles are shown long after the last detection"
 
 
 def _check_carrying(tracker: VideoTracker) -> None:
     assert isinstance(tracker, CarryingTracker)
     for index in range(3 * RATE):
-        time, image = index / RATE, _scene(index)
+        time, picture = index / RATE, Picture(_scene(index))
         if index % 2 == 0:
-            shown = tracker.update(_detections(index), time, image)
+            shown = tracker.update(_detections(index), time, picture)
             continue
-        carried = tracker.carry(time, image)
+        carried = tracker.carry(time, picture)
         _check_tracks(carried)
         ids = [track.id for track in carried]
         assert ids == [track.id for track in shown], "a vehicle that was not looked for is missed"
@@ -225,7 +229,7 @@ class _ShowsFrame(NullDetector):
 
 
 def _result(index: int) -> FrameResult:
-    frame = Frame(index, Fraction(index, RATE), _scene(index))
+    frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
     tracks = tuple(
         Track(number, box, 0.9, predicted=number == 2)
         for number, box in enumerate(_boxes(index), start=1)

@@ -127,9 +127,10 @@ def last_frame(path: Path) -> Any:
 
 
 def tag_width(image: Any) -> int:
-    """Return how many columns have the colour of the first vehicle above its box."""
-    near = abs(image[: CAR.y - 6].astype(int) - color_of(1)).max(axis=2) < 40
-    return int(near.any(axis=0).sum())
+    """Return how many columns have the colour of the first vehicle in the top rows drawn on."""
+    near = abs(image.astype(int) - color_of(1)).max(axis=2) < 40
+    top = int(near.any(axis=1).argmax())
+    return int(near[top : top + 8].any(axis=0).sum())
 
 
 FULL = OSError(28, "No space left on device")

@@ -18,6 +18,7 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ConfigError, ModelError
+from vdet.media import Picture
 
 OTHER = FeatureSettings(color_space="HSV")
 
@@ -56,7 +57,9 @@ class TestLinearModel:
         seed = shipped_model(SvmSettings()).with_name("seed.npz")
         image = np.zeros((720, 1280, 3), np.uint8)
         detector = load_detector(SvmSettings(), seed).for_video(1280, 720, [image])
-        sheet = detector.stage_pictures(image, detector.detect(detector.search(image, None)))
+        sheet = detector.stage_pictures(
+            image, detector.detect(detector.search(Picture(image), None))
+        )
         assert sheet["patches"].size > 0
 
     def test_features_asked_for_must_be_those_of_the_model(self) -> None:
@@ -120,7 +123,7 @@ class TestAnotherPackage:
             def for_video(self, width, height, images):
                 return self
 
-            def search(self, image, index):
+            def search(self, picture, index):
                 return None
 
             def detect(self, candidates):

@@ -10,13 +10,13 @@ from vdet.draw.boxes import (
     BLACK,
     GREEN,
     WHITE,
-    Color,
     color_of,
     draw_box,
     draw_label,
     line_width,
     text_color,
 )
+from vdet.draw.paint import Color
 from vdet.geometry import Box
 from vdet.media.images import Image
 

@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame, VideoReader
-from vdet.media.frame import ColorTags, Orientation
+from vdet.media.coding import Coding
+from vdet.media.frame import ColorTags
+from vdet.media.orientation import Orientation
 from vdet.media.reader import Clock
 
 Image = NDArray[np.uint8]
@@ -182,18 +184,19 @@ def test_other_video_streams_are_told(
     assert warnings() == [f"{path}: has 2 video streams; only the first is used"]
 
 
-def write_hdr(path: Path, transfer: int, luma: int) -> Path:
-    """Write 10-bit grey frames with a transfer of BT.2100 and primaries of BT.2020."""
+def write_hdr(path: Path, transfer: int, luma: int, *, bits: int = 10, matrix: int = 9) -> Path:
+    """Write a grey frame with a transfer of BT.2100 and primaries of BT.2020."""
     with av.open(str(path), "w") as container:
         stream = container.add_stream("ffv1", rate=25)
         assert isinstance(stream, av.VideoStream)
-        stream.width, stream.height, stream.pix_fmt = 160, 96, "yuv420p10le"
+        pixels = "yuv420p" if bits == 8 else "yuv420p10le"
+        stream.width, stream.height, stream.pix_fmt = 160, 96, pixels
         context = stream.codec_context
-        context.color_trc, context.color_primaries, context.colorspace = transfer, 9, 9
+        context.color_trc, context.color_primaries, context.colorspace = transfer, 9, matrix
         context.color_range = 1
-        planes = np.full((144, 160), 512, np.uint16)
+        planes = np.full((144, 160), 1 << bits - 1, np.uint8 if bits == 8 else np.uint16)
         planes[:96] = luma
-        frame = av.VideoFrame.from_ndarray(planes, format="yuv420p10le")
+        frame = av.VideoFrame.from_ndarray(planes, format=pixels)
         container.mux(stream.encode(frame) + stream.encode(None))
     return path
 
@@ -218,6 +221,123 @@ def test_hdr_is_read_as_standard_range_and_told(
     expected = 255 * share ** (1 / 2.4)
     assert np.abs(frame.image - expected).max() < 5
     assert warnings() == [f"{path}: is HDR ({name}) and is read as standard range (BT.709)"]
+
+
+def pictures_of(path: Path) -> list[av.VideoFrame]:
+    """Decode a file without the reader."""
+    with av.open(str(path)) as container:
+        return list(container.decode(video=0))
+
+
+PLANAR: dict[str, tuple[str, dict[str, Any], Coding]] = {
+    "untagged": ("mp4", {}, Coding()),
+    "BT.601": ("mp4", {"matrix": 5}, Coding()),
+    "BT.709": ("mp4", {"matrix": 1}, Coding("bt709")),
+    "full range": ("mp4", {"full_range": True}, Coding(full_range=True)),
+    "BT.709, full range": (
+        "mp4",
+        {"matrix": 1, "full_range": True},
+        Coding("bt709", full_range=True),
+    ),
+    "motion jpeg": ("avi", {"codec": "mjpeg", "pix_fmt": "yuvj420p"}, Coding(full_range=True)),
+    "odd sides": ("mkv", {"size": (153, 97), "codec": "ffv1"}, Coding()),
+    "grey": ("mp4", {"pix_fmt": "gray"}, Coding()),
+    "mpeg-4": ("avi", {"codec": "mpeg4", "options": {"bf": "2"}}, Coding()),
+    "vp9": ("webm", {"codec": "libvpx-vp9", "options": {"deadline": "realtime"}}, Coding()),
+}
+"""Suffix and arguments of `write_clip` for clips that are read as planes, and their coding."""
+
+
+class TestPlanes:
+    """Frames that need no conversion are given as they were decoded; others are BGR."""
+
+    @pytest.mark.parametrize("kind", PLANAR)
+    @pytest.mark.parametrize("start", [None, Fraction(5, 25)])
+    def test_are_those_of_the_decoder(
+        self, kind: str, start: Fraction | None, *, tmp_path: Path, write_clip: Writer
+    ) -> None:
+        suffix, spec, coding = PLANAR[kind]
+        path = write_clip(tmp_path / f"clip.{suffix}", **spec)
+        pictures = pictures_of(path)
+        with VideoReader(path, start=start) as reader:
+            assert reader.info.coding == coding
+            frames = list(reader)
+        assert len(frames) == (12 if start is None else 7)
+        for frame in frames:
+            planes = frame.picture.planes
+            assert planes is not None
+            assert planes.coding == coding
+            assert not planes.is_own, "the decoder may need it for the next frames"
+            height, width = planes.shape
+            assert (reader.info.width, reader.info.height) == (width, height)
+            decoded = pictures[frame.index]
+            for layer, plane in zip(planes.layers, decoded.planes, strict=True):
+                rows = np.frombuffer(bytes(plane), np.uint8).reshape(-1, plane.line_size)
+                np.testing.assert_array_equal(layer, rows[: layer.shape[0], : layer.shape[1]])
+            other = decoded.to_ndarray(format="bgr24").astype(int)
+            assert np.abs(frame.image - other).mean() < 3
+
+    @pytest.mark.parametrize(
+        ("suffix", "spec"),
+        [
+            ("mp4", {"pix_fmt": "yuv444p"}),
+            ("mp4", {"pix_fmt": "yuv422p"}),
+            ("mp4", {"pix_fmt": "yuv420p10le"}),
+            ("mkv", {"codec": "ffv1", "pix_fmt": "bgr0"}),
+            ("mp4", {"rotation": 90}),
+            ("mp4", {"rotation": 180}),
+            ("mp4", {"rotation": 270, "matrix": 1}),
+        ],
+    )
+    def test_of_frames_that_are_turned_or_of_another_form_there_are_none(
+        self, suffix: str, spec: dict[str, Any], *, tmp_path: Path, write_clip: Writer
+    ) -> None:
+        with VideoReader(write_clip(tmp_path / f"clip.{suffix}", **spec)) as reader:
+            assert reader.info.coding == Coding()
+            assert all(frame.picture.planes is None for frame in reader)
+
+    def test_of_mirrored_frames_there_are_none(self, tmp_path: Path, write_clip: Writer) -> None:
+        path = set_matrix(write_clip(tmp_path / "clip.mp4"), -1, 0, 0, 1)
+        with VideoReader(path) as reader:
+            assert reader.info.orientation == Orientation(mirrored=True)
+            assert all(frame.picture.planes is None for frame in reader)
+
+    @pytest.mark.parametrize(("bits", "matrix"), [(10, 9), (8, 9), (8, 1)])
+    @pytest.mark.parametrize("transfer", [16, 18])
+    def test_of_hdr_there_are_none(
+        self, transfer: int, bits: int, matrix: int, *, tmp_path: Path
+    ) -> None:
+        path = write_hdr(tmp_path / "hdr.mkv", transfer, 100, bits=bits, matrix=matrix)
+        with VideoReader(path) as reader:
+            assert reader.info.coding == Coding()
+            assert [frame.picture.planes for frame in reader] == [None]
+
+    def test_of_frames_that_are_scaled_there_are_none(
+        self, tmp_path: Path, write_clip: Writer
+    ) -> None:
+        small = write_clip(tmp_path / "small.h264", count=6)
+        large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
+        path = tmp_path / "both.h264"
+        path.write_bytes(small.read_bytes() + large.read_bytes())
+        with VideoReader(path) as reader:
+            planar = [frame.picture.planes is not None for frame in reader]
+        assert planar == [True] * 6 + [False] * 9
+
+    def test_of_frames_that_are_coded_unlike_the_first_there_are_none(
+        self, tmp_path: Path, write_clip: Writer
+    ) -> None:
+        one = write_clip(tmp_path / "one.h264", count=6, matrix=1)
+        other = write_clip(tmp_path / "other.h264", count=9, matrix=5, full_range=True)
+        path = tmp_path / "both.h264"
+        path.write_bytes(one.read_bytes() + other.read_bytes())
+        with VideoReader(path) as reader:
+            assert reader.info.coding == Coding("bt709")
+            frames = list(reader)
+        planar = [frame.picture.planes is not None for frame in frames]
+        assert planar == [True] * 6 + [False] * 9
+        for frame in frames:
+            corner = frame.image[60:90, 10:70].mean(axis=(0, 1))
+            assert np.abs(corner - (40, 30, 210)).max() < 5, "its own coding counts"
 
 
 def test_raw_motion_jpeg_is_read(
@@ -367,15 +487,16 @@ class TestFaults:
 
 
 def test_pixels_that_cannot_be_converted_are_one_error(
-    plain_clip: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, write_clip: Writer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> Image:
         raise av.error.InvalidDataError(1, "no such conversion")
 
+    path = write_clip(tmp_path / "fine.mp4", pix_fmt="yuv444p")
     monkeypatch.setattr("vdet.media.reader.to_bgr", refuse)
     with (
-        VideoReader(plain_clip) as reader,
-        pytest.raises(VideoError, match=r"plain\.mp4: its pixels \(yuv420p\) cannot be converted"),
+        VideoReader(path) as reader,
+        pytest.raises(VideoError, match=r"fine\.mp4: its pixels \(yuv444p\) cannot be converted"),
     ):
         list(reader)
 

@@ -3,22 +3,29 @@
 import re
 import resource
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 import pytest
+from av.video.frame import PictureType
 
 import vdet
 from clips import write_clip
 from vdet.config.schema import OutputSettings
+from vdet.draw.paint import fill
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
-from vdet.media import ColorTags, Frame, VideoInfo, VideoReader, VideoWriter
+from vdet.geometry import Box
+from vdet.media import ColorTags, Frame, Picture, VideoInfo, VideoReader, VideoWriter
+from vdet.media.coding import Coding
 from vdet.media.frame import Tags
 from vdet.media.images import Image
+from vdet.media.planes import Planes
 from vdet.media.writer import may_replace_video
 
 Draw = Callable[[int, int, int], Image]
@@ -31,7 +38,8 @@ INFO = VideoInfo(Path("unused"), 160, 96, Fraction(25), Fraction(1, 12_800))
 def frames(draw_frame: Draw) -> list[Frame]:
     """Twelve frames, the first at 7 s."""
     return [
-        Frame(index, 7 + Fraction(index, 25), draw_frame(index, 160, 96)) for index in range(12)
+        Frame(index, 7 + Fraction(index, 25), Picture(draw_frame(index, 160, 96)))
+        for index in range(12)
     ]
 
 
@@ -135,7 +143,7 @@ class TestFile:
     def test_odd_sides_grow_by_a_pixel(self, tmp_path: Path, draw_frame: Draw) -> None:
         image = draw_frame(5, 153, 97)
         info = replace(INFO, width=153, height=97)
-        (frame,) = read(write(tmp_path / "out.mp4", [Frame(0, Fraction(0), image)], info))
+        (frame,) = read(write(tmp_path / "out.mp4", [Frame(0, Fraction(0), Picture(image))], info))
         assert frame.image.shape == (98, 154, 3)
         assert np.abs(frame.image[:97, :153].astype(int) - image).mean() < 3
 
@@ -156,19 +164,31 @@ class TestFile:
             assert reader.info.pixel_aspect == Fraction(4, 3)
 
     @pytest.mark.parametrize(
-        ("source", "written"),
+        ("source", "coding", "written"),
         [
-            (ColorTags(), ColorTags()),
-            (ColorTags(1, 1, 1), ColorTags(1, 1, 6)),
-            (ColorTags(9, 14, 9), ColorTags(9, 14, 6)),
+            (ColorTags(), Coding(), ColorTags()),
+            (ColorTags(1, 1, 5), Coding(), ColorTags(1, 1, 6)),
+            (ColorTags(1, 1, 1), Coding("bt709"), ColorTags(1, 1, 1)),
+            (ColorTags(1, 1, 1), Coding(), ColorTags(1, 1, 6)),
+            (ColorTags(9, 14, 9), Coding(), ColorTags(9, 14, 6)),
         ],
     )
-    def test_colours_are_tagged_if_the_source_is(
-        self, source: ColorTags, written: ColorTags, frames: list[Frame], tmp_path: Path
+    @pytest.mark.parametrize("full_range", [False, True])
+    def test_colours_are_tagged_as_they_are_coded_if_the_source_is_tagged(
+        self,
+        source: ColorTags,
+        coding: Coding,
+        written: ColorTags,
+        *,
+        full_range: bool,
+        frames: list[Frame],
+        tmp_path: Path,
     ) -> None:
-        path = write(tmp_path / "out.mp4", frames, replace(INFO, color=source))
+        coding = replace(coding, full_range=full_range)
+        path = write(tmp_path / "out.mp4", frames, replace(INFO, color=source, coding=coding))
         with VideoReader(path) as reader:
             assert reader.info.color == written
+            assert reader.info.coding == coding
             corner = next(iter(reader)).image[60:90, 10:70]
         assert np.abs(corner.mean(axis=(0, 1)) - (40, 30, 210)).max() < 5
 
@@ -211,6 +231,140 @@ class TestFile:
         assert listing(tmp_path) == [name]
 
 
+CODINGS: dict[str, tuple[dict[str, Any], int, str]] = {
+    "untagged": ({}, 2, "yuv420p"),
+    "BT.601": ({"matrix": 5}, 6, "yuv420p"),
+    "BT.709": ({"matrix": 1}, 1, "yuv420p"),
+    "full range": ({"full_range": True}, 2, "yuvj420p"),
+    "BT.601, full range": ({"matrix": 5, "full_range": True}, 6, "yuvj420p"),
+    "BT.709, full range": ({"matrix": 1, "full_range": True}, 1, "yuvj420p"),
+}
+"""Arguments of `write_clip`, and the code of the matrix and the pixels of what is written."""
+LOSSLESS = OutputSettings(preset="ultrafast", crf=0)
+
+
+def copied(
+    source: Path,
+    target: Path,
+    settings: OutputSettings,
+    change: Callable[[Picture], Picture] = lambda picture: picture,
+) -> list[Frame]:
+    """Write the frames of a video to another one; return those of the source."""
+    with VideoReader(source) as reader, VideoWriter(target, reader.info, settings) as writer:
+        frames = list(reader)
+        for frame in frames:
+            writer.write(replace(frame, picture=change(frame.picture)))
+    return frames
+
+
+def planes_of(frame: Frame) -> Planes:
+    planes = frame.picture.planes
+    assert planes is not None
+    return planes
+
+
+class TestPlanes:
+    """Planes are encoded as they are, and described as they are."""
+
+    @pytest.mark.parametrize("kind", CODINGS)
+    def test_are_not_converted(self, kind: str, tmp_path: Path) -> None:
+        spec, matrix, pixels = CODINGS[kind]
+        source = write_clip(tmp_path / "in.mp4", **spec)
+        before = copied(source, tmp_path / "out.mp4", LOSSLESS)
+        for one, other in zip(before, read(tmp_path / "out.mp4"), strict=True):
+            for layer, kept in zip(planes_of(one).layers, planes_of(other).layers, strict=True):
+                np.testing.assert_array_equal(kept, layer)
+        with av.open(str(tmp_path / "out.mp4")) as container:
+            context = container.streams.video[0].codec_context
+            assert (context.colorspace, context.pix_fmt) == (matrix, pixels)
+
+    @pytest.mark.parametrize("kind", CODINGS)
+    def test_what_is_drawn_has_its_colour_and_the_rest_keeps_its_own(
+        self, kind: str, tmp_path: Path
+    ) -> None:
+        color = (200, 60, 120)
+
+        def drawn(picture: Picture) -> Picture:
+            assert picture.planes is not None
+            surface = picture.planes.copy()
+            fill(surface, Box(90, 56, 60, 30), color)
+            return Picture(surface)
+
+        source = write_clip(tmp_path / "in.mp4", **CODINGS[kind][0])
+        settings = OutputSettings(preset="ultrafast", crf=10)
+        before = copied(source, tmp_path / "out.mp4", settings, drawn)
+        for one, other in zip(before, read(tmp_path / "out.mp4"), strict=True):
+            box = other.image[60:82, 94:146].mean(axis=(0, 1))
+            assert np.abs(box - color).max() <= 3
+            for corner in (np.s_[56:90, 4:70], np.s_[88:95, 90:150], np.s_[4:40, 4:20]):
+                moved = other.image[corner].mean(axis=(0, 1)) - one.image[corner].mean(axis=(0, 1))
+                assert np.abs(moved).max() <= 3
+
+    @pytest.mark.parametrize("kind", CODINGS)
+    def test_images_are_coded_as_the_planes_are(self, kind: str, tmp_path: Path) -> None:
+        source = write_clip(tmp_path / "in.mp4", **CODINGS[kind][0])
+        settings = OutputSettings(preset="ultrafast", crf=10)
+        out = tmp_path / "out.mp4"
+        before = copied(source, out, settings, lambda picture: Picture(picture.image))
+        with VideoReader(out) as reader, VideoReader(source) as original:
+            assert reader.info.coding == original.info.coding
+            for one, other in zip(before, reader, strict=True):
+                corner = np.s_[56:90, 4:70]
+                moved = other.image[corner].mean(axis=(0, 1)) - one.image[corner].mean(axis=(0, 1))
+                assert np.abs(moved).max() <= 4
+
+    def test_of_another_coding_are_converted(self, tmp_path: Path) -> None:
+        source = write_clip(tmp_path / "in.mp4", matrix=1, full_range=True)
+        with VideoReader(source) as reader:
+            frames = list(reader)
+        for frame in read(write(tmp_path / "out.mp4", frames)):
+            assert planes_of(frame).coding == INFO.coding
+            corner = frame.image[60:90, 10:70].mean(axis=(0, 1))
+            assert np.abs(corner - (40, 30, 210)).max() < 5
+
+    def test_of_odd_sides_grow_by_a_pixel(self, tmp_path: Path) -> None:
+        source = write_clip(tmp_path / "in.mkv", size=(153, 97), codec="ffv1")
+        before = copied(source, tmp_path / "out.mp4", LOSSLESS)
+        for one, other in zip(before, read(tmp_path / "out.mp4"), strict=True):
+            assert planes_of(one).shape == (97, 153)
+            assert planes_of(other).shape == (98, 154)
+            assert np.abs(other.image[:97, :153].astype(int) - one.image).mean() < 3
+
+    def test_of_one_frame_can_be_written_to_several_videos(self, tmp_path: Path) -> None:
+        source = write_clip(tmp_path / "in.mp4")
+        paths = [tmp_path / "a.mp4", tmp_path / "b.mkv"]
+        with VideoReader(source) as reader, ExitStack() as stack:
+            writers = [
+                stack.enter_context(VideoWriter(path, reader.info, LOSSLESS)) for path in paths
+            ]
+            frames = list(reader)
+            for frame in frames:
+                for writer in writers:
+                    writer.write(frame)
+        for path in paths:
+            for one, other in zip(frames, read(path), strict=True):
+                assert other.time == one.time
+                np.testing.assert_array_equal(planes_of(other).luma, planes_of(one).luma)
+
+    @pytest.mark.parametrize("settings", [FAST, OutputSettings()], ids=["fast", "default"])
+    def test_the_encoder_chooses_its_key_frames_not_the_source(
+        self, settings: OutputSettings, tmp_path: Path
+    ) -> None:
+        source = write_clip(tmp_path / "in.mp4", options={"g": "1"})
+        assert key_frames(source) == list(range(12))
+        copied(source, tmp_path / "out.mp4", settings)
+        assert key_frames(tmp_path / "out.mp4") == [0]
+
+
+def key_frames(path: Path) -> list[int]:
+    """Return the numbers of the frames that are coded without the others."""
+    with av.open(str(path)) as container:
+        pictures = container.decode(video=0)
+        return [
+            index for index, picture in enumerate(pictures) if picture.pict_type == PictureType.I
+        ]
+
+
 class TestAllOrNothing:
     def test_the_file_does_not_exist_before_the_end(
         self, frames: list[Frame], tmp_path: Path
@@ -250,7 +404,7 @@ class TestAllOrNothing:
     def test_a_full_disk_is_one_error_and_no_file(self, suffix: str, tmp_path: Path) -> None:
         rng = np.random.default_rng(0)
         noise = [
-            Frame(index, Fraction(index, 25), rng.integers(0, 256, (96, 160, 3), np.uint8))
+            Frame(index, Fraction(index, 25), Picture(rng.integers(0, 256, (96, 160, 3), np.uint8)))
             for index in range(12)
         ]
         with pytest.raises(OutputError, match=r"out\.\w+: cannot be written: File too large"):

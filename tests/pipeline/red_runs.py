@@ -12,7 +12,7 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
 from vdet.geometry import Box
 from vdet.lanes.road import Road
-from vdet.media import Frame, VideoInfo, VideoReader
+from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.loop import NullDetector, Summary, VideoJob, follow_frames, peek, run_video
 from vdet.pipeline.result import FrameResult
@@ -80,7 +80,7 @@ def result_of(
 
     `found` is the road; without an `image` the red car is in the frame.
     """
-    frame = Frame(index, time, road(CAR) if image is None else image)
+    frame = Frame(index, time, Picture(road(CAR) if image is None else image))
     tracks = tuple(
         Track(number, each, 0.9, predicted=False) if isinstance(each, Box) else each
         for number, each in enumerate(vehicles, start=1)

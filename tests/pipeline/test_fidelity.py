@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -10,12 +11,18 @@ from typing import Any
 import av
 import numpy as np
 import pytest
+from av.video.frame import PictureType
+from numpy.typing import NDArray
 
-from pipeline.red_runs import outputs, read, run_red, with_search
-from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, road
-from vdet.config.schema import WindowSettings
-from vdet.media import VideoReader
-from vdet.media.frame import Orientation
+from pipeline.red_runs import outputs, read, run_red, video_info, with_search
+from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, road
+from vdet.config.draw import DrawSettings
+from vdet.config.schema import OutputSettings, Settings, WindowSettings
+from vdet.media import ColorTags, Picture, VideoReader, VideoWriter
+from vdet.media.coding import Coding
+from vdet.media.frame import UNSPECIFIED
+from vdet.media.orientation import Orientation
+from vdet.media.planes import Planes
 from vdet.pipeline.loop import VideoJob
 
 TONE_RATE = 48_000
@@ -73,6 +80,125 @@ def _sound(path: Path) -> list[tuple[float, bytes]]:
             for packet in container.demux(audio=0)
             if packet.size
         ]
+
+
+CODINGS = {
+    "untagged": (Coding(), UNSPECIFIED),
+    "BT.601": (Coding(), 6),
+    "BT.709": (Coding("bt709"), 1),
+    "BT.601, full range": (Coding(full_range=True), 6),
+    "BT.709, full range": (Coding("bt709", full_range=True), 1),
+}
+"""How the source is coded, and the tag of its matrix."""
+FRAMES = 30
+LABEL = 30
+"""Pixels above a box that its label may need."""
+
+
+@pytest.fixture(scope="module", params=CODINGS)
+def filmed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A red car on a road with noise, which no encoder leaves as it is."""
+    coding, matrix = CODINGS[request.param]
+    path = tmp_path_factory.mktemp("filmed") / "in.mp4"
+    info = replace(video_info(), color=ColorTags(matrix=matrix), coding=coding)
+    noise = np.random.default_rng(0).integers(0, 40, (FRAMES, HEIGHT, WIDTH, 3), np.uint8)
+    with VideoWriter(path, info, OutputSettings(crf=15)) as writer:
+        for frame in drive(FRAMES):
+            grainy = np.where(frame.image > 200, frame.image, frame.image + noise[frame.index])
+            writer.write(replace(frame, picture=Picture(grainy.astype(np.uint8))))
+    return path
+
+
+def written_with(settings: OutputSettings, **draw: Any) -> Settings:
+    return SETTINGS.model_copy(update={"output": settings, "draw": DrawSettings(**draw)})
+
+
+def planes_of(path: Path) -> list[Planes]:
+    """Return what the decoder gives."""
+    found = [frame.picture.planes for frame in read(path)]
+    planes = [each for each in found if each is not None]
+    assert len(planes) == len(found) == FRAMES
+    return planes
+
+
+def transcoded(source: Path, target: Path, settings: OutputSettings) -> Path:
+    """Give the decoder's pictures to the same encoder, without vdet."""
+    with av.open(str(source)) as original, av.open(str(target), "w") as copy:
+        options = {"preset": settings.preset, "crf": str(settings.crf)}
+        stream = copy.add_stream(settings.codec, rate=25, options=options)
+        context = stream.codec_context
+        context.width, context.height, context.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        context.thread_count = 1
+        coded = original.streams.video[0].codec_context
+        context.colorspace, context.color_range = coded.colorspace, coded.color_range
+        for picture in original.decode(video=0):
+            picture.pict_type = PictureType.NONE
+            copy.mux(stream.encode(picture))
+        copy.mux(stream.encode(None))
+    return target
+
+
+def untouched(track_file: Path) -> list[NDArray[np.bool_]]:
+    """Tell for each frame, by value of chroma, what lies away from the outlines and labels."""
+    masks = []
+    for line in track_file.read_text().splitlines():
+        mask = np.ones((HEIGHT // 2, WIDTH // 2), bool)
+        for track in json.loads(line)["tracks"]:
+            x, y, width, height = (track[key] for key in ("x", "y", "width", "height"))
+            left, right, top, bottom = x - 4, x + max(width, 40) + 4, y - LABEL, y + height + 4
+            mask[max(0, top // 2) : bottom // 2 + 1, max(0, left // 2) : right // 2 + 1] = False
+            inner = np.s_[y // 2 + 4 : (y + height) // 2 - 4, x // 2 + 4 : (x + width) // 2 - 4]
+            mask[inner] = True
+        masks.append(mask)
+    return masks
+
+
+def doubled(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell it by pixel."""
+    return mask.repeat(2, axis=0).repeat(2, axis=1)
+
+
+class TestPixels:
+    """What is not drawn on is changed by the encoder alone."""
+
+    def test_without_loss_in_the_encoder_they_are_those_of_the_source(
+        self, filmed: Path, tmp_path: Path
+    ) -> None:
+        """Far from boxes and labels, and inside boxes: luma and chroma are equal, bit for bit."""
+        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
+        settings = written_with(OutputSettings(preset="ultrafast", crf=0), smoothing=0)
+        run_red(VideoJob(filmed, wanted), settings)
+        masks = untouched(tmp_path / "out.jsonl")
+        drawn = 0
+        pairs = zip(planes_of(filmed), planes_of(tmp_path / "out.mp4"), strict=True)
+        for mask, (before, after) in zip(masks, pairs, strict=True):
+            changed = after.luma != before.luma
+            assert not (changed & doubled(mask)).any()
+            for old, new in ((before.blue, after.blue), (before.red, after.red)):
+                assert not ((new != old) & mask).any()
+            if not mask.all():
+                assert changed.any()
+                drawn += 1
+        assert drawn > FRAMES // 2, "there are boxes"
+
+    def test_where_nothing_is_drawn_the_video_is_a_plain_transcode(
+        self, filmed: Path, tmp_path: Path
+    ) -> None:
+        """With the settings that ship, each value of each frame is the same."""
+        settings = written_with(OutputSettings(), boxes=False, label=())
+        job = VideoJob(filmed, outputs(video=tmp_path / "out.mp4"))
+        run_red(job, settings, codec_threads=1)
+        plain = transcoded(filmed, tmp_path / "plain.mp4", OutputSettings())
+        pairs = zip(planes_of(tmp_path / "out.mp4"), planes_of(plain), strict=True)
+        for ours, theirs in pairs:
+            for layer, expected in zip(ours.layers, theirs.layers, strict=True):
+                np.testing.assert_array_equal(layer, expected)
+
+    def test_the_coding_of_the_source_is_kept(self, filmed: Path, tmp_path: Path) -> None:
+        run_red(VideoJob(filmed, outputs(video=tmp_path / "out.mp4"), frames=5))
+        with VideoReader(filmed) as before, VideoReader(tmp_path / "out.mp4") as after:
+            assert after.info.coding == before.info.coding
+            assert after.info.color == before.info.color
 
 
 class TestFidelity:

@@ -40,9 +40,9 @@ from vdet.config.loading import load_settings
 from vdet.config.schema import DrawSettings, OutputSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import ImageError, OutputError, VdetError, VideoError
-from vdet.media import Frame, VideoWriter
+from vdet.media import Frame, Picture, VideoWriter
 from vdet.media.images import Image, read_image
-from vdet.media.pixels import to_bgr
+from vdet.media.planes import Planes
 from vdet.pipeline.loop import FIRST_FRAMES, VideoJob, follow_frames, peek, run_video
 from vdet.pipeline.threads import map_ordered
 from vdet.synthetic import frames, true_boxes
@@ -83,7 +83,8 @@ class TestFollowFrames:
     def test_searches_each_frame_at_the_sets_whose_turn_it_is(self) -> None:
         for result in follow(drive(5), PERSPECTIVE, threads=2):
             sizes = set(result.detections.trace.windows.boxes[:, 2].tolist())
-            assert sizes == ({64} if result.frame.index % 2 else {48})
+            turn = result.frame.index % PERSPECTIVE.svm.search.alternate
+            assert sizes == [{48}, {64}, set()][turn]
 
     @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
     @pytest.mark.parametrize("threads", [3, 5])
@@ -102,7 +103,7 @@ class TestFollowFrames:
             np.testing.assert_array_equal(heat, same)
 
     def test_shows_nothing_on_an_empty_road(self) -> None:
-        empty = (replace(frame, image=road()) for frame in drive(15))
+        empty = (replace(frame, picture=Picture(road())) for frame in drive(15))
         for result in follow(empty):
             assert result.tracks == ()
             assert len(result.detections) == 0
@@ -230,9 +231,9 @@ class TestRun:
     ) -> None:
         pools: list[int] = []
 
-        def note(function: Any, items: Any, threads: int) -> Any:
+        def note(function: Any, items: Any, threads: int, **options: Any) -> Any:
             pools.append(threads)
-            return map_ordered(function, items, threads)
+            return map_ordered(function, items, threads, **options)
 
         monkeypatch.setattr("joblib.cpu_count", lambda: 3)  # it knows control groups
         monkeypatch.setattr("vdet.pipeline.loop.map_ordered", note)
@@ -354,7 +355,7 @@ class TestBreakage:
 
     def test_the_reader_breaks(self, job: VideoJob, monkeypatch: pytest.MonkeyPatch) -> None:
         error = VideoError("its pixels cannot be converted")
-        monkeypatch.setattr("vdet.media.reader.to_bgr", _breaking(to_bgr, error))
+        monkeypatch.setattr("vdet.media.reader.Planes", _breaking(Planes, error))
         with pytest.raises(VdetError, match="its pixels"):
             run_red(job)
 

@@ -14,6 +14,7 @@ from pipeline.red_runs import model_for
 from red_cars import CAR, PERSPECTIVE, SETTINGS, road
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, OutputError
+from vdet.media import Picture
 from vdet.media.images import read_image, write_image
 from vdet.pipeline.pictures import (
     PictureJob,
@@ -144,7 +145,7 @@ class TestRun:
         result = run_red(source, settings)
         image = road(CAR)
         detector = model_for(settings).for_video(image.shape[1], image.shape[0], [image])
-        detections = detector.detect(detector.search(image, None))
+        detections = detector.detect(detector.search(Picture(image), None))
         assert result.source == source
         assert (result.frame.index, result.frame.time) == (0, Fraction(0))
         np.testing.assert_array_equal(result.frame.image, image)

@@ -12,8 +12,7 @@ from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.detections import Detections
 from vdet.geometry import Box
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.media import Frame
-from vdet.media.images import Image
+from vdet.media import Picture
 from vdet.pipeline.loop import NullDetector, follow_frames
 from vdet.pipeline.pictures import detect_picture
 from vdet.pipeline.positions import with_positions
@@ -46,7 +45,7 @@ SCENE = Scene(
 class TrueDetector(NullDetector):
     """Finds the vehicles of the scene; for the tests of what follows from boxes."""
 
-    def search(self, image: Image, index: int | None) -> None:
+    def search(self, picture: Picture, index: int | None) -> None:
         """Do nothing: the vehicles keep their distances."""
 
     def detect(self, candidates: None) -> Detections:  # noqa: ARG002
@@ -90,7 +89,7 @@ def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
 
 @pytest.mark.parametrize("with_roads", [False, True])
 def test_without_a_lane_they_have_none(*, with_roads: bool) -> None:
-    grey = [Frame(f.index, f.time, np.full_like(f.image, 90)) for f in frames(SCENE)]
+    grey = [replace(f, picture=Picture(np.full_like(f.image, 90))) for f in frames(SCENE)]
     finder = roads() if with_roads else None
     found = list(
         follow_frames(grey, TrueDetector(), SETTINGS, video_info(WIDTH, HEIGHT), roads=finder)

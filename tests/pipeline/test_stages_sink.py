@@ -9,7 +9,7 @@ import pytest
 from red_cars import CAR, SETTINGS, red_model, road
 from vdet.files import OutputFiles
 from vdet.geometry import Box
-from vdet.media import Frame
+from vdet.media import Frame, Picture
 from vdet.media.images import Image, read_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import SinkContext
@@ -22,9 +22,9 @@ NAMES = ["1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.
 def result_of(image: Image, *tracks: Track) -> FrameResult:
     height, width = image.shape[:2]
     detector = red_model().for_video(width, height, [image])
-    detections = detector.detect(detector.search(image, None))
+    detections = detector.detect(detector.search(Picture(image), None))
     return FrameResult(
-        Path("road.png"), Frame(0, Fraction(0), image), detections, tracks, None, detector
+        Path("road.png"), Frame(0, Fraction(0), Picture(image)), detections, tracks, None, detector
     )
 
 

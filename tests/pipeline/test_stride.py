@@ -11,6 +11,7 @@ from pipeline.red_runs import COUNT, follow, outputs, run_red, write
 from red_cars import CAR, PERSPECTIVE, SETTINGS, drive
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.detections import NO_DETECTIONS
+from vdet.media import Picture
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output
@@ -60,7 +61,7 @@ def test_the_detector_gets_the_number_of_each_frame_that_it_searches() -> None:
     searched: list[int | None] = []
 
     class Counting:
-        def search(self, image: object, index: int | None) -> None:  # noqa: ARG002
+        def search(self, picture: object, index: int | None) -> None:  # noqa: ARG002
             searched.append(index)
 
     for position, frame in enumerate(list(drive(20))[7:]):
@@ -102,11 +103,13 @@ def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
 
 
 def test_no_hit_stays_in_the_heat_for_longer_than_its_frames() -> None:
-    """A car that has gone is not seen two frames later, so neither at the next search."""
-    frames = list(drive(12))
-    empty = np.full_like(frames[0].image, 90)
-    gone = [*frames[:6], *(type(f)(f.index, f.time, empty) for f in frames[6:])]
-    results = list(follow(gone, strided(2)))
+    """A car that has gone is not seen any more when so many frames have passed."""
+    settings = strided(2)
+    gone = settings.svm.heat.frames
+    frames = list(drive(2 * gone))
+    empty = Picture(np.full_like(frames[0].image, 90))
+    left = [*frames[:gone], *(type(f)(f.index, f.time, empty) for f in frames[gone:])]
+    results = list(follow(left, settings))
     assert len(results[4].detections) == 1
-    assert results[6].detections.boxes.shape == NO_DETECTIONS.boxes.shape
+    assert results[2 * gone - 2].detections.boxes.shape == NO_DETECTIONS.boxes.shape
     assert results[4].detections.rounded[0].iou(CAR.moved_to(44, CAR.y)) > 0.5

@@ -6,18 +6,20 @@ import pytest
 from summary.passing import HEIGHT, WIDTH, frame, track
 from vdet.config.schema import CropSettings
 from vdet.geometry import Box
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.summary.crops import BestCrops, Crop
 from vdet.track.track import Track
 
 BARE = CropSettings(padding=0)
 ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
+PICTURE = Picture(ROAD)
 
 
 def crops(*shown: list[Track], settings: CropSettings = BARE) -> dict[int, Crop]:
     """Return the picture of each vehicle that was given back last."""
     best = BestCrops(settings)
-    found = [crop for n, each in enumerate(shown) for crop in best.add(frame(n, *each), ROAD)]
+    found = [crop for n, each in enumerate(shown) for crop in best.add(frame(n, *each), PICTURE)]
     return {crop.id: crop for crop in (*found, *best.end())}
 
 
@@ -67,26 +69,26 @@ def test_padding_shows_what_is_around_as_far_as_the_frame_goes() -> None:
 
 def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:
     best = BestCrops(BARE)
-    assert best.add(frame(0, track(1, box(40))), ROAD) == []
-    assert [crop.id for crop in best.add(frame(1), ROAD)] == [1]
-    assert best.add(frame(2), ROAD) == []
-    assert best.add(frame(3, track(1, box(30))), ROAD) == []
-    assert best.add(frame(4), ROAD) == [], "the first one is better"
-    best.add(frame(5, track(1, box(60))), ROAD)
+    assert best.add(frame(0, track(1, box(40))), PICTURE) == []
+    assert [crop.id for crop in best.add(frame(1), PICTURE)] == [1]
+    assert best.add(frame(2), PICTURE) == []
+    assert best.add(frame(3, track(1, box(30))), PICTURE) == []
+    assert best.add(frame(4), PICTURE) == [], "the first one is better"
+    best.add(frame(5, track(1, box(60))), PICTURE)
     assert [crop.image.shape[0] for crop in best.end()] == [60]
 
 
 def test_memory_holds_only_vehicles_that_are_shown() -> None:
     best = BestCrops(BARE)
     for number in range(1, 200):
-        best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), ROAD)
+        best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), PICTURE)
     assert len(best.end()) == 2
 
 
 def test_a_picture_is_a_copy() -> None:
     image = ROAD.copy()
     best = BestCrops(BARE)
-    best.add(frame(0, track(1, box(40))), image)
+    best.add(frame(0, track(1, box(40))), Picture(image))
     image[:] = 0
     assert best.end()[0].image.any()
 

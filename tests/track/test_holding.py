@@ -1,6 +1,6 @@
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.geometry import Box
-from vdet.media.images import Image
+from vdet.media import Picture
 from vdet.track.holding import HoldingTracker
 from vdet.track.track import Track
 
@@ -17,7 +17,7 @@ class SeesOne:
         self,
         detections: Detections,  # noqa: ARG002
         time: float,
-        image: Image | None = None,  # noqa: ARG002
+        picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
         self.times.append(time)
         return [Track(1, CAR.moved_to(100 + round(100 * time), 100), 0.9, predicted=False)]

@@ -52,7 +52,7 @@ class StillSettings(Section):
     """Which detections are shown in a still picture; in video, the tracker decides."""
 
     strength: float = Field(
-        0.42,
+        0.84,
         ge=0,
         description="least evidence: heat, or with votes the weight of the hits that agree",
     )
@@ -69,13 +69,13 @@ class ScoreSettings(Section):
     """
 
     middle: float = Field(
-        0.272,
+        0.42,
         gt=0,
         le=1e6,
         description="evidence (heat, or weight of hits) at which the score is 0.5",
     )
     slope: float = Field(
-        3.5, gt=0, le=100, description="how steeply the score rises with the evidence"
+        3.25, gt=0, le=100, description="how steeply the score rises with the evidence"
     )
 
     def of(self, evidence: float) -> float:

@@ -16,7 +16,7 @@ class VoteSettings(Section):
     inside: Fraction = Field(
         0.7, description="a box with more than this share inside a larger vehicle is a part of it"
     )
-    least: float = Field(0.08, ge=0, description="least weight of the hits that agree on a vehicle")
+    least: float = Field(0.12, ge=0, description="least weight of the hits that agree on a vehicle")
     sharpness: float = Field(
         4.0,
         ge=0,
@@ -29,7 +29,7 @@ class VoteSettings(Section):
 class HeatSettings(Section):
     """How the hits of consecutive frames are summed into a heatmap, and become detections."""
 
-    frames: int = Field(2, ge=1, le=100, description="number of frames whose hits are summed")
+    frames: int = Field(6, ge=1, le=100, description="number of frames whose hits are summed")
     weight: Literal["none", "coverage"] = Field(
         "coverage",
         description="none: a hit adds its probability; coverage: a hit adds its probability "
@@ -43,7 +43,9 @@ class HeatSettings(Section):
         15,
         description="side of the Gaussian kernel that blurs the heat, pixels; 0 or 1 for no blur",
     )
-    threshold: float = Field(0.05, ge=0, description="a region is hot where the heat is above this")
+    threshold: float = Field(
+        0.075, ge=0, description="a region is hot where the heat is above this"
+    )
     regions: Literal["outline", "votes"] = Field(
         "votes",
         description="outline: each hot region is a detection, and its box bounds the region; "

@@ -101,11 +101,11 @@ class SearchSettings(Section):
     )
     perspective: PerspectiveSettings = PerspectiveSettings()
     alternate: int = Field(
-        2,
+        3,
         ge=1,
         le=10,
-        description="number of frames in which all sets of a video are searched once: with 2, "
-        "every other set in each frame",
+        description="number of frames in which all sets of a video are searched once: with 3, "
+        "every third set in each frame",
     )
 
     def fitted(self, camera: "CameraSearch | None") -> "SearchSettings":

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from vdet.detect.detections import Detections
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.regions import Regions, SearchArea
 
@@ -15,13 +16,13 @@ class VideoDetector(Protocol):
     of the frames.
     """
 
-    def search(self, image: Image, index: int | None) -> Any:
+    def search(self, picture: Picture, index: int | None) -> Any:
         """Return the candidates of a frame; several threads call this at once, in any order.
 
         Parameters
         ----------
-        image
-            BGR uint8 `(H, W, 3)`.
+        picture
+            The frame; its `image` is BGR, its `planes` are those of the decoder, if it has such.
         index
             Number of the frame in its video, from 0; None for a still picture. With a `stride`
             in the settings, only every so many frames are searched.

@@ -1,1 +1,1 @@
-"""Boxes and labels, drawn into BGR images."""
+"""Boxes, labels and lines, drawn into BGR images or planes."""

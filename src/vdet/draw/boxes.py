@@ -1,23 +1,18 @@
-"""Boxes with labels, drawn into BGR images."""
+"""Boxes with labels."""
 
 import colorsys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
+from vdet.draw.paint import Color, Surface, TextStyle, fill, text_size, write_text
 from vdet.geometry import Box
-from vdet.media.images import Image
-
-Color = tuple[int, int, int]
-"""Blue, green, red, 0 to 255."""
 
 GREEN: Color = (80, 220, 60)
 WHITE: Color = (255, 255, 255)
 BLACK: Color = (0, 0, 0)
 _GOLDEN_RATIO = 0.618034
-_FONT = cv2.FONT_HERSHEY_DUPLEX
 _SMALLEST_TEXT = 0.35
 """Font scale; smaller digits cannot be read."""
 _DASH = 4
@@ -31,17 +26,17 @@ def color_of(number: int) -> Color:
     return round(255 * blue), round(255 * green), round(255 * red)
 
 
-def line_width(image: Image, thickness: float = 1.0) -> int:
+def line_width(surface: Surface, thickness: float = 1.0) -> int:
     """Return a line width in pixels that looks the same at any frame height; 3 at 720 rows.
 
     `thickness` is a factor of it.
     """
-    height: int = image.shape[0]
+    height: int = surface.shape[0]
     return max(1, round(thickness * max(1, (height + 120) // 240)))
 
 
 def draw_box(
-    image: Image,
+    surface: Surface,
     box: Box,
     color: Color,
     label: str = "",
@@ -53,40 +48,39 @@ def draw_box(
 
     Parameters
     ----------
-    image
-        BGR uint8 `(H, W, 3)`; it is changed.
+    surface
+        It is changed.
     box
-        In pixels of the image; it may reach beyond the image.
+        In pixels of the surface; it may reach beyond it.
     dashed
         Whether the outline has gaps. This marks a box that is predicted, not detected.
     thickness
         Factor of the width of the outline.
     """
-    width = line_width(image, thickness)
+    width = line_width(surface, thickness)
     dash = _DASH * width if dashed else None
     for side in _sides(box, width):
         for part in _dashes(side, dash) if dash else [side]:
-            _fill(image, part, color)
+            fill(surface, part, color)
     if label:
-        draw_label(image, label, (box.x, box.y), color)
+        draw_label(surface, label, (box.x, box.y), color)
 
 
-def draw_label(image: Image, text: str, corner: tuple[int, int], color: Color) -> Box:
+def draw_label(surface: Surface, text: str, corner: tuple[int, int], color: Color) -> Box:
     """Write text on a filled tag whose lower left corner is `corner`, and return the tag.
 
-    The corner is `(x, y)` in pixels. The tag is moved so that it lies in the image. A text that is
-    wider than the image becomes smaller; if it still does not fit, its end is cut off.
+    The corner is `(x, y)` in pixels. The tag is moved so that it lies in the surface. A text that
+    is wider than the surface becomes smaller; if it still does not fit, its end is cut off.
     """
-    label = _lay_out(image, text, corner)
-    _fill(image, label.tag, color)
-    ink = text_color(color)
-    cv2.putText(image, text, label.origin, _FONT, label.scale, ink, label.stroke, cv2.LINE_AA)
+    label = _lay_out(surface, text, corner)
+    fill(surface, label.tag, color)
+    write_text(surface, text, label.origin, label.style, text_color(color), within=label.tag)
     return label.tag
 
 
-def label_tag(image: Image, text: str, corner: tuple[int, int]) -> Box:
+def label_tag(surface: Surface, text: str, corner: tuple[int, int]) -> Box:
     """Return the tag that `draw_label` would draw."""
-    return _lay_out(image, text, corner).tag
+    return _lay_out(surface, text, corner).tag
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,21 +89,20 @@ class _Label:
 
     tag: Box
     origin: tuple[int, int]
-    scale: float
-    stroke: int
+    style: TextStyle
 
 
-def _lay_out(image: Image, text: str, corner: tuple[int, int]) -> _Label:
-    rows, columns = image.shape[:2]
-    scale = _text_scale(image, text)
-    stroke = max(1, round(1.5 * scale))
+def _lay_out(surface: Surface, text: str, corner: tuple[int, int]) -> _Label:
+    rows, columns = surface.shape[:2]
+    scale = _text_scale(surface, text)
+    style = TextStyle(scale, max(1, round(1.5 * scale)))
     margin = max(3, round(6 * scale))
-    (width, height), baseline = cv2.getTextSize(text, _FONT, scale, stroke)
+    width, height, baseline = text_size(text, style)
     tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
     x = max(0, min(corner[0], columns - tag_width))
     y = max(0, min(corner[1], rows) - tag_height)
     tag = Box(x, y, tag_width, tag_height)
-    return _Label(tag, (x + margin, y + margin + height), scale, stroke)
+    return _Label(tag, (x + margin, y + margin + height), style)
 
 
 def text_color(background: Color) -> Color:
@@ -121,10 +114,10 @@ def text_color(background: Color) -> Color:
     return BLACK if on_black > on_white else WHITE
 
 
-def _text_scale(image: Image, text: str) -> float:
-    """Return the font scale that fits the image's height, or less so that the text fits in."""
-    rows, columns = (int(side) for side in image.shape[:2])
-    (width, _), _ = cv2.getTextSize(text, _FONT, 1, 1)
+def _text_scale(surface: Surface, text: str) -> float:
+    """Return the font scale that fits the surface's height, or less so that the text fits in."""
+    rows, columns = (int(side) for side in surface.shape[:2])
+    width, _, _ = text_size(text, TextStyle(1, 1))
     return max(_SMALLEST_TEXT, min(rows / 1200, columns / (width + 20)))
 
 
@@ -147,9 +140,3 @@ def _dashes(side: Box, dash: int) -> Iterator[Box]:
             yield Box(side.x + start, side.y, dash, side.height)
         else:
             yield Box(side.x, side.y + start, side.width, dash)
-
-
-def _fill(image: Image, box: Box, color: Color) -> None:
-    """Fill the part of a box that lies in the image."""
-    inside = box.clipped(image.shape[1], image.shape[0])
-    image[inside.y : inside.bottom, inside.x : inside.right] = color

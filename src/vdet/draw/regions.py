@@ -1,11 +1,11 @@
-"""Regions, drawn into BGR images."""
+"""Regions: dark outside, with outlines and names."""
 
 from collections.abc import Mapping, Sequence
 
-import cv2
 import numpy as np
 
-from vdet.draw.boxes import GREEN, Color, draw_label, label_tag, line_width
+from vdet.draw.boxes import GREEN, draw_label, label_tag, line_width
+from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.geometry import BoolArray
 from vdet.media.images import Image
 
@@ -39,10 +39,10 @@ def draw_regions(
     return picture
 
 
-def draw_outline(image: Image, corners: Sequence[Point], color: Color, label: str) -> None:
-    """Draw the sides of a polygon into an image, and write a label at its highest corner."""
+def draw_outline(surface: Surface, corners: Sequence[Point], color: Color, label: str) -> None:
+    """Draw the sides of a polygon, and write a label at its highest corner."""
     points = np.round(np.array(corners)).astype(np.int32)
-    cv2.polylines(image, [points], True, color, line_width(image), cv2.LINE_AA)
+    draw_lines(surface, points, color, line_width(surface), closed=True)
     left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
-    height = label_tag(image, label, (0, 0)).height
-    draw_label(image, label, (round(left), round(top) + height), color)
+    height = label_tag(surface, label, (0, 0)).height
+    draw_label(surface, label, (round(left), round(top) + height), color)

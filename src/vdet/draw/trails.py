@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-import cv2
 import numpy as np
 
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.geometry import Float64Array
-from vdet.media.images import Image
 
 _PARTS = 4
 """Pieces of a trail, each of one width."""
@@ -21,16 +19,16 @@ _FARTHEST = 2**15
 
 
 def draw_trail(
-    image: Image, points: Sequence[tuple[float, float]], color: Color, width: int
+    surface: Surface, points: Sequence[tuple[float, float]], color: Color, width: int
 ) -> None:
     """Draw a smooth line along points, the oldest first; it ends at the newest.
 
     Parameters
     ----------
-    image
-        BGR uint8 `(H, W, 3)`; it is changed.
+    surface
+        It is changed.
     points
-        x, y in pixels; they may lie outside the image.
+        x, y in pixels; they may lie outside the surface.
     width
         Of the newest part of the line, pixels; the oldest is 1 pixel wide.
     """
@@ -42,8 +40,7 @@ def draw_trail(
     for part, (first, last) in enumerate(pairwise(ends), start=1):
         if last > first:
             thickness = max(1, round(width * part / _PARTS))
-            piece = fixed[first : last + 1].reshape(-1, 1, 2)
-            cv2.polylines(image, [piece], False, color, thickness, cv2.LINE_AA, _SHIFT)
+            draw_lines(surface, fixed[first : last + 1], color, thickness, shift=_SHIFT)
 
 
 def _smoothed(points: Float64Array) -> Float64Array:

@@ -1,7 +1,9 @@
 """Video and pictures: frames with exact times, sound carried over, sizes limited."""
 
 from vdet.media.frame import ColorTags, Frame, VideoInfo
+from vdet.media.picture import Picture
+from vdet.media.planes import Planes
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 
-__all__ = ["ColorTags", "Frame", "VideoInfo", "VideoReader", "VideoWriter"]
+__all__ = ["ColorTags", "Frame", "Picture", "Planes", "VideoInfo", "VideoReader", "VideoWriter"]

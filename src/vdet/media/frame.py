@@ -1,10 +1,13 @@
 """A frame of a video, and what is known of a video: given by the reader, taken by the writer."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 
+from vdet.media.coding import Coding
 from vdet.media.images import Image
+from vdet.media.orientation import Orientation
+from vdet.media.picture import Picture
 
 UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 
@@ -15,12 +18,16 @@ class Frame:
 
     `index` counts all frames of the file from 0. `time` is the exact presentation time in seconds
     as the file has it (its first frame need not be at 0).
-    `image` is upright, BGR uint8, shape (height, width, 3).
     """
 
     index: int
     time: Fraction
-    image: Image
+    picture: Picture
+
+    @property
+    def image(self) -> Image:
+        """The picture as BGR uint8 `(H, W, 3)`."""
+        return self.picture.image
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,23 +37,6 @@ class ColorTags:
     primaries: int = UNSPECIFIED
     transfer: int = UNSPECIFIED
     matrix: int = UNSPECIFIED
-
-
-@dataclass(frozen=True, slots=True)
-class Orientation:
-    """How a coded picture becomes upright: mirrored left to right, or not, and then turned.
-
-    `rotation` is counter-clockwise: 0, 90, 180 or 270 degrees.
-    """
-
-    rotation: int = 0
-    mirrored: bool = False
-
-    @classmethod
-    def of_exif(cls, number: int) -> "Orientation":
-        """Return the orientation of a number, 1 to 8, in EXIF data (CIPA DC-008, 4.6.4)."""
-        rotation = (0, 0, 180, 180, 90, 270, 270, 90)[number - 1]
-        return cls(rotation, mirrored=number in (2, 4, 5, 7))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +62,7 @@ class VideoInfo:
     declares, or an estimate: not exact, None where unknown. `orientation` says how the coded
     picture was turned to stand upright. `pixel_aspect` is the width of an upright pixel over its
     height. `color` is of the images: where the file is HDR (PQ or HLG), they are BT.709.
+    `coding` is that of the planes of the frames which come so, and of a video that is made of them.
     """
 
     path: Path
@@ -82,8 +73,9 @@ class VideoInfo:
     start: Fraction = Fraction(0)
     frames: int | None = None
     duration: Fraction | None = None
-    orientation: Orientation = Orientation()
+    orientation: Orientation = field(default_factory=Orientation)
     pixel_aspect: Fraction = Fraction(1)
     color: ColorTags = ColorTags()
+    coding: Coding = field(default_factory=Coding)
     has_sound: bool = False
     tags: Tags = Tags()

@@ -179,3 +179,10 @@ def _to_uint8(image: cv2.typing.MatLike) -> Image:
         shares = np.nan_to_num(values.astype(np.float32)).clip(0, 1)  # such pictures hold 0 to 1
         scaled[number] = shares * 255 + 0.5
     return scaled
+
+
+def split_channels(image: Image) -> tuple[Image, Image, Image]:
+    """Return the three channels of an image `(H, W, 3)`, uint8 `(H, W)` each."""
+    # cv2.split fails where the garbage collector looks at its unfinished tuple in another thread.
+    first, second, third = (np.asarray(cv2.extractChannel(image, n), np.uint8) for n in range(3))
+    return first, second, third

@@ -10,11 +10,12 @@ from av.stream import Disposition, Stream
 from av.video.stream import VideoStream
 
 from vdet.errors import VideoError
+from vdet.media.coding import Coding
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
-from vdet.media.frame import ColorTags, Orientation, Tags, VideoInfo
+from vdet.media.frame import ColorTags, Tags, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS
+from vdet.media.orientation import Orientation, orientation
 from vdet.media.picture_size import jpeg_orientation
-from vdet.media.pixels import orientation
 
 _DEFAULT_RATE = Fraction(25)
 _BT709 = ColorTags(1, 1, 1)
@@ -85,9 +86,16 @@ def describe(
         orientation=turn,
         pixel_aspect=aspect,
         color=_BT709 if first.color_trc in HDR_TRANSFERS else _colors(first),
+        coding=_coding(first, turn),
         has_sound=bool(container.streams.audio),
         tags=_tags(container, stream),
     )
+
+
+def _coding(first: av.VideoFrame, turn: Orientation) -> Coding:
+    """Return the coding of planes that need not be converted; else the default one."""
+    is_converted = turn != Orientation() or first.color_trc in HDR_TRANSFERS
+    return Coding() if is_converted else Coding.of(first) or Coding()
 
 
 def _colors(picture: av.VideoFrame) -> ColorTags:

@@ -1,4 +1,4 @@
-"""Read a video: upright BGR frames with their exact times."""
+"""Read a video: upright frames with their exact times."""
 
 import itertools
 import logging
@@ -13,12 +13,16 @@ import av
 
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
+from vdet.media.coding import Coding
 from vdet.media.decoder import Decoder
 from vdet.media.demux import MAX_PIXELS
 from vdet.media.frame import Frame, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS, StandardRange
 from vdet.media.images import Image
-from vdet.media.pixels import orientation, resized, to_bgr, upright
+from vdet.media.orientation import Orientation, orientation, upright
+from vdet.media.picture import Picture
+from vdet.media.pixels import resized, to_bgr
+from vdet.media.planes import Planes
 from vdet.media.probe import check_size, describe, moving_streams, stated_duration
 from vdet.media.restarts import restarts_clock
 
@@ -187,16 +191,27 @@ class VideoReader:
             if self._end is not None and since >= self._end:
                 return
             if since >= self._start:
-                yield Frame(index, time, self._image(picture))
+                yield Frame(index, time, self._upright(picture))
+
+    def _upright(self, picture: av.VideoFrame) -> Picture:
+        """Return a picture as its planes if these need no conversion, else as BGR."""
+        info = self.info
+        is_converted = info.orientation != Orientation() or self._standard_range
+        if is_converted or Coding.of(picture) != info.coding:
+            return Picture(self._image(picture))
+        if (picture.width, picture.height) != (info.width, info.height):
+            return Picture(self._image(picture))
+        return Picture(Planes(picture, info.coding))
 
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
-            image = to_bgr(picture)
+            coding = Coding.of(picture)
+            image = Planes(picture, coding).to_image() if coding else to_bgr(picture)
         except (av.FFmpegError, ValueError) as error:
-            coding = picture.format.name
+            pixels = picture.format.name
             raise VideoError(
-                f"{info.path}: its pixels ({coding}) cannot be converted; convert it to H.264 first"
+                f"{info.path}: its pixels ({pixels}) cannot be converted; convert it to H.264 first"
             ) from error
         if self._standard_range:
             image = self._standard_range.convert(image)

@@ -9,14 +9,17 @@ from pathlib import Path
 from typing import Self
 
 import av
+from av.video.reformatter import ColorRange
 
 import vdet
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
+from vdet.media.coding import Coding
 from vdet.media.demux import is_pipe, open_input
 from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
 from vdet.media.mp4_index import begins_like_mp4
-from vdet.media.pixels import to_i420
+from vdet.media.picture import Picture
+from vdet.media.planes import Planes
 from vdet.media.sound import SoundCopy
 
 _log = logging.getLogger("vdet")
@@ -25,8 +28,7 @@ VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
 _MARK = "made by vdet"
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
-_BT601 = 6  # matrix code of ITU-T H.273
-_LIMITED = 1  # av.video.reformatter.ColorRange.MPEG
+_MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
 
 def may_replace_video(path: Path) -> bool:
@@ -53,8 +55,9 @@ class VideoWriter:
 
     The first frame is shown at second 0, every other exactly as long after it as in the source
     (mkv: to the millisecond), the last for one period of the average rate. Sides of odd length grow
-    by one pixel, the last row or column repeated: 4:2:0 needs even ones. Colours are coded by
-    BT.601, limited range, and tagged so if the source was tagged at all. Sound packets are copied,
+    by one pixel, the last row or column repeated: 4:2:0 needs even ones. Colours are coded as the
+    planes of the source are (`VideoInfo.coding`), and tagged so if the source was tagged at all.
+    Planes that were not changed are encoded as they were decoded. Sound packets are copied,
     not encoded again. Creation time, location, title and time code are kept; the time code only if
     the first frame of the source is written.
 
@@ -158,6 +161,7 @@ class _Encoder:
         self._time_base = info.time_base
         if info.time_base.denominator > _FINEST:
             self._time_base = Fraction(1, _FINEST)
+        self._coding = info.coding
         self._last = -1
         self.size = 0
         self._container = av.open(
@@ -174,7 +178,7 @@ class _Encoder:
 
     def write(self, frame: Frame) -> None:
         """Encode a frame, and copy the sound up to it."""
-        picture = to_i420(frame.image)
+        picture = _to_encode(frame.picture, self._coding)
         since = frame.time - self._origin
         self._last = max(self._last + 1, round(since / self._time_base))
         picture.pts = self._last
@@ -216,9 +220,19 @@ class _Encoder:
         context.color_primaries = info.color.primaries
         context.color_trc = info.color.transfer
         if info.color.matrix != UNSPECIFIED:
-            context.colorspace = _BT601
-            context.color_range = _LIMITED
+            context.colorspace = _MATRICES[info.coding.matrix]
+            context.color_range = ColorRange.MPEG
+        if info.coding.full_range:
+            context.color_range = ColorRange.JPEG
         return stream
+
+
+def _to_encode(picture: Picture, coding: Coding) -> av.VideoFrame:
+    """Return a picture of even sides that the encoder may have."""
+    planes = picture.planes
+    if planes is None or planes.coding != coding or picture.width % 2 or picture.height % 2:
+        planes = Planes.of_image(picture.image, coding)
+    return (planes if planes.is_own else planes.copy()).picture
 
 
 def _tags(info: VideoInfo, origin: Fraction) -> dict[str, str]:

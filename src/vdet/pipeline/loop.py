@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from vdet.config.schema import Settings
@@ -15,7 +16,7 @@ from vdet.detect.protocol import DetectorModel, VideoDetector, limited
 from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
 from vdet.files import OutputFiles
 from vdet.lanes.road import FrameView, LaneRequest, RoadFinder
-from vdet.media import Frame, VideoInfo, VideoReader
+from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.pipeline.positions import with_positions
 from vdet.pipeline.result import FrameResult
@@ -28,6 +29,7 @@ from vdet.pipeline.threads import (
     run_in_thread,
     single_threaded_libraries,
 )
+from vdet.pipeline.waits import Waits
 from vdet.regions import lay_regions
 from vdet.track.factory import make_tracker
 from vdet.workers import core_count
@@ -158,7 +160,7 @@ def run_video(
 
     No output is left after an error.
     """
-    began = time.perf_counter()
+    began, waits = time.perf_counter(), Waits()
     ids: set[int] = set()
     frames, last = 0, None
     only_at = _needs_only_at(job)
@@ -170,10 +172,12 @@ def run_video(
         files = stack.enter_context(OutputFiles(overwrite=job.overwrite))
         stack.enter_context(_name_stalls(job, timeout))
         stack.enter_context(single_threaded_libraries())
-        reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)
+        with waits.on("reading"):
+            reader = run_in_thread(lambda: _open(job, settings, codec_threads), timeout=timeout)
         info = reader.info
         _check_times(job, reader.length)
-        read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
+        prefetched = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
+        read = waits.for_each("reading", prefetched)
         context = SinkContext(
             files,
             settings,
@@ -183,10 +187,11 @@ def run_video(
             codec_threads=codec_threads,
             timeout=timeout,
             outputs=job.outputs,
+            waits=waits,
         )
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         advance = progress(None if only_at else reader.expected)
-        results = _follow_job(read, job, model, settings, video=info, threads=threads)
+        results = _follow_job(read, job, model, settings, video=info, threads=threads, waits=waits)
         for result in stack.enter_context(closing(results)):
             for sink in sinks:
                 sink.write(result)
@@ -197,7 +202,9 @@ def run_video(
             if only_at and result.searched and last is not None and last >= job.at:
                 break
         _check_seen(job, last, reader.length)
-    return Summary(info.width, info.height, frames, len(ids), time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    log.info("%s: %s", job.source, waits.describe(seconds))
+    return Summary(info.width, info.height, frames, len(ids), seconds)
 
 
 def _needs_only_at(job: VideoJob) -> bool:
@@ -245,12 +252,14 @@ def follow_frames(
     *,
     threads: int = 1,
     roads: RoadFinder | None = None,
+    waits: Waits | None = None,
 ) -> Generator[FrameResult]:
     """Find and follow the vehicles through the frames of a video.
 
     With `roads` the lane is found too, and the distance and the lane of each vehicle.
 
-    `threads` frames are searched at once. The results do not depend on their number.
+    `threads` frames are searched at once. The results do not depend on their number. `waits` counts
+    how long they are waited for.
 
     Raises
     ------
@@ -267,7 +276,8 @@ def follow_frames(
         view = roads.observe(frame.image) if roads else None
         return search_frame(detector, frame, position, stride), view
 
-    with map_ordered(search, enumerate(frames), threads) as results:
+    waiting = partial((waits or Waits()).on, "searching")
+    with map_ordered(search, enumerate(frames), threads, waiting=waiting) as results:
         for (_, frame), (found, view) in results:
             searched = found is not None
             detections, tracks = follow_frame(detector, tracker, found, frame)
@@ -292,7 +302,7 @@ def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
 class NullDetector:
     """A `VideoDetector` that finds nothing, for frames that are too small to be searched."""
 
-    def search(self, image: Image, index: int | None) -> None:
+    def search(self, picture: Picture, index: int | None) -> None:
         """Do nothing."""
 
     def detect(self, candidates: None) -> Detections:  # noqa: ARG002
@@ -312,6 +322,7 @@ def _follow_job(
     *,
     video: VideoInfo,
     threads: int,
+    waits: Waits,
 ) -> Generator[FrameResult]:
     """Follow the vehicles of a job; an error gets the name of the video."""
     size = video.width, video.height
@@ -320,7 +331,9 @@ def _follow_job(
         roads = RoadFinder(job.lanes, settings.lanes, *size) if job.lanes else None
         detector = _detector(images, job.source, model, size)
         del images  # else they stay in memory for the whole run
-        yield from follow_frames(frames, detector, settings, video, threads=threads, roads=roads)
+        yield from follow_frames(
+            frames, detector, settings, video, threads=threads, roads=roads, waits=waits
+        )
     except (ConfigError, ImageError) as error:
         raise VideoError(f"{job.source}: {error}") from error
 

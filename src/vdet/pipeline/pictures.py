@@ -16,7 +16,7 @@ from vdet.detect.protocol import DetectorModel, VideoDetector, limited
 from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.media import Frame
+from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
 from vdet.pipeline.loop import Progress, no_progress
 from vdet.pipeline.positions import with_positions
@@ -185,7 +185,7 @@ def detect_picture(
     tracks = _tracks(detections)
     with _named(source):
         road = _road(image, tracks, settings, lanes) if lanes else None
-    frame = Frame(0, Fraction(0), image)
+    frame = Frame(0, Fraction(0), Picture(image))
     placed = with_positions(tracks, road)
     return FrameResult(source, frame, detections, placed, road, detector)
 
@@ -202,7 +202,7 @@ def search_picture(
     height, width = image.shape[:2]
     with _named(source):
         detector = limited(model.for_video(width, height, [image]), regions)
-        detections = detector.detect(detector.search(image, None))
+        detections = detector.detect(detector.search(Picture(image), None))
     if regions is None:
         return detector, detections
     boxes = detections.rounded

@@ -31,7 +31,7 @@ def search_frame(
     """
     if position % stride:
         return None
-    return Search(detector.search(frame.image, frame.index))
+    return Search(detector.search(frame.picture, frame.index))
 
 
 def follow_frame(
@@ -43,6 +43,6 @@ def follow_frame(
     """
     time = float(frame.time)
     if found is None:
-        return NO_DETECTIONS, tuple(tracker.carry(time, frame.image))
+        return NO_DETECTIONS, tuple(tracker.carry(time, frame.picture))
     detections = detector.detect(found.candidates)
-    return detections, tuple(tracker.update(detections, time, frame.image))
+    return detections, tuple(tracker.update(detections, time, frame.picture))

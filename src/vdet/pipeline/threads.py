@@ -181,9 +181,21 @@ def _closing(items: Iterable[object]) -> AbstractContextManager[object]:
 
 @contextlib.contextmanager
 def map_ordered(
-    function: Callable[[T], R], items: Iterable[T], threads: int
+    function: Callable[[T], R],
+    items: Iterable[T],
+    threads: int,
+    *,
+    waiting: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> Iterator[Iterator[tuple[T, R]]]:
-    """Pair items with the results of `function`, computed in parallel, in their order."""
+    """Pair items with the results of `function`, computed in parallel, in their order.
+
+    A result is waited for within a context manager that `waiting` returns.
+    """
+
+    def result(future: Future[R]) -> R:
+        with waiting():
+            return future.result()
+
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
         def pairs() -> Iterator[tuple[T, R]]:
@@ -192,9 +204,9 @@ def map_ordered(
                 running.append((item, pool.submit(function, item)))
                 if len(running) > threads:
                     first, future = running.popleft()
-                    yield first, future.result()
+                    yield first, result(future)
             for first, future in running:
-                yield first, future.result()
+                yield first, result(future)
 
         try:
             yield pairs()

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from vdet.config.summary import CropSettings
 from vdet.geometry import Box
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.track import FrameTracks, Track
 
@@ -35,8 +36,8 @@ class BestCrops:
         self._best: dict[int, Crop] = {}
         self._merits: dict[int, _Merit] = {}
 
-    def add(self, frame: FrameTracks, image: Image) -> list[Crop]:
-        """Look at the next frame, BGR uint8 `(H, W, 3)`.
+    def add(self, frame: FrameTracks, picture: Picture) -> list[Crop]:
+        """Look at the next frame.
 
         Returns
         -------
@@ -46,28 +47,27 @@ class BestCrops:
         shown = {track.id for track in frame.tracks}
         gone = [self._best.pop(number) for number in sorted(self._best.keys() - shown)]
         for track in frame.tracks:
-            merit = self._merit(track, image)
+            merit = self._merit(track, picture)
             if merit and merit > self._merits.get(track.id, (False, 0.0)):
                 self._merits[track.id] = merit
-                self._best[track.id] = Crop(track.id, frame.time, self._cut(track.box, image))
+                self._best[track.id] = Crop(track.id, frame.time, self._cut(track.box, picture))
         return gone
 
     def end(self) -> list[Crop]:
         """Return the pictures of the vehicles that the last frame shows."""
         return [crop for _, crop in sorted(self._best.items())]
 
-    def _merit(self, track: Track, image: Image) -> _Merit | None:
+    def _merit(self, track: Track, picture: Picture) -> _Merit | None:
         """Return None where the vehicle was not seen, or is too small."""
         box = track.box
         if track.predicted or min(box.width, box.height) < self._settings.least:
             return None
-        height, width = image.shape[:2]
-        is_whole = min(box.x, box.y) > 0 and box.right < width and box.bottom < height
+        inside = box.right < picture.width and box.bottom < picture.height
+        is_whole = inside and min(box.x, box.y) > 0
         return is_whole, box.area * track.score
 
-    def _cut(self, box: Box, image: Image) -> Image:
+    def _cut(self, box: Box, picture: Picture) -> Image:
         x, y = (round(side * self._settings.padding) for side in (box.width, box.height))
-        height, width = image.shape[:2]
         padded = Box(box.x - x, box.y - y, box.width + 2 * x, box.height + 2 * y)
-        part = padded.clipped(width, height)
-        return image[part.y : part.bottom, part.x : part.right].copy()
+        part = padded.clipped(picture.width, picture.height)
+        return picture.image[part.y : part.bottom, part.x : part.right].copy()

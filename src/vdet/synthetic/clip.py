@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vdet.config.schema import OutputSettings
 from vdet.files import staged
-from vdet.media import Frame, VideoInfo, VideoWriter
+from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.writer import may_replace_video
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
@@ -20,7 +20,7 @@ def frames(scene: Scene) -> Iterator[Frame]:
     """Render the frames of a scene, the first at 0 s."""
     renderer = Renderer(scene)
     for index in range(scene.frames):
-        yield Frame(index, Fraction(index) / scene.rate, renderer.image(index))
+        yield Frame(index, Fraction(index) / scene.rate, Picture(renderer.image(index)))
 
 
 def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color
 from vdet.geometry import Float64Array
 from vdet.media.images import Image
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import (
     PERIOD,

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color
 from vdet.geometry import Float64Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, PinholeCamera, distances

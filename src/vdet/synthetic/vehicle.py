@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color
 from vdet.geometry import Float64Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near

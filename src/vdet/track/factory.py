@@ -13,7 +13,9 @@ from vdet.config.schema import (
 from vdet.config.section import scale_lengths
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.holding import HoldingTracker
+from vdet.track.motion.tracker import MotionTracker
 from vdet.track.protocol import CarryingTracker, VideoTracker
+from vdet.track.rules.tracker import RulesTracker
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,17 +49,9 @@ def make_tracker(settings: Settings, width: int, height: int) -> CarryingTracker
     return tracker if isinstance(tracker, CarryingTracker) else HoldingTracker(tracker)
 
 
-def _make_motion(settings: MotionTrackerSettings, width: int, height: int) -> VideoTracker:
-    from vdet.track.motion.tracker import MotionTracker  # scipy takes long to import
-
-    return MotionTracker(settings, width, height)
-
-
 def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001
-    from vdet.track.rules.tracker import RulesTracker
-
     return RulesTracker(scale_lengths(settings, height / settings.reference_height))
 
 
-MOTION = TrackerKind(MotionTrackerSettings, _make_motion)
+MOTION = TrackerKind(MotionTrackerSettings, MotionTracker)
 RULES = TrackerKind(RulesTrackerSettings, _make_rules)

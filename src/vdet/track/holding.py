@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from vdet.detect.detections import Detections
-from vdet.media.images import Image
+from vdet.media import Picture
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import Track
 
@@ -22,12 +22,12 @@ class HoldingTracker:
         self._shown: list[Track] = []
 
     def update(
-        self, detections: Detections, time: float, image: Image | None = None
+        self, detections: Detections, time: float, picture: Picture | None = None
     ) -> list[Track]:
         """Follow the vehicles into a frame that was searched; as `VideoTracker.update`."""
-        self._shown = self.tracker.update(detections, time, image)
+        self._shown = self.tracker.update(detections, time, picture)
         return self._shown
 
-    def carry(self, time: float, image: Image | None = None) -> list[Track]:  # noqa: ARG002
+    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
         """Return the vehicles of the latest searched frame; as `CarryingTracker.carry`."""
         return [replace(track, predicted=True) for track in self._shown]

@@ -3,7 +3,7 @@
 from typing import Protocol, runtime_checkable
 
 from vdet.detect.detections import Detections
-from vdet.media.images import Image
+from vdet.media import Picture
 from vdet.track.track import Track
 
 
@@ -11,7 +11,7 @@ class VideoTracker(Protocol):
     """Follows the vehicles of one video; a new one is made for every video."""
 
     def update(
-        self, detections: Detections, time: float, image: Image | None = None
+        self, detections: Detections, time: float, picture: Picture | None = None
     ) -> list[Track]:
         """Follow the vehicles into the next frame.
 
@@ -21,8 +21,8 @@ class VideoTracker(Protocol):
             What the detector sees in the frame.
         time
             When the frame is shown, seconds; it increases from frame to frame.
-        image
-            The frame, BGR uint8 `(H, W, 3)`; only trackers that look at pixels need it.
+        picture
+            The frame; only trackers that look at pixels need it.
 
         Returns
         -------
@@ -31,7 +31,7 @@ class VideoTracker(Protocol):
         Raises
         ------
         ValueError
-            The tracker looks at pixels, and `image` is None.
+            The tracker looks at pixels, and `picture` is None.
         """
 
 
@@ -43,7 +43,7 @@ class CarryingTracker(VideoTracker, Protocol):
     stay where they were.
     """
 
-    def carry(self, time: float, image: Image | None = None) -> list[Track]:
+    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:
         """Follow the vehicles into the next frame, which was not searched.
 
         A vehicle that is not looked for is not missed: it must not be forgotten for it. All tracks
@@ -51,7 +51,7 @@ class CarryingTracker(VideoTracker, Protocol):
 
         Parameters
         ----------
-        time, image
+        time, picture
             As `update` takes them.
 
         Returns

@@ -24,6 +24,7 @@ from vdet.detect.onnx.detector import NetworkModel
 from vdet.detect.onnx.recognition import recognize
 from vdet.detect.onnx.session import Session
 from vdet.errors import ModelError
+from vdet.media import Picture
 from vdet.media.images import Image
 
 SIZE = 128, 64
@@ -52,7 +53,7 @@ def frame_with_red(x: int, y: int) -> Image:
 def detect(path: Path, image: Image, **settings: object) -> Detections:
     model = NetworkModel(path, NetworkSettings.model_validate(settings))
     detector = model.for_video(image.shape[1], image.shape[0], [image])
-    return detector.detect(detector.search(image, 0))
+    return detector.detect(detector.search(Picture(image), 0))
 
 
 def class_names(found: Detections) -> list[str]:

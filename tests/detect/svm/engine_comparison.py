@@ -14,6 +14,7 @@ from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.geometry import Float32Array
+from vdet.media import Picture, Planes
 from vdet.media.images import Image
 from vdet.synthetic import background_patches, demo_scene, render, vehicle_patches
 
@@ -40,17 +41,20 @@ class EngineResults:
         return float(np.mean((self.dense >= 0) == (self.patch >= 0)))
 
 
-def compare(model: LinearModel, grids: list[WindowGrid], image: Image) -> EngineResults:
+def compare(model: LinearModel, grids: list[WindowGrid], pixels: Image | Planes) -> EngineResults:
     """Search a frame with both engines."""
-    frame = pyramid(image, grids)
+    frame = _pyramid(pixels, model.features, grids)
     dense = [dense_search(model, grid).search(frame).probabilities for grid in grids]
     patch = [PatchSearch(model, grid).search(frame).probabilities for grid in grids]
     return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
 
 
-def pyramid(image: Image, grids: list[WindowGrid]) -> FramePyramid:
+def _pyramid(
+    pixels: Image | Planes, features: FeatureSettings, grids: list[WindowGrid]
+) -> FramePyramid:
     """Return a frame with a margin for windows beyond its sides, whole pixels at all levels."""
-    return FramePyramid(image, margin=-16 * min(0, *(int(grid.left // 16) for grid in grids)))
+    margin = -16 * min(0, *(int(grid.left // 16) for grid in grids))
+    return FramePyramid(Picture(pixels), features, margin=margin)
 
 
 def log_odds(probabilities: Float32Array) -> Float32Array:

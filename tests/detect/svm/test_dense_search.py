@@ -33,6 +33,7 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.detect.svm.windows import WindowGrid
 from vdet.errors import ConfigError
+from vdet.media import Picture
 from vdet.media.images import Image
 
 FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=0))
@@ -85,7 +86,7 @@ def test_a_texture_is_most_probable_in_the_window_that_it_fills(
         x, y, w, h = grid.boxes[index].tolist()
         frame = np.full((2 * size + 6 * step, 2 * size + 8 * step, 3), 100, np.uint8)
         frame[y : y + h, x : x + w] = texture(size)
-        found = search.search(FramePyramid(frame)).probabilities
+        found = search.search(FramePyramid(Picture(frame), FEATURES)).probabilities
         assert found.shape == (35,)
         assert found.dtype == np.float32
         assert int(found.argmax()) == index
@@ -98,7 +99,7 @@ def test_a_grid_may_be_a_window_a_row_or_a_column(
 ) -> None:
     grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(3), columns, rows)
     model = texture_finder(1)
-    frame = FramePyramid(np.asarray(texture(256), np.uint8))
+    frame = FramePyramid(Picture(texture(256)), FEATURES)
     search = dense_search(model, grid)
     assert type(search) is kind
     expected = PatchSearch(model, grid).search(frame).probabilities
@@ -113,7 +114,7 @@ def test_the_hog_features_of_a_window_give_its_probability(
     model = texture_finder(2)
     search = dense_search(model, grid)
     assert type(search) is kind
-    found = search.search(FramePyramid(np.asarray(texture(400), np.uint8)))
+    found = search.search(FramePyramid(Picture(texture(400)), FEATURES))
     numbers = np.random.default_rng(1).permutation(len(grid))
     hogs = found.hogs(numbers)
     assert hogs.shape == (len(grid), FeatureExtractor(FEATURES).layout.hog_length)
@@ -127,11 +128,11 @@ def test_a_search_does_not_change_later_searches() -> None:
     for _, size, step in GRIDS:
         grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
         search = dense_search(texture_finder(1), grid)
-        first = search.search(FramePyramid(texture(256)))
+        first = search.search(FramePyramid(Picture(texture(256)), FEATURES))
         kept = first.probabilities.copy()
         hogs = first.hogs(np.arange(len(grid)))
-        search.search(FramePyramid(255 - texture(256)))
-        again = search.search(FramePyramid(texture(256)))
+        search.search(FramePyramid(Picture(255 - texture(256)), FEATURES))
+        again = search.search(FramePyramid(Picture(texture(256)), FEATURES))
         for found in (first, again):
             np.testing.assert_array_equal(found.probabilities, kept)
             np.testing.assert_array_equal(found.hogs(np.arange(len(grid))), hogs)
@@ -162,14 +163,15 @@ def settings(engine: str) -> SvmSettings:
 
 
 def searched(features: FeatureSettings, engine: str) -> np.ndarray:
-    (windows,) = FrameSearch(model_of(features), settings(engine), 160, 90).search(NOISE)
+    (windows,) = FrameSearch(model_of(features), settings(engine), 160, 90).search(Picture(NOISE))
     return windows.probabilities
 
 
 def by_patch(features: FeatureSettings) -> np.ndarray:
     model = model_of(features)
     (grid,) = lay_grids(settings("patch"), features, 160, 90)
-    return PatchSearch(model, grid).search(FramePyramid(NOISE)).probabilities
+    frame = FramePyramid(Picture(NOISE), features)
+    return PatchSearch(model, grid).search(frame).probabilities
 
 
 @pytest.fixture(autouse=True)

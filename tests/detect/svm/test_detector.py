@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, by_perspective, red_finder, road
+from detect.svm.turns import IN_TURNS
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, by_perspective, red_finder, road
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
 from vdet.detect.svm.detector import SvmModel, horizon_of
@@ -18,12 +19,13 @@ from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
 from vdet.geometry import Box, Float32Array
+from vdet.media import Picture
 from vdet.media.images import Image
 
 MODEL = red_finder()
 ROWS = SETTINGS.svm
 """Window sets over fixed rows, outlines."""
-DEFAULT = PERSPECTIVE.svm
+DEFAULT = IN_TURNS.svm
 """Window sets by perspective, alternating; boxes from votes."""
 
 
@@ -33,14 +35,14 @@ def detect_video(
     """Give the detections in consecutive frames of a video."""
     model = SvmModel(MODEL, settings, is_shipped=is_shipped)
     detector = model.for_video(WIDTH, HEIGHT, images[:1])
-    return [detector.detect(detector.search(image, i)) for i, image in enumerate(images)]
+    return [detector.detect(detector.search(Picture(image), i)) for i, image in enumerate(images)]
 
 
 def detect_still(image: Image, settings: SvmSettings = ROWS) -> Detections:
     """Give the detections in a still picture."""
     height, width = image.shape[:2]
     detector = SvmModel(MODEL, settings).for_video(width, height, [image])
-    return detector.detect(detector.search(image, None))
+    return detector.detect(detector.search(Picture(image), None))
 
 
 def trace_of(detections: Detections) -> Trace:
@@ -148,10 +150,14 @@ class TestDefaultSettings:
             assert max(box.iou(car) for box in voted) > 0.6
 
     def test_each_frame_is_searched_with_its_own_window_sets(self) -> None:
-        traces = [trace_of(each) for each in detect_video(*[road()] * 4, settings=DEFAULT)]
+        alternate = DEFAULT.search.alternate
+        images = [road()] * (2 * alternate)
+        traces = [trace_of(each) for each in detect_video(*images, settings=DEFAULT)]
         sizes = [np.unique(trace.windows.boxes[:, 2]).tolist() for trace in traces]
-        assert sizes == [[48], [64], [48], [64]]
-        assert [grid.size for grid in traces[0].grids] == [48, 64]
+        sets = [grid.size for grid in traces[0].grids]
+        assert sets == [48, 64, 80]
+        assert len(sets) >= alternate, "too few sets for every frame to have its own"
+        assert sizes == 2 * [sets[turn::alternate] for turn in range(alternate)]
 
     @pytest.mark.parametrize("x", [-32, WIDTH - 32])
     def test_a_car_half_beyond_the_side_is_detected_and_its_box_ends_there(self, x: int) -> None:
@@ -161,8 +167,15 @@ class TestDefaultSettings:
         assert box.iou(seen) > 0.4
 
     def test_votes_of_forgotten_frames_do_not_count(self) -> None:
-        *_, detections = detect_video(road(CAR), road(CAR), road(), road(), settings=DEFAULT)
-        assert len(detections) == 0
+        frames = DEFAULT.heat.frames
+        before, car = [road(CAR)] * frames, CAR.moved_to(CAR.x + 8, CAR.y)
+        for now, count in ((road(), 0), (road(car), 1)):
+            detections = detect_video(*before, *[now] * frames, settings=DEFAULT)
+            expected = detect_video(*[road()] * frames, *[now] * frames, settings=DEFAULT)
+            assert len(detections[frames - 1]) == 1
+            assert len(detections[-1]) == count
+            np.testing.assert_array_equal(detections[-1].boxes, expected[-1].boxes)
+            np.testing.assert_array_equal(detections[-1].strengths, expected[-1].strengths)
 
     def test_nothing_is_detected_on_an_empty_road(self) -> None:
         assert len(detect_still(road(), DEFAULT)) == 0
@@ -198,8 +211,9 @@ class TestStillPictures:
         np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
         assert still.rounded == video.rounded
 
-    @pytest.mark.parametrize("frames", [2, 3, 4])
-    @pytest.mark.parametrize("alternate", [1, 2])
+    @pytest.mark.parametrize(
+        ("alternate", "frames"), [(1, 2), (1, 3), (1, 4), (2, 2), (2, 3), (2, 4), (3, 3), (3, 4)]
+    )
     def test_a_still_picture_is_as_hot_as_a_video_with_alternating_sets(
         self, alternate: int, frames: int
     ) -> None:
@@ -220,9 +234,9 @@ class TestStillPictures:
         calls = []
         search = FrameSearch.search
 
-        def counted(self: FrameSearch, image: Image, sets: Any = None) -> Any:
+        def counted(self: FrameSearch, picture: Picture, sets: Any = None) -> Any:
             calls.append(len(self.grids) if sets is None else len(sets))
-            return search(self, image, sets)
+            return search(self, picture, sets)
 
         monkeypatch.setattr(FrameSearch, "search", counted)
         detections = detect_still(road(CAR), but(settings, "heat", frames=6))
@@ -231,7 +245,7 @@ class TestStillPictures:
     def test_the_windows_of_a_still_picture_are_those_of_every_set(self) -> None:
         trace = trace_of(detect_still(road(CAR), DEFAULT))
         assert len(trace.windows) == sum(len(grid) for grid in trace.grids)
-        assert set(trace.hits.boxes[:, 2].tolist()) == {48, 64}
+        assert set(trace.hits.boxes[:, 2].tolist()) == {48, 64, 80}
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
     def test_a_detection_is_shown_if_it_is_large_and_strong_enough(
@@ -313,9 +327,9 @@ def test_one_loaded_model_serves_frames_of_any_size() -> None:
     model = SvmModel(replace(MODEL), DEFAULT)
     for width, height in ((WIDTH, HEIGHT), (2 * WIDTH, 2 * HEIGHT)):
         image = np.zeros((height, width, 3), np.uint8)
-        detector = model.for_video(width, height, [image])
-        assert len(detector.detect(detector.search(image, 0))) == 0
-        assert trace_of(detector.detect(detector.search(image, 1))).heat.values.shape == (
+        detector, picture = model.for_video(width, height, [image]), Picture(image)
+        assert len(detector.detect(detector.search(picture, 0))) == 0
+        assert trace_of(detector.detect(detector.search(picture, 1))).heat.values.shape == (
             height // 4,
             width // 4,
         )

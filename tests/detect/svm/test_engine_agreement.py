@@ -42,6 +42,8 @@ from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.detect.svm.strips import Strip, describe_blocks
 from vdet.detect.svm.windows import WindowGrid, Windows, join_windows
 from vdet.geometry import iou_matrix
+from vdet.media import Picture, Planes
+from vdet.media.coding import Coding
 from vdet.media.images import Image
 
 SHIPPED = {"seed": SEED.svm, "default": SvmSettings()}
@@ -113,6 +115,14 @@ def test_the_engines_agree_for_any_features(name: str) -> None:
     assert_agree(compare(model, grids, cars()), same=FEW)
 
 
+@pytest.mark.parametrize("coding", [Coding(), Coding("bt709")], ids=["BT.601", "BT.709"])
+@pytest.mark.parametrize("name", ["default", "HSV"])
+def test_the_engines_agree_on_planes(name: str, coding: Coding) -> None:
+    model = fitted(FEATURES.get(name, FeatureSettings()))
+    grids = lay_grids(SvmSettings(), model.features, 1280, 720, horizon=HORIZON)
+    assert_agree(compare(model, grids, Planes.of_image(road(), coding)))
+
+
 def _a_car_cut_off(side: str) -> Image:
     """Return a picture in which the nearest of the drawn cars is cut off by this side."""
     return cars()[:, 280:440] if side == "left" else cars()[:, 160:320]
@@ -182,7 +192,7 @@ def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("vdet.detect.svm.search.lay_grids", lambda *_, **__: [grid])
         height, width = image.shape[:2]
-        (windows,) = FrameSearch(model, settings, width, height).search(image)
+        (windows,) = FrameSearch(model, settings, width, height).search(Picture(image))
         return windows
 
 
@@ -240,7 +250,8 @@ def test_the_vehicles_differ_only_because_of_the_edges_of_patches(kind: type) ->
 def _windows_of_blocks(model: LinearModel, grid: WindowGrid) -> tuple[np.ndarray, np.ndarray]:
     """Return the blocks of each window, from its strip and from its patch, `(n, 7, 7, d)`."""
     features, image = model.features, cars()
-    every = describe_blocks(Strip(grid, features).cut(FramePyramid(image)), features)
+    frame = FramePyramid(Picture(image), features)
+    every = describe_blocks(Strip(grid, features).cut(frame), features)
     extractor, layout = FeatureExtractor(features), Layout.of(features)
     by_strip, by_patch = [], []
     for i, (x, y, w, h) in enumerate(grid.boxes.tolist()):
@@ -266,7 +277,7 @@ def test_blocks_away_from_the_edge_of_a_patch_are_the_same(
 def test_a_frame_is_searched_with_all_windows_of_all_sets_in_order() -> None:
     model, image = fitted(FeatureSettings()), road()
     search = FrameSearch(model, SvmSettings(), 1280, 720, horizon=HORIZON)
-    found = join_windows(search.search(image))
+    found = join_windows(search.search(Picture(image)))
     grids = lay_grids(SvmSettings(), model.features, 1280, 720, horizon=HORIZON)
     assert list(search.grids) == grids
     np.testing.assert_array_equal(found.boxes, np.concatenate([grid.boxes for grid in grids]))

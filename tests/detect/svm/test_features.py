@@ -3,6 +3,8 @@ from typing import get_args
 import cv2
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from seed import SEED
 from vdet.config.schema import (
@@ -15,10 +17,11 @@ from vdet.config.schema import (
 from vdet.detect.svm.features import (
     FeatureExtractor,
     Layout,
-    convert,
+    cut_window,
     halve,
     histogram,
     resize,
+    split,
     to_patch,
 )
 
@@ -92,7 +95,7 @@ def test_a_histogram_of_one_colour_has_all_its_bins() -> None:
 def test_every_colour_space_is_that_of_opencv(space: ColorSpace) -> None:
     settings = seed_but(color_space=space, hog=NO_HOG, spatial=SpatialSettings(size=64))
     converted = cv2.cvtColor(PATCH, getattr(cv2, f"COLOR_BGR2{space}"))
-    np.testing.assert_array_equal(convert(PATCH, settings), converted)
+    np.testing.assert_array_equal(split(PATCH, settings), converted.transpose(2, 0, 1))
     spatial = FeatureExtractor(settings).describe(PATCH)[96:]
     np.testing.assert_array_equal(spatial.reshape(3, 64, 64), converted.transpose(2, 0, 1))
 
@@ -145,6 +148,17 @@ def test_spatial_features_come_last() -> None:
     vector = FeatureExtractor(settings).describe(PATCH)
     np.testing.assert_array_equal(vector[:4800], FeatureExtractor(FEATURES).describe(PATCH))
     assert len(vector) == 4800 + 192
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [FEATURES, seed_but(color_space="HLS", spatial=SpatialSettings(size=8))],
+    ids=["seed", "other space"],
+)
+def test_channels_are_described_as_the_patch_that_they_are_of(settings: FeatureSettings) -> None:
+    extractor = FeatureExtractor(settings)
+    described = extractor.describe_channels(split(PATCH, settings))
+    np.testing.assert_array_equal(described, extractor.describe(PATCH))
 
 
 def test_describe_all_stacks_the_vectors_of_the_patches() -> None:
@@ -203,3 +217,37 @@ def test_width_and_height_may_differ() -> None:
     assert resize(PATCH, 30, 20).shape == (20, 30, 3)
     assert resize(PATCH[:10, :50], 64, 64).shape == (64, 64, 3)
     np.testing.assert_array_equal(resize(PATCH, 32, 32), to_patch(PATCH, 32))
+
+
+PIXELS = st.integers(1, 40)
+
+
+@given(st.integers(0, 63), st.integers(0, 63), PIXELS, PIXELS)
+def test_a_window_inside_an_image_is_cut_as_it_is(x: int, y: int, width: int, height: int) -> None:
+    x, y = min(x, 64 - width), min(y, 64 - height)
+    window = cut_window(PATCH, x, y, width, height)
+    np.testing.assert_array_equal(window, PATCH[y : y + height, x : x + width])
+
+
+BEYOND = 50
+PADDED = np.pad(PATCH, ((BEYOND, BEYOND), (BEYOND, BEYOND), (0, 0)), mode="edge")
+CORNERS = st.integers(-BEYOND, 64 + BEYOND - 40)
+
+
+@example(x=-10, y=20, width=30, height=20)
+@example(x=50, y=20, width=30, height=20)
+@example(x=20, y=-10, width=20, height=30)
+@example(x=20, y=50, width=20, height=30)
+@example(x=-BEYOND, y=20, width=40, height=20)
+@given(CORNERS, CORNERS, PIXELS, PIXELS)
+def test_beyond_each_side_of_an_image_the_outermost_pixels_repeat(
+    x: int, y: int, width: int, height: int
+) -> None:
+    left, top = x + BEYOND, y + BEYOND
+    window = cut_window(PATCH, x, y, width, height)
+    np.testing.assert_array_equal(window, PADDED[top : top + height, left : left + width])
+
+
+def test_a_window_around_an_image_shows_all_of_it() -> None:
+    window = cut_window(PATCH, -BEYOND, -BEYOND, 64 + 2 * BEYOND, 64 + 2 * BEYOND)
+    np.testing.assert_array_equal(window, PADDED)

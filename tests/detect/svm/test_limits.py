@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, red_finder, road
+from detect.svm.turns import IN_TURNS
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from seed import SEED
 from textured_road import textured_road
 from vdet.config.schema import Settings, SvmSettings
@@ -15,6 +16,7 @@ from vdet.detect.svm.model import load_model
 from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.errors import ImageError
 from vdet.geometry import Box
+from vdet.media import Picture
 from vdet.regions import SearchArea
 
 
@@ -29,12 +31,12 @@ def area_of(box: Box, width: int, height: int) -> SearchArea:
     "box", [Box(700, 420, 200, 50), Box(0, 380, 333, 340), Box(901, 433, 379, 77)]
 )
 def test_windows_that_touch_the_area_look_the_same(settings: SvmSettings, box: Box) -> None:
-    image, model = textured_road(1280, 720), load_model(shipped_model(settings))
+    picture, model = Picture(textured_road(1280, 720)), load_model(shipped_model(settings))
     area = area_of(box, 1280, 720)
     whole = FrameSearch(model, settings, 1280, 720)
     part = FrameSearch(model, settings, 1280, 720, area=area)
     assert sum(map(len, part.grids)) < sum(map(len, whole.grids))
-    for all_windows, some in zip(whole.search(image), part.search(image), strict=True):
+    for all_windows, some in zip(whole.search(picture), part.search(picture), strict=True):
         near = area.touches(all_windows.boxes)
         kept = area.touches(some.boxes)
         assert np.array_equal(all_windows.boxes[near], some.boxes[kept])
@@ -43,7 +45,7 @@ def test_windows_that_touch_the_area_look_the_same(settings: SvmSettings, box: B
         assert np.allclose(all_windows.shares[near], some.shares[kept])
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["rows", "perspective"])
+@pytest.mark.parametrize("settings", [SETTINGS, IN_TURNS], ids=["rows", "perspective"])
 def test_a_vehicle_in_the_area_is_found_as_before(settings: Settings) -> None:
     detector = SvmModel(red_finder(), settings.svm).for_video(WIDTH, HEIGHT, [road(CAR)])
     assert isinstance(detector, LimitableDetector)
@@ -54,8 +56,8 @@ def test_a_vehicle_in_the_area_is_found_as_before(settings: Settings) -> None:
         "near": detector.limited_to(area_of(near, WIDTH, HEIGHT)),
         "far": detector.limited_to(area_of(far, WIDTH, HEIGHT)),
     }.items():
-        for index in range(3):
-            found[name] = each.detect(each.search(road(CAR), index)).rounded
+        for index in range(settings.svm.heat.frames + 1):
+            found[name] = each.detect(each.search(Picture(road(CAR)), index)).rounded
     assert len(found["whole"]) == 1
     assert found["near"] == found["whole"]
     assert found["far"] == []
@@ -70,14 +72,15 @@ def test_regions_that_no_window_reaches_are_refused() -> None:
 def test_a_set_out_of_reach_takes_its_turn_without_windows() -> None:
     settings = SvmSettings()
     model = load_model(shipped_model(settings))
-    area = area_of(Box(700, 420, 60, 10), 1280, 720)
+    area = area_of(Box(700, 520, 60, 10), 1280, 720)
     grids = lay_grids(settings, model.features, 1280, 720)
     kept = [limited_grid(grid, area, model.features) for grid in grids]
+    assert kept[0] is None, "the first set reaches the area"
     low = SvmDetector(model, settings, 1280, 720, area=area)
     image = textured_road(1280, 720)
-    for index in range(2):
-        candidates = low.search(image, index)
-        expected = [part for part in kept[index::2] if part is not None]
-        assert len(candidates.windows) == sum(map(len, expected))
+    for turn in range(settings.search.alternate):
+        candidates = low.search(Picture(image), turn)
+        expected = [part.boxes for part in kept[turn :: settings.search.alternate] if part]
+        np.testing.assert_array_equal(candidates.windows.boxes, np.concatenate(expected))
         pictures = low.stage_pictures(image, low.detect(candidates))
         assert "windows" in pictures

@@ -1,11 +1,36 @@
+from typing import get_args
+
+import av
 import numpy as np
+import numpy.typing as npt
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.detect.svm.features import resize
+from codings import CODINGS, FULL, HD, LIMITED, in_any_coding, smooth_picture
+from vdet.config.schema import ColorSpace, FeatureSettings
+from vdet.detect.svm.features import Channels, resize, split
 from vdet.detect.svm.pyramid import FramePyramid
+from vdet.media import Picture, Planes
+from vdet.media.coding import Coding
+from vdet.media.images import Image
 
+FEATURES = FeatureSettings()
+RGB = FeatureSettings(color_space="RGB")
 FRAME = np.random.default_rng(0).integers(0, 256, (97, 131, 3), dtype=np.uint8)
+
+
+def pyramid(
+    pixels: Image | Planes = FRAME, top: int = 0, bottom: int | None = None, margin: int = 0
+) -> FramePyramid:
+    return FramePyramid(Picture(pixels), FEATURES, top, bottom, margin)
+
+
+def resized(
+    image: Image, width: int, height: int, features: FeatureSettings = FEATURES
+) -> Channels:
+    """Resize a crop, BGR `(h, w, 3)`, and convert it, as in training."""
+    return split(resize(image, width, height), features)
 
 
 def spans(length: int) -> st.SearchStrategy[slice]:
@@ -13,12 +38,20 @@ def spans(length: int) -> st.SearchStrategy[slice]:
     return pairs.map(lambda pair: slice(pair[0], min(length, sum(pair))))
 
 
-@given(spans(97), spans(131), st.integers(1, 60), st.integers(1, 60), st.integers(0, 96))
-def test_a_cut_is_the_resized_crop(
-    rows: slice, columns: slice, width: int, height: int, top: int
+@given(
+    spans(97),
+    spans(131),
+    st.integers(1, 60),
+    st.integers(1, 60),
+    st.integers(0, 96),
+    st.sampled_from(get_args(ColorSpace)),
+)
+def test_a_cut_is_the_resized_crop_converted_last(
+    rows: slice, columns: slice, width: int, height: int, top: int, space: ColorSpace
 ) -> None:
-    frame = FramePyramid(FRAME, min(top, rows.start))
-    expected = resize(FRAME[rows, columns], width, height)
+    features = FeatureSettings(color_space=space)
+    frame = FramePyramid(Picture(FRAME), features, min(top, rows.start))
+    expected = resized(FRAME[rows, columns], width, height, features)
     np.testing.assert_array_equal(frame.cut(rows, columns, width, height), expected)
 
 
@@ -33,18 +66,20 @@ def test_a_cut_of_halvable_size_is_halved_from_odd_and_even_pixels(
 ) -> None:
     rows = slice(top, top + factor * side * 2)
     columns = slice(left, left + factor * side * 3)
-    cut = FramePyramid(FRAME).cut(rows, columns, side * 3, side * 2)
-    np.testing.assert_array_equal(cut, resize(FRAME[rows, columns], side * 3, side * 2))
-    means = FRAME[rows, columns].reshape(side * 2, factor, side * 3, factor, 3).mean(axis=(1, 3))
+    cut = FramePyramid(Picture(FRAME), RGB).cut(rows, columns, side * 3, side * 2)
+    part = FRAME[rows, columns]
+    np.testing.assert_array_equal(cut, resized(part, side * 3, side * 2, RGB))
+    red_green_blue = part[..., ::-1].transpose(2, 0, 1)
+    means = red_green_blue.reshape(3, side * 2, factor, side * 3, factor).mean(axis=(2, 4))
     np.testing.assert_allclose(cut, means, atol=np.log2(factor) / 2)  # each halving rounds
 
 
 def test_cuts_do_not_depend_on_what_was_cut_before() -> None:
-    one = FramePyramid(FRAME)
+    one = pyramid()
     places = [(slice(0, 64), slice(0, 128)), (slice(8, 72), slice(4, 68)), (slice(1, 65),) * 2]
     for rows, columns in [*places, *places[::-1]]:
         for side in (8, 16, 32, 64):
-            fresh = FramePyramid(FRAME).cut(rows, columns, side, side)
+            fresh = pyramid().cut(rows, columns, side, side)
             np.testing.assert_array_equal(one.cut(rows, columns, side, side), fresh)
 
 
@@ -52,26 +87,26 @@ def test_pixels_outside_the_searched_rows_do_not_matter() -> None:
     other = np.array(FRAME)
     other[:32] = other[80:] = 0
     rows, columns = slice(40, 72), slice(0, 64)
-    first = FramePyramid(FRAME, 32, 80).cut(rows, columns, 16, 8)
-    second = FramePyramid(other, 32, 80).cut(rows, columns, 16, 8)
+    first = pyramid(FRAME, 32, 80).cut(rows, columns, 16, 8)
+    second = pyramid(other, 32, 80).cut(rows, columns, 16, 8)
     np.testing.assert_array_equal(first, second)
 
 
 def test_the_frame_is_not_changed() -> None:
     image = FRAME.copy()
-    frame = FramePyramid(image, 16, 80, margin=16)
+    frame = pyramid(image, 16, 80, margin=16)
     frame.cut(slice(16, 80), slice(-16, 48), 8, 8)
     np.testing.assert_array_equal(image, FRAME)
 
 
 @given(spans(97), spans(131), st.integers(0, 96))
-def test_a_crop_is_a_window_of_the_frame_at_full_size(
-    rows: slice, columns: slice, top: int
-) -> None:
-    frame = FramePyramid(FRAME, min(top, rows.start))
-    size = columns.stop - columns.start, rows.stop - rows.start
-    crop = frame.crop(columns.start, rows.start, *size)
-    np.testing.assert_array_equal(crop, FRAME[rows, columns])
+def test_a_cut_at_full_size_is_a_window_of_the_frame(rows: slice, columns: slice, top: int) -> None:
+    window = at_full_size(pyramid(FRAME, min(top, rows.start)), rows, columns)
+    np.testing.assert_array_equal(window, split(FRAME[rows, columns], FEATURES))
+
+
+def at_full_size(frame: FramePyramid, rows: slice, columns: slice) -> Channels:
+    return frame.cut(rows, columns, columns.stop - columns.start, rows.stop - rows.start)
 
 
 MARGIN = 48
@@ -82,19 +117,179 @@ BEYOND = np.pad(FRAME, ((0, 0), (MARGIN, MARGIN), (0, 0)), mode="edge")
 def test_beyond_the_sides_the_outermost_columns_repeat(
     rows: slice, columns: slice, top: int, side: int
 ) -> None:
-    frame = FramePyramid(FRAME, min(top, rows.start), margin=MARGIN)
+    frame = pyramid(FRAME, min(top, rows.start), margin=MARGIN)
     expected = BEYOND[rows, columns]
-    left, height = columns.start - MARGIN, rows.stop - rows.start
-    crop = frame.crop(left, rows.start, columns.stop - columns.start, height)
-    np.testing.assert_array_equal(crop, expected)
-    cut = frame.cut(rows, slice(left, columns.stop - MARGIN), side, side)
-    np.testing.assert_array_equal(cut, resize(expected, side, side))
+    of_frame = slice(columns.start - MARGIN, columns.stop - MARGIN)
+    window = at_full_size(frame, rows, of_frame)
+    np.testing.assert_array_equal(window, split(expected, FEATURES))
+    cut = frame.cut(rows, of_frame, side, side)
+    np.testing.assert_array_equal(cut, resized(expected, side, side))
 
 
 def test_inside_the_frame_a_margin_changes_nothing() -> None:
     rows, columns = slice(8, 72), slice(16, 80)
-    plain, wide = FramePyramid(FRAME), FramePyramid(FRAME, margin=16)
+    plain, wide = pyramid(), pyramid(margin=16)
     for side in (8, 16, 20, 64):
         np.testing.assert_array_equal(
             wide.cut(rows, columns, side, side), plain.cut(rows, columns, side, side)
         )
+
+
+SIZES = [(132, 98), (131, 97), (132, 97), (131, 98)]
+
+
+def noisy_planes(width: int, height: int, coding: Coding) -> Planes:
+    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding)
+    rng = np.random.default_rng(1)
+    for layer in planes.layers:
+        layer[:] = rng.integers(0, 256, layer.shape, dtype=np.uint8)
+    return planes
+
+
+def full_range(values: Image, base: int, steps: int) -> Image:
+    """Return values with the full range; `base` keeps its meaning, `steps` become 255."""
+    zero = 0 if base == 16 else base
+    return (zero + (values - float(base)) * 255 / steps).round().clip(0, 255).astype(np.uint8)
+
+
+def channels_of(planes: Planes) -> npt.NDArray[np.uint8]:
+    """Return luma, red and blue of each pixel, `(3, H, W)`, as BT.601 with the full range."""
+    height, width = planes.shape
+    luma, blue, red = planes.layers
+    if planes.coding.matrix == "bt709":
+        luma, blue, red = planes.coding.to_common((luma, blue, red))
+    elif not planes.coding.full_range:
+        luma = full_range(luma, 16, 219)
+        blue, red = full_range(blue, 128, 224), full_range(red, 128, 224)
+    whole = (each.repeat(2, 0).repeat(2, 1)[:height, :width] for each in (red, blue))
+    return np.array([luma, *whole])
+
+
+class TestPlanes:
+    """Planes are taken for the channels YCrCb."""
+
+    @in_any_coding
+    @pytest.mark.parametrize("level", [0, 1, 2])
+    def test_they_show_about_what_the_same_picture_shows_as_bgr(
+        self, coding: Coding, level: int
+    ) -> None:
+        picture = smooth_picture(coding)
+        assert picture.planes is not None
+        size = 192 >> level, 144 >> level
+        ours, expected = (
+            np.array(pyramid(each).cut(slice(0, 144), slice(0, 192), *size), int)
+            for each in (picture.planes, picture.image)
+        )
+        apart = np.abs(ours - expected)
+        assert apart.mean(axis=(1, 2)).max() < 0.5
+        assert apart.max() <= 6
+        assert expected.std(axis=(1, 2)).min() > 20
+
+    @pytest.mark.parametrize("coding", [LIMITED, FULL], ids=["limited range", "full range"])
+    def test_chroma_at_half_size_is_the_plane_itself_with_the_full_range(
+        self, coding: Coding
+    ) -> None:
+        planes = noisy_planes(132, 98, coding)
+        _, red, blue = pyramid(planes).cut(slice(0, 98), slice(0, 132), 66, 49)
+        for channel, plane in ((red, planes.red), (blue, planes.blue)):
+            expected = plane if coding.full_range else full_range(plane, 128, 224)
+            np.testing.assert_array_equal(channel, expected)
+
+    @in_any_coding
+    @pytest.mark.parametrize(("width", "height"), SIZES)
+    def test_a_value_of_chroma_stands_for_two_by_two_pixels(
+        self, width: int, height: int, coding: Coding
+    ) -> None:
+        planes = noisy_planes(width, height, coding)
+        whole = at_full_size(pyramid(planes), slice(0, height), slice(0, width))
+        np.testing.assert_array_equal(whole, channels_of(planes))
+
+    def test_black_grey_and_white_have_their_values_in_both_ranges(self) -> None:
+        for coding in CODINGS.values():
+            black, white = (0, 255) if coding.full_range else (16, 235)
+            planes = noisy_planes(64, 64, coding)
+            planes.luma[:32], planes.luma[32:] = black, white
+            planes.blue[:] = planes.red[:] = 128
+            luma, red, blue = at_full_size(pyramid(planes), slice(0, 64), slice(0, 64))
+            assert luma[[0, 31, 32, 63]].tolist() == [[each] * 64 for each in (0, 0, 255, 255)]
+            assert (red == 128).all()
+            assert (blue == 128).all()
+
+    @given(
+        st.sampled_from(SIZES),
+        spans(97),
+        spans(131 + 2 * MARGIN),
+        st.integers(0, 48),
+        st.integers(1, 40),
+        st.sampled_from(list(CODINGS.values())),
+    )
+    def test_beyond_the_sides_the_outermost_columns_of_all_channels_repeat(
+        self,
+        frame: tuple[int, int],
+        rows: slice,
+        columns: slice,
+        half_top: int,
+        side: int,
+        coding: Coding,
+    ) -> None:
+        planes = noisy_planes(*frame, coding)
+        ours = pyramid(planes, min(2 * half_top, rows.start // 2 * 2), margin=MARGIN)
+        beyond = np.pad(channels_of(planes), ((0, 0), (0, 0), (MARGIN, MARGIN)), mode="edge")
+        expected = beyond[:, rows, columns]
+        of_frame = slice(columns.start - MARGIN, columns.stop - MARGIN)
+        np.testing.assert_array_equal(at_full_size(ours, rows, of_frame), expected)
+        cut = ours.cut(rows, of_frame, side, side)
+        np.testing.assert_array_equal(cut, [resize(each, side, side) for each in expected])
+
+    @pytest.mark.parametrize("bottom", [79, 80])
+    @pytest.mark.parametrize("coding", [LIMITED, HD], ids=["BT.601", "BT.709"])
+    def test_rows_outside_the_searched_ones_do_not_matter(
+        self, coding: Coding, bottom: int
+    ) -> None:
+        planes, other = noisy_planes(132, 98, coding), noisy_planes(132, 98, coding)
+        for layer, factor in zip(other.layers, (1, 2, 2), strict=True):
+            layer[: 32 // factor] = layer[80 // factor :] = 0
+        part = slice(40, bottom), slice(0, 64), 16, 8
+        first, second = (pyramid(each, 32, bottom).cut(*part) for each in (planes, other))
+        np.testing.assert_array_equal(first, second)
+
+    @pytest.mark.parametrize(
+        ("features", "top", "margin"),
+        [
+            (FEATURES, 15, 16),
+            (FEATURES, 16, 15),
+            (FeatureSettings(color_space="HSV"), 16, 16),
+            (FeatureSettings(color_space="YUV"), 16, 16),
+        ],
+        ids=["odd row", "odd margin", "HSV", "YUV"],
+    )
+    def test_what_planes_do_not_give_is_converted_from_bgr(
+        self, features: FeatureSettings, top: int, margin: int
+    ) -> None:
+        picture = smooth_picture(HD)
+        ours, expected = (
+            FramePyramid(each, features, top, margin=margin)
+            for each in (picture, Picture(picture.image))
+        )
+        for width, height in ((64, 48), (32, 24), (20, 12)):
+            part = slice(18, 66), slice(-8, 56), width, height
+            np.testing.assert_array_equal(ours.cut(*part), expected.cut(*part))
+
+    @in_any_coding
+    def test_they_are_not_converted_to_bgr(
+        self, coding: Coding, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(Picture, "image", property(pytest.fail))
+        frame = pyramid(noisy_planes(132, 98, coding), 16, margin=16)
+        frame.cut(slice(16, 80), slice(-16, 48), 8, 8)
+        at_full_size(frame, slice(16, 48), slice(-16, 16))
+
+    @in_any_coding
+    def test_they_are_not_changed(self, coding: Coding) -> None:
+        planes = noisy_planes(132, 98, coding)
+        before = [layer.copy() for layer in planes.layers]
+        frame = pyramid(planes, 16, 80, margin=16)
+        frame.cut(slice(16, 80), slice(-16, 48), 8, 8)
+        at_full_size(frame, slice(16, 48), slice(-16, 16))
+        for layer, expected in zip(planes.layers, before, strict=True):
+            np.testing.assert_array_equal(layer, expected)

@@ -6,6 +6,10 @@ from vdet.config.loading import load_settings
 from vdet.config.schema import HeatSettings, PerspectiveSettings, SearchSettings, SvmSettings
 from vdet.errors import ConfigError
 
+FRAMES = HeatSettings().frames
+"""Number of frames in the heat, by default."""
+ALTERNATE = SearchSettings().alternate
+"""Number of frames that the sets alternate over, by default."""
 WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
 
 
@@ -20,8 +24,14 @@ WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
             "detector.search.perspective.lowest=0.5",
             "detector.search.perspective: lowest must be at least highest",
         ),
-        ("detector.search.alternate=3", "detector: heat.frames must be at least search.alternate"),
-        ("detector.heat.frames=1", "detector: heat.frames must be at least search.alternate"),
+        (
+            f"detector.search.alternate={FRAMES + 1}",
+            "detector: heat.frames must be at least search.alternate",
+        ),
+        (
+            f"detector.heat.frames={ALTERNATE - 1}",
+            "detector: heat.frames must be at least search.alternate",
+        ),
         (
             "detector.search.alternate=0",
             "detector.search.alternate: should be greater than or equal to 1",
@@ -74,8 +84,9 @@ def test_fixed_sets_may_stand_alone_and_beside_those_of_the_perspective() -> Non
 
 
 def test_the_heat_may_sum_as_few_frames_as_the_sets_alternate_over() -> None:
-    settings = SvmSettings(search=SearchSettings(alternate=3), heat=HeatSettings(frames=3))
-    assert settings.heat.frames == settings.search.alternate
+    more = max(FRAMES, ALTERNATE) + 1
+    settings = SvmSettings(search=SearchSettings(alternate=more), heat=HeatSettings(frames=more))
+    assert settings.heat.frames == settings.search.alternate == more
 
 
 def test_the_highest_and_lowest_windows_may_be_one_row() -> None:

@@ -11,6 +11,7 @@ from vdet.detect.svm.stages import Trace, blend_heat, stage_pictures
 from vdet.detect.svm.windows import Windows
 from vdet.draw.boxes import GREEN, color_of, draw_box, draw_label
 from vdet.geometry import Box
+from vdet.media import Picture
 from vdet.media.images import Image
 
 NAMES = ["patches", "windows", "hits", "heat"]
@@ -24,7 +25,7 @@ def pictures_of(image: Image, settings: SvmSettings = ROWS) -> dict[str, Image]:
     """Detect in a still picture and draw the stages."""
     height, width = image.shape[:2]
     detector = SvmModel(red_finder(), settings).for_video(width, height, [image])
-    return detector.stage_pictures(image, detector.detect(detector.search(image, None)))
+    return detector.stage_pictures(image, detector.detect(detector.search(Picture(image), None)))
 
 
 def with_windows(*sets: WindowSettings) -> SvmSettings:
@@ -44,7 +45,7 @@ def test_there_are_four_pictures_in_the_order_of_the_stages(image: Image) -> Non
 def test_a_video_frame_has_the_same_pictures_as_a_still_one() -> None:
     detector = SvmModel(red_finder(), ROWS).for_video(WIDTH, HEIGHT, [road(CAR)])
     for index in range(2):
-        detections = detector.detect(detector.search(road(CAR), index))
+        detections = detector.detect(detector.search(Picture(road(CAR)), index))
     still = pictures_of(road(CAR))
     for name, picture in detector.stage_pictures(road(CAR), detections).items():
         np.testing.assert_array_equal(picture, still[name])
@@ -145,7 +146,7 @@ def test_the_likeliest_window_is_shown_with_the_columns_that_it_repeats() -> Non
 def test_patches_are_shown_with_the_features_of_the_model(space: str) -> None:
     features = FeatureSettings.model_validate({"color_space": space})
     detector = SvmModel(red_finder(), ROWS).for_video(WIDTH, HEIGHT, [road(CAR)])
-    trace = detector.detect(detector.search(road(CAR), None)).trace
+    trace = detector.detect(detector.search(Picture(road(CAR)), None)).trace
     assert isinstance(trace, Trace)
     sheet = stage_pictures(road(CAR), trace, features)["patches"]
     assert sheet.shape[1] > pictures_of(road(CAR))["patches"].shape[1]

@@ -17,8 +17,7 @@ from vdet.errors import TruthError
 from vdet.evaluate.clips.clip import Variant, find_tracks, follow_variants, open_clip
 from vdet.evaluate.clips.evaluate import evaluate_clips
 from vdet.evaluate.predictions import read_predictions
-from vdet.media import Frame, VideoInfo, VideoReader
-from vdet.media.images import Image
+from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.pipeline.loop import follow_frames, no_progress, peek
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output
@@ -98,9 +97,9 @@ def searched(monkeypatch: pytest.MonkeyPatch) -> list[int | None]:
     searched: list[int | None] = []
     search = SvmDetector.search
 
-    def counted(self: SvmDetector, image: Image, index: int | None) -> Candidates:
+    def counted(self: SvmDetector, picture: Picture, index: int | None) -> Candidates:
         searched.append(index)
-        return search(self, image, index)
+        return search(self, picture, index)
 
     monkeypatch.setattr(SvmDetector, "search", counted)
     return searched

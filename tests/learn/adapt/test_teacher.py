@@ -10,6 +10,7 @@ import pytest
 from vdet.detect.detections import Detections
 from vdet.geometry import Box
 from vdet.learn.adapt.teacher import Teacher, parts_of
+from vdet.media import Picture
 from vdet.media.images import Image
 
 WIDTH, HEIGHT = 640, 360
@@ -27,8 +28,8 @@ class Seer:
         self.sizes.append((width, height))
         return self
 
-    def search(self, image: Image, index: int | None) -> Image:  # noqa: ARG002
-        return image
+    def search(self, picture: Picture, index: int | None) -> Image:  # noqa: ARG002
+        return picture.image
 
     def detect(self, candidates: Image) -> Detections:
         red: Image = (candidates[..., 2] > 128).astype(np.uint8)

@@ -16,7 +16,7 @@ from vdet.errors import DataError, VideoError
 from vdet.geometry import Box
 from vdet.learn.dataset import find_boxed, find_patches, read_patches
 from vdet.learn.mining import MiningJob, MiningResult, PictureSource, VideoSource, mine
-from vdet.media import Frame, VideoInfo, VideoWriter
+from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image, write_image
 
 WIDTH, HEIGHT, FRAMES = 640, 360, 5
@@ -44,9 +44,9 @@ class FixedBoxes:
         assert all(image.shape == (height, width, 3) for image in images)
         return self
 
-    def search(self, image: Image, index: int | None) -> Image:
+    def search(self, picture: Picture, index: int | None) -> Image:
         assert index is None, "mined frames are searched as still pictures"
-        return image
+        return picture.image
 
     def detect(self, candidates: Image) -> Detections:
         assert candidates.dtype == np.uint8
@@ -68,7 +68,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     info = VideoInfo(path, WIDTH, HEIGHT, rate, 1 / rate, frames=FRAMES)
     with VideoWriter(path, info, OutputSettings(crf=1)) as writer:
         for index in range(FRAMES):
-            writer.write(Frame(index, index / rate, draw()))
+            writer.write(Frame(index, index / rate, Picture(draw())))
     return path
 
 
@@ -189,7 +189,7 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
     source, truth = tmp_path / "tiny.mp4", tmp_path / "gt.txt"
     info = VideoInfo(source, 8, 8, rate := Fraction(25), 1 / rate, frames=1)
     with VideoWriter(source, info, OutputSettings()) as writer:
-        writer.write(Frame(0, Fraction(0), np.zeros((8, 8, 3), np.uint8)))
+        writer.write(Frame(0, Fraction(0), Picture(np.zeros((8, 8, 3), np.uint8))))
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
     job = MiningJob((VideoSource(source, truth),), tmp_path / "mined.zip")
     with pytest.raises(VideoError, match=r"tiny\.mp4: no window fits into a frame of 8×8 pixels"):

@@ -29,6 +29,7 @@ from vdet.learn.network.export import export_network  # noqa: E402
 from vdet.learn.network.losses import giou, paired_iou, quality_focal_loss  # noqa: E402
 from vdet.learn.network.samples import Source  # noqa: E402
 from vdet.learn.network.training import TrainingState, train_network  # noqa: E402
+from vdet.media import Picture  # noqa: E402
 from vdet.testing import check_detector  # noqa: E402
 
 QUICK = NetworkTrainingSettings(
@@ -143,7 +144,7 @@ def test_what_was_learnt_is_found_again(
     for seed in range(100, 120):
         sample = block_picture(seed)
         detector = model.for_video(256, 128, [sample.image])
-        detections = detector.detect(detector.search(sample.image, None))
+        detections = detector.detect(detector.search(Picture(sample.image), None))
         assert detections.classes is not None
         names = [detections.names[each] for each in detections.classes.tolist()]
         boxes = torch.tensor(detections.boxes)

@@ -19,8 +19,10 @@ from vdet.geometry import Box
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.media import VideoInfo
+from vdet.media import Picture, VideoInfo
+from vdet.media.coding import Coding
 from vdet.media.images import Image
+from vdet.media.planes import Planes
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.overlay import Overlay, time_text
 from vdet.track.track import Track
@@ -43,7 +45,14 @@ def overlay_with(*, video: VideoInfo | None = VIDEO, **settings: Any) -> Overlay
 
 def drawn_on(result: FrameResult, *, video: VideoInfo | None = VIDEO, **settings: Any) -> Image:
     """Return what is drawn of a single frame under these settings of `draw`."""
-    return overlay_with(video=video, **settings).draw(result)
+    return shown(overlay_with(video=video, **settings), result)
+
+
+def shown(overlay: Overlay, result: FrameResult) -> Image:
+    """Return what is drawn of the next frame, whose picture is BGR."""
+    surface = overlay.draw(result)
+    assert not isinstance(surface, Planes)
+    return surface
 
 
 def road_seen(camera: CalibratedCamera | None) -> Road:
@@ -116,6 +125,32 @@ def test_the_lane_lies_under_the_boxes() -> None:
     assert green > max(blue, red)
 
 
+@pytest.mark.parametrize("settings", [{}, {"trails": 1.0, "time": True}])
+def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
+    settings: dict[str, Any],
+) -> None:
+    planes = Planes.of_image(road(CAR), Coding("bt709"))
+    as_image = result_of(CAR, image=planes.to_image())
+    as_planes = replace(as_image, frame=replace(as_image.frame, picture=Picture(planes)))
+    before = planes.copy()
+    drawn = overlay_with(**settings).draw(as_planes)
+    assert isinstance(drawn, Planes)
+    assert drawn.is_own, "it may be encoded"
+    for layer, old, new in zip(planes.layers, before.layers, drawn.layers, strict=True):
+        np.testing.assert_array_equal(layer, old)
+        assert (new != old).any()
+    expected = drawn_on(as_image, **settings)
+    assert np.abs(drawn.to_image().astype(int) - expected).mean() < 1.5
+
+
+def test_a_lane_is_drawn_into_the_undistorted_image_even_if_the_frame_is_planes() -> None:
+    undistorted = road_seen(LENS)
+    result = result_of(CAR, found=undistorted)
+    planes = Picture(Planes.of_image(road(CAR), Coding()))
+    as_planes = replace(result, frame=replace(result.frame, picture=planes))
+    np.testing.assert_array_equal(drawn_on(as_planes), drawn_on(result))
+
+
 def white(width: int, height: int) -> Image:
     return np.full((height, width, 3), 255, np.uint8)
 
@@ -142,8 +177,10 @@ def test_each_id_has_its_own_color() -> None:
 
 def test_no_tracks_leave_the_picture_as_it_was() -> None:
     result = result_of(image=white(320, 240))
-    assert drawn_on(result) is result.frame.image
-    assert drawn_on(result, trails=1.0).min() == 255
+    for trails in (0.0, 1.0):
+        drawn = drawn_on(result, trails=trails)
+        assert drawn.min() == 255
+        assert not np.shares_memory(drawn, result.frame.image), "a copy may be drawn into"
 
 
 # Labels
@@ -215,7 +252,7 @@ def test_a_vehicle_is_not_missed_in_frames_that_are_not_searched(predicted: str)
         (result_of(PREDICTED), missed),
         (skipped, missed),
     ):
-        np.testing.assert_array_equal(overlay.draw(result), expected)
+        np.testing.assert_array_equal(shown(overlay, result), expected)
 
 
 def test_lines_can_be_thicker() -> None:
@@ -250,7 +287,7 @@ def test_colors_can_be_those_of_the_regions() -> None:
         draw=DrawSettings(colors="region"), regions=RegionsSettings(polygons=tuple(polygons))
     )
     boxes = [Box(x, 100, 40, 40) for x in (10, 80, 170, 260)]
-    image = Overlay(settings, None).draw(result_of(*boxes, image=white(320, 240) // 2))
+    image = shown(Overlay(settings, None), result_of(*boxes, image=white(320, 240) // 2))
     one, same, other, outside = (tuple(image[139, box.x + 20].tolist()) for box in boxes)
     assert one == same
     assert len({one, other, outside}) == 3
@@ -278,7 +315,7 @@ def trail_columns(seconds: float, count: int = 50, **settings: Any) -> list[int]
     """Return the columns in which the trail of `passing` is drawn in the last frame."""
     quiet: dict[str, Any] = {"boxes": False, "label": (), "smoothing": 0.0, **settings}
     overlay = overlay_with(trails=seconds, **quiet)
-    *_, last = (overlay.draw(result) for result in passing(count))
+    *_, last = (shown(overlay, result) for result in passing(count))
     rows, columns = np.nonzero((last != 255).any(axis=2))
     assert not len(rows) or max(abs(rows - 130)) <= 3, "it follows the feet"
     return sorted(set(columns.tolist()))
@@ -300,7 +337,7 @@ def test_a_vehicle_that_was_just_found_has_no_trail() -> None:
 
 def test_trails_lie_under_the_boxes() -> None:
     overlay = overlay_with(trails=1.0, smoothing=0.0, label=())
-    *_, last = (overlay.draw(result) for result in passing(50))
+    *_, last = (shown(overlay, result) for result in passing(50))
     box = Box(10 + 4 * 49, 100, 40, 30)
     assert (last[box.bottom - 1, box.x : box.right] == color_of(1)).all()
 
@@ -313,7 +350,7 @@ def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
     overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=0.0)
     for number in range(10):
         start = CAR.moved_to(CAR.x - 4 * (9 - number), CAR.y)
-        drawn = overlay.draw(result_of(start, found=seen, time=Fraction(number, 25)))
+        drawn = shown(overlay, result_of(start, found=seen, time=Fraction(number, 25)))
     rows, columns = np.nonzero((drawn != seen.image).any(axis=2))
     assert abs(columns.max() - x) <= 2
     assert abs(rows[columns == columns.max()].mean() - y) <= 2
@@ -363,7 +400,7 @@ def test_boxes_that_tremble_are_drawn_steadily() -> None:
             box = Box(100 + number % 2 * 2, 100, 100, 80)
             time = Fraction(number, 25)
             result = result_of(box, image=white(320, 240), index=number, time=time)
-            images.append(overlay.draw(result))
+            images.append(shown(overlay, result))
         drawn = [np.nonzero((image != 255).any(axis=(0, 2)))[0].min() for image in images[20:]]
         lefts.append(np.ptp(drawn))
     assert lefts[1] < lefts[0] == 2

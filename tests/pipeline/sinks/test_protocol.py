@@ -16,7 +16,7 @@ from red_cars import HEIGHT, SETTINGS
 from vdet.config.schema import OutputSettings
 from vdet.errors import ConfigError, OutputError
 from vdet.files import OutputFiles
-from vdet.media import Frame, VideoInfo, VideoWriter
+from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
 from vdet.pipeline.loop import VideoJob, check_job
 from vdet.pipeline.result import FrameResult
@@ -208,7 +208,7 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
     with VideoWriter(source, info, OutputSettings()) as writer:
         for index in range(5):
             image = np.full((height, width, 3), 90, np.uint8)
-            writer.write(Frame(index, index / rate, image))
+            writer.write(Frame(index, index / rate, Picture(image)))
     sink = collect("collects")
     (tmp_path / "stages").mkdir()
     wanted = outputs(

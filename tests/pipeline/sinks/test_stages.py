@@ -28,7 +28,7 @@ def detected(*boxes: Box, time: Fraction = Fraction(0), found: Road | None = Non
     """Return a result whose detections are those of the red car."""
     result = result_of(*boxes, time=time, found=found)
     detector = model_for(SETTINGS).for_video(WIDTH, HEIGHT, [result.frame.image])
-    detections = detector.detect(detector.search(result.frame.image, None))
+    detections = detector.detect(detector.search(result.frame.picture, None))
     return replace(result, detections=detections, detector=detector)
 
 

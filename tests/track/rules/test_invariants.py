@@ -8,6 +8,7 @@ from seed import tracker_but
 from vdet.config.schema import RulesTrackerSettings
 from vdet.detect.detections import Detections
 from vdet.geometry import Box
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import Track
@@ -55,7 +56,10 @@ Clip = list[tuple[Image, list[tuple[Box, float]]]]
 
 def run(clip: Clip, tracker: RulesTrackerSettings) -> list[list[Track]]:
     cars = RulesTracker(tracker)
-    return [cars.update(_detections(found), n / 25, image) for n, (image, found) in enumerate(clip)]
+    return [
+        cars.update(_detections(found), n / 25, Picture(image))
+        for n, (image, found) in enumerate(clip)
+    ]
 
 
 def _detections(found: list[tuple[Box, float]]) -> Detections:

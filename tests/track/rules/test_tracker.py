@@ -8,6 +8,7 @@ from textured_road import textured_road
 from track.rules.scenes import detections
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.geometry import Box
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.car import Region
 from vdet.track.rules.tracker import RulesTracker, large_enough
@@ -22,7 +23,7 @@ def road(*boxes: Box | None) -> Image:
 
 
 def update(cars: RulesTracker, image: Image, *boxes: Box, peak: float = 2.0) -> list[Track]:
-    return cars.update(detections(boxes, peak), 0.0, image)
+    return cars.update(detections(boxes, peak), 0.0, Picture(image))
 
 
 def see(cars: RulesTracker, *boxes: Box, frames: int = 1, peak: float = 2.0) -> list[list[Track]]:
@@ -326,13 +327,15 @@ def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() ->
 
 def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> None:
     cars = RulesTracker(SEED_TRACKER)
-    shown = [cars.update(detections([SEDAN], score=0.05 * n), 0.0, GREY) for n in range(12)]
+    shown = [
+        cars.update(detections([SEDAN], score=0.05 * n), 0.0, Picture(GREY)) for n in range(12)
+    ]
     assert [track.score for track in shown[-1]] == pytest.approx([0.05 * 6.5])
 
 
 def test_a_match_keeps_the_score_of_the_detection_before_it() -> None:
     cars = RulesTracker(tracker_but(history=2, detections_needed=1))
-    cars.update(detections([SEDAN], score=0.4), 0.0, road(SEDAN))
+    cars.update(detections([SEDAN], score=0.4), 0.0, Picture(road(SEDAN)))
     for _ in range(3):
         (track,) = update(cars, road(SEDAN))
     assert track.score == pytest.approx(0.4)
@@ -343,7 +346,7 @@ def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
     corners = [[SEDAN.x, SEDAN.y, SEDAN.right, SEDAN.bottom]]
     for class_id in (0, 1, 1):
         found = Detections(corners, [0.9], classes=[class_id], names=("car", "van"))
-        (track,) = cars.update(found, 0.0, GREY)
+        (track,) = cars.update(found, 0.0, Picture(GREY))
     assert track.class_name == "van"
     assert see(RulesTracker(tracker_but(detections_needed=1)), SEDAN)[0][0].class_name is None
 

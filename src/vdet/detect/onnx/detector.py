@@ -17,6 +17,7 @@ from vdet.detect.onnx.suppression import suppress
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
 from vdet.geometry import Box, Int32Array
+from vdet.media import Picture
 from vdet.media.images import Image
 
 
@@ -81,13 +82,13 @@ class NetworkDetector:
         self._numbers = numbers
         self._settings = settings
 
-    def search(self, image: Image, index: int | None) -> Candidates:
+    def search(self, picture: Picture, index: int | None) -> Candidates:
         """Run the network on a frame; several threads may call this at once."""
-        values, place = self._recognized.form.prepare(image)
+        values, place = self._recognized.form.prepare(picture)
         outputs = self._session.run(self._recognized.feed(self._session, values))
         raw = self._recognized.layout.decode(outputs, self._settings.least)
         return Candidates(
-            self._wanted(raw, place, image.shape[1], image.shape[0]), is_still=index is None
+            self._wanted(raw, place, picture.width, picture.height), is_still=index is None
         )
 
     def detect(self, candidates: Candidates) -> Detections:
@@ -106,7 +107,7 @@ class NetworkDetector:
 
     def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
         """Return what the network sees, and its boxes before suppression."""
-        values, _ = self._recognized.form.prepare(image)
+        values, _ = self._recognized.form.prepare(Picture(image))
         boxes = image.copy()
         raw: RawBoxes = detections.trace
         for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.geometry import Float32Array
+from vdet.media import Picture
 from vdet.media.images import Image
 
 GREY = 114
@@ -45,10 +46,10 @@ class InputForm:
     rows_first: bool = False
     dtype: type[np.generic] = np.float32
 
-    def prepare(self, image: Image) -> tuple[npt.NDArray[Any], "Placement"]:
-        """Return the input that shows a frame, BGR uint8 `(H, W, 3)`, and where it lies in it."""
-        place = self._place(image)
-        scaled = scaled_to(image, *place.size)
+    def prepare(self, picture: Picture) -> tuple[npt.NDArray[Any], "Placement"]:
+        """Return the input that shows a frame, and where it lies in it."""
+        place = self._place(picture.width, picture.height)
+        scaled = _scaled_picture(picture, *place.size)
         if place.size != (self.width, self.height):
             canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
             left, top = place.left, place.top
@@ -67,8 +68,7 @@ class InputForm:
         image = np.clip(image / self.factor + 0.5, 0, 255).astype(np.uint8)
         return np.ascontiguousarray(image[..., ::-1] if self.is_rgb else image)
 
-    def _place(self, image: Image) -> "Placement":
-        rows, columns = image.shape[:2]
+    def _place(self, columns: int, rows: int) -> "Placement":
         if self.fit == "stretch":
             size = self.width, self.height
         else:
@@ -108,6 +108,16 @@ def scaled_to(image: Image, width: int, height: int) -> Image:
         if half == (width, height):
             return image
     return np.asarray(cv2.resize(image, (width, height)), np.uint8)
+
+
+def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
+    """Return a picture as BGR in another size; planes are scaled before they are converted."""
+    planes = picture.planes
+    if planes is None:
+        return scaled_to(picture.image, width, height)
+    first, second, third = (scaled_to(layer, width, height) for layer in planes.layers)
+    luma, blue, red = planes.coding.to_common((first, second, third))
+    return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
 
 
 def size_of_area(width: int, height: int, pixels: int, multiple: int) -> tuple[int, int]:

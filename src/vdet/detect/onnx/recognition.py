@@ -22,6 +22,7 @@ from vdet.detect.onnx.layouts import (
 from vdet.detect.onnx.preparation import GREY, InputForm, size_of_area
 from vdet.detect.onnx.session import Array, InputSlot, Session, first_line
 from vdet.errors import ModelError
+from vdet.media import Picture
 
 _MULTIPLE = 32
 _MOST_FINAL_ROWS = 1000
@@ -297,7 +298,7 @@ def _outputs_for_grey(session: Session, path: Path, guess: Recognized) -> list[A
     """Return the outputs for a grey picture."""
     grey = np.full((guess.form.height, guess.form.width, 3), GREY, np.uint8)
     try:
-        return session.run(guess.feed(session, guess.form.prepare(grey)[0]))
+        return session.run(guess.feed(session, guess.form.prepare(Picture(grey))[0]))
     except Exception as error:  # onnxruntime raises kinds of its own
         seen = f"it does not run on a picture ({first_line(error):.120})"
         raise _unknown(path, seen) from error

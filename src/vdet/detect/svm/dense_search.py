@@ -12,21 +12,19 @@ from fractions import Fraction
 import numpy as np
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.features import Layout, hog_descriptor
+from vdet.detect.svm.features import Channels, Layout, hog_descriptor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.strips import (
     Strip,
     StripWeights,
     block_sums,
-    channel_of,
     describe_blocks,
     table_sums,
     window_blocks,
 )
 from vdet.detect.svm.windows import GridResult, IndexArray, WindowGrid
 from vdet.geometry import Float32Array
-from vdet.media.images import Image
 
 MAX_PHASES = 2
 """Of `PhasedSearch`, across and down. With more, `LocatedSearch` is faster."""
@@ -151,7 +149,7 @@ class LocatedSearch:
     def search(self, frame: FramePyramid) -> GridResult:
         """Return the probability of each window."""
         probabilities = np.zeros(self._windows, np.float32)
-        strips: list[Image] = []
+        strips: list[Channels] = []
         for phase in self._phases:
             strip = phase.strip.cut(frame)
             strips.append(strip)
@@ -161,7 +159,7 @@ class LocatedSearch:
                 probabilities[phase.indices[batch]] = self._model.to_probabilities(values)
         return GridResult(probabilities, lambda indices: self._hogs(strips, indices))
 
-    def _hogs(self, strips: list[Image], indices: IndexArray) -> Float32Array:
+    def _hogs(self, strips: list[Channels], indices: IndexArray) -> Float32Array:
         """Describe some windows, each on its own strip."""
         hogs = np.zeros((len(indices), Layout.of(self._model.features).hog_length), np.float32)
         for phase, strip in zip(self._phases, strips, strict=True):
@@ -170,17 +168,17 @@ class LocatedSearch:
                 hogs[rows] = self._describe(strip, phase.x[places], phase.y[places])
         return hogs
 
-    def _decision_values(self, strip: Image, x: IndexArray, y: IndexArray) -> Float32Array:
+    def _decision_values(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
         hogs = self._describe(strip, x, y)
         values = hogs @ self._model.weights[:, : hogs.shape[1]].T + self._model.biases
         side = self._model.features.patch
         return np.asarray(values + table_sums(strip, self._tables, side, x, y).T, np.float32)
 
-    def _describe(self, strip: Image, x: IndexArray, y: IndexArray) -> Float32Array:
+    def _describe(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
         """Return the HOG features of each window, float32 `(n, h)`, channel by channel."""
         locations = list(zip(x.tolist(), y.tolist(), strict=True))
         described = [
-            self._hog.compute(channel_of(strip, number), locations=locations)
+            self._hog.compute(strip[number], locations=locations)
             for number in self._model.features.hog.channels
         ]
         return np.concatenate(

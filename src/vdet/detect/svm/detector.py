@@ -19,6 +19,7 @@ from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows, join_windows
 from vdet.geometry import are_nested
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.regions import SearchArea
 
@@ -140,11 +141,11 @@ class SvmDetector:
             is_shipped=self._is_shipped,
         )
 
-    def search(self, image: Image, index: int | None) -> Candidates:
+    def search(self, picture: Picture, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
         turns = [self._search.sets_of(frame) for frame in self._frames_for(index)]
         sets = sorted({number for turn in turns for number in turn})
-        by_set = dict(zip(sets, self._search.search(image, sets), strict=True))
+        by_set = dict(zip(sets, self._search.search(picture, sets), strict=True))
         by_frame = tuple(join_windows([by_set[number] for number in turn]) for turn in turns)
         windows = join_windows(list(by_set.values()))
         return Candidates(windows, by_frame, is_still=index is None)

@@ -5,7 +5,7 @@ section 1.
 """
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings
 from vdet.geometry import Float32Array
-from vdet.media.images import Image
+from vdet.media.images import Image, split_channels
 
 _CONVERSIONS = {
     "YCrCb": cv2.COLOR_BGR2YCrCb,
@@ -24,6 +24,10 @@ _CONVERSIONS = {
     "YUV": cv2.COLOR_BGR2YUV,
     "RGB": cv2.COLOR_BGR2RGB,
 }
+
+
+Channels = tuple[Image, Image, Image]
+"""The channels of a colour space, uint8 `(H, W)` each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +87,10 @@ class FeatureExtractor:
         -------
         float32 `(layout.length,)`: HOG 0 to 1, histogram in pixels, shrunk patch 0 to 255.
         """
-        channels = np.ascontiguousarray(convert(patch, self.settings).transpose(2, 0, 1))
+        return self.describe_channels(split(patch, self.settings))
+
+    def describe_channels(self, channels: Channels) -> Float32Array:
+        """Compute the features of one patch from its channels `(patch, patch)`."""
         parts: list[npt.ArrayLike] = []
         parts += [self._hog.compute(channels[i]) for i in self.settings.hog.channels]
         if self.settings.histogram.bins:
@@ -94,13 +101,16 @@ class FeatureExtractor:
 
     def describe_all(self, patches: Iterable[Image]) -> Float32Array:
         """Compute the features of patches one by one; float32 `(n, layout.length)`."""
-        vectors = [self.describe(patch) for patch in patches]
+        return self.stack([self.describe(patch) for patch in patches])
+
+    def stack(self, vectors: Sequence[Float32Array]) -> Float32Array:
+        """Return vectors as one array, float32 `(n, layout.length)`."""
         return np.stack(vectors) if vectors else np.empty((0, self.layout.length), np.float32)
 
 
-def convert(image: Image, settings: FeatureSettings) -> Image:
-    """Convert BGR to the settings' colour space; uint8 of the same shape `(H, W, 3)`."""
-    return np.asarray(cv2.cvtColor(image, _CONVERSIONS[settings.color_space]), np.uint8)
+def split(image: Image, settings: FeatureSettings) -> Channels:
+    """Return the channels of the settings' colour space of an image, BGR uint8 `(H, W, 3)`."""
+    return split_channels(np.asarray(cv2.cvtColor(image, _CONVERSIONS[settings.color_space])))
 
 
 def hog_descriptor(settings: FeatureSettings, window: tuple[int, int]) -> cv2.HOGDescriptor:
@@ -114,6 +124,13 @@ def hog_descriptor(settings: FeatureSettings, window: tuple[int, int]) -> cv2.HO
 def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:
     """Count the pixels of one channel in `bins` equal bins over 0 … 255; shape `(bins,)`."""
     return np.bincount(channel.ravel() // (256 // bins), minlength=bins)
+
+
+def cut_window(image: Image, x: int, y: int, width: int, height: int) -> Image:
+    """Return a window of an image; beyond the sides of it, the outermost pixels are repeated."""
+    rows = np.arange(y, y + height).clip(0, image.shape[0] - 1)
+    columns = np.arange(x, x + width).clip(0, image.shape[1] - 1)
+    return np.asarray(image[rows[:, np.newaxis], columns])
 
 
 def to_patch(image: Image, side: int) -> Image:

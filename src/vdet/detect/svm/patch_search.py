@@ -5,7 +5,7 @@ It is slow and simple, and the reference for the dense engine. Source: seed sect
 
 import numpy as np
 
-from vdet.detect.svm.features import FeatureExtractor, to_patch
+from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import GridResult, IndexArray, WindowGrid
@@ -37,5 +37,8 @@ class PatchSearch:
 
     def _describe(self, frame: FramePyramid, indices: IndexArray) -> Float32Array:
         side = self._model.features.patch
-        crops = (frame.crop(*box) for box in self._boxes[indices].tolist())
-        return self._extractor.describe_all(to_patch(crop, side) for crop in crops)
+        vectors = []
+        for x, y, width, height in self._boxes[indices].tolist():
+            patch = frame.cut(slice(y, y + height), slice(x, x + width), side, side)
+            vectors.append(self._extractor.describe_channels(patch))
+        return self._extractor.stack(vectors)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.features import convert, histogram, hog_descriptor, to_patch
+from vdet.detect.svm.features import histogram, hog_descriptor, split, to_patch
 from vdet.draw.boxes import WHITE
 from vdet.geometry import Float64Array
 from vdet.media.images import Image
@@ -29,7 +29,7 @@ def patch_sheet(patches: dict[str, Image], settings: FeatureSettings) -> Image:
 
 def _row(name: str, crop: Image, settings: FeatureSettings) -> Image:
     patch = to_patch(crop, settings.patch)
-    channels = [np.ascontiguousarray(c) for c in cv2.split(convert(patch, settings))]
+    channels = split(patch, settings)
     tiles = [_captioned(_enlarged(patch), name)]
     for i, channel in enumerate(channels):
         gray = np.asarray(cv2.cvtColor(channel, cv2.COLOR_GRAY2BGR), np.uint8)

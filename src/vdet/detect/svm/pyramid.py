@@ -1,19 +1,31 @@
 """A frame at full, half, quarter … size, from which strips and windows are cut."""
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
-from vdet.detect.svm.features import halve, resize
+from vdet.config.schema import FeatureSettings
+from vdet.detect.svm.features import Channels, halve, resize, split
+from vdet.media import Picture, Planes
 from vdet.media.images import Image
+
+_STREAM_SPACE = "YCrCb"  # the colour space whose channels planes have
 
 
 class FramePyramid:
     """The searched rows of one frame at full size and, made when needed, halved again and again.
 
+    It gives the channels of the features' colour space. Where these are luma and chroma, it works
+    on the planes of a picture; a value of chroma stands for 2 × 2 pixels. Elsewhere it works on
+    BGR, which is converted last, as in training.
+
     Parameters
     ----------
-    image
-        BGR uint8 `(H, W, 3)`.
+    picture
+        Upright, H × W pixels.
+    features
+        Their colour space.
     top, bottom
         First row that is searched, and first row below; None for the frame's end.
     margin
@@ -22,26 +34,28 @@ class FramePyramid:
     """
 
     def __init__(
-        self, image: Image, top: int = 0, bottom: int | None = None, margin: int = 0
+        self,
+        picture: Picture,
+        features: FeatureSettings,
+        top: int = 0,
+        bottom: int | None = None,
+        margin: int = 0,
     ) -> None:
-        rows = image[top:bottom]
-        if margin:
-            rows = np.asarray(
-                cv2.copyMakeBorder(rows, 0, 0, margin, margin, cv2.BORDER_REPLICATE), np.uint8
-            )
+        self._features = features
         self._origin = margin, -top
-        self._levels = [rows]
+        rows = slice(top, picture.height if bottom is None else bottom)
+        planes = picture.planes
+        if planes and features.color_space == _STREAM_SPACE and not (top % 2 or margin % 2):
+            self._levels = _of_planes(planes, rows, margin)
+        else:
+            self._levels = (_Levels(_widened(picture.image[rows], margin)),)
 
-    def crop(self, x: int, y: int, width: int, height: int) -> Image:
-        """Return a window at full size; all in pixels of the frame, `x` may be negative."""
-        left, top = x + self._origin[0], y + self._origin[1]
-        return self._levels[0][top : top + height, left : left + width]
-
-    def cut(self, rows: slice, columns: slice, width: int, height: int) -> Image:
+    def cut(self, rows: slice, columns: slice, width: int, height: int) -> Channels:
         """Return a part of the frame, resized to `width` × `height`.
 
-        `rows` and `columns` are pixels of the frame, columns may be negative. The result equals
-        `resize(image[rows, columns], width, height)`; halvings are shared by all cuts.
+        `rows` and `columns` are pixels of the frame, columns may be negative. Of planes, each
+        channel equals `resize(channel[rows, columns], width, height)`; BGR is resized so, and then
+        converted. Halvings are shared by all cuts.
         """
         across, down = self._origin
         sides = rows.start + down, rows.stop + down, columns.start + across, columns.stop + across
@@ -49,15 +63,70 @@ class FramePyramid:
         while _halves_exactly(sides) and _is_twice(sides, width, height):
             sides = (sides[0] // 2, sides[1] // 2, sides[2] // 2, sides[3] // 2)
             level += 1
-        part = self._level(level)[sides[0] : sides[1], sides[2] : sides[3]]
-        return resize(part, width, height)
+        return self._split(
+            [
+                resize(each.at(level)[sides[0] : sides[1], sides[2] : sides[3]], width, height)
+                for each in self._levels
+            ]
+        )
 
-    def _level(self, number: int) -> Image:
-        while len(self._levels) <= number:
-            last = self._levels[-1]
-            height, width = last.shape[:2]
-            self._levels.append(halve(last[: height // 2 * 2, : width // 2 * 2]))
-        return self._levels[number]
+    def _split(self, parts: Sequence[Image]) -> Channels:
+        """Return the channels of a part of the frame: BGR, or channel by channel."""
+        if len(parts) == 1:
+            return split(parts[0], self._features)
+        first, second, third = parts
+        return first, second, third
+
+
+class _Levels:
+    """An image, or one channel, at full, half, quarter … size.
+
+    Parameters
+    ----------
+    full
+        At full size; None if it is to be made of `half`.
+    half
+        At half size; None if it is to be made of `full`.
+    """
+
+    def __init__(self, full: Image | None, half: Image | None = None) -> None:
+        self._levels = {level: each for level, each in enumerate((full, half)) if each is not None}
+
+    def at(self, level: int) -> Image:
+        """Return the channel, halved `level` times."""
+        if level not in self._levels:
+            self._levels[level] = _halved(self.at(level - 1)) if level else _doubled(self.at(1))
+        return self._levels[level]
+
+
+def _of_planes(planes: Planes, rows: slice, margin: int) -> tuple[_Levels, ...]:
+    blue_red = slice(rows.start // 2, -(-rows.stop // 2))
+    luma, blue, red = planes.coding.to_common(
+        (planes.luma[rows], planes.blue[blue_red], planes.red[blue_red])
+    )
+    return (
+        _Levels(_widened(luma, margin)),
+        *(_Levels(None, _widened(each, margin // 2)) for each in (red, blue)),
+    )
+
+
+def _widened(values: Image, margin: int) -> Image:
+    if not margin:
+        return values
+    edge = cv2.BORDER_REPLICATE
+    return np.asarray(cv2.copyMakeBorder(values, 0, 0, margin, margin, edge), np.uint8)
+
+
+def _halved(values: Image) -> Image:
+    height, width = values.shape[:2]
+    return halve(values[: height // 2 * 2, : width // 2 * 2])
+
+
+def _doubled(values: Image) -> Image:
+    height, width = values.shape
+    return np.asarray(
+        cv2.resize(values, (2 * width, 2 * height), interpolation=cv2.INTER_NEAREST), np.uint8
+    )
 
 
 def _halves_exactly(sides: tuple[int, int, int, int]) -> bool:

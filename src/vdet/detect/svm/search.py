@@ -18,7 +18,7 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import NO_WINDOWS, GridResult, WindowGrid, Windows, lay_grid
 from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.geometry import Float32Array
-from vdet.media.images import Image
+from vdet.media import Picture
 from vdet.regions import SearchArea
 
 MAX_WINDOWS = 100_000
@@ -93,16 +93,17 @@ class FrameSearch:
             _WindowSet(part, engine(model, part), grid.share) if part else None
             for grid, part in zip(grids, parts, strict=True)
         ]
-        self._alternate = min(settings.search.alternate, len(grids))
+        self._alternate = settings.search.alternate
         self._probability = settings.search.probability
         self._regression = model.box_regression
+        self._features = model.features
 
     def sets_of(self, index: int) -> range:
         """Return the indices of the sets that are searched in frame `index` of a video."""
         return range(index % self._alternate, len(self._sets), self._alternate)
 
-    def search(self, image: Image, sets: Sequence[int] | None = None) -> list[Windows]:
-        """Search a frame, BGR uint8 `(H, W, 3)`; return the windows of each of the sets.
+    def search(self, picture: Picture, sets: Sequence[int] | None = None) -> list[Windows]:
+        """Search a frame; return the windows of each of the sets.
 
         Parameters
         ----------
@@ -115,9 +116,10 @@ class FrameSearch:
             return [NO_WINDOWS] * len(chosen)
         top = min(each.top for each in near) // ALIGNMENT * ALIGNMENT
         margin = max(0, -(min(each.left for each in near) // ALIGNMENT * ALIGNMENT))
-        margin = max(margin, max(each.right for each in near) - image.shape[1])
+        margin = max(margin, max(each.right for each in near) - picture.width)
         margin = -(-margin // ALIGNMENT) * ALIGNMENT
-        frame = FramePyramid(image, top, max(each.bottom for each in near), margin=margin)
+        bottom = max(each.bottom for each in near)
+        frame = FramePyramid(picture, self._features, top, bottom, margin=margin)
         return [
             self._windows(each, each.search.search(frame)) if each else NO_WINDOWS
             for each in chosen

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 
 from vdet.config.schema import FeatureSettings
+from vdet.detect.svm.features import cut_window
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.patch_sheet import patch_sheet
-from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, label_tag
 from vdet.geometry import Box
@@ -53,11 +53,10 @@ def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dic
 def _examples(image: Image, windows: Windows) -> dict[str, Image]:
     """Return the most and the least probable window of the frame, by caption."""
     best, worst = int(windows.probabilities.argmax()), int(windows.probabilities.argmin())
-    frame = FramePyramid(image, margin=int(windows.boxes[:, 2].max()))
     examples = {}
     for name, i in (("car", best), ("not car", worst)):
         caption = f"{name}? p = {windows.probabilities[i]:.2f}"
-        examples[caption] = frame.crop(*windows.boxes[i].tolist())
+        examples[caption] = cut_window(image, *windows.boxes[i].tolist())
     return examples
 
 

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.features import Layout, convert, hog_descriptor
+from vdet.detect.svm.features import Channels, Layout, hog_descriptor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import IndexArray, WindowGrid
 from vdet.geometry import Float32Array
-from vdet.media.images import Image
 
 
 class Strip:
@@ -30,14 +29,12 @@ class Strip:
     """
 
     def __init__(self, grid: WindowGrid, features: FeatureSettings) -> None:
-        self._features = features
         self._columns, self._width = _extent(grid, features, grid.left, grid.columns)
         self._rows, self._height = _extent(grid, features, grid.top, grid.rows)
 
-    def cut(self, frame: FramePyramid) -> Image:
-        """Return the strip of a frame in the features' colour space, uint8 `(h, w, 3)`."""
-        strip = frame.cut(self._rows, self._columns, self._width, self._height)
-        return convert(strip, self._features)
+    def cut(self, frame: FramePyramid) -> Channels:
+        """Return the strip of a frame, channels of `(h, w)`."""
+        return frame.cut(self._rows, self._columns, self._width, self._height)
 
 
 def _extent(
@@ -82,33 +79,28 @@ def _tables(weights: Float32Array, bins: int) -> Float32Array:
     return np.ascontiguousarray(np.repeat(by_channel, 256 // bins, axis=2).transpose(0, 2, 1))
 
 
-def describe_blocks(strip: Image, features: FeatureSettings) -> Float32Array:
+def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
     """Compute the HOG features of every block of a strip.
 
     Parameters
     ----------
     strip
-        uint8 `(h, w, 3)` in the features' colour space; both sides whole numbers of cells.
+        Channels of `(h, w)` in the features' colour space; both sides whole numbers of cells.
 
     Returns
     -------
     float32 `(columns, rows, d)`, `d` features of a block, channel by channel.
     """
-    height, width = strip.shape[:2]
+    height, width = strip[0].shape
     hog = features.hog
     columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
     # A descriptor whose window is the strip gives each block once, column by column.
     descriptor = hog_descriptor(features, (width, height))
     blocks = [
-        np.reshape(descriptor.compute(channel_of(strip, number)), (columns, rows, -1))
+        np.reshape(descriptor.compute(strip[number]), (columns, rows, -1))
         for number in hog.channels
     ]
     return np.concatenate(blocks, axis=-1, dtype=np.float32)
-
-
-def channel_of(strip: Image, number: int) -> Image:
-    """Return one channel of a strip, contiguous `(h, w)`, as the descriptor needs it."""
-    return np.ascontiguousarray(strip[:, :, number])
 
 
 def window_blocks(
@@ -170,14 +162,14 @@ def block_sums(blocks: Float32Array, weights: Float32Array) -> Float32Array:
 
 
 def table_sums(
-    strip: Image, tables: Float32Array, side: int, x: IndexArray, y: IndexArray
+    strip: Channels, tables: Float32Array, side: int, x: IndexArray, y: IndexArray
 ) -> Float32Array:
     """Sum look-up tables over the pixels of square windows.
 
     Parameters
     ----------
     strip
-        uint8 `(h, w, 3)`.
+        Channels of `(h, w)`.
     tables
         float32 `(m, 256, 3)`.
     side
@@ -191,11 +183,11 @@ def table_sums(
     """
     sums = []
     for table in tables:
-        values = cv2.LUT(strip, np.ascontiguousarray(table[:, np.newaxis]))
-        integral = np.asarray(cv2.integral(cv2.transform(values, _ADD_CHANNELS)))
+        first, second, third = (
+            cv2.LUT(channel, np.ascontiguousarray(table[:, number]))
+            for number, channel in enumerate(strip)
+        )
+        integral = np.asarray(cv2.integral(cv2.add(cv2.add(first, second), third)))
         inner = integral[y + side, x + side] - integral[y, x + side]
         sums.append(inner - integral[y + side, x] + integral[y, x])
     return np.asarray(sums, np.float32)
-
-
-_ADD_CHANNELS = np.ones((1, 3), np.float32)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color
 from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.labelled import LabelledImages
 from vdet.evaluate.images.scores import SIZE_NAMES, MeasuredImage, Source

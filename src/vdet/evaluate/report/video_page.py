@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vdet.config.schema import InputSettings
-from vdet.draw.boxes import Color
+from vdet.draw.paint import Color
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
 from vdet.evaluate.clips.losses import Loss, LossKind
 from vdet.evaluate.clips.text import (

@@ -15,6 +15,7 @@ import numpy as np
 from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
 from vdet.geometry import Float64Array, Int64Array, iou_matrix, to_sides
+from vdet.media import Picture
 from vdet.media.images import Image
 
 _PARTS = 3  # beside one another, each of half the frame's width and height
@@ -93,7 +94,7 @@ class Teacher:
         pixels = np.ascontiguousarray(part.cut(image)[:, ::-1] if mirrored else part.cut(image))
         height, width = pixels.shape[:2]
         detector = self._model.for_video(width, height, [pixels])
-        found = detector.detect(detector.search(pixels, None))
+        found = detector.detect(detector.search(Picture(pixels), None))
         boxes = found.boxes.astype(np.float64)
         if mirrored:
             boxes[:, [0, 2]] = width - boxes[:, [2, 0]]

@@ -10,8 +10,7 @@ import numpy as np
 
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
-from vdet.detect.svm.features import to_patch
-from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.features import cut_window, to_patch
 from vdet.errors import DataError
 from vdet.learn.dataset import PatchArchive, patch_archive
 from vdet.learn.mining.choosing import ChosenWindow, PatchKind, choose_windows
@@ -108,11 +107,8 @@ def _choose(frame: LabelledFrame, settings: Settings) -> list[ChosenWindow]:
 def _add(
     archive: PatchArchive, frame: LabelledFrame, chosen: Sequence[ChosenWindow], stem: str
 ) -> None:
-    width = frame.image.shape[1]
-    beyond = max((max(-each.box.x, each.box.right - width) for each in chosen), default=0)
-    pixels = FramePyramid(frame.image, margin=max(0, beyond))
     for window in chosen:
         box = window.box
         name = f"{frame.name}_x{box.x:04}_y{box.y:04}_s{box.width:04}"
-        patch = to_patch(pixels.crop(box.x, box.y, box.width, box.height), PATCH)
+        patch = to_patch(cut_window(frame.image, box.x, box.y, box.width, box.height), PATCH)
         archive.add(f"{_FOLDERS[window.kind].format(stem)}/{name}.png", patch, window.sides)

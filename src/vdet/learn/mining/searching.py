@@ -13,6 +13,7 @@ from vdet.detect.svm.windows import Windows
 from vdet.errors import FrameSizeError
 from vdet.geometry import Float32Array, Int32Array, to_sides
 from vdet.learn.mining.choosing import compare_windows
+from vdet.media import Picture
 from vdet.media.images import Image
 
 WindowSearch = Callable[[Image], Windows]
@@ -36,7 +37,7 @@ def search_windows(
     size = width, height
     detector = model.for_video(*size, images) if model else None
     if isinstance(detector, SvmDetector):
-        return lambda image: detector.search(image, None).windows
+        return lambda image: detector.search(Picture(image), None).windows
     boxes = _default_windows(*size, images)
     if model is None:
         likely = _scored(boxes, np.ones(len(boxes), np.float32))
@@ -44,7 +45,7 @@ def search_windows(
 
     def search(image: Image) -> Windows:
         still = model.for_video(*size, [image])
-        return score_windows(boxes, still.detect(still.search(image, None)), width)
+        return score_windows(boxes, still.detect(still.search(Picture(image), None)), width)
 
     return search
 

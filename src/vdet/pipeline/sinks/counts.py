@@ -16,9 +16,9 @@ from vdet.count.files import SUFFIXES, join_counts, write_counts
 from vdet.count.layout import Layout, Line, lay_out
 from vdet.count.totals import Counts
 from vdet.draw.counts import DrawnLine, DrawnZone, draw_counts
+from vdet.draw.paint import Surface
 from vdet.errors import ConfigError, OutputError
 from vdet.lanes.road import Road
-from vdet.media.images import Image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import BatchTotal, SinkContext, SinkKind
 from vdet.polygons import Point
@@ -77,10 +77,9 @@ class CountsPicture:
         self._layout = layout
         self._counter = VehicleCounter(layout)
 
-    def draw(self, image: Image, result: FrameResult) -> Image:
-        """Count in the next frame, and return its picture with lines, zones and counts.
+    def draw(self, surface: Surface, result: FrameResult) -> None:
+        """Count in the next frame, and draw lines, zones and counts into its picture.
 
-        `image` is changed, but not if it is the frame's own image: then that is copied.
         In an undistorted picture they lie on the same places of the road.
         """
         self._counter.update(result.frame_tracks)
@@ -93,8 +92,7 @@ class CountsPicture:
             )
             for zone in self._layout.zones
         ]
-        own = image.copy() if image is result.frame.image else image
-        return draw_counts(own, lines, zones)
+        draw_counts(surface, lines, zones)
 
     def _line(self, line: Line, road: Road | None) -> DrawnLine:
         start, end = _placed((line.start, line.end), road)

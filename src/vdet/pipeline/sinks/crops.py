@@ -31,7 +31,7 @@ class CropSink:
 
     def write(self, result: FrameResult) -> None:
         """Look for better pictures in a frame."""
-        self._write_all(self._best.add(result.frame_tracks, result.frame.image))
+        self._write_all(self._best.add(result.frame_tracks, result.frame.picture))
 
     def _write_all(self, crops: list[Crop]) -> None:
         for crop in crops:

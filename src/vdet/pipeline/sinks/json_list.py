@@ -39,11 +39,10 @@ class JsonSink:
 
     def write(self, result: FrameResult) -> None:
         """Add the item of a picture."""
-        height, width = result.frame.image.shape[:2]
         item: dict[str, Any] = {
             "image": str(result.source),
-            "width": width,
-            "height": height,
+            "width": result.frame.picture.width,
+            "height": result.frame.picture.height,
             "boxes": [_box(track, on_road=result.road is not None) for track in result.tracks],
         }
         if result.road:

@@ -15,17 +15,16 @@ from vdet.draw.boxes import (
     BLACK,
     GREEN,
     WHITE,
-    Color,
     color_of,
     draw_box,
     draw_label,
     line_width,
 )
+from vdet.draw.paint import Color, Surface
 from vdet.draw.trails import draw_trail
 from vdet.lanes.drawing import draw_lane
 from vdet.lanes.road import Road
-from vdet.media import VideoInfo
-from vdet.media.images import Image
+from vdet.media import Picture, VideoInfo
 from vdet.pipeline.result import FrameResult
 from vdet.regions import Regions
 from vdet.track.steady import SteadyBoxes
@@ -62,25 +61,31 @@ class Overlay:
         self._trails: dict[int, Points] = {}
         self._missed: set[int] = set()
 
-    def draw(self, result: FrameResult) -> Image:
-        """Return a copy of the frame with its vehicles; its own image if nothing is drawn.
+    def draw(self, result: FrameResult) -> Surface:
+        """Return a copy of the frame with its vehicles: BGR or planes, as the frame came.
 
         If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
         are drawn where they lie in it.
         """
         shown = self._shown(result)
-        if not (shown or result.road or self._settings.time):
-            return result.frame.image
-        image = (result.road or result.frame).image.copy()
-        if result.road and result.road.lane:
-            draw_lane(image, result.road.lane)
-        height, width = result.frame.image.shape[:2]
-        colors = {track.id: self._color(track, width, height) for track in shown}
-        shown = _placed(shown, result.road, image)
-        self._draw_trails(image, shown, colors, float(result.frame.time))
-        self._draw_vehicles(image, shown, colors)
+        picture = result.frame.picture
+        surface = self._surface(result)
+        colors = {track.id: self._color(track, picture) for track in shown}
+        shown = _placed(shown, result.road, surface)
+        self._draw_trails(surface, shown, colors, float(result.frame.time))
+        self._draw_vehicles(surface, shown, colors)
         if self._settings.time and self._start is not None:
-            draw_label(image, time_text(result.frame.time - self._start), (0, len(image)), BLACK)
+            time = time_text(result.frame.time - self._start)
+            draw_label(surface, time, (0, surface.shape[0]), BLACK)
+        return surface
+
+    def _surface(self, result: FrameResult) -> Surface:
+        """Return what is drawn into: a copy of the frame, or of the road with its lane."""
+        if result.road is None:
+            return result.frame.picture.pixels.copy()
+        image = result.road.image.copy()
+        if result.road.lane:
+            draw_lane(image, result.road.lane)
         return image
 
     def _shown(self, result: FrameResult) -> list[Track]:
@@ -95,7 +100,7 @@ class Overlay:
         return sorted(tracks, key=lambda track: track.box.bottom)
 
     def _draw_trails(
-        self, image: Image, shown: Sequence[Track], colors: Mapping[int, Color], now: float
+        self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color], now: float
     ) -> None:
         longest = self._settings.trails
         if self._start is None or not longest:
@@ -106,39 +111,39 @@ class Overlay:
             while points and now - points[0][0] > longest:
                 points.popleft()
         self._trails = {id_: points for id_, points in self._trails.items() if points}
-        width = line_width(image, self._settings.thickness)
+        width = line_width(surface, self._settings.thickness)
         for track in shown:
             path = [(x, y) for _, x, y in self._trails[track.id]]
-            draw_trail(image, path, colors[track.id], width)
+            draw_trail(surface, path, colors[track.id], width)
 
     def _draw_vehicles(
-        self, image: Image, shown: Sequence[Track], colors: Mapping[int, Color]
+        self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color]
     ) -> None:
         settings = self._settings
         if settings.boxes:
             for track in shown:
                 dashed = settings.predicted == "dashed" and track.id in self._missed
                 color, thickness = colors[track.id], settings.thickness
-                draw_box(image, track.box, color, dashed=dashed, thickness=thickness)
+                draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:
             if text := label_text(track, self._label):
-                draw_label(image, text, (track.box.x, track.box.y), colors[track.id])
+                draw_label(surface, text, (track.box.x, track.box.y), colors[track.id])
 
-    def _color(self, track: Track, width: int, height: int) -> Color:
+    def _color(self, track: Track, picture: Picture) -> Color:
         match self._settings.colors:
             case "id":
                 return color_of(track.id)
             case "class":
                 return _class_color(track.class_name)
             case "region":
-                return self._region_color(track, width, height)
+                return self._region_color(track, picture)
             case "one":
                 return GREEN
 
-    def _region_color(self, track: Track, width: int, height: int) -> Color:
+    def _region_color(self, track: Track, picture: Picture) -> Color:
         """Return the colour of the first polygon in which a vehicle stands; white in none."""
         if self._regions is None:
-            self._regions = Regions(self._region_settings, width, height)
+            self._regions = Regions(self._region_settings, picture.width, picture.height)
         name = self._regions.name_at(track.foot)
         return WHITE if name is None else color_of(list(self._regions.included).index(name) + 1)
 
@@ -170,9 +175,9 @@ def _class_color(name: str | None) -> Color:
     return color_of(len(OUR_NAMES) + 1 + zlib.crc32(name.encode()) % _OTHER_CLASSES)
 
 
-def _placed(tracks: Sequence[Track], road: Road | None, image: Image) -> list[Track]:
+def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> list[Track]:
     """Return where the vehicles lie in the picture; those outside it are left out."""
-    height, width = image.shape[:2]
+    height, width = surface.shape[:2]
     placed = []
     for track in tracks:
         box = track.box.clipped(width, height)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Self
 
 from vdet.errors import OutputError
+from vdet.media import Picture
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.overlay import Overlay
@@ -35,7 +36,7 @@ class PictureSink:
                 f"{self._path}: takes one picture; for several give the name of a folder"
             )
         self._is_done = True
-        data = encode_image(self._overlay.draw(result), self._path)
+        data = encode_image(Picture(self._overlay.draw(result)).image, self._path)
         self._context.files.stage(self._path).write_bytes(data)
 
 

@@ -1,7 +1,7 @@
 """The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
@@ -19,6 +19,7 @@ from vdet.files import (
 )
 from vdet.media import VideoInfo
 from vdet.pipeline.result import FrameResult
+from vdet.pipeline.waits import Waits
 from vdet.plugins import SINKS, load_plugin
 
 STANDARD_OUTPUT = Path("-")
@@ -74,6 +75,8 @@ class SinkContext:
         Seconds after which a write that does not end is an error.
     outputs
         All outputs of the run, for a sink that refers to another.
+    waits
+        Counts how long the run waits for an encoder.
     """
 
     files: OutputFiles
@@ -84,6 +87,7 @@ class SinkContext:
     codec_threads: int | None = None
     timeout: float | None = None
     outputs: tuple[Output, ...] = ()
+    waits: Waits = field(default_factory=Waits)
 
 
 @dataclass(frozen=True, slots=True)

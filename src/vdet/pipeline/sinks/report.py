@@ -68,20 +68,20 @@ class ReportSink:
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
-        frame, image = result.frame_tracks, result.frame.image
+        frame, picture = result.frame_tracks, result.frame.picture
         if not self._frames:
             self._start = frame.time
         self._frames += 1
         self._last = frame.time
         if self._still is None or self._is_even:
-            self._still = _at_most(image, self._settings.report.still, image.shape[1])
+            self._still = _at_most(picture.image, self._settings.report.still, picture.width)
             self._is_even = float(self._still.std()) < _EVEN
         self._records.add(frame)
         self._levels.add(frame)
         self._heat.add(frame)
         if self._counter:
             self._counter.update(frame)
-        self._keep(self._crops.add(frame, image))
+        self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:

@@ -50,8 +50,8 @@ class StagesSink:
 
 
 def _with_regions(result: FrameResult, settings: RegionsSettings) -> Image:
-    height, width = result.frame.image.shape[:2]
-    regions = Regions(settings, width, height)
+    picture = result.frame.picture
+    regions = Regions(settings, picture.width, picture.height)
     included, excluded = (
         {name: each.corners for name, each in outlines.items()}
         for outlines in (regions.included, regions.excluded)

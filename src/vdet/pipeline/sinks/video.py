@@ -4,7 +4,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
-from vdet.media import Frame, VideoWriter
+from vdet.media import Frame, Picture, VideoWriter
 from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
 from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.counts import CountsPicture, layout_of
@@ -52,14 +52,16 @@ class VideoSink:
         return self
 
     def __exit__(self, *raised: Any) -> None:
-        self._stack.__exit__(*raised)
+        with self._context.waits.on("encoding"):
+            self._stack.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
         """Draw the shown vehicles, and give the frame to the encoder."""
-        image = self._overlay.draw(result)
+        surface = self._overlay.draw(result)
         if self._counts:
-            image = self._counts.draw(image, result)
-        self._encode(Frame(result.frame.index, result.frame.time, image))
+            self._counts.draw(surface, result)
+        with self._context.waits.on("encoding"):
+            self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
 VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)

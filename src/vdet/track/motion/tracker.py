@@ -8,7 +8,7 @@ import numpy as np
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
 from vdet.geometry import Box, Float64Array, are_nested, to_sides, visible
-from vdet.media.images import Image
+from vdet.media import Picture
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
 from vdet.track.motion.overlapping import are_hidden, are_parts, around, shows_both, stretched
 from vdet.track.motion.vehicle import Observation, Vehicle
@@ -44,7 +44,7 @@ class MotionTracker:
         self,
         detections: Detections,
         time: float,
-        image: Image | None = None,  # noqa: ARG002 - boxes are enough
+        picture: Picture | None = None,  # noqa: ARG002 - boxes are enough
     ) -> list[Track]:
         """Follow the vehicles into the next frame; as `VideoTracker.update`.
 
@@ -68,7 +68,7 @@ class MotionTracker:
         self._vehicles = without_duplicates(self._vehicles, self._size, self._settings)
         return self._tracks(seconds)
 
-    def carry(self, time: float, image: Image | None = None) -> list[Track]:  # noqa: ARG002
+    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
         """Move the vehicles on into a frame that was not searched; as `CarryingTracker.carry`.
 
         Nothing is missed there: the evidence and the times without a detection stay as they are,

@@ -17,6 +17,7 @@ from itertools import count
 
 from vdet.config.schema import RulesTrackerSettings
 from vdet.detect.detections import Detections
+from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.association import Association
 from vdet.track.rules.car import Car, Region
@@ -41,11 +42,12 @@ class RulesTracker:
         self,
         detections: Detections,
         time: float,  # noqa: ARG002 - the rules count frames
-        image: Image | None = None,
+        picture: Picture | None = None,
     ) -> list[Track]:
-        """Follow the cars into the next frame; as `VideoTracker.update`, but `image` is needed."""
-        if image is None:
-            raise ValueError("image: the rules tracker needs the frame; give it")
+        """Follow the cars into the next frame as `VideoTracker.update`; `picture` is needed."""
+        if picture is None:
+            raise ValueError("the rules tracker needs the frame; give its image")
+        image = picture.image
         height, width = image.shape[:2]
         regions = large_enough(detections, width, height, self._settings)
         association = Association(self._cars, regions, image, self._settings)

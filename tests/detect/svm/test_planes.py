@@ -1,0 +1,96 @@
+"""A detector finds about the same in the planes of a decoder as in the same picture as BGR."""
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+import pytest
+
+from codings import in_any_coding
+from detect.svm.engine_comparison import fitted, log_odds, road
+from detect.svm.turns import IN_TURNS
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder
+from red_cars import road as plain_road
+from vdet.config.schema import FeatureSettings, Settings, SvmSettings
+from vdet.detect.factory import load_detector
+from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.windows import join_windows
+from vdet.geometry import Float32Array, Float64Array, iou_matrix, to_sides
+from vdet.media import Picture, Planes
+from vdet.media.coding import Coding
+from vdet.media.images import Image
+from vdet.synthetic import demo_scene, true_boxes
+
+HORIZON = 0.57
+"""Row of the horizon of the drawn road."""
+
+
+def both_forms(image: Image, coding: Coding) -> tuple[Picture, Picture]:
+    """Return an image as planes, and these as BGR."""
+    picture = Picture(Planes.of_image(image, coding))
+    return picture, Picture(picture.image)
+
+
+@in_any_coding
+def test_windows_have_about_the_same_probabilities(coding: Coding) -> None:
+    search = FrameSearch(fitted(FeatureSettings()), SvmSettings(), 1280, 720, horizon=HORIZON)
+    ours, expected = (
+        log_odds(join_windows(search.search(picture)).probabilities)
+        for picture in both_forms(road(), coding)
+    )
+    assert (expected > 0).any(), "nothing is found: decisions cannot differ"
+    assert np.corrcoef(ours, expected)[0, 1] > 0.99
+    assert np.mean((ours > 0) == (expected > 0)) > 0.98
+
+
+@in_any_coding
+def test_the_shipped_model_finds_the_same_vehicles(coding: Coding) -> None:
+    ours, expected = (vehicles_in(picture) for picture in both_forms(road(), coding))
+    assert np.diag(iou_matrix(ours.boxes, expected.boxes)).min() > 0.8
+    for found in (ours, expected):
+        assert np.diag(iou_matrix(found.boxes, TRUE_BOXES)).min() > 0.5
+        assert found.scores.min() > 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicles:
+    """The detection of each vehicle of the drawn road, in the order of `TRUE_BOXES`.
+
+    The model was trained on photographs and finds more than vehicles in a drawing. What else it
+    finds changes when each value of the BGR image changes by one level at random.
+    """
+
+    boxes: Float64Array  # x, y, width, height
+    scores: Float32Array
+
+
+SCENE = demo_scene(1, width=1280, height=720)
+TRUE_BOXES = np.array([astuple(true.box) for true in true_boxes(SCENE, 200)], np.float64)
+
+
+def vehicles_in(picture: Picture) -> Vehicles:
+    detector = load_detector(SvmSettings()).for_video(1280, 720, [road()])
+    found = detector.detect(detector.search(picture, None))
+    boxes = to_sides(found.boxes)
+    nearest = iou_matrix(boxes, TRUE_BOXES).argmax(axis=0)
+    return Vehicles(boxes[nearest], found.scores[nearest])
+
+
+@in_any_coding
+@pytest.mark.parametrize("settings", [SETTINGS, IN_TURNS], ids=["rows", "perspective"])
+def test_a_model_of_another_colour_space_finds_exactly_the_same(
+    settings: Settings, coding: Coding
+) -> None:
+    image = plain_road(CAR)
+    model = SvmModel(red_finder(), settings.svm)
+
+    def found_in(picture: Picture) -> tuple[Float32Array, Float32Array]:
+        detector = model.for_video(WIDTH, HEIGHT, [image])
+        for index in range(settings.svm.heat.frames + 1):
+            found = detector.detect(detector.search(picture, index))
+        return found.boxes, found.strengths
+
+    ours, expected = (found_in(picture) for picture in both_forms(image, coding))
+    assert len(expected[0]) == 1
+    for one, other in zip(ours, expected, strict=True):
+        np.testing.assert_array_equal(one, other)

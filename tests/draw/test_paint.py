@@ -1,0 +1,254 @@
+"""What is drawn into planes looks like what is drawn into images."""
+
+from collections.abc import Callable
+from itertools import product
+
+import av
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from vdet.draw.boxes import draw_box, draw_label
+from vdet.draw.counts import DrawnLine, DrawnZone, draw_counts
+from vdet.draw.paint import (
+    Color,
+    Surface,
+    TextStyle,
+    blend,
+    draw_arrow,
+    draw_lines,
+    fill,
+    write_text,
+)
+from vdet.draw.trails import draw_trail
+from vdet.geometry import Box
+from vdet.media.coding import Coding
+from vdet.media.images import Image
+from vdet.media.planes import Planes
+
+Mask = NDArray[np.bool_]
+WIDTH, HEIGHT = 320, 240
+RED: Color = (40, 30, 230)
+CODINGS = [Coding(matrix, full) for matrix in ("bt601", "bt709") for full in (False, True)]
+NAMES = [f"{each.matrix} {'full' if each.full_range else 'limited'}" for each in CODINGS]
+each_coding = pytest.mark.parametrize("coding", CODINGS, ids=NAMES)
+
+
+def ground(coding: Coding, width: int = WIDTH, height: int = HEIGHT) -> Planes:
+    """Return planes of soft colours; unlike `Planes.of_image` it takes odd sides."""
+    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding, is_own=True)
+    for layer, base in zip(planes.layers, (90, 120, 130), strict=True):
+        y, x = np.mgrid[: layer.shape[0], : layer.shape[1]]
+        layer[:] = base + 20 * x // width + 20 * y // height
+    return planes
+
+
+def triangle() -> Image:
+    mask = np.zeros((101, 151), np.uint8)
+    cv2.fillPoly(mask, [np.array([[0, 0], [150, 20], [60, 100]], np.int32)], 255)
+    return mask
+
+
+CORNERS = np.array([[11, 21], [151, 61], [90, 200]], np.int32)
+BEYOND = np.array([[-30, 21], [151, 61], [400, 300]], np.int32)
+Draw = Callable[[Surface], object]
+AREAS: dict[str, Draw] = {
+    "fill": lambda surface: fill(surface, Box(30, 40, 120, 76), RED),
+    "fill, odd corners": lambda surface: fill(surface, Box(31, 41, 120, 77), RED),
+    "fill, over the first corner": lambda surface: fill(surface, Box(-31, -41, 120, 77), RED),
+    "fill, over the last corner": lambda surface: fill(surface, Box(251, 201, 120, 77), RED),
+    "blend": lambda surface: blend(surface, triangle(), (76, 50), RED),
+    "blend, odd corner": lambda surface: blend(surface, triangle(), (77, 51), RED),
+    "blend, half": lambda surface: blend(surface, triangle(), (77, 50), RED, 0.5),
+}
+"""Drawings with hardly an edge."""
+STROKES: dict[str, Draw] = {
+    "line": lambda surface: draw_lines(surface, CORNERS, RED, 3),
+    "thin line": lambda surface: draw_lines(surface, CORNERS, RED, 1),
+    "thick line, closed": lambda surface: draw_lines(surface, CORNERS, RED, 6, closed=True),
+    "line beyond the frame": lambda surface: draw_lines(surface, BEYOND, RED, 3, closed=True),
+    "line between pixels": lambda surface: draw_lines(surface, 16 * CORNERS + 5, RED, 4, shift=4),
+    "arrow": lambda surface: draw_arrow(surface, (20.4, 30.2), (200, 133), RED, 3, tip=0.2),
+    "text": lambda surface: write_text(
+        surface, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=Box(30, 60, 250, 90)
+    ),
+    "box": lambda surface: draw_box(surface, Box(51, 61, 101, 83), RED, "#1 0.9"),
+    "dashed box": lambda surface: draw_box(surface, Box(50, 60, 100, 80), RED, dashed=True),
+    "box beyond the frame": lambda surface: draw_box(surface, Box(-11, 181, 101, 83), RED, "#1"),
+    "label": lambda surface: draw_label(surface, "0:01:02.500", (0, HEIGHT), RED),
+    "trail": lambda surface: draw_trail(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
+    "counts": lambda surface: draw_counts(
+        surface,
+        [DrawnLine("a", (20, 200), (300, 180), ("in", 3), ("out", 2))],
+        [DrawnZone("z", ((-20, 20), (150, 30), (90, 120)), 4)],
+    ),
+}
+"""Drawings that are mostly edges, where 4:2:0 has less of the colour than an image."""
+DRAWINGS = AREAS | STROKES
+
+
+def covered(draw: Draw) -> Mask:
+    """Tell which pixels of an image a drawing changes, whatever their colour."""
+    dark = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    bright = np.full_like(dark, 255)
+    draw(dark)
+    draw(bright)
+    return np.asarray((dark != 0).any(axis=2) | (bright != 255).any(axis=2))
+
+
+def halved(mask: Mask) -> Mask:
+    """Tell which values of chroma stand for a pixel of a mask."""
+    even = np.pad(mask, [(0, side % 2) for side in mask.shape])
+    return np.asarray(even[::2, ::2] | even[1::2, ::2] | even[::2, 1::2] | even[1::2, 1::2])
+
+
+def grown(mask: Mask) -> Mask:
+    return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((3, 3))) > 0)
+
+
+@each_coding
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_luma_is_that_of_the_same_drawing_in_an_image(name: str, coding: Coding) -> None:
+    planes = ground(coding)
+    image = planes.to_image()
+    DRAWINGS[name](planes)
+    DRAWINGS[name](image)
+    expected = Planes.of_image(image, coding).luma.astype(int)
+    assert np.abs(planes.luma - expected).max() <= 5
+
+
+@each_coding
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_colours_are_nearly_those_of_the_same_drawing_in_an_image(
+    name: str, coding: Coding
+) -> None:
+    planes = ground(coding)
+    image = planes.to_image()
+    DRAWINGS[name](planes)
+    DRAWINGS[name](image)
+    differences = np.abs(planes.to_image().astype(int) - image).max(axis=2)
+    assert differences[covered(DRAWINGS[name])].mean() < (4 if name in AREAS else 50)
+
+
+@each_coding
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_nothing_else_is_changed(name: str, coding: Coding) -> None:
+    """Luma to the pixel; of chroma, only the values next to those that are drawn on."""
+    before, after = ground(coding), ground(coding)
+    DRAWINGS[name](after)
+    drawn = covered(DRAWINGS[name])
+    changed = after.luma != before.luma
+    assert changed.any()
+    assert not (changed & ~drawn).any()
+    changed = (after.blue != before.blue) | (after.red != before.red)
+    assert changed.any()
+    assert not (changed & ~grown(halved(drawn))).any()
+
+
+@each_coding
+def test_the_middle_of_a_thick_line_has_its_colour(coding: Coding) -> None:
+    planes, image = ground(coding), np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    for surface in (planes, image):
+        draw_lines(surface, CORNERS, RED, 8)
+    solid = (image == RED).all(axis=2).astype(np.uint8)
+    middle = cv2.erode(solid, np.ones((5, 5))) > 0
+    assert middle.sum() > 500
+    assert np.abs(planes.to_image()[middle].astype(int) - RED).max() <= 3
+
+
+class TestFill:
+    @each_coding
+    def test_has_its_colour(self, coding: Coding) -> None:
+        values = (0, 30, 60, 130, 220, 255)
+        for color in product(values, values, values):
+            planes = ground(coding, 16, 16)
+            fill(planes, Box(2, 4, 12, 8), color)
+            shown = planes.to_image()[4:12, 2:14].astype(int)
+            assert np.abs(shown - color).max() <= 3, color
+
+    @given(
+        box=st.builds(
+            Box, st.integers(-30, 50), st.integers(-30, 40), st.integers(0, 60), st.integers(0, 60)
+        ),
+        width=st.integers(1, 40),
+        height=st.integers(1, 30),
+        coding=st.sampled_from(CODINGS),
+    )
+    def test_of_any_box_changes_its_pixels_and_all_chroma_that_stands_for_one_of_them(
+        self, box: Box, width: int, height: int, coding: Coding
+    ) -> None:
+        before, after = ground(coding, width, height), ground(coding, width, height)
+        fill(after, box, (0, 0, 0))
+        inside = np.zeros((height, width), bool)
+        part = box.clipped(width, height)
+        inside[part.y : part.bottom, part.x : part.right] = True
+        np.testing.assert_array_equal(
+            after.luma, np.where(inside, 0 if coding.full_range else 16, before.luma)
+        )
+        for layer, old in ((after.blue, before.blue), (after.red, before.red)):
+            np.testing.assert_array_equal(layer, np.where(halved(inside), 128, old))
+
+
+class TestBlend:
+    @pytest.mark.parametrize("x", [0, 1])
+    @pytest.mark.parametrize("y", [0, 1])
+    def test_a_whole_mask_that_is_even_is_a_filled_box(self, x: int, y: int) -> None:
+        mixed, filled = ground(Coding(), 33, 25), ground(Coding(), 33, 25)
+        box = Box(2 * x, 2 * y, 20, 16)
+        blend(mixed, np.full((box.height, box.width), 255, np.uint8), (box.x, box.y), RED)
+        fill(filled, box, RED)
+        for ours, theirs in zip(mixed.layers, filled.layers, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+
+    def test_chroma_is_mixed_by_the_share_of_its_pixels(self) -> None:
+        planes = ground(Coding(), 32, 32)
+        before, (_, blue, _) = planes.copy(), _coded(RED)
+        blend(planes, np.full((1, 1), 255, np.uint8), (5, 7), RED)
+        old = float(before.blue[3, 2])
+        assert planes.blue[3, 2] == pytest.approx(old + (blue - old) / 4, abs=1)
+
+    @pytest.mark.parametrize("corner", [(30, 20), (31, 21), (32, 24)])
+    def test_reaches_the_last_pixel_of_odd_sides(self, corner: tuple[int, int]) -> None:
+        planes = ground(Coding(), 33, 25)
+        x, y = corner
+        blend(planes, np.full((25 - y, 33 - x), 255, np.uint8), corner, RED)
+        luma, _, _ = _coded(RED)
+        assert (planes.luma[y:, x:] == luma).all()
+
+    def test_without_opacity_nothing_changes(self) -> None:
+        planes = ground(Coding())
+        blend(planes, triangle(), (77, 51), RED, 0.0)
+        for ours, theirs in zip(planes.layers, ground(Coding()).layers, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+
+    @pytest.mark.parametrize("size", [(0, 0), (0, 5), (5, 0)])
+    def test_an_empty_mask_changes_nothing(self, size: tuple[int, int]) -> None:
+        for surface in (ground(Coding()), ground(Coding()).to_image()):
+            blend(surface, np.zeros(size, np.uint8), (10, 10), RED)
+
+
+class TestText:
+    @pytest.mark.parametrize("within", [Box(60, 100, 40, 20), Box(61, 101, 41, 21)])
+    def test_no_stroke_lies_outside_its_box(self, within: Box) -> None:
+        planes = ground(Coding())
+        write_text(planes, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=within)
+        changed = planes.luma != ground(Coding()).luma
+        rows, columns = np.nonzero(changed)
+        assert within.x <= columns.min() <= columns.max() < within.right
+        assert within.y <= rows.min() <= rows.max() < within.bottom
+
+    @pytest.mark.parametrize("origin", [(-50, 10), (300, 239), (310, 300), (900, 900)])
+    def test_may_lie_beyond_the_frame(self, origin: tuple[int, int]) -> None:
+        planes = ground(Coding())
+        within = Box(origin[0], origin[1] - 30, 200, 40)
+        write_text(planes, "#12 car", origin, TextStyle(1.2, 2), RED, within=within)
+
+
+def _coded(color: Color) -> list[int]:
+    """Return luma, blue and red chroma of a colour in the default coding."""
+    planes = ground(Coding(), 2, 2)
+    fill(planes, Box(0, 0, 2, 2), color)
+    return [int(layer[0, 0]) for layer in planes.layers]

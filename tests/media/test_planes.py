@@ -1,0 +1,265 @@
+"""Pictures as planes: which decoded ones come so, and how an image becomes planes."""
+
+from fractions import Fraction
+
+import av
+import av.filter
+import numpy as np
+import pytest
+from av.video.reformatter import ColorRange
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from vdet.media.coding import Coding
+from vdet.media.images import Image
+from vdet.media.planes import Planes
+
+CODINGS = [
+    Coding("bt601"),
+    Coding("bt709"),
+    Coding("bt601", full_range=True),
+    Coding("bt709", full_range=True),
+]
+NAMES = [f"{each.matrix} {'full' if each.full_range else 'limited'}" for each in CODINGS]
+each_coding = pytest.mark.parametrize("coding", CODINGS, ids=NAMES)
+
+
+def decoded(
+    pixels: str = "yuv420p", *, matrix: int = 2, full_range: bool = False, side: int = 32
+) -> av.VideoFrame:
+    """Return a picture as a decoder gives it: of a pixel format, with its tags."""
+    grey = np.full((side, side, 3), 90, np.uint8)
+    picture = av.VideoFrame.from_ndarray(grey, format="bgr24").reformat(format=pixels)
+    picture.colorspace = matrix
+    picture.color_range = ColorRange.JPEG if full_range else ColorRange.MPEG
+    return picture
+
+
+def upside_down(picture: av.VideoFrame) -> av.VideoFrame:
+    """Return a picture whose rows are stored from the bottom up."""
+    graph = av.filter.Graph()
+    source = graph.add_buffer(
+        width=picture.width,
+        height=picture.height,
+        format=picture.format,
+        time_base=Fraction(1, 25),
+    )
+    flip, sink = graph.add("vflip"), graph.add("buffersink")
+    source.link_to(flip)
+    flip.link_to(sink)
+    graph.configure()
+    graph.push(picture)
+    flipped = graph.pull()
+    assert isinstance(flipped, av.VideoFrame)
+    return flipped
+
+
+def slopes(width: int, height: int) -> Image:
+    """Return an image with all kinds of colours, but no edges."""
+    y, x = np.mgrid[:height, :width] / [[[height]], [[width]]]
+    layers = [20 + 210 * x, 30 + 190 * y, 240 - 110 * (x + y)]
+    return np.stack(layers, axis=-1).astype(np.uint8)
+
+
+class TestCoding:
+    @pytest.mark.parametrize("full_range", [False, True])
+    @pytest.mark.parametrize(
+        ("matrix", "name"), [(1, "bt709"), (2, "bt601"), (5, "bt601"), (6, "bt601")]
+    )
+    def test_is_the_one_that_the_tags_name(
+        self, matrix: int, name: str, *, full_range: bool
+    ) -> None:
+        found = Coding.of(decoded(matrix=matrix, full_range=full_range))
+        assert found is not None
+        assert (found.matrix, found.full_range) == (name, full_range)
+
+    def test_of_video_without_tags_is_the_default(self) -> None:
+        assert Coding.of(av.VideoFrame(32, 32, "yuv420p")) == Coding("bt601", full_range=False)
+
+    def test_the_pixels_of_jpeg_use_the_full_range_whatever_the_tag(self) -> None:
+        assert Coding.of(decoded("yuvj420p")) == Coding(full_range=True)
+
+    @pytest.mark.parametrize(
+        "pixels", ["yuv444p", "yuvj444p", "yuv422p", "yuv420p10le", "nv12", "gray", "bgr24"]
+    )
+    def test_other_forms_of_pixels_have_none(self, pixels: str) -> None:
+        assert Coding.of(decoded(pixels)) is None
+
+    @pytest.mark.parametrize("matrix", [4, 7, 9, 10])
+    def test_other_matrices_have_none(self, matrix: int) -> None:
+        assert Coding.of(decoded(matrix=matrix)) is None
+
+    def test_rows_from_the_bottom_up_have_none(self) -> None:
+        assert Coding.of(upside_down(decoded())) is None
+
+
+class TestViews:
+    def test_are_luma_and_the_two_chromas_at_half_the_size(self) -> None:
+        values = np.arange(48 * 64, dtype=np.uint64).astype(np.uint8).reshape(48, 64)
+        planes = Planes(av.VideoFrame.from_ndarray(values, format="yuv420p"), Coding())
+        np.testing.assert_array_equal(planes.luma, values[:32])
+        np.testing.assert_array_equal(planes.blue, values[32:40].reshape(16, 32))
+        np.testing.assert_array_equal(planes.red, values[40:].reshape(16, 32))
+
+    @pytest.mark.parametrize("side", [32, 97])
+    def test_a_value_of_chroma_stands_for_what_is_left_of_an_odd_side(self, side: int) -> None:
+        planes = Planes(decoded(side=side), Coding())
+        half = -(-side // 2)
+        assert planes.shape == planes.luma.shape == (side, side)
+        assert planes.blue.shape == planes.red.shape == (half, half)
+
+    def test_share_the_memory_of_the_picture(self) -> None:
+        picture = decoded()
+        planes = Planes(picture, Coding())
+        for layer, value in zip(planes.layers, (20, 100, 200), strict=True):
+            layer[3, 5] = value
+        again = Planes(picture, Coding())
+        assert [int(layer[3, 5]) for layer in again.layers] == [20, 100, 200]
+        assert picture.to_ndarray()[3, 5] == 20
+
+    def test_are_not_our_own_unless_that_is_said(self) -> None:
+        assert not Planes(decoded(), Coding()).is_own
+
+
+class TestCopy:
+    @each_coding
+    def test_has_the_same_values_and_coding_in_memory_of_its_own(self, coding: Coding) -> None:
+        original = Planes.of_image(slopes(64, 48), coding)
+        copied = original.copy()
+        assert copied.is_own
+        assert (copied.shape, copied.coding) == (original.shape, coding)
+        for ours, theirs in zip(copied.layers, original.layers, strict=True):
+            np.testing.assert_array_equal(ours, theirs)
+        before = [layer.copy() for layer in original.layers]
+        for layer in copied.layers:
+            layer[:] = 0
+        for layer, expected in zip(original.layers, before, strict=True):
+            np.testing.assert_array_equal(layer, expected)
+
+    @each_coding
+    def test_means_the_same_colours(self, coding: Coding) -> None:
+        original = Planes.of_image(slopes(64, 48), coding)
+        copied = original.copy()
+        np.testing.assert_array_equal(copied.to_image(), original.to_image())
+        assert Coding.of(copied.picture) == coding
+
+    def test_of_odd_sides_has_these_sides(self) -> None:
+        original = Planes(decoded(side=97), Coding())
+        copied = original.copy()
+        assert copied.shape == (97, 97)
+        np.testing.assert_array_equal(copied.blue, original.blue)
+
+    def test_of_the_pixels_of_jpeg_uses_the_full_range(self) -> None:
+        copied = Planes(decoded("yuvj420p"), Coding(full_range=True)).copy()
+        assert Coding.of(copied.picture) == Coding(full_range=True)
+
+
+class TestOfImage:
+    @given(st.integers(1, 70), st.integers(1, 70), st.sampled_from(CODINGS))
+    def test_sides_are_even(self, width: int, height: int, coding: Coding) -> None:
+        planes = Planes.of_image(np.zeros((height, width, 3), np.uint8), coding)
+        assert planes.shape == (height + height % 2, width + width % 2)
+        assert planes.picture.format.name == "yuv420p"
+        assert planes.coding == coding
+        assert planes.is_own
+
+    @each_coding
+    def test_an_odd_side_grows_by_its_last_row_or_column(self, coding: Coding) -> None:
+        image = np.zeros((5, 7, 3), np.uint8)
+        image[4:, :] = image[:, 6:] = 200
+        luma = Planes.of_image(image, coding).luma
+        assert luma.shape == (6, 8)
+        assert (luma[5] == luma[4]).all()
+        assert (luma[:, 7] == luma[:, 6]).all()
+        assert luma[5, 7] > luma[0, 0]
+
+    @each_coding
+    @pytest.mark.parametrize(
+        "color", [(255, 255, 255), (0, 0, 0), (40, 30, 210), (200, 60, 20), (128, 128, 128)]
+    )
+    def test_colours_are_the_same_as_planes_and_back(
+        self, color: tuple[int, int, int], coding: Coding
+    ) -> None:
+        image = np.full((32, 48, 3), color, np.uint8)
+        back = Planes.of_image(image, coding).to_image()
+        assert np.abs(back.astype(int) - color).max() <= 4
+
+    @each_coding
+    def test_a_picture_is_the_same_as_planes_and_back(self, coding: Coding) -> None:
+        image = slopes(96, 64)
+        difference = np.abs(Planes.of_image(image, coding).to_image().astype(int) - image)
+        assert difference.max() <= 9
+        assert difference.mean() < 2.5
+
+    @each_coding
+    def test_the_picture_names_the_coding(self, coding: Coding) -> None:
+        assert Coding.of(Planes.of_image(slopes(32, 32), coding).picture) == coding
+
+    @each_coding
+    def test_black_and_white_are_the_ends_of_the_range(self, coding: Coding) -> None:
+        image = np.zeros((4, 4, 3), np.uint8)
+        image[:, 2:] = 255
+        luma = Planes.of_image(image, coding).luma
+        black, white = (0, 255) if coding.full_range else (16, 235)
+        assert luma[0].tolist() == [black, black, white, white]
+
+
+def exact_image(planes: Planes) -> NDArray[np.float64]:
+    """Return what ITU-R BT.601 or BT.709 say of planes, BGR from 0 to 255, not rounded."""
+    of_red, of_blue = (0.2126, 0.0722) if planes.coding.matrix == "bt709" else (0.299, 0.114)
+    base, luma_steps, chroma_steps = (0, 255, 255) if planes.coding.full_range else (16, 219, 224)
+    height, width = planes.shape
+    luma = (planes.luma - float(base)) / luma_steps
+    blue, red = (
+        ((each - 128.0) / chroma_steps).repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+        for each in (planes.blue, planes.red)
+    )
+    blue, red = luma + blue * (2 - 2 * of_blue), luma + red * (2 - 2 * of_red)
+    green = (luma - of_red * red - of_blue * blue) / (1 - of_red - of_blue)
+    return 255 * np.clip(np.stack([blue, green, red], axis=-1), 0, 1)
+
+
+def blocks_of_any_colour(width: int, height: int, coding: Coding) -> Planes:
+    """Return planes of one random colour for each value of chroma, coded as the standard says."""
+    planes = Planes(av.VideoFrame(width, height, "yuv420p"), coding, is_own=True)
+    of_red, of_blue = (0.2126, 0.0722) if coding.matrix == "bt709" else (0.299, 0.114)
+    base, luma_steps, chroma_steps = (0, 255, 255) if coding.full_range else (16, 219, 224)
+    blue, green, red = np.random.default_rng(width).random((3, *planes.blue.shape))
+    luma = of_red * red + (1 - of_red - of_blue) * green + of_blue * blue
+    planes.blue[:] = np.rint(128 + chroma_steps * (blue - luma) / (2 - 2 * of_blue)).clip(0, 255)
+    planes.red[:] = np.rint(128 + chroma_steps * (red - luma) / (2 - 2 * of_red)).clip(0, 255)
+    whole = luma.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+    planes.luma[:] = np.rint(base + luma_steps * whole)
+    return planes
+
+
+class TestToImage:
+    @each_coding
+    @pytest.mark.parametrize("size", [(64, 48), (33, 48), (64, 47), (7, 5)])
+    def test_is_what_the_standard_says(self, coding: Coding, size: tuple[int, int]) -> None:
+        width, height = size
+        planes = blocks_of_any_colour(width, height, coding)
+        image = planes.to_image()
+        assert image.shape == (height, width, 3)
+        assert image.dtype == np.uint8
+        differences = np.abs(image - exact_image(planes))
+        assert differences.max() < 3.5
+        assert differences.mean() < 1
+
+    @each_coding
+    def test_grey_stays_grey(self, coding: Coding) -> None:
+        planes = Planes(av.VideoFrame(32, 8, "yuv420p"), coding, is_own=True)
+        planes.luma[:] = np.arange(256, dtype=np.uint64).astype(np.uint8).reshape(8, 32)
+        planes.blue[:] = planes.red[:] = 128
+        assert np.ptp(planes.to_image(), axis=2).max() == 0
+
+    @each_coding
+    def test_gives_memory_of_its_own(self, coding: Coding) -> None:
+        planes = Planes.of_image(slopes(32, 24), coding)
+        image = planes.to_image()
+        before = image.copy()
+        for layer in planes.layers:
+            layer[:] = 0
+        np.testing.assert_array_equal(image, before)
+        assert image.flags.writeable
