@@ -19,7 +19,7 @@ class NetworkScoreSettings(Section):
 class NetworkTrainingSettings(Section):
     """How `vdet train-net` trains the network."""
 
-    steps: int = Field(11_000, ge=1, le=10_000_000, description="steps of the training")
+    steps: int = Field(20_000, ge=1, le=10_000_000, description="steps of the training")
     batch: int = Field(16, ge=1, le=1024, description="pictures in a step")
     width: int = Field(512, ge=64, le=4096, multiple_of=64, description="width of the pictures")
     height: int = Field(288, ge=64, le=4096, multiple_of=32, description="height of the pictures")
