@@ -69,7 +69,7 @@ class ScoreSettings(Section):
     """
 
     middle: float = Field(
-        0.42,
+        0.5,
         gt=0,
         le=1e6,
         description="evidence (heat, or weight of hits) at which the score is 0.5",
