@@ -178,3 +178,9 @@ def times_of(spec: dict[str, Any]) -> list[Fraction]:
     return given or [
         index / spec.get("rate", Fraction(25)) for index in range(spec.get("count", 12))
     ]
+
+
+def joined(path: Path, *parts: Path) -> Path:
+    """Write a file of the bytes of others, one after the other."""
+    path.write_bytes(b"".join(part.read_bytes() for part in parts))
+    return path

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vdet.media.decoder
+from clips import joined
 from vdet.config.schema import InputSettings
 from vdet.media import VideoReader
 
@@ -76,8 +77,7 @@ def test_a_damaged_recording_joined_to_another_gives_both(
     threads: int, tmp_path: Path, write_clip: Writer, read_number: Number
 ) -> None:
     first = damage(write_clip(tmp_path / "first.ts", **GOP))
-    path = tmp_path / "joined.ts"
-    path.write_bytes(first.read_bytes() + write_clip(tmp_path / "second.ts", **GOP).read_bytes())
+    path = joined(tmp_path / "joined.ts", first, write_clip(tmp_path / "second.ts", **GOP))
     numbers, _, damaged = read(path, read_number, threads=threads)
     assert numbers[-60:] == list(range(60))
     assert len(numbers) >= 120 - damaged

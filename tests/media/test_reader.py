@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from clips import joined
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame, VideoReader
@@ -317,8 +318,7 @@ class TestPlanes:
     ) -> None:
         small = write_clip(tmp_path / "small.h264", count=6)
         large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
-        path = tmp_path / "both.h264"
-        path.write_bytes(small.read_bytes() + large.read_bytes())
+        path = joined(tmp_path / "both.h264", small, large)
         with VideoReader(path) as reader:
             planar = [frame.picture.planes is not None for frame in reader]
         assert planar == [True] * 6 + [False] * 9
@@ -328,8 +328,7 @@ class TestPlanes:
     ) -> None:
         one = write_clip(tmp_path / "one.h264", count=6, matrix=1)
         other = write_clip(tmp_path / "other.h264", count=9, matrix=5, full_range=True)
-        path = tmp_path / "both.h264"
-        path.write_bytes(one.read_bytes() + other.read_bytes())
+        path = joined(tmp_path / "both.h264", one, other)
         with VideoReader(path) as reader:
             assert reader.info.coding == Coding("bt709")
             frames = list(reader)
@@ -388,8 +387,7 @@ def test_frames_of_another_size_are_scaled_to_the_first(
 ) -> None:
     small = write_clip(tmp_path / "small.h264", count=6)
     large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
-    path = tmp_path / "both.h264"
-    path.write_bytes(small.read_bytes() + large.read_bytes())
+    path = joined(tmp_path / "both.h264", small, large)
     with VideoReader(path) as reader:
         frames = list(reader)
     assert {frame.image.shape for frame in frames} == {(96, 160, 3)}

@@ -7,14 +7,9 @@ import av
 import pytest
 from av.stream import Disposition
 
-from clips import write_clip
+from clips import joined, write_clip
 from conftest import Run
 from strange.conftest import Process, Shown, assert_whole
-
-
-def _joined(first: Path, second: Path, path: Path) -> Path:
-    path.write_bytes(first.read_bytes() + second.read_bytes())
-    return path
 
 
 def test_a_cover_picture_is_not_the_video(tmp_path: Path, process: Process) -> None:
@@ -75,7 +70,7 @@ def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
 ) -> None:
     small = write_clip(tmp_path / "small.h264", count=6)
     large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
-    shown = process(_joined(small, large, tmp_path / "both.h264"))
+    shown = process(joined(tmp_path / "both.h264", small, large))
     assert {image.shape for image in shown.images} == {(96, 160, 3)}
     assert_whole(shown, [*range(6), *range(9)])
     (warning,) = shown.warnings
@@ -87,7 +82,7 @@ def test_frames_that_change_from_landscape_to_portrait_are_scaled(
 ) -> None:
     wide = write_clip(tmp_path / "wide.h264", count=3)
     high = write_clip(tmp_path / "high.h264", count=3, size=(96, 160))
-    shown = process(_joined(wide, high, tmp_path / "both.h264"))
+    shown = process(joined(tmp_path / "both.h264", wide, high))
     assert {image.shape for image in shown.images} == {(96, 160, 3)}
     assert_whole(shown, [0, 1, 2, 0, 1, 2])
 

@@ -1,11 +1,12 @@
 """How luma and chroma hold colours: BT.601 or BT.709, with the full or the limited range."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import av
 import cv2
 import numpy as np
+import numpy.typing as npt
 from av.video.reformatter import ColorRange
 
 from vdet.geometry import Float64Array
@@ -59,6 +60,12 @@ class Coding:
         stretched = layers if self.full_range else _looked_up(layers, _FULL_LUMA, _FULL_CHROMA)
         return stretched if self.matrix == "bt601" else _recoded(stretched, _FROM_BT709)
 
+    def to_bgr(self, layers: Layers) -> Image:
+        """Return values of this coding as BGR uint8 `(H, W, 3)`, as large as luma."""
+        luma, *chroma = self.to_common(layers)
+        blue, red = (_as_large(each, luma) for each in chroma)
+        return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
+
     def from_common(self, layers: Layers) -> Layers:
         """Return values of the common coding in this one."""
         recoded = layers if self.matrix == "bt601" else _recoded(layers, _TO_BT709)
@@ -91,17 +98,22 @@ def _recoded(layers: Layers, matrix: Float64Array) -> Layers:
     luma, *chroma = layers
     (_, *added), *mixed = matrix.tolist()
     change = _mixture(chroma, added, -128 * sum(added), cv2.CV_16S)
-    height, width = luma.shape
-    if change.shape != luma.shape:
-        change = change.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
     blue, red = (
         np.asarray(_mixture(chroma, shares, 128 * (1 - sum(shares)), cv2.CV_8U), np.uint8)
         for _, *shares in mixed
     )
-    return np.asarray(cv2.add(luma, change, dtype=cv2.CV_8U), np.uint8), blue, red
+    return np.asarray(cv2.add(luma, _as_large(change, luma), dtype=cv2.CV_8U), np.uint8), blue, red
 
 
 def _mixture(
     chroma: list[Image], shares: list[float], offset: float, kind: int
 ) -> cv2.typing.MatLike:
     return cv2.addWeighted(chroma[0], shares[0], chroma[1], shares[1], offset, dtype=kind)
+
+
+def _as_large(values: npt.NDArray[Any], luma: Image) -> npt.NDArray[Any]:
+    """Return values of the size of luma; of half of it, each stands for 2 × 2 pixels."""
+    if values.shape == luma.shape:
+        return values
+    height, width = luma.shape
+    return values.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]

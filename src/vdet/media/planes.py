@@ -76,9 +76,7 @@ class Planes:
             return np.asarray(
                 cv2.cvtColor(stacked.reshape(-1, width), cv2.COLOR_YUV2BGR_I420), np.uint8
             )
-        luma, *chroma = self.coding.to_common(self.layers)
-        blue, red = (each.repeat(2, axis=0).repeat(2, axis=1)[:height, :width] for each in chroma)
-        return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
+        return self.coding.to_bgr(self.layers)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from detect.svm.turns import IN_TURNS
-from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, by_perspective, red_finder, road
+from red_cars import CAR, HEIGHT, IN_TURNS, SETTINGS, WIDTH, by_perspective, red_finder, road
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
 from vdet.detect.svm.detector import SvmModel, horizon_of
@@ -301,7 +300,7 @@ class TestHorizon:
     def test_each_still_picture_has_its_own_horizon(self, monkeypatch: pytest.MonkeyPatch) -> None:
         for horizon in (0.35, 0.45):
             monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda _, h=horizon: h)
-            first = trace_of(detect_still(road(CAR), by_perspective(0).svm)).grids[0]
+            first = trace_of(detect_still(road(CAR), by_perspective(0, 0.15, 0.2).svm)).grids[0]
             assert float(first.top) == pytest.approx(horizon * HEIGHT - 0.1 * first.size, abs=1)
 
 

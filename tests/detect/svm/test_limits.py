@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from detect.svm.turns import IN_TURNS
-from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
+from red_cars import CAR, HEIGHT, IN_TURNS, SETTINGS, WIDTH, red_finder, road
 from seed import SEED
 from textured_road import textured_road
 from vdet.config.schema import Settings, SvmSettings

@@ -7,8 +7,7 @@ import pytest
 
 from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
-from detect.svm.turns import IN_TURNS
-from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder
+from red_cars import CAR, HEIGHT, IN_TURNS, SETTINGS, WIDTH, red_finder
 from red_cars import road as plain_road
 from vdet.config.schema import FeatureSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector

@@ -116,8 +116,7 @@ def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
     if planes is None:
         return scaled_to(picture.image, width, height)
     first, second, third = (scaled_to(layer, width, height) for layer in planes.layers)
-    luma, blue, red = planes.coding.to_common((first, second, third))
-    return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
+    return planes.coding.to_bgr((first, second, third))
 
 
 def size_of_area(width: int, height: int, pixels: int, multiple: int) -> tuple[int, int]:

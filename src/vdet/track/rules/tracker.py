@@ -48,8 +48,7 @@ class RulesTracker:
         if picture is None:
             raise ValueError("the rules tracker needs the frame; give its image")
         image = picture.image
-        height, width = image.shape[:2]
-        regions = large_enough(detections, width, height, self._settings)
+        regions = large_enough(detections, picture.width, picture.height, self._settings)
         association = Association(self._cars, regions, image, self._settings)
         self._cars = association.cars
         placed = association.places
