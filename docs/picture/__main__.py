@@ -49,7 +49,7 @@ def last_frame_with_vehicles(folder: Path) -> Image:
     """Run `vdet detect-video` on the frames and return the last frame of its video."""
     video = folder / "found.mp4"
     program = [sys.executable, "-m", "vdet", "detect-video", folder / "%03d.png", video, "--lanes"]
-    settings = ("output.crf=6", "draw.label=[id, score]", "tracker.leak=0.75")
+    settings = ("output.crf=6", "draw.label=[id, score]", "tracker.leak=0.6")
     subprocess.run([*program, *(word for each in settings for word in ("--set", each))], check=True)
     with VideoReader(video) as reader:
         *_, last = reader
