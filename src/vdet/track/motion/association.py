@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vdet.config.schema import MotionTrackerSettings
-from vdet.geometry import Float64Array, iou_matrix, visible
+from vdet.geometry import Float64Array, iou, visible
 from vdet.track.motion.assignment import assign
 from vdet.track.motion.overlapping import CLEAR, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
@@ -44,16 +44,13 @@ def buffered_iou(
     buffers
         Shape `(n, 2)`: shares of width and height by which a box is widened on each side.
     """
-    rows = [
-        iou_matrix(_widened(box[np.newaxis], buffer), _widened(found, buffer))
-        for box, buffer in zip(expected, np.minimum(buffers, WIDEST_BUFFER), strict=True)
-    ]
-    return np.concatenate([np.zeros((0, len(found))), *rows])
+    shares = np.minimum(buffers, WIDEST_BUFFER)[:, np.newaxis]
+    return iou(_widened(expected[:, np.newaxis], shares), _widened(found, shares))
 
 
-def _widened(boxes: Float64Array, buffer: Float64Array) -> Float64Array:
-    margin = boxes[:, 2:] * buffer
-    return np.concatenate([boxes[:, :2] - margin, boxes[:, 2:] + 2 * margin], axis=1)
+def _widened(boxes: Float64Array, shares: Float64Array) -> Float64Array:
+    margin = boxes[..., 2:] * shares
+    return np.concatenate([boxes[..., :2] - margin, boxes[..., 2:] + 2 * margin], axis=-1)
 
 
 def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> Pairs:
