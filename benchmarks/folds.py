@@ -59,12 +59,12 @@ Numbers = npt.NDArray[np.intp]
 
 @dataclass(frozen=True)
 class SearchedVideo:
-    """The likely windows of each frame, from a model that has not seen it."""
+    """The likely windows of each frame, from a model that has not seen it; None if not searched."""
 
     width: int
     height: int
     rate: float
-    windows: list[Windows]
+    windows: list[Windows | None]
 
 
 def main() -> None:
@@ -127,7 +127,7 @@ def _search(
     video: Path, last: int, models: Sequence[LinearModel], settings: Settings
 ) -> SearchedVideo:
     """Search each frame with the model that was trained without its block."""
-    found = []
+    found: list[Windows | None] = []
     with VideoReader(video, frames=last) as reader:
         info = reader.info
         images, frames = peek(reader)
@@ -136,7 +136,11 @@ def _search(
             SvmDetector(model, settings.svm, info.width, info.height, horizon=horizon)
             for model in models
         ]
+        stride = settings.detector.stride_at(info.rate)
         for frame in frames:
+            if frame.index % stride:
+                found.append(None)
+                continue
             block = int(_block_of(np.array([frame.index + 1]), last)[0])
             candidates = detectors[block].search(frame.picture, frame.index)
             found.append(candidates.windows.hits(LEAST))
@@ -175,8 +179,13 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     tracker = make_tracker(settings, searched.width, searched.height)
     rows = []
     for number, windows in enumerate(searched.windows, start=1):
-        detections = detector.detect(Candidates(windows, (windows,), is_still=False))
-        for track in tracker.update(detections, number / searched.rate):
+        time = number / searched.rate
+        if windows is None:
+            tracks = tracker.carry(time)
+        else:
+            detections = detector.detect(Candidates(windows, is_still=False))
+            tracks = tracker.update(detections, time)
+        for track in tracks:
             box = track.box
             rows.append(Row(0, number, track.id, box.x, box.y, box.width, box.height))
     return LabelledVideo.from_rows(rows, frame_count=len(searched.windows), rate=searched.rate)

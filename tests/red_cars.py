@@ -36,13 +36,13 @@ COLOUR = FeatureSettings(
 )
 SETTINGS = Settings(
     detector=SvmSettings(
+        stride=1,
         reference_height=HEIGHT,
         features=COLOUR,
         search=SearchSettings(
             probability=0.5,
             windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),),
             perspective=PerspectiveSettings(sizes=()),
-            alternate=1,
         ),
         heat=HeatSettings(
             frames=2, weight="none", shrink=1, blur=5, threshold=1.4, regions="outline"
@@ -63,6 +63,7 @@ def by_perspective(horizon: float, *sizes: float) -> Settings:
     perspective = PerspectiveSettings(sizes=sizes, horizon=horizon, highest=0.9, lowest=2.1, step=2)
     return Settings(
         detector=SvmSettings(
+            stride=1,
             features=COLOUR,
             search=SearchSettings(probability=0.5, perspective=perspective),
             heat=HeatSettings(votes=VoteSettings(least=0.5)),

@@ -1,7 +1,8 @@
 """The shipped model on drawn roads, seen by other cameras than the one it was tuned on.
 
 Cars, bins and trees are drawn, and the model was trained on photographs: the bounds tell what must
-not get worse, not how well real roads are searched.
+not get worse, not how well real roads are searched. Most false boxes lie on vehicles, but are too
+large: several drawn cars side by side look like one to it.
 """
 
 from collections import Counter
@@ -24,7 +25,8 @@ from vdet.evaluate.matching import match
 from vdet.evaluate.scores import score, score_comparison
 from vdet.formats.rows import Row
 from vdet.geometry import Box, Float64Array
-from vdet.media import Frame, Picture, VideoInfo
+from vdet.media import Frame, Picture, Planes, VideoInfo
+from vdet.media.coding import Coding
 from vdet.pipeline.loop import follow_frames, peek
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
@@ -57,13 +59,13 @@ class Case:
 
 DUSK = Light(gain=0.5, noise=3.0)
 CASES = {  # behind each the F1 and false boxes measured, from which the bounds keep some distance
-    "dashboard": Case(PinholeCamera.dashboard(1280, 720), 0.93, 6),  # 1.00, 0
-    "fewer rows": Case(PinholeCamera.dashboard(960, 540), 0.93, 6),  # 0.99, 0
-    "wide": Case(PinholeCamera(1242, 375, 721, 0.46 * 375, 1.65), 0.85, 15),  # 1.00, 0
-    "high horizon": Case(PinholeCamera(1920, 1080, 1500, 0.45 * 1080, 1.4), 0.93, 6),  # 0.98, 0
-    "dusk": Case(PinholeCamera(640, 360, 560, 0.52 * 360, 1.3), 0.88, 11, light=DUSK),  # 1.00, 0
+    "dashboard": Case(PinholeCamera.dashboard(1280, 720), 0.60, 12),  # 0.71, 6
+    "fewer rows": Case(PinholeCamera.dashboard(960, 540), 0.85, 9),  # 0.94, 3
+    "wide": Case(PinholeCamera(1242, 375, 721, 0.46 * 375, 1.65), 0.40, 20),  # 0.50, 10
+    "high horizon": Case(PinholeCamera(1920, 1080, 1500, 0.45 * 1080, 1.4), 0.55, 18),  # 0.68, 10
+    "dusk": Case(PinholeCamera(640, 360, 560, 0.52 * 360, 1.3), 0.80, 8, light=DUSK),  # 0.89, 0
     "right lane": Case(PinholeCamera.dashboard(960, 540), 0.93, 6, lane=2),  # 1.00, 0
-    "left lane": Case(PinholeCamera.dashboard(960, 540), 0.90, 9, lane=0),  # 0.96, 2
+    "left lane": Case(PinholeCamera.dashboard(960, 540), 0.93, 6, lane=0),  # 1.00, 0
 }
 each_camera = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
@@ -75,7 +77,7 @@ def model() -> DetectorModel:
 
 def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) -> LabelledVideo:
     """Find and follow the vehicles of a clip; give the boxes shown in the scored frames."""
-    rate = Fraction(25)
+    rate, clip = Fraction(25), map(as_planes, clip)
     video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
     images, clip = peek(clip)
     with single_threaded_libraries():
@@ -86,6 +88,11 @@ def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) ->
             for track in result.tracks
             if result.frame.index in SCORED
         )
+
+
+def as_planes(frame: Frame) -> Frame:
+    """Give a frame in the form of a decoded video's."""
+    return replace(frame, picture=Picture(Planes.of_image(frame.image, Coding())))
 
 
 def to_be_shown(scene: Scene) -> LabelledVideo:
@@ -152,8 +159,8 @@ def test_a_mirrored_clip_gives_mirrored_boxes(model: DetectorModel) -> None:
     straight, turned_back = (on_vehicles(each) for each in both)
     common = straight.keys() & turned_back.keys()
     offsets = [np.abs(straight[key] - turned_back[key]).max() for key in common]
-    assert len(common) >= 45  # of 50
-    assert median(offsets) < 5  # pixels; measured: 2
+    assert len(common) >= 28  # of 50; measured: 33
+    assert median(offsets) < 8  # pixels; measured: 5
     f1, f1_mirrored = (score_comparison(each).f1 for each in both)
     assert f1_mirrored == pytest.approx(f1, abs=0.1)
 

@@ -9,7 +9,9 @@ import vdet
 from conftest import Run
 from quick import QUICK_OPTIONS
 
-TWO_SHIPPED = "detector.features={patch: 32, hog: {cell: 4}},{patch: 64, hog: {cell: 8}}"
+TWO_SHIPPED = (
+    "detector.features={patch: 32, hog: {cell: 4}},{patch: 64, halved: [], hog: {cell: 8}}"
+)
 """Features of two shipped models."""
 
 
@@ -109,7 +111,7 @@ def test_without_a_model_each_setting_has_the_shipped_one_that_fits_it(
     result = run("eval", "video", clip_path, *options)
     assert result.code == 0, result.err
     features = [each["settings"]["detector.features"] for each in json.loads(result.out)["sweep"]]
-    assert features == ["{patch: 32, hog: {cell: 4}}", "{patch: 64, hog: {cell: 8}}"]
+    assert features == ["{patch: 32, hog: {cell: 4}}", "{patch: 64, halved: [], hog: {cell: 8}}"]
 
 
 def test_truth_of_a_longer_video(

@@ -196,7 +196,8 @@ class TestOtherPackages:
         assert type(detector.detector).__name__ == "FakeSettings"
         assert detector.detector.model_dump() == {
             "kind": "fake",
-            "stride": 1,
+            "searches": 0.0,
+            "stride": 0,
             "level": 9,
             "parts": ({"size": 5},),
             "by_name": {},

@@ -137,7 +137,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         ("features: {color_space: BGR}", 23, "features.color_space: should be 'YCrCb', 'HSV', "),
         ("features: {patch: 62}", 12, "features: patch must be a multiple of hog.cell (4)"),
         ("features: {hog: {block: 8, cell: 16}}", 12, "features: hog.block × hog.cell must not"),
-        ("features: {hog: {channels: [0, 0]}}", 23, "features.hog: channels must differ"),
+        ("features: {hog: {channels: [0, 0]}}", 29, "features.hog.channels: channels must differ"),
         (
             "features: {hog: {channels: []}, histogram: {bins: 0}}",
             12,

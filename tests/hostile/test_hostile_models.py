@@ -163,6 +163,7 @@ def bombs() -> dict[str, tuple[bytes, str]]:
     billion = npy_header("<f4", "(1, 1000000000)")
     many = FEATURES.model_dump(mode="json") | {
         "patch": 256,
+        "halved": [],
         "hog": {"orientations": 32, "cell": 2, "block": 8, "channels": [0, 1, 2]},
     }
     asking = json.dumps({"format": "vdet model", "version": FORMAT_VERSION, "features": many})

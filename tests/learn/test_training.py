@@ -45,6 +45,7 @@ SETTINGS = Settings(
     detector=SvmSettings(
         features=FeatureSettings(
             patch=SIZE,
+            halved=(),
             hog=HogSettings(cell=4, channels=(0,)),
             histogram=HistogramSettings(bins=8),
         )

@@ -80,12 +80,6 @@ class TestFollowFrames:
             assert track.id == 1
             assert track.box.iou(car_at(result.frame.index)) > least
 
-    def test_searches_each_frame_at_the_sets_whose_turn_it_is(self) -> None:
-        for result in follow(drive(5), PERSPECTIVE, threads=2):
-            sizes = set(result.detections.trace.windows.boxes[:, 2].tolist())
-            turn = result.frame.index % PERSPECTIVE.svm.search.alternate
-            assert sizes == [{48}, {64}, set()][turn]
-
     @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
     @pytest.mark.parametrize("threads", [3, 5])
     def test_gives_the_same_with_any_number_of_threads(

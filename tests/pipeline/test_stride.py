@@ -1,6 +1,7 @@
-"""`detector.stride`: the detector searches some frames, and every frame has its tracks."""
+"""The detector searches some frames, and every frame has its tracks."""
 
 import json
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -8,9 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.red_runs import COUNT, follow, outputs, run_red, write
-from red_cars import CAR, PERSPECTIVE, SETTINGS, drive
-from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.detect.detections import NO_DETECTIONS
+from red_cars import PERSPECTIVE, SETTINGS, drive
+from vdet.config.schema import MotionTrackerSettings, Settings, SvmSettings
 from vdet.media import Picture
 from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.result import FrameResult
@@ -102,14 +102,32 @@ def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
     assert (tmp_path / "stages" / "5-boxes.png").exists()
 
 
-def test_no_hit_stays_in_the_heat_for_longer_than_its_frames() -> None:
-    """A car that has gone is not seen any more when so many frames have passed."""
+def test_a_hit_leaves_the_heat_when_as_many_frames_were_searched() -> None:
     settings = strided(2)
-    gone = settings.svm.heat.frames
-    frames = list(drive(2 * gone))
+    searched = settings.svm.heat.frames
+    frames = list(drive(8 * searched))
     empty = Picture(np.full_like(frames[0].image, 90))
-    left = [*frames[:gone], *(type(f)(f.index, f.time, empty) for f in frames[gone:])]
+    left = [*frames[: 2 * searched], *(replace(f, picture=empty) for f in frames[2 * searched :])]
     results = list(follow(left, settings))
-    assert len(results[4].detections) == 1
-    assert results[2 * gone - 2].detections.boxes.shape == NO_DETECTIONS.boxes.shape
-    assert results[4].detections.rounded[0].iou(CAR.moved_to(44, CAR.y)) > 0.5
+    found = [len(result.detections) for result in results if result.searched]
+    assert found[searched - 1] == 1
+    assert not any(found[2 * searched - 1 :])
+
+
+@pytest.mark.parametrize(
+    ("rate", "stride"), [(1, 1), (7.9, 1), (15, 1), (24, 3), (25, 3), (30, 3), (50, 6), (60, 7)]
+)
+def test_at_least_so_many_frames_a_second_are_searched(rate: float, stride: int) -> None:
+    settings = SvmSettings(searches=8)
+    assert settings.stride_at(Fraction(rate)) == stride
+    assert settings.model_copy(update={"stride": 2}).stride_at(Fraction(rate)) == 2
+
+
+def test_every_frame_is_searched_where_no_number_is_given() -> None:
+    assert SvmSettings(searches=0).stride_at(Fraction(25)) == 1
+
+
+def test_which_frames_are_searched_follows_from_the_rate_of_the_video() -> None:
+    detector = PERSPECTIVE.detector.model_copy(update={"searches": 12.0, "stride": 0})
+    results = follow(drive(5), PERSPECTIVE.model_copy(update={"detector": detector}))
+    assert [result.searched for result in results] == [True, False, True, False, True]

@@ -2,31 +2,42 @@
 
 import math
 from collections.abc import Hashable
+from fractions import Fraction as Rational
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from vdet.config.features import FeatureSettings
 from vdet.config.heat import HeatSettings
 from vdet.config.search import SearchSettings
 from vdet.config.section import Fraction, Section
 
+_SEARCHES = (
+    "so many frames a second of a video are searched, or a few more; the tracker moves the "
+    "vehicles on in the others; 0: all frames"
+)
+
 
 class DetectorSettings(Section):
     """Which detector finds vehicles, and its settings; each kind has its own class."""
 
     kind: str
+    searches: float = Field(0.0, ge=0, le=1000, description=_SEARCHES)
     stride: int = Field(
-        1,
-        ge=1,
+        0,
+        ge=0,
         le=100,
-        description="one of so many frames of a video is searched; the tracker moves the vehicles "
-        "on in the others",
+        description="one of so many frames is searched, whatever searches says; 0: as searches "
+        "says",
     )
+
+    def stride_at(self, rate: float | Rational) -> int:
+        """Return that one of so many frames is searched in a video of `rate` frames a second."""
+        return self.stride or max(1, int(rate / (self.searches or rate)))
 
     @property
     def search_key(self) -> Hashable:
-        """What the search of a frame depends on, apart from `stride`.
+        """What the search of a frame depends on, apart from which frames are searched.
 
         Detectors whose settings have the same key and the same stride, and that read the same model
         file, find the same candidates in a frame.
@@ -92,6 +103,7 @@ class SvmSettings(DetectorSettings):
     kind: Literal["svm"] = Field(
         "svm", description="kind of detector; svm: a linear SVM on HOG and colour features"
     )
+    searches: float = Field(8.0, ge=0, le=1000, description=_SEARCHES)
     reference_height: int = Field(
         720,
         ge=16,
@@ -119,17 +131,12 @@ class SvmSettings(DetectorSettings):
         """Return settings without `stills.strength`; the least size stays."""
         return self.model_copy(update={"stills": self.stills.model_copy(update={"strength": 0.0})})
 
-    @model_validator(mode="after")
-    def _heat_sees_every_set(self) -> "SvmSettings":
-        if self.heat.frames < self.search.alternate:
-            raise ValueError("heat.frames must be at least search.alternate")
-        return self
-
 
 class NetworkSettings(DetectorSettings):
     """The detector: a network in an ONNX file, our own or another."""
 
     kind: Literal["net"] = Field("net", description="kind of detector; net: a network")
+    searches: float = Field(12.0, ge=0, le=1000, description=_SEARCHES)
     least: float = Field(0.1, gt=0, lt=1, description="boxes with a lower score are not looked at")
     overlap: Fraction = Field(
         0.55,

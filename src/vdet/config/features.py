@@ -1,12 +1,21 @@
 """The section `detector.features`: which features of a patch the model gets."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from vdet.config.section import Section
 
 ColorSpace = Literal["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
+
+
+def _are_distinct(channels: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(channels)) != len(channels):
+        raise ValueError("channels must differ from one another")
+    return channels
+
+
+ChannelNumbers = Annotated[tuple[Literal[0, 1, 2], ...], AfterValidator(_are_distinct)]
 
 
 class HogSettings(Section):
@@ -19,15 +28,9 @@ class HogSettings(Section):
     block: int = Field(
         2, ge=1, le=8, description="side of a block, cells; neighbouring blocks are one cell apart"
     )
-    channels: tuple[Literal[0, 1, 2], ...] = Field(
+    channels: ChannelNumbers = Field(
         (0, 1, 2), description="channels of the colour space that have HOG features; [] for none"
     )
-
-    @model_validator(mode="after")
-    def _channels_are_distinct(self) -> "HogSettings":
-        if len(set(self.channels)) != len(self.channels):
-            raise ValueError("channels must differ from one another")
-        return self
 
 
 class HistogramSettings(Section):
@@ -53,17 +56,30 @@ class FeatureSettings(Section):
     color_space: ColorSpace = Field(
         "YCrCb", description="colour space: YCrCb, HSV, LUV, HLS, YUV or RGB"
     )
+    halved: ChannelNumbers = Field(
+        (1, 2),
+        description="channels of the colour space that are described at half their size, with HOG "
+        "cells of half the side; video has chroma at half size",
+    )
     hog: HogSettings = HogSettings()
     histogram: HistogramSettings = HistogramSettings()
     spatial: SpatialSettings = SpatialSettings()
 
     @model_validator(mode="after")
     def _cells_fill_the_patch(self) -> "FeatureSettings":
+        if not (self.hog.channels or self.histogram.bins or self.spatial.size):
+            raise ValueError("at least one of hog, histogram and spatial must be on")
         if self.hog.channels:
             if self.patch % self.hog.cell:
                 raise ValueError(f"patch must be a multiple of hog.cell ({self.hog.cell})")
             if self.hog.block * self.hog.cell > self.patch:
                 raise ValueError("hog.block × hog.cell must not exceed patch")
-        elif not (self.histogram.bins or self.spatial.size):
-            raise ValueError("at least one of hog, histogram and spatial must be on")
+            if self.halved and (self.hog.cell % 2 or self.hog.cell < 4):
+                raise ValueError("hog.cell must be even, and 4 or more, or halved must be []")
+        if self.halved and self.patch % 2:
+            raise ValueError("patch must be even, or halved must be []")
         return self
+
+    def shrink(self, channel: int) -> int:
+        """Return how many times smaller than the patch a channel is described: 1 or 2."""
+        return 2 if channel in self.halved else 1

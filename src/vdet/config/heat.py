@@ -29,7 +29,9 @@ class VoteSettings(Section):
 class HeatSettings(Section):
     """How the hits of consecutive frames are summed into a heatmap, and become detections."""
 
-    frames: int = Field(6, ge=1, le=100, description="number of frames whose hits are summed")
+    frames: int = Field(
+        2, ge=1, le=100, description="number of searched frames whose hits are summed"
+    )
     weight: Literal["none", "coverage"] = Field(
         "coverage",
         description="none: a hit adds its probability; coverage: a hit adds its probability "

@@ -100,13 +100,6 @@ class SearchSettings(Section):
         (), max_length=32, description="window sets over fixed rows ([] for none)"
     )
     perspective: PerspectiveSettings = PerspectiveSettings()
-    alternate: int = Field(
-        3,
-        ge=1,
-        le=10,
-        description="number of frames in which all sets of a video are searched once: with 3, "
-        "every third set in each frame",
-    )
 
     def fitted(self, camera: "CameraSearch | None") -> "SearchSettings":
         """Return these settings with those of a camera, where these are the default ones."""

@@ -269,7 +269,7 @@ def follow_frames(
     regions = lay_regions(settings.regions, video.width, video.height)
     detector = limited(detector, regions)
     tracker = make_tracker(settings, video.width, video.height)
-    stride = settings.detector.stride
+    stride = settings.detector.stride_at(video.rate)
 
     def search(numbered: tuple[int, Frame]) -> tuple[Search | None, FrameView | None]:
         position, frame = numbered
@@ -277,7 +277,8 @@ def follow_frames(
         return search_frame(detector, frame, position, stride), view
 
     waiting = partial((waits or Waits()).on, "searching")
-    with map_ordered(search, enumerate(frames), threads, waiting=waiting) as results:
+    ahead = threads * stride  # so that each thread has a frame to search
+    with map_ordered(search, enumerate(frames), threads, ahead=ahead, waiting=waiting) as results:
         for (_, frame), (found, view) in results:
             searched = found is not None
             detections, tracks = follow_frame(detector, tracker, found, frame)

@@ -185,11 +185,13 @@ def map_ordered(
     items: Iterable[T],
     threads: int,
     *,
+    ahead: int | None = None,
     waiting: Callable[[], AbstractContextManager[object]] = nullcontext,
 ) -> Iterator[Iterator[tuple[T, R]]]:
     """Pair items with the results of `function`, computed in parallel, in their order.
 
-    A result is waited for within a context manager that `waiting` returns.
+    At most `ahead` items are taken before the result of the first is waited for, or as many as
+    there are threads. It is waited for within a context manager that `waiting` returns.
     """
 
     def result(future: Future[R]) -> R:
@@ -202,7 +204,7 @@ def map_ordered(
             running: deque[tuple[T, Future[R]]] = deque()
             for item in items:
                 running.append((item, pool.submit(function, item)))
-                if len(running) > threads:
+                if len(running) > (ahead or threads):
                     first, future = running.popleft()
                     yield first, result(future)
             for first, future in running:

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vdet.config.schema import FeatureSettings, HogSettings, WindowSettings
+from seed import SEED
+from vdet.config.schema import FeatureSettings, WindowSettings
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import BoxRegression, LinearModel
@@ -20,7 +21,7 @@ from vdet.synthetic import background_patches, demo_scene, render, vehicle_patch
 
 Exact = npt.NDArray[np.float64]
 
-SEED_FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8))
+SEED_FEATURES = SEED.svm.features
 _EACH = 120  # patches of each class
 
 

@@ -163,7 +163,7 @@ def settings(engine: str) -> SvmSettings:
 
 
 def searched(features: FeatureSettings, engine: str) -> np.ndarray:
-    (windows,) = FrameSearch(model_of(features), settings(engine), 160, 90).search(Picture(NOISE))
+    windows = FrameSearch(model_of(features), settings(engine), 160, 90).search(Picture(NOISE))
     return windows.probabilities
 
 

@@ -129,7 +129,7 @@ def test_lengths_scale_with_the_frame() -> None:
 
 
 class TestDefaultSettings:
-    """Window sets that follow the perspective, alternating; boxes from votes."""
+    """Window sets that follow the perspective; boxes from votes."""
 
     def test_a_car_is_detected_where_it_is(self) -> None:
         detections = detect_still(road(CAR), DEFAULT)
@@ -147,16 +147,6 @@ class TestDefaultSettings:
         assert len(voted) == 2
         for car in cars:
             assert max(box.iou(car) for box in voted) > 0.6
-
-    def test_each_frame_is_searched_with_its_own_window_sets(self) -> None:
-        alternate = DEFAULT.search.alternate
-        images = [road()] * (2 * alternate)
-        traces = [trace_of(each) for each in detect_video(*images, settings=DEFAULT)]
-        sizes = [np.unique(trace.windows.boxes[:, 2]).tolist() for trace in traces]
-        sets = [grid.size for grid in traces[0].grids]
-        assert sets == [48, 64, 80]
-        assert len(sets) >= alternate, "too few sets for every frame to have its own"
-        assert sizes == 2 * [sets[turn::alternate] for turn in range(alternate)]
 
     @pytest.mark.parametrize("x", [-32, WIDTH - 32])
     def test_a_car_half_beyond_the_side_is_detected_and_its_box_ends_there(self, x: int) -> None:
@@ -210,36 +200,27 @@ class TestStillPictures:
         np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
         assert still.rounded == video.rounded
 
-    @pytest.mark.parametrize(
-        ("alternate", "frames"), [(1, 2), (1, 3), (1, 4), (2, 2), (2, 3), (2, 4), (3, 3), (3, 4)]
-    )
-    def test_a_still_picture_is_as_hot_as_a_video_with_alternating_sets(
-        self, alternate: int, frames: int
-    ) -> None:
-        settings = but(but(DEFAULT, "search", alternate=alternate), "heat", frames=frames)
-        *_, video = detect_video(*[road(CAR)] * frames, settings=settings)
-        still = detect_still(road(CAR), settings)
-        np.testing.assert_allclose(
-            trace_of(still).heat.values, trace_of(video).heat.values, atol=1e-6
-        )
+    def test_by_votes_too_it_shows_what_the_video_shows(self) -> None:
+        *_, video = detect_video(*[road(CAR)] * DEFAULT.heat.frames, settings=DEFAULT)
+        still = detect_still(road(CAR), DEFAULT)
         assert still.rounded == video.rounded
         for name in ("strengths", "scores", "centroids"):
             np.testing.assert_allclose(getattr(still, name), getattr(video, name), rtol=1e-5)
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
-    def test_a_still_picture_is_searched_once_with_every_set(
+    def test_a_still_picture_is_searched_once(
         self, settings: SvmSettings, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         calls = []
         search = FrameSearch.search
 
-        def counted(self: FrameSearch, picture: Picture, sets: Any = None) -> Any:
-            calls.append(len(self.grids) if sets is None else len(sets))
-            return search(self, picture, sets)
+        def counted(self: FrameSearch, picture: Picture) -> Any:
+            calls.append(picture)
+            return search(self, picture)
 
         monkeypatch.setattr(FrameSearch, "search", counted)
-        detections = detect_still(road(CAR), but(settings, "heat", frames=6))
-        assert calls == [len(trace_of(detections).grids)]
+        detect_still(road(CAR), but(settings, "heat", frames=6))
+        assert len(calls) == 1
 
     def test_the_windows_of_a_still_picture_are_those_of_every_set(self) -> None:
         trace = trace_of(detect_still(road(CAR), DEFAULT))

@@ -119,6 +119,19 @@ def test_hog_may_be_of_some_channels_in_any_order(channels: tuple[int, ...]) -> 
     )
 
 
+def test_a_halved_channel_is_described_at_half_its_size() -> None:
+    features = seed_but(halved=(1, 2))
+    _, red, blue = split(PATCH, FEATURES)
+    descriptor = cv2.HOGDescriptor((32, 32), (8, 8), (4, 4), (4, 4), 8)
+    hogs = [np.ravel(descriptor.compute(halve(channel))) for channel in (red, blue)]
+    counts = [histogram(halve(channel), 32) for channel in (red, blue)]
+    whole, vector = (FeatureExtractor(each).describe(PATCH) for each in (FEATURES, features))
+    assert Layout.of(features) == Layout.of(FEATURES)
+    np.testing.assert_array_equal(vector[:1568], whole[:1568])
+    np.testing.assert_array_equal(vector[1568:4704], np.concatenate(hogs))
+    np.testing.assert_array_equal(vector[4704:], [*whole[4704:4736], *np.concatenate(counts)])
+
+
 def test_without_hog_only_the_histogram_is_left() -> None:
     extractor = FeatureExtractor(seed_but(hog=NO_HOG))
     assert extractor.layout.hog == ()
@@ -129,7 +142,7 @@ def test_without_hog_only_the_histogram_is_left() -> None:
 
 @pytest.mark.parametrize("patch", [17, 20, 100])
 def test_without_hog_a_patch_need_not_be_a_multiple_of_the_cell(patch: int) -> None:
-    settings = FeatureSettings(patch=patch, hog=NO_HOG)
+    settings = seed_but(patch=patch, hog=NO_HOG)
     assert FeatureExtractor(settings).describe(to_patch(PATCH, patch)).sum() == 3 * patch**2
 
 

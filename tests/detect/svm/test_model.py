@@ -168,6 +168,14 @@ def test_the_features_of_a_model_come_with_it(path: Path) -> None:
     assert load_model(path, features).features == features
 
 
+def test_a_model_that_does_not_say_which_channels_are_halved_has_none(path: Path) -> None:
+    features = SMALL.model_copy(update={"halved": ()})
+    header = header_of(features)
+    del header["features"]["halved"]
+    write_npz(path, header)
+    assert load_model(path).features == features
+
+
 def test_the_sides_of_a_box_are_linear_in_the_hog() -> None:
     weights = np.array([[1, 0], [0, 1], [2, 0], [0, -1]], np.float32)
     regression = BoxRegression(weights, np.array([-0.5, -0.5, 0.5, 0.5], np.float32))

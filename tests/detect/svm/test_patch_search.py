@@ -58,7 +58,7 @@ def test_every_window_is_cropped_resized_described_and_classified(
 
 
 def test_each_channel_of_planes_is_cropped_and_resized() -> None:
-    features = FeatureSettings()
+    features = FeatureSettings(halved=())
     model, extractor = model_of(features), FeatureExtractor(features)
     planes = Planes.of_image(FRAME, Coding(full_range=True))
     red, blue = (each.repeat(2, 0).repeat(2, 1) for each in (planes.red, planes.blue))
@@ -87,7 +87,7 @@ def test_a_window_of_planes_is_seen_about_as_a_patch_of_bgr_is_in_training(
     vectors = extractor.describe_all(to_patch(crop, features.patch) for crop in crops)
     expected = log_odds(model.probabilities(vectors))
     assert expected.std() > 0.5
-    assert np.corrcoef(log_odds(found), expected)[0, 1] > 0.98
+    assert np.corrcoef(log_odds(found), expected)[0, 1] > 0.97
 
 
 def test_probabilities_differ_from_window_to_window() -> None:

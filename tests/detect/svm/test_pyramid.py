@@ -15,8 +15,8 @@ from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 from vdet.media.images import Image
 
-FEATURES = FeatureSettings()
-RGB = FeatureSettings(color_space="RGB")
+FEATURES = FeatureSettings(halved=())
+RGB = FeatureSettings(color_space="RGB", halved=())
 FRAME = np.random.default_rng(0).integers(0, 256, (97, 131, 3), dtype=np.uint8)
 
 
@@ -49,7 +49,7 @@ def spans(length: int) -> st.SearchStrategy[slice]:
 def test_a_cut_is_the_resized_crop_converted_last(
     rows: slice, columns: slice, width: int, height: int, top: int, space: ColorSpace
 ) -> None:
-    features = FeatureSettings(color_space=space)
+    features = FeatureSettings(color_space=space, halved=())
     frame = FramePyramid(Picture(FRAME), features, min(top, rows.start))
     expected = resized(FRAME[rows, columns], width, height, features)
     np.testing.assert_array_equal(frame.cut(rows, columns, width, height), expected)
@@ -258,8 +258,8 @@ class TestPlanes:
         [
             (FEATURES, 15, 16),
             (FEATURES, 16, 15),
-            (FeatureSettings(color_space="HSV"), 16, 16),
-            (FeatureSettings(color_space="YUV"), 16, 16),
+            (FeatureSettings(color_space="HSV", halved=()), 16, 16),
+            (FeatureSettings(color_space="YUV", halved=()), 16, 16),
         ],
         ids=["odd row", "odd margin", "HSV", "YUV"],
     )

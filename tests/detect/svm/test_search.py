@@ -20,7 +20,7 @@ from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.search import FrameSearch, lay_grids
-from vdet.detect.svm.windows import Windows, join_windows
+from vdet.detect.svm.windows import Windows
 from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.geometry import Int32Array
 from vdet.media import Picture
@@ -76,11 +76,9 @@ PERSPECTIVE = SvmSettings(
 )
 
 
-def by_perspective(alternate: int = 2) -> FrameSearch:
+def by_perspective() -> FrameSearch:
     """Return a search with four sets that follow the perspective."""
-    search = PERSPECTIVE.search.model_copy(update={"alternate": alternate})
-    settings = PERSPECTIVE.model_copy(update={"search": search})
-    return FrameSearch(model_of(SMALL), settings, 160, 120, horizon=0.3)
+    return FrameSearch(model_of(SMALL), PERSPECTIVE, 160, 120, horizon=0.3)
 
 
 def with_sides(
@@ -99,13 +97,7 @@ def with_sides(
 
 
 def search_all(search: FrameSearch, image: Image = FRAME) -> Windows:
-    """Search an image with all window sets."""
-    return join_windows(search.search(Picture(image)))
-
-
-def search_frame(search: FrameSearch, index: int) -> Windows:
-    """Search a video's frame with the window sets of its number."""
-    return join_windows(search.search(Picture(FRAME), search.sets_of(index)))
+    return search.search(Picture(image))
 
 
 MEDIAN = float(np.median(search_all(search_of(SMALL)).probabilities))
@@ -244,46 +236,10 @@ class TestSearching:
             assert expected[tuple(box)] == pytest.approx(probability, abs=1e-5)
 
 
-class TestAlternatingSets:
-    """In a video, `alternate` frames together are searched like a single picture."""
-
-    def test_each_set_has_its_own_windows_in_the_order_of_the_grids(self) -> None:
-        search = by_perspective()
-        found = search.search(Picture(FRAME))
-        assert [each.boxes.tolist() for each in found] == [
-            grid.boxes.tolist() for grid in search.grids
-        ]
-        for number, expected in enumerate(found):
-            (alone,) = search.search(Picture(FRAME), [number])
-            assert rows_of(alone) == rows_of(expected)
-
-    @pytest.mark.parametrize("alternate", [1, 2, 3, 4, 9])
-    def test_alternate_frames_together_search_every_set_once(self, alternate: int) -> None:
-        search = by_perspective(alternate)
-        found = [search_frame(search, index) for index in range(alternate)]
-        sizes = [{int(size) for size in each.boxes[:, 2]} for each in found]
-        assert sum(len(each) for each in sizes) == len(set().union(*sizes)) == 4
-        assert all(sizes[:4]), "4 sets take their turns in the first frames"
-        assert sorted(row for each in found for row in rows_of(each)) == sorted(
-            rows_of(search_all(search))
-        )
-
-    def test_sets_repeat_after_alternate_frames(self) -> None:
-        search = by_perspective(3)
-        for index in range(3):
-            assert rows_of(search_frame(search, index)) == rows_of(search_frame(search, index + 3))
-
-    def test_a_single_set_has_its_turn_once_in_alternate_frames(self) -> None:
-        settings = SvmSettings(features=SMALL, search=fixed(SETS[0]), reference_height=120)
-        search = FrameSearch(model_of(SMALL), settings, 160, 120)
-        alternate = settings.search.alternate
-        turns = [list(search.sets_of(index)) for index in range(2 * alternate)]
-        assert turns == 2 * [[0], *[[]] * (alternate - 1)]
-
-    def test_neighbouring_sizes_are_searched_in_different_frames(self) -> None:
-        search = by_perspective(2)
-        sizes = [np.unique(search_frame(search, index).boxes[:, 2]).tolist() for index in (0, 1)]
-        assert sizes == [[16, 32], [24, 48]]
+def test_the_windows_are_those_of_the_grids_in_their_order() -> None:
+    search = by_perspective()
+    expected = np.concatenate([grid.boxes for grid in search.grids])
+    np.testing.assert_array_equal(search_all(search).boxes, expected)
 
 
 class TestVehicles:

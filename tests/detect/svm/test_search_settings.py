@@ -3,13 +3,9 @@
 import pytest
 
 from vdet.config.loading import load_settings
-from vdet.config.schema import HeatSettings, PerspectiveSettings, SearchSettings, SvmSettings
+from vdet.config.schema import PerspectiveSettings
 from vdet.errors import ConfigError
 
-FRAMES = HeatSettings().frames
-"""Number of frames in the heat, by default."""
-ALTERNATE = SearchSettings().alternate
-"""Number of frames that the sets alternate over, by default."""
 WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
 
 
@@ -24,18 +20,9 @@ WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
             "detector.search.perspective.lowest=0.5",
             "detector.search.perspective: lowest must be at least highest",
         ),
-        (
-            f"detector.search.alternate={FRAMES + 1}",
-            "detector: heat.frames must be at least search.alternate",
-        ),
-        (
-            f"detector.heat.frames={ALTERNATE - 1}",
-            "detector: heat.frames must be at least search.alternate",
-        ),
-        (
-            "detector.search.alternate=0",
-            "detector.search.alternate: should be greater than or equal to 1",
-        ),
+        ("detector.heat.frames=0", "detector.heat.frames: should be greater than or equal to 1"),
+        ("detector.searches=-1", "detector.searches: should be greater than or equal to 0"),
+        ("detector.stride=-1", "detector.stride: should be greater than or equal to 0"),
         (
             "detector.search.perspective.sizes=[0.1, 0]",
             "detector.search.perspective.sizes[1]: should be greater",
@@ -81,12 +68,6 @@ def test_fixed_sets_may_stand_alone_and_beside_those_of_the_perspective() -> Non
     alone = load_settings(None, [WINDOWS, "detector.search.perspective.sizes=[]"]).svm.search
     assert alone.windows == both.windows
     assert alone.perspective.sizes == ()
-
-
-def test_the_heat_may_sum_as_few_frames_as_the_sets_alternate_over() -> None:
-    more = max(FRAMES, ALTERNATE) + 1
-    settings = SvmSettings(search=SearchSettings(alternate=more), heat=HeatSettings(frames=more))
-    assert settings.heat.frames == settings.search.alternate == more
 
 
 def test_the_highest_and_lowest_windows_may_be_one_row() -> None:

@@ -9,7 +9,15 @@ import pytest
 
 from detect.svm.engine_comparison import SEED_FEATURES
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
-from vdet.detect.svm.features import Channels, FeatureExtractor, Layout, resize, split, to_patch
+from vdet.detect.svm.features import (
+    Channels,
+    FeatureExtractor,
+    Layout,
+    halve,
+    resize,
+    split,
+    to_patch,
+)
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.strips import (
@@ -24,6 +32,7 @@ from vdet.detect.svm.windows import WindowGrid
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 
+NO_HISTOGRAM = HistogramSettings(bins=0)
 FRAME = np.random.default_rng(0).integers(0, 256, (300, 400, 3), dtype=np.uint8)
 
 
@@ -54,7 +63,7 @@ def test_the_position_of_a_window_is_scaled_by_patch_over_size(
     size: int, step: int, color_space: str
 ) -> None:
     features = FeatureSettings.model_validate(
-        {"patch": 64, "color_space": color_space, "hog": HogSettings(cell=8)}
+        {"patch": 64, "color_space": color_space, "halved": (), "hog": HogSettings(cell=8)}
     )
     grid = WindowGrid(size, Fraction(step), Fraction(6), Fraction(11), 4, 3)
     strip = Strip(grid, features).cut(FramePyramid(Picture(FRAME), features))
@@ -129,7 +138,9 @@ def test_the_sum_of_a_window_is_that_of_its_weighted_blocks(
 
 def test_every_block_of_a_strip_is_described_once() -> None:
     assert describe_blocks(STRIP, SEED_FEATURES).shape == (19, 11, 3 * 4 * 8)
-    large = FeatureSettings(hog=HogSettings(cell=8, block=3, orientations=9, channels=(1,)))
+    large = FeatureSettings(
+        halved=(), hog=HogSettings(cell=8, block=3, orientations=9, channels=(1,))
+    )
     assert describe_blocks(STRIP, large).shape == (18, 10, 9 * 9)
 
 
@@ -147,7 +158,7 @@ def test_a_block_equals_that_of_a_descriptor_around_it() -> None:
 
 def test_channels_are_described_in_the_order_of_the_settings() -> None:
     every = describe_blocks(STRIP, SEED_FEATURES)
-    settings = FeatureSettings(hog=HogSettings(cell=8, channels=(2, 0)))
+    settings = FeatureSettings(halved=(), hog=HogSettings(cell=8, channels=(2, 0)))
     some = describe_blocks(STRIP, settings)
     np.testing.assert_array_equal(some, np.concatenate([every[..., 64:], every[..., :32]], axis=-1))
 
@@ -187,12 +198,14 @@ SMALL_STRIP = noise(40, 70)
 X, Y = np.array([0, 3, 38])[:, np.newaxis], np.array([0, 1, 7, 8])[np.newaxis]
 
 
-def weights_of(bins: int, members: int) -> tuple[StripWeights, np.ndarray]:
+def features_of(bins: int) -> FeatureSettings:
+    histogram = HistogramSettings.model_validate({"bins": bins})
+    return FeatureSettings(halved=(), hog=HogSettings(channels=(0,)), histogram=histogram)
+
+
+def weights_of(features: FeatureSettings, members: int) -> tuple[StripWeights, np.ndarray]:
     """Return a model's sorted weights, and those of its histogram, `(members, 3, bins)`."""
-    features = FeatureSettings(
-        hog=HogSettings(channels=(0,)), histogram=HistogramSettings.model_validate({"bins": bins})
-    )
-    layout = Layout.of(features)
+    layout, bins = Layout.of(features), features.histogram.bins
     weights = np.random.default_rng(bins).normal(size=(members, layout.length)).astype(np.float32)
     model = LinearModel(features, weights, *np.zeros((3, members), np.float32))
     return StripWeights.of(model), weights[:, layout.histogram].reshape(members, 3, bins)
@@ -201,8 +214,9 @@ def weights_of(bins: int, members: int) -> tuple[StripWeights, np.ndarray]:
 @pytest.mark.parametrize("bins", [8, 32, 256])
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_window_sums_the_weights_of_its_histogram(bins: int, members: int) -> None:
-    sorted_weights, weights = weights_of(bins, members)
-    sums = table_sums(SMALL_STRIP, sorted_weights.tables, 32, X, Y)
+    features = features_of(bins)
+    sorted_weights, weights = weights_of(features, members)
+    sums = table_sums(SMALL_STRIP, sorted_weights.tables, features, X, Y)
     assert sums.shape == (members, 3, 4)
     assert sums.dtype == np.float32
     for m, i, j in np.ndindex(*sums.shape):
@@ -213,12 +227,69 @@ def test_a_window_sums_the_weights_of_its_histogram(bins: int, members: int) -> 
 
 
 def test_tables_are_summed_for_a_list_of_windows_too() -> None:
-    tables = weights_of(16, 2)[0].tables
-    grid = table_sums(SMALL_STRIP, tables, 32, X, Y)
-    listed = table_sums(SMALL_STRIP, tables, 32, np.array([38, 0]), np.array([7, 8]))
+    features = features_of(16)
+    tables = weights_of(features, 2)[0].tables
+    grid = table_sums(SMALL_STRIP, tables, features, X, Y)
+    listed = table_sums(SMALL_STRIP, tables, features, np.array([38, 0]), np.array([7, 8]))
     np.testing.assert_array_equal(listed, [[m[2, 2], m[0, 3]] for m in grid])
 
 
 def test_without_a_histogram_nothing_is_added() -> None:
-    tables = weights_of(0, 2)[0].tables
-    assert not table_sums(SMALL_STRIP, tables, 32, X, Y).any()
+    features = features_of(0)
+    tables = weights_of(features, 2)[0].tables
+    assert not table_sums(SMALL_STRIP, tables, features, X, Y).any()
+
+
+class TestHalvedChannels:
+    """A channel at half size has the blocks and windows of the strip at half their pixels."""
+
+    FEATURES = SEED_FEATURES.model_copy(update={"halved": (1, 2)})
+
+    @staticmethod
+    def strip() -> Channels:
+        luma, red, blue = STRIP
+        return luma, halve(red), halve(blue)
+
+    def test_each_is_cut_at_its_size(self) -> None:
+        grid = WindowGrid(96, Fraction(12), Fraction(6), Fraction(11), 4, 3)
+        whole, halved = (
+            Strip(grid, each).cut(FramePyramid(Picture(FRAME), each))
+            for each in (SEED_FEATURES, self.FEATURES)
+        )
+        np.testing.assert_array_equal(halved[0], whole[0])
+        for ours, channel in zip(halved[1:], whole[1:], strict=True):
+            np.testing.assert_array_equal(ours, halve(channel))
+
+    def test_of_planes_too(self) -> None:
+        planes = Planes.of_image(FRAME, Coding(full_range=True))
+        grid = WindowGrid(128, Fraction(16), Fraction(0), Fraction(16), 4, 3)
+        luma, red, blue = Strip(grid, self.FEATURES).cut(
+            FramePyramid(Picture(planes), self.FEATURES)
+        )
+        assert luma.shape == (64 + 2 * 8, 64 + 3 * 8)
+        for ours, plane in ((red, planes.red), (blue, planes.blue)):
+            np.testing.assert_array_equal(ours, halve(plane[8:88, :88]))
+
+    def test_their_blocks_are_those_of_cells_of_half_the_side(self) -> None:
+        ours = describe_blocks(self.strip(), self.FEATURES)
+        half = FeatureSettings(
+            patch=32, halved=(), hog=HogSettings(cell=4, channels=(1, 2)), histogram=NO_HISTOGRAM
+        )
+        _, red, blue = self.strip()
+        expected = describe_blocks((red, red, blue), half)
+        np.testing.assert_array_equal(ours[..., 32:], expected)
+        np.testing.assert_array_equal(
+            ours[..., :32], describe_blocks(STRIP, SEED_FEATURES)[..., :32]
+        )
+
+    def test_a_window_counts_half_its_pixels_across_and_down(self) -> None:
+        tables = weights_of(self.FEATURES, 2)[0].tables
+        strip, x, y = self.strip(), np.array([0, 16, 96]), np.array([0, 8, 32])
+        none = np.zeros_like(tables)
+        for number, channel in enumerate(strip):
+            one = none.copy()
+            one[:, number] = tables[:, number]
+            shrink = 2 if number else 1
+            alone = self.FEATURES.model_copy(update={"patch": 64 // shrink, "halved": ()})
+            expected = table_sums((channel,) * 3, one, alone, x // shrink, y // shrink)
+            np.testing.assert_array_equal(table_sums(strip, one, self.FEATURES, x, y), expected)

@@ -74,7 +74,7 @@ class AlignedSearch:
         blocks = describe_blocks(strip, features)
         at_every_block = block_sums(blocks, self._weights.hog)
         values = at_every_block[:, :: self._cells, :: self._cells]
-        values = values + table_sums(strip, self._weights.tables, features.patch, self._x, self._y)
+        values = values + table_sums(strip, self._weights.tables, features, self._x, self._y)
         by_row = values.transpose(2, 1, 0).reshape(-1, len(values))
         probabilities = self._model.to_probabilities(by_row + self._model.biases)
         return GridResult(probabilities, lambda indices: self._hogs(blocks, indices))
@@ -135,7 +135,7 @@ class LocatedSearch:
     """Searches a grid of any step.
 
     A strip is resized and its gradients are computed once (`HOGDescriptor.compute` with locations).
-    Windows lie on the same strip if they are whole pixels of it apart.
+    Windows lie on the same strip if they are whole pixels of each of its channels apart.
     """
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
@@ -143,8 +143,9 @@ class LocatedSearch:
         self._tables = StripWeights.of(model).tables
         self._windows = len(grid)
         self._phases = list(_phases(grid, model))
-        side = model.features.patch
-        self._hog = hog_descriptor(model.features, (side, side))
+        sides = model.features.patch, model.features.patch
+        channels = model.features.hog.channels
+        self._descriptors = {i: hog_descriptor(model.features, sides, i) for i in channels}
 
     def search(self, frame: FramePyramid) -> GridResult:
         """Return the probability of each window."""
@@ -171,27 +172,24 @@ class LocatedSearch:
     def _decision_values(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
         hogs = self._describe(strip, x, y)
         values = hogs @ self._model.weights[:, : hogs.shape[1]].T + self._model.biases
-        side = self._model.features.patch
-        return np.asarray(values + table_sums(strip, self._tables, side, x, y).T, np.float32)
+        sums = table_sums(strip, self._tables, self._model.features, x, y)
+        return np.asarray(values + sums.T, np.float32)
 
     def _describe(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
         """Return the HOG features of each window, float32 `(n, h)`, channel by channel."""
-        locations = list(zip(x.tolist(), y.tolist(), strict=True))
-        described = [
-            self._hog.compute(strip[number], locations=locations)
-            for number in self._model.features.hog.channels
-        ]
-        return np.concatenate(
-            [np.reshape(vectors, (len(locations), -1)) for vectors in described],
-            axis=1,
-            dtype=np.float32,
-        )
+        described = []
+        for number, hog in self._descriptors.items():
+            shrink = self._model.features.shrink(number)
+            places = zip((x // shrink).tolist(), (y // shrink).tolist(), strict=True)
+            vectors = hog.compute(strip[number], locations=list(places))
+            described.append(np.reshape(vectors, (len(x), -1)))
+        return np.concatenate(described, axis=1, dtype=np.float32)
 
 
 def _phases(grid: WindowGrid, model: LinearModel) -> Iterator[_Phase]:
-    """Split a grid into parts whose windows are whole pixels of a patch apart."""
+    """Split a grid into parts whose windows are whole pixels apart, in each channel of a patch."""
     scale = Fraction(model.features.patch, grid.size)
-    n = (grid.step * scale).denominator
+    n = (grid.step * scale / max(map(model.features.shrink, range(3)))).denominator
     for first_row in range(min(n, grid.rows)):
         for first_column in range(min(n, grid.columns)):
             part = grid.every_nth(n, first_column, first_row)

@@ -17,7 +17,7 @@ from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
-from vdet.detect.svm.windows import Windows, join_windows
+from vdet.detect.svm.windows import Windows
 from vdet.geometry import are_nested
 from vdet.media import Picture
 from vdet.media.images import Image
@@ -40,14 +40,10 @@ the project video, and 0.33 to 0.74 in nine sets of pictures of other roads."""
 class Candidates:
     """What the search of one frame gives.
 
-    `windows` are all that were searched. `by_frame` are the windows that each of one or more
-    consecutive frames adds to the heat: for a frame of a video there is one. A still picture, and a
-    frame of a video of which not all are searched, count as several, each of which adds the sets
-    that it would search in a video.
+    `windows` are all that were searched. A still picture is no frame of a video.
     """
 
     windows: Windows
-    by_frame: tuple[Windows, ...]
     is_still: bool
 
 
@@ -143,22 +139,7 @@ class SvmDetector:
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
-        turns = [self._search.sets_of(frame) for frame in self._frames_for(index)]
-        sets = sorted({number for turn in turns for number in turn})
-        by_set = dict(zip(sets, self._search.search(picture, sets), strict=True))
-        by_frame = tuple(join_windows([by_set[number] for number in turn]) for turn in turns)
-        windows = join_windows(list(by_set.values()))
-        return Candidates(windows, by_frame, is_still=index is None)
-
-    def _frames_for(self, index: int | None) -> range:
-        """Return the frames for which a frame counts: itself, and those that are not searched.
-
-        So no hit stays in the heat for longer than `heat.frames` frames, whatever the stride. A
-        still picture counts for all frames of the heat.
-        """
-        if index is None:
-            return range(self._heat.frames)
-        return range(index, index + min(self._settings.stride, self._heat.frames))
+        return Candidates(self._search.search(picture), is_still=index is None)
 
     def detect(self, candidates: Candidates) -> Detections:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -166,14 +147,13 @@ class SvmDetector:
         A still picture counts as `heat.frames` frames that all show it, so that thresholds mean the
         same as in video.
         """
-        for windows in candidates.by_frame:
-            hits = windows.hits(self._settings.search.probability)
+        hits = candidates.windows.hits(self._settings.search.probability)
+        for _ in range(self._heat.frames if candidates.is_still else 1):
             heat = self._map.update(hits)
             self._recent.append(hits)
         regions = self._regions(heat)
         if candidates.is_still:
             regions = self._shown_in_still(regions, self._settings.stills)
-        hits = candidates.windows.hits(self._settings.search.probability)
         trace = Trace(candidates.windows, hits, heat, self._search.grids)
         detections = self._detections(regions, trace)
         self._count(detections)

@@ -27,7 +27,7 @@ _CONVERSIONS = {
 
 
 Channels = tuple[Image, Image, Image]
-"""The channels of a colour space, uint8 `(H, W)` each."""
+"""The channels of a colour space, uint8 `(H, W)` each; of those in `halved`, `(H / 2, W / 2)`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,8 @@ class FeatureExtractor:
     def __init__(self, settings: FeatureSettings) -> None:
         self.settings = settings
         self.layout = Layout.of(settings)
-        self._hog = hog_descriptor(settings, (settings.patch, settings.patch))
+        sides = settings.patch, settings.patch
+        self._descriptors = {i: hog_descriptor(settings, sides, i) for i in settings.hog.channels}
 
     def describe(self, patch: Image) -> Float32Array:
         """Compute the features of one patch.
@@ -90,9 +91,9 @@ class FeatureExtractor:
         return self.describe_channels(split(patch, self.settings))
 
     def describe_channels(self, channels: Channels) -> Float32Array:
-        """Compute the features of one patch from its channels `(patch, patch)`."""
+        """Compute the features of one patch from its channels."""
         parts: list[npt.ArrayLike] = []
-        parts += [self._hog.compute(channels[i]) for i in self.settings.hog.channels]
+        parts += [hog.compute(channels[i]) for i, hog in self._descriptors.items()]
         if self.settings.histogram.bins:
             parts += [histogram(channel, self.settings.histogram.bins) for channel in channels]
         if side := self.settings.spatial.size:
@@ -110,15 +111,26 @@ class FeatureExtractor:
 
 def split(image: Image, settings: FeatureSettings) -> Channels:
     """Return the channels of the settings' colour space of an image, BGR uint8 `(H, W, 3)`."""
-    return split_channels(np.asarray(cv2.cvtColor(image, _CONVERSIONS[settings.color_space])))
+    channels = split_channels(np.asarray(cv2.cvtColor(image, _CONVERSIONS[settings.color_space])))
+    first, second, third = (
+        halve(channel) if number in settings.halved else channel
+        for number, channel in enumerate(channels)
+    )
+    return first, second, third
 
 
-def hog_descriptor(settings: FeatureSettings, window: tuple[int, int]) -> cv2.HOGDescriptor:
-    """Return OpenCV's descriptor for a window of `(width, height)` pixels, blocks a cell apart."""
-    hog = settings.hog
-    block = hog.block * hog.cell
-    cell = (hog.cell, hog.cell)
-    return cv2.HOGDescriptor(window, (block, block), cell, cell, hog.orientations)
+def hog_descriptor(
+    settings: FeatureSettings, window: tuple[int, int], channel: int
+) -> cv2.HOGDescriptor:
+    """Return OpenCV's descriptor of a channel, blocks a cell apart.
+
+    `window` is its width and height, pixels of the patch; those of the channel may be fewer.
+    """
+    shrink = settings.shrink(channel)
+    width, height = (side // shrink for side in window)
+    side = settings.hog.cell // shrink
+    block, cell = (settings.hog.block * side,) * 2, (side, side)
+    return cv2.HOGDescriptor((width, height), block, cell, cell, settings.hog.orientations)
 
 
 def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:

@@ -211,8 +211,9 @@ def _parse_header(array: npt.NDArray[Any], path: Path) -> dict[str, Any]:
 
 def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
     try:
-        return FeatureSettings.model_validate(header.get("features"))
-    except ValidationError as error:
+        # Older files do not say which channels are halved: none is.
+        return FeatureSettings.model_validate({"halved": ()} | header["features"])
+    except (KeyError, TypeError, ValidationError) as error:
         raise ModelError(
             f"{path}: its feature settings are not understood; train it again"
         ) from error

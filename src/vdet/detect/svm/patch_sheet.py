@@ -35,8 +35,7 @@ def _row(name: str, crop: Image, settings: FeatureSettings) -> Image:
         gray = np.asarray(cv2.cvtColor(channel, cv2.COLOR_GRAY2BGR), np.uint8)
         tiles.append(_captioned(_enlarged(gray), f"{settings.color_space} [{i}]"))
     tiles += [
-        _captioned(_hog_tile(np.asarray(channels[i], np.uint8), settings), f"HOG [{i}]")
-        for i in settings.hog.channels
+        _captioned(_hog_tile(channels[i], settings, i), f"HOG [{i}]") for i in settings.hog.channels
     ]
     if bins := settings.histogram.bins:
         counts = np.stack([histogram(np.asarray(c, np.uint8), bins) for c in channels])
@@ -54,10 +53,10 @@ def _captioned(tile: Image, text: str) -> Image:
     return np.asarray(framed, np.uint8)
 
 
-def _hog_tile(channel: Image, settings: FeatureSettings) -> Image:
+def _hog_tile(channel: Image, settings: FeatureSettings, number: int) -> Image:
     """Draw each cell's edges as lines; a stronger gradient makes a brighter line."""
     tile = np.zeros((TILE, TILE, 3), np.uint8)
-    strengths = _cell_strengths(channel, settings)
+    strengths = _cell_strengths(channel, settings, number)
     _, columns, orientations = strengths.shape
     size = TILE / columns
     for row, column, k in np.argwhere(strengths > 0.05 * strengths.max()).tolist():
@@ -71,11 +70,11 @@ def _hog_tile(channel: Image, settings: FeatureSettings) -> Image:
     return tile
 
 
-def _cell_strengths(channel: Image, settings: FeatureSettings) -> Float64Array:
+def _cell_strengths(channel: Image, settings: FeatureSettings, number: int) -> Float64Array:
     """Average each cell over its blocks; float64 `(rows, columns, orientations)`."""
     hog = settings.hog
     cells, blocks = settings.patch // hog.cell, settings.patch // hog.cell - hog.block + 1
-    vector = hog_descriptor(settings, (settings.patch, settings.patch)).compute(channel)
+    vector = hog_descriptor(settings, (settings.patch,) * 2, number).compute(channel)
     # axes: block column, block row, cell column, cell row, orientation
     values = np.reshape(vector, (blocks, blocks, hog.block, hog.block, hog.orientations))
     total = np.zeros((cells, cells, hog.orientations))

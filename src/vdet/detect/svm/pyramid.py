@@ -1,7 +1,5 @@
 """A frame at full, half, quarter … size, from which strips and windows are cut."""
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
 
@@ -59,22 +57,13 @@ class FramePyramid:
         """
         across, down = self._origin
         sides = rows.start + down, rows.stop + down, columns.start + across, columns.stop + across
-        level = 0
-        while _halves_exactly(sides) and _is_twice(sides, width, height):
-            sides = (sides[0] // 2, sides[1] // 2, sides[2] // 2, sides[3] // 2)
-            level += 1
-        return self._split(
-            [
-                resize(each.at(level)[sides[0] : sides[1], sides[2] : sides[3]], width, height)
-                for each in self._levels
-            ]
+        if len(self._levels) == 1:
+            return split(self._levels[0].cut(sides, width, height), self._features)
+        shrinks = map(self._features.shrink, range(len(self._levels)))
+        first, second, third = (
+            each.cut(sides, width // shrink, height // shrink)
+            for each, shrink in zip(self._levels, shrinks, strict=True)
         )
-
-    def _split(self, parts: Sequence[Image]) -> Channels:
-        """Return the channels of a part of the frame: BGR, or channel by channel."""
-        if len(parts) == 1:
-            return split(parts[0], self._features)
-        first, second, third = parts
         return first, second, third
 
 
@@ -92,10 +81,19 @@ class _Levels:
     def __init__(self, full: Image | None, half: Image | None = None) -> None:
         self._levels = {level: each for level, each in enumerate((full, half)) if each is not None}
 
-    def at(self, level: int) -> Image:
-        """Return the channel, halved `level` times."""
+    def cut(self, sides: tuple[int, int, int, int], width: int, height: int) -> Image:
+        """Return a part, from first row to first row below, resized to `width` × `height`."""
+        level = 0
+        while _halves_exactly(sides) and _is_twice(sides, width, height):
+            sides = (sides[0] // 2, sides[1] // 2, sides[2] // 2, sides[3] // 2)
+            level += 1
+        part = self._at(level)[sides[0] : sides[1], sides[2] : sides[3]]
+        return resize(part, width, height)
+
+    def _at(self, level: int) -> Image:
+        """Return the image, halved `level` times."""
         if level not in self._levels:
-            self._levels[level] = _halved(self.at(level - 1)) if level else _doubled(self.at(1))
+            self._levels[level] = _halved(self._at(level - 1)) if level else _doubled(self._at(1))
         return self._levels[level]
 
 

@@ -1,7 +1,6 @@
 """The search of one frame size: window sets laid over the frame, each searched by an engine."""
 
 import logging
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -15,7 +14,7 @@ from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import NO_WINDOWS, GridResult, WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, join_windows, lay_grid
 from vdet.errors import ConfigError, FrameSizeError, ImageError
 from vdet.geometry import Float32Array
 from vdet.media import Picture
@@ -90,40 +89,23 @@ class FrameSearch:
         if not self.grids:
             raise ImageError("no search window reaches the regions; make them larger, or lower")
         self._sets = [
-            _WindowSet(part, engine(model, part), grid.share) if part else None
+            _WindowSet(part, engine(model, part), grid.share)
             for grid, part in zip(grids, parts, strict=True)
+            if part
         ]
-        self._alternate = settings.search.alternate
+        self._top = min(each.top for each in self._sets) // ALIGNMENT * ALIGNMENT
+        self._bottom = max(each.bottom for each in self._sets)
+        beyond = max(max(-each.left, each.right - width, 0) for each in self._sets)
+        self._margin = -(-beyond // ALIGNMENT) * ALIGNMENT
         self._probability = settings.search.probability
         self._regression = model.box_regression
         self._features = model.features
 
-    def sets_of(self, index: int) -> range:
-        """Return the indices of the sets that are searched in frame `index` of a video."""
-        return range(index % self._alternate, len(self._sets), self._alternate)
-
-    def search(self, picture: Picture, sets: Sequence[int] | None = None) -> list[Windows]:
-        """Search a frame; return the windows of each of the sets.
-
-        Parameters
-        ----------
-        sets
-            Indices of sets, from `sets_of`; None for all of them.
-        """
-        chosen = self._sets if sets is None else [self._sets[index] for index in sets]
-        near = [each for each in chosen if each is not None]
-        if not near:
-            return [NO_WINDOWS] * len(chosen)
-        top = min(each.top for each in near) // ALIGNMENT * ALIGNMENT
-        margin = max(0, -(min(each.left for each in near) // ALIGNMENT * ALIGNMENT))
-        margin = max(margin, max(each.right for each in near) - picture.width)
-        margin = -(-margin // ALIGNMENT) * ALIGNMENT
-        bottom = max(each.bottom for each in near)
-        frame = FramePyramid(picture, self._features, top, bottom, margin=margin)
-        return [
-            self._windows(each, each.search.search(frame)) if each else NO_WINDOWS
-            for each in chosen
-        ]
+    def search(self, picture: Picture) -> Windows:
+        """Search a frame; return the windows of all sets, in the order of `grids`."""
+        frame = FramePyramid(picture, self._features, self._top, self._bottom, margin=self._margin)
+        found = [self._windows(each, each.search.search(frame)) for each in self._sets]
+        return join_windows(found)
 
     def _windows(self, window_set: "_WindowSet", result: GridResult) -> Windows:
         boxes = window_set.boxes

@@ -51,8 +51,8 @@ class StripWeights:
     """The weights of a model with `m` members, in the order in which strips need them.
 
     `hog` is float32 `(m, blocks, blocks, d)`: blocks of a window by column and row, `d` features of
-    a block, channel by channel. `tables` is float32 `(m, 256, 3)`: what a pixel adds to the colour
-    histogram's part of the decision value, by the pixel's value and channel.
+    a block, channel by channel. `tables` is float32 `(m, 3, 256)`: what a pixel adds to the colour
+    histogram's part of the decision value, by the pixel's channel and value.
     """
 
     hog: Float32Array
@@ -74,9 +74,8 @@ def _by_block(weights: Float32Array, features: FeatureSettings) -> Float32Array:
 
 def _tables(weights: Float32Array, bins: int) -> Float32Array:
     if not bins:
-        return np.zeros((len(weights), 256, 3), np.float32)
-    by_channel = weights.reshape(len(weights), 3, bins)
-    return np.ascontiguousarray(np.repeat(by_channel, 256 // bins, axis=2).transpose(0, 2, 1))
+        return np.zeros((len(weights), 3, 256), np.float32)
+    return np.repeat(weights.reshape(len(weights), 3, bins), 256 // bins, axis=2)
 
 
 def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
@@ -85,19 +84,21 @@ def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
     Parameters
     ----------
     strip
-        Channels of `(h, w)` in the features' colour space; both sides whole numbers of cells.
+        Channels in the features' colour space; both sides whole numbers of cells.
 
     Returns
     -------
     float32 `(columns, rows, d)`, `d` features of a block, channel by channel.
     """
-    height, width = strip[0].shape
+    height, width = (side * features.shrink(0) for side in strip[0].shape)
     hog = features.hog
     columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
     # A descriptor whose window is the strip gives each block once, column by column.
-    descriptor = hog_descriptor(features, (width, height))
     blocks = [
-        np.reshape(descriptor.compute(strip[number]), (columns, rows, -1))
+        np.reshape(
+            hog_descriptor(features, (width, height), number).compute(strip[number]),
+            (columns, rows, -1),
+        )
         for number in hog.channels
     ]
     return np.concatenate(blocks, axis=-1, dtype=np.float32)
@@ -162,32 +163,33 @@ def block_sums(blocks: Float32Array, weights: Float32Array) -> Float32Array:
 
 
 def table_sums(
-    strip: Channels, tables: Float32Array, side: int, x: IndexArray, y: IndexArray
+    strip: Channels,
+    tables: Float32Array,
+    features: FeatureSettings,
+    x: IndexArray,
+    y: IndexArray,
 ) -> Float32Array:
-    """Sum look-up tables over the pixels of square windows.
+    """Sum look-up tables over the pixels of windows.
 
     Parameters
     ----------
     strip
-        Channels of `(h, w)`.
+        Channels in the features' colour space.
     tables
-        float32 `(m, 256, 3)`.
-    side
-        Of a window, pixels of the strip.
+        float32 `(m, 3, 256)`.
     x, y
-        Top-left pixels of the windows, of shapes that broadcast.
+        Top-left pixels of the windows in the strip, of shapes that broadcast.
 
     Returns
     -------
     float32 `(m, …)`, `…` being the broadcast shape of `x` and `y`.
     """
-    sums = []
-    for table in tables:
-        first, second, third = (
-            cv2.LUT(channel, np.ascontiguousarray(table[:, number]))
-            for number, channel in enumerate(strip)
-        )
-        integral = np.asarray(cv2.integral(cv2.add(cv2.add(first, second), third)))
-        inner = integral[y + side, x + side] - integral[y, x + side]
-        sums.append(inner - integral[y + side, x] + integral[y, x])
-    return np.asarray(sums, np.float32)
+    sums = np.zeros((len(tables), *np.broadcast_shapes(x.shape, y.shape)), np.float32)
+    for number, channel in enumerate(strip):
+        shrink = features.shrink(number)
+        left, top, side = x // shrink, y // shrink, features.patch // shrink
+        for member, table in enumerate(tables[:, number]):
+            integral = np.asarray(cv2.integral(cv2.LUT(channel, table)))
+            inner = integral[top + side, left + side] - integral[top, left + side]
+            sums[member] += inner - integral[top + side, left] + integral[top, left]
+    return sums

@@ -141,7 +141,7 @@ def follow_variants(
     del images  # else they stay in memory for the whole run
     trackers = [make_tracker(each.settings, *size) for each in variants]
     sections = [each.settings.detector for each in variants]
-    keys = [(section.search_key, section.stride) for section in sections]
+    keys = [(section.search_key, section.stride_at(video.rate)) for section in sections]
     searchers = dict(zip(keys, detectors, strict=True))
     with single_threaded_libraries():
         for position, frame in enumerate(frames):
