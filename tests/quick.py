@@ -31,6 +31,8 @@ FEW_OPTIONS = (
     "--set",
     "detector.search.probability=1",
     "--set",
+    "tracker.needed=5",
+    "--set",
     "output.preset=ultrafast",
 )
 """Options with which a run takes little time, for tests in which nothing need be found."""
