@@ -7,9 +7,14 @@ from typing import TypeVar
 
 import pytest
 
-from vdet.batch.plan import Plan, Total
-from vdet.batch.run import each_once, write_totals
+from running import write_drive
+from vdet.batch.manifest import Origin
+from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, Total, make_plan
+from vdet.batch.run import each_once, run_batch, write_totals
+from vdet.batch.task import Work
+from vdet.config.schema import Settings
 from vdet.errors import OutputError
+from vdet.pipeline.loop import VideoJob
 from vdet.pipeline.sinks.protocol import BatchTotal
 from vdet.workers import WorkerKilledError
 
@@ -66,6 +71,24 @@ def test_items_that_were_in_work_when_a_process_was_killed_are_repeated_one_by_o
     results = dict(each_once(same, range(6), workers))
     assert results == {item: item for item in range(6)}
     assert workers.calls == [[0, 1, 2, 3], [4, 5], [2], [3]]
+
+
+def test_what_is_repeated_may_differ_and_counts_for_its_item() -> None:
+    workers = FakeWorkers(2, deadly=[3], kills_left=1)
+    results = dict(each_once(same, range(4), workers, again=lambda item: item + 10))
+    assert results == {0: 0, 1: 1, 2: 12, 3: 13}
+
+
+def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: Path) -> None:
+    clip = write_drive(tmp_path / "clip.mp4", 3)
+    outputs = OutputOptions([OutputSuffix("tracks", ".csv")])
+    plan = make_plan([clip], tmp_path / "out", VideoJob(Path()), outputs)
+    workers = FakeWorkers(1, deadly=list(enumerate(plan.jobs)), kills_left=1)
+    work = Work(Settings(), None, threads=1)
+    ((job, record),) = run_batch(plan, work, Origin("", None, None), workers=workers)
+    assert len(workers.calls) == 2
+    assert record.error is None
+    assert all(output.path.exists() for output in job.outputs)
 
 
 def test_processes_that_cannot_even_begin_end_the_batch() -> None:

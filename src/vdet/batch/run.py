@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -47,7 +48,9 @@ def run_batch(
     try:
         with (
             open_manifest(plan.manifest, origin) as add,
-            closing(each_once(function, list(enumerate(plan.jobs)), workers)) as results,
+            closing(
+                each_once(function, list(enumerate(plan.jobs)), workers, again=_replacing)
+            ) as results,
         ):
             for (number, job), result in results:
                 record = result or record_of_killed(job)
@@ -78,14 +81,24 @@ def _process_numbered(
     return process_file(job, work=work, progress=progress)
 
 
+def _replacing(numbered: tuple[int, VideoJob]) -> tuple[int, VideoJob]:
+    """Return a job that replaces its outputs: when its process was killed, it may have ended."""
+    number, job = numbered
+    return number, replace(job, overwrite=True)
+
+
 def each_once(
-    function: Callable[[T], R], items: Sequence[T], workers: Workers
+    function: Callable[[T], R],
+    items: Sequence[T],
+    workers: Workers,
+    *,
+    again: Callable[[T], T] = lambda item: item,
 ) -> Generator[tuple[T, R | None]]:
     """Yield every item with its result, in the order in which they end.
 
     The result is None for an item that kills its worker process. When a process is killed, several
     items may be in work, and any of them may be the cause. They are repeated at the end, one by
-    one, so that only the cause is blamed.
+    one, so that only the cause is blamed; `again` returns what is then done in place of an item.
     """
     left = list(items)
     suspects: list[T] = []
@@ -101,7 +114,7 @@ def each_once(
             ended |= error.lost
         left = [item for number, item in enumerate(left) if number not in ended]
     for item in suspects:
-        yield item, _result_alone(function, item, workers)
+        yield item, _result_alone(function, again(item), workers)
 
 
 def _result_alone(function: Callable[[T], R], item: T, workers: Workers) -> R | None:
