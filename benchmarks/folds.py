@@ -33,6 +33,7 @@ from vdet.learn.fitting import fit_patches
 from vdet.learn.training_set import training_set
 from vdet.media import VideoReader
 from vdet.pipeline.loop import peek
+from vdet.pipeline.stride import search_frame
 from vdet.pipeline.threads import single_threaded_libraries
 from vdet.track.factory import make_tracker
 from vdet.workers import make_workers
@@ -138,12 +139,9 @@ def _search(
         ]
         stride = settings.detector.stride_at(info.rate)
         for frame in frames:
-            if frame.index % stride:
-                found.append(None)
-                continue
             block = int(_block_of(np.array([frame.index + 1]), last)[0])
-            candidates = detectors[block].search(frame.picture, frame.index)
-            found.append(candidates.windows.hits(LEAST))
+            search = search_frame(detectors[block], frame, frame.index, stride)
+            found.append(search.candidates.windows.hits(LEAST) if search else None)
     return SearchedVideo(info.width, info.height, float(info.rate), found)
 
 

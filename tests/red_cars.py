@@ -74,8 +74,8 @@ def by_perspective(horizon: float, *sizes: float) -> Settings:
 
 
 PERSPECTIVE = by_perspective(0.35, 0.15, 0.2)
-IN_TURNS = by_perspective(0.35, 0.15, 0.2, 0.25)
-"""With a window set for every frame's turn, of 48, 64 and 80 pixels; all of them find `CAR`."""
+THREE_SETS = by_perspective(0.35, 0.15, 0.2, 0.25)
+"""With window sets of 48, 64 and 80 pixels; all of them find `CAR`."""
 
 
 def red_finder() -> LinearModel:

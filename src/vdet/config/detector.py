@@ -3,7 +3,7 @@
 import math
 from collections.abc import Hashable
 from fractions import Fraction as Rational
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
@@ -12,17 +12,22 @@ from vdet.config.heat import HeatSettings
 from vdet.config.search import SearchSettings
 from vdet.config.section import Fraction, Section
 
-_SEARCHES = (
-    "so many frames a second of a video are searched, or a few more; the tracker moves the "
-    "vehicles on in the others; 0: all frames"
-)
+Searches = Annotated[
+    float,
+    Field(
+        ge=0,
+        le=1000,
+        description="so many frames a second of a video are searched, or a few more; the tracker "
+        "moves the vehicles on in the others; 0: all frames",
+    ),
+]
 
 
 class DetectorSettings(Section):
     """Which detector finds vehicles, and its settings; each kind has its own class."""
 
     kind: str
-    searches: float = Field(0.0, ge=0, le=1000, description=_SEARCHES)
+    searches: Searches = 0.0
     stride: int = Field(
         0,
         ge=0,
@@ -103,7 +108,7 @@ class SvmSettings(DetectorSettings):
     kind: Literal["svm"] = Field(
         "svm", description="kind of detector; svm: a linear SVM on HOG and colour features"
     )
-    searches: float = Field(8.0, ge=0, le=1000, description=_SEARCHES)
+    searches: Searches = 8.0
     reference_height: int = Field(
         720,
         ge=16,
@@ -136,7 +141,7 @@ class NetworkSettings(DetectorSettings):
     """The detector: a network in an ONNX file, our own or another."""
 
     kind: Literal["net"] = Field("net", description="kind of detector; net: a network")
-    searches: float = Field(12.0, ge=0, le=1000, description=_SEARCHES)
+    searches: Searches = 12.0
     least: float = Field(0.1, gt=0, lt=1, description="boxes with a lower score are not looked at")
     overlap: Fraction = Field(
         0.55,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from red_cars import CAR, HEIGHT, IN_TURNS, SETTINGS, WIDTH, by_perspective, red_finder, road
+from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
 from vdet.detect.svm.detector import SvmModel, horizon_of
@@ -24,7 +24,7 @@ from vdet.media.images import Image
 MODEL = red_finder()
 ROWS = SETTINGS.svm
 """Window sets over fixed rows, outlines."""
-DEFAULT = IN_TURNS.svm
+DEFAULT = THREE_SETS.svm
 """Window sets by perspective, alternating; boxes from votes."""
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from red_cars import CAR, HEIGHT, IN_TURNS, SETTINGS, WIDTH, red_finder, road
+from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder, road
 from seed import SEED
 from textured_road import textured_road
 from vdet.config.schema import Settings, SvmSettings
@@ -43,7 +43,7 @@ def test_windows_that_touch_the_area_look_the_same(settings: SvmSettings, box: B
     assert np.allclose(all_windows.shares[near], some.shares[kept])
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, IN_TURNS], ids=["rows", "perspective"])
+@pytest.mark.parametrize("settings", [SETTINGS, THREE_SETS], ids=["rows", "perspective"])
 def test_a_vehicle_in_the_area_is_found_as_before(settings: Settings) -> None:
     detector = SvmModel(red_finder(), settings.svm).for_video(WIDTH, HEIGHT, [road(CAR)])
     assert isinstance(detector, LimitableDetector)

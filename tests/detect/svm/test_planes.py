@@ -7,7 +7,7 @@ import pytest
 
 from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
-from red_cars import CAR, HEIGHT, IN_TURNS, SETTINGS, WIDTH, red_finder
+from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder
 from red_cars import road as plain_road
 from vdet.config.schema import FeatureSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector
@@ -73,7 +73,7 @@ def vehicles_in(picture: Picture) -> Vehicles:
 
 
 @in_any_coding
-@pytest.mark.parametrize("settings", [SETTINGS, IN_TURNS], ids=["rows", "perspective"])
+@pytest.mark.parametrize("settings", [SETTINGS, THREE_SETS], ids=["rows", "perspective"])
 def test_a_model_of_another_colour_space_finds_exactly_the_same(
     settings: Settings, coding: Coding
 ) -> None:

@@ -12,7 +12,7 @@ from fractions import Fraction
 import numpy as np
 
 from vdet.config.schema import FeatureSettings
-from vdet.detect.svm.features import Channels, Layout, hog_descriptor
+from vdet.detect.svm.features import Channels, Layout, patch_descriptors
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.strips import (
@@ -143,9 +143,7 @@ class LocatedSearch:
         self._tables = StripWeights.of(model).tables
         self._windows = len(grid)
         self._phases = list(_phases(grid, model))
-        sides = model.features.patch, model.features.patch
-        channels = model.features.hog.channels
-        self._descriptors = {i: hog_descriptor(model.features, sides, i) for i in channels}
+        self._descriptors = patch_descriptors(model.features)
 
     def search(self, frame: FramePyramid) -> GridResult:
         """Return the probability of each window."""

@@ -73,8 +73,7 @@ class FeatureExtractor:
     def __init__(self, settings: FeatureSettings) -> None:
         self.settings = settings
         self.layout = Layout.of(settings)
-        sides = settings.patch, settings.patch
-        self._descriptors = {i: hog_descriptor(settings, sides, i) for i in settings.hog.channels}
+        self._descriptors = patch_descriptors(settings)
 
     def describe(self, patch: Image) -> Float32Array:
         """Compute the features of one patch.
@@ -131,6 +130,12 @@ def hog_descriptor(
     side = settings.hog.cell // shrink
     block, cell = (settings.hog.block * side,) * 2, (side, side)
     return cv2.HOGDescriptor((width, height), block, cell, cell, settings.hog.orientations)
+
+
+def patch_descriptors(settings: FeatureSettings) -> dict[int, cv2.HOGDescriptor]:
+    """Return the descriptors of a patch, by channel, in the order of the features."""
+    sides = settings.patch, settings.patch
+    return {number: hog_descriptor(settings, sides, number) for number in settings.hog.channels}
 
 
 def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:

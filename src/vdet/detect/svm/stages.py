@@ -40,10 +40,8 @@ def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dic
     features
         The features of the model.
     """
-    patches = {}
-    if len(trace.windows):  # in a frame of a video, none may be near the regions
-        patches["patches"] = patch_sheet(_examples(image, trace.windows), features)
-    return patches | {
+    return {
+        "patches": patch_sheet(_examples(image, trace.windows), features),
         "windows": _draw_window_sets(image, trace.grids),
         "hits": _draw_hits(image, trace.hits),
         "heat": _draw_heat(image, trace.heat),

@@ -52,18 +52,8 @@ class Windows:
         )
 
 
-NO_WINDOWS = Windows(
-    np.empty((0, 4), np.int32),
-    np.empty(0, np.float32),
-    np.empty(0, np.float32),
-    np.empty((0, 4), np.float32),
-)
-
-
 def join_windows(parts: Sequence[Windows]) -> Windows:
-    """Return the windows of several sets as one; parts in the order given."""
-    if not parts:
-        return NO_WINDOWS
+    """Return the windows of one or more sets as one; parts in the order given."""
     return Windows(
         np.concatenate([part.boxes for part in parts]),
         np.concatenate([part.probabilities for part in parts]),
