@@ -20,11 +20,10 @@ from vdet.config.schema import (
     SvmSettings,
     TrainingSettings,
 )
-from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.geometry import Float32Array
 from vdet.learn.extraction import LabelledVectors, SampleVectors
-from vdet.learn.fitting import fit, fit_patches, learn_more
+from vdet.learn.fitting import fit, fit_patches
 from vdet.learn.linear_svm import LinearSvm
 
 COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
@@ -205,54 +204,3 @@ def test_a_fit_has_the_training_part_in_memory_once() -> None:
     )
     peak = peak_memory(lambda: fit_patches(data, np.ones(3000, bool), settings))
     assert peak < 1.5 * (vectors.nbytes + more.nbytes)
-
-
-def turned(vectors: Float32Array, angle: float) -> Float32Array:
-    """Return vectors whose first two features are turned by an angle, radians."""
-    turned = vectors.copy()
-    turned[:, 0] = np.cos(angle) * vectors[:, 0] - np.sin(angle) * vectors[:, 1]
-    turned[:, 1] = np.sin(angle) * vectors[:, 0] + np.cos(angle) * vectors[:, 1]
-    return turned
-
-
-def accuracy(model: LinearModel, vectors: Float32Array, vehicle: npt.NDArray[np.bool_]) -> float:
-    return float(((model.probabilities(vectors) > 0.5) == vehicle).mean())
-
-
-@pytest.mark.parametrize("ensemble", [True, False])
-def test_a_model_learns_more_and_keeps_most_of_what_it_knew(ensemble: bool) -> None:
-    rng = np.random.default_rng(0)
-    known = rng.normal(size=(2000, 24)).astype(np.float32)
-    vehicle = known[:, 0] > 0
-    new = turned(known, 1.2)
-    base = fit(known, vehicle, COLOUR, training(ensemble=ensemble))
-    more = learn_more(base, new.copy(), vehicle, training())
-    assert accuracy(base, known, vehicle) > 0.97
-    assert accuracy(base, new, vehicle) < 0.65
-    assert accuracy(more, new, vehicle) > accuracy(base, new, vehicle) + 0.15
-    assert accuracy(more, known, vehicle) > 0.6
-    np.testing.assert_array_equal(more.slopes, base.slopes)
-
-
-def test_a_model_that_knows_all_that_is_new_stays_as_it_is() -> None:
-    rng = np.random.default_rng(0)
-    vectors = rng.normal(size=(500, 24)).astype(np.float32)
-    vectors = vectors[abs(vectors[:, 0]) > 0.5]
-    vehicle = vectors[:, 0] > 0
-    base = fit(vectors, vehicle, COLOUR, training(C=100.0, ensemble=False))
-    known = abs(base.decision_values(vectors)[:, 0]) > 1.01
-    more = learn_more(base, vectors[known], vehicle[known], training(C=1.0))
-    np.testing.assert_allclose(more.weights, base.weights, atol=1e-4)
-
-
-def test_the_rarer_class_counts_as_much_as_the_other() -> None:
-    rng = np.random.default_rng(0)
-    known = rng.normal(size=(2000, 24)).astype(np.float32)
-    base = fit(known, known[:, 0] > 0, COLOUR, training(ensemble=False))
-    new = turned(known, 1.2)
-    vehicle = known[:, 0] > 0
-    few = ~vehicle | (np.arange(2000) % 10 == 0)
-    more = learn_more(base, new[few], vehicle[few], training())
-    probable = more.probabilities(new)
-    found, alarms = (probable[vehicle] > 0.5).mean(), (probable[~vehicle] > 0.5).mean()
-    assert found == pytest.approx(1 - alarms, abs=0.1)

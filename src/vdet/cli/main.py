@@ -17,8 +17,8 @@ from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
 
 _COMMANDS = (
-    *("adapt", "calibrate", "count", "demo", "detect-image", "detect-video", "doctor", "info"),
-    *("mine", "train", "train-net"),
+    *("calibrate", "count", "demo", "detect-image", "detect-video", "doctor", "info", "mine"),
+    *("train", "train-net"),
 )
 _EVALUATIONS = "images", "patches", "tracks", "video"
 

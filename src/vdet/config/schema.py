@@ -5,7 +5,6 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from pydantic import SerializeAsAny
 
-from vdet.config.adapt import AdaptSettings
 from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
 from vdet.config.detector import (
     DetectorSettings,
@@ -30,7 +29,7 @@ from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
 from vdet.config.regions import RegionSettings, RegionsSettings
 from vdet.config.report import ReportSettings
-from vdet.config.search import CameraSearch, PerspectiveSettings, SearchSettings, WindowSettings
+from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
 from vdet.config.summary import CropSettings, SummarySettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
@@ -43,11 +42,9 @@ from vdet.config.training import (
 from vdet.errors import ConfigError
 
 __all__ = [
-    "AdaptSettings",
     "AugmentationSettings",
     "BoxSettings",
     "CalibrationSettings",
-    "CameraSearch",
     "ColorSpace",
     "CountSettings",
     "CropSettings",
@@ -96,7 +93,6 @@ class Settings(Section):
     lanes: LaneSettings = LaneSettings()
     training: TrainingSettings = TrainingSettings()
     mining: MiningSettings = MiningSettings()
-    adapt: AdaptSettings = AdaptSettings()
     network: NetworkTrainingSettings = NetworkTrainingSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()

@@ -101,23 +101,8 @@ class SearchSettings(Section):
     )
     perspective: PerspectiveSettings = PerspectiveSettings()
 
-    def fitted(self, camera: "CameraSearch | None") -> "SearchSettings":
-        """Return these settings with those of a camera, where these are the default ones."""
-        if camera is None:
-            return self
-        default = SearchSettings()
-        left = [n for n in CameraSearch.model_fields if getattr(self, n) == getattr(default, n)]
-        return self.model_copy(update={name: getattr(camera, name) for name in left})
-
     @model_validator(mode="after")
     def _has_windows(self) -> "SearchSettings":
         if not (self.windows or self.perspective.sizes):
             raise ValueError("windows or perspective.sizes must be given")
         return self
-
-
-class CameraSearch(Section):
-    """What `vdet adapt` fits of a search to a camera; each is as in `SearchSettings`."""
-
-    probability: Fraction
-    perspective: PerspectiveSettings

@@ -115,10 +115,10 @@ def fit_split_boxes(
     if patches.assumed is not None:
         assumed_held = _hold_out(patches.assumed, name, settings.training)
         assumed = training_set(patches.assumed, ~assumed_held)
-    regression = fit_boxes([with_sides(each, ~out) for each, out in parts], assumed, settings)
+    regression = fit_boxes([_with_sides(each, ~out) for each, out in parts], assumed, settings)
     if regression is None:
         return None, None
-    tested = [with_sides(replace(each, augmented=None), out) for each, out in parts]
+    tested = [_with_sides(replace(each, augmented=None), out) for each, out in parts]
     return regression, _error(regression, tested, settings)
 
 
@@ -141,7 +141,7 @@ def fit_boxes(
     return fit_sides(rows, boxes.penalty)
 
 
-def with_sides(data: LabelledVectors, kept: BoolArray) -> SampleVectors:
+def _with_sides(data: LabelledVectors, kept: BoolArray) -> SampleVectors:
     """Return the training set of the kept patches of which at least one side is known."""
     if data.sides is not None:
         kept = kept & np.isfinite(data.sides).any(axis=1)
@@ -182,9 +182,7 @@ class BoxRows:
     weight: float = 1.0
 
 
-def fit_sides(
-    parts: Sequence[BoxRows], penalty: float, prior: BoxRegression | None = None
-) -> BoxRegression:
+def fit_sides(parts: Sequence[BoxRows], penalty: float) -> BoxRegression:
     """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
 
     The rows are taken in blocks, so that they are not copied as a whole.
@@ -193,18 +191,11 @@ def fit_sides(
     ----------
     penalty
         Ridge penalty of the weights of scaled features, for each row of weight 1.
-    prior
-        The penalty is on the change of these weights.
     """
     slopes = np.zeros((4, parts[0].hogs.shape[1]), np.float32)
     biases = np.zeros(4, np.float32)
-    if prior is not None:
-        parts = [replace(part, sides=part.sides - prior.sides(part.hogs)) for part in parts]
-        slopes, biases = prior.weights.copy(), prior.biases.copy()
     for columns, rows in _patterns([~np.isnan(part.sides) for part in parts]):
-        weights, offsets = _Ridge(parts, columns, rows).solve(penalty)
-        slopes[columns] += weights
-        biases[columns] += offsets
+        slopes[columns], biases[columns] = _Ridge(parts, columns, rows).solve(penalty)
     return BoxRegression(slopes, biases)
 
 

@@ -3,7 +3,6 @@
 import logging
 import warnings
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -95,42 +94,6 @@ def fit(
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
     return _to_model(calibrated.calibrated_classifiers_, scaler, features)
-
-
-def learn_more(
-    base: LinearModel, vectors: Float32Array, vehicle: BoolArray, settings: TrainingSettings
-) -> LinearModel:
-    """Let a model learn more patches, without those that it has learnt before.
-
-    The penalty is on the change of the weights. Both classes of the new patches count the same as a
-    whole. The sigmoid stays as it is, since the new patches do not show all vehicles.
-    Source: Yang, Yan and Hauptmann, "Adapting SVM Classifiers to Data with Shifted Distributions",
-    2007.
-
-    Parameters
-    ----------
-    vectors
-        float32 `(n, features)`, of both classes; they are overwritten.
-    vehicle
-        bool `(n,)`.
-    """
-    from sklearn.preprocessing import StandardScaler
-
-    from vdet.learn.linear_svm import LinearSvm
-
-    known = base.decision_values(vectors).mean(axis=1)
-    scaler = StandardScaler(copy=False)
-    scaled = scaler.fit_transform(vectors)
-    shares = np.where(vehicle, np.mean(vehicle), np.mean(~vehicle))
-    svm = LinearSvm(scaled, settings.C, settings.max_iterations, known, 0.5 / shares)
-    svm.fit(np.arange(len(vehicle)), vehicle)
-    change = svm.coef_[0] / scaler.scale_
-    bias = svm.intercept_[0] - change @ scaler.mean_
-    return replace(
-        base,
-        weights=(base.weights + change).astype(np.float32),
-        biases=(base.biases + bias).astype(np.float32),
-    )
 
 
 def _weights(patches: RowNumbers, count: int) -> Float64Array:

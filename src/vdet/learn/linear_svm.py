@@ -29,29 +29,15 @@ class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit
     so that a cross-validation copies no vectors. `C` is the penalty of the errors, `max_iter` the
     most iterations of the solver. `fit` warns with `ConvergenceWarning` if they are not enough. It
     takes no sample weights.
-
-    `weights`, float64 `(n,)`, say how much each row counts; None: 1. `start`, float32 `(n,)`, is
-    added to the decision values: the SVM learns what another one lacks.
-    Source: Yang, Yan and Hauptmann, "Adapting SVM Classifiers to Data with Shifted Distributions",
-    2007.
     """
 
-    def __init__(
-        self,
-        vectors: Float32Array,
-        C: float = 1.0,
-        max_iter: int = 1000,
-        start: Float32Array | None = None,
-        weights: Float64Array | None = None,
-    ) -> None:
+    def __init__(self, vectors: Float32Array, C: float = 1.0, max_iter: int = 1000) -> None:
         self.vectors = vectors
         self.C = C
         self.max_iter = max_iter
-        self.start = start
-        self.weights = weights
 
     def __sklearn_clone__(self) -> "LinearSvm":  # scikit-learn would copy the vectors
-        return LinearSvm(self.vectors, self.C, self.max_iter, self.start, self.weights)
+        return LinearSvm(self.vectors, self.C, self.max_iter)
 
     def fit(self, rows: RowNumbers, y: BoolArray) -> "LinearSvm":
         """Fit to some rows, with labels `y`, bool `(m,)`."""
@@ -59,16 +45,14 @@ class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit
         signs = np.zeros(len(x), np.float32)
         signs[rows] = np.where(y, 1, -1)
         used = abs(signs)
-        counts = used if self.weights is None else (used * self.weights).astype(np.float32)
         scale = 1 / (self.C * len(y))  # the loss of zero weights becomes 1
-        start = np.float32(0) if self.start is None else self.start
 
         def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
             weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
-            errors = np.maximum(0, used - signs * (x @ weights + bias + start))
-            slopes = -2 * self.C * (counts * errors * signs)
+            errors = np.maximum(0, used - signs * (x @ weights + bias))
+            slopes = -2 * self.C * (errors * signs)
             gradient = parameters + np.append(slopes @ x, slopes.sum())
-            squares = float((counts * np.square(errors, dtype=np.float64)).sum())
+            squares = float(np.square(errors, dtype=np.float64).sum())
             value = 0.5 * float(parameters @ parameters) + self.C * squares
             return scale * value, scale * gradient
 
@@ -98,8 +82,6 @@ class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit
         blocks = (rows[start : start + _BLOCK] for start in range(0, len(rows), _BLOCK))
         parts = [self.vectors[block] @ weights for block in blocks]
         distances: Float32Array = np.concatenate([np.zeros(0, np.float32), *parts])
-        if self.start is not None:
-            distances += self.start[rows]
         return distances + np.float32(self.intercept_[0])
 
     def predict(self, rows: RowNumbers) -> BoolArray:

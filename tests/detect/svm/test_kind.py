@@ -1,6 +1,5 @@
 """The linear model under its name: which file is shipped, and which features it must have."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,14 +7,12 @@ import pytest
 from red_cars import red_finder
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import (
-    CameraSearch,
     FeatureSettings,
     HeatSettings,
-    PerspectiveSettings,
     SvmSettings,
 )
 from vdet.detect.factory import load_detector, model_file
-from vdet.detect.svm.kind import requested_features, shipped_model, with_search_of
+from vdet.detect.svm.kind import requested_features, shipped_model
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import ModelError
 
@@ -56,17 +53,3 @@ def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for(
     load_detector(SvmSettings(features=red_finder().features), path)
     with pytest.raises(ModelError, match=r"red\.npz: was trained with other features"):
         load_detector(SvmSettings(features=HSV), path)
-
-
-def test_the_search_of_the_camera_of_a_model_is_taken_where_the_settings_are_the_default() -> None:
-    perspective = PerspectiveSettings(sizes=(0.1, 0.2))
-    model = replace(red_finder(), camera=CameraSearch(probability=0.6, perspective=perspective))
-    default = SvmSettings()
-    fitted = with_search_of(model, default).search
-    assert (fitted.probability, fitted.perspective) == (0.6, perspective)
-    own = default.model_copy(
-        update={"search": default.search.model_copy(update={"probability": 0.5})}
-    )
-    assert with_search_of(model, own).search.probability == 0.5
-    assert with_search_of(model, own).search.perspective == perspective
-    assert with_search_of(red_finder(), own) == own

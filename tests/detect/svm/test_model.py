@@ -14,11 +14,9 @@ import numpy.typing as npt
 import pytest
 
 from vdet.config.schema import (
-    CameraSearch,
     FeatureSettings,
     HistogramSettings,
     HogSettings,
-    PerspectiveSettings,
     SpatialSettings,
 )
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model, save_model
@@ -199,15 +197,6 @@ def test_a_model_without_boxes_is_loaded_without(path: Path) -> None:
     assert load_model(path).box_regression is None
 
 
-def test_the_search_of_a_camera_is_kept(path: Path) -> None:
-    perspective = PerspectiveSettings(sizes=(0.1, 0.2), horizon=0.4)
-    camera = CameraSearch(probability=0.6, perspective=perspective)
-    save_model(replace(model_of(2), camera=camera), path)
-    assert load_model(path).camera == camera
-    save_model(model_of(2), path, overwrite=True)
-    assert load_model(path).camera is None
-
-
 @pytest.mark.parametrize(
     ("name", "array", "message"),
     [
@@ -346,8 +335,6 @@ def test_a_wrongly_declared_compression_is_damage(path: Path, method: int) -> No
         (header_of(provenance=[]), "provenance is not understood"),
         (header_of(provenance="me"), "provenance is not understood"),
         (header_of(provenance=None), "provenance is not understood"),
-        (header_of(camera=None), "the search of its camera is not understood; adapt it again"),
-        (header_of(camera={"probability": 2}), "the search of its camera is not understood"),
     ],
 )
 def test_a_header_that_is_not_understood_is_refused(

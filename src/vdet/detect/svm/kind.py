@@ -5,7 +5,7 @@ from pathlib import Path
 from vdet.config.schema import FeatureSettings, SvmSettings
 from vdet.detect.factory import DetectorKind
 from vdet.detect.svm.detector import SvmModel
-from vdet.detect.svm.model import LinearModel, load_model
+from vdet.detect.svm.model import load_model
 from vdet.errors import ModelError
 
 _MODELS = Path(__file__).parents[2] / "models"
@@ -40,12 +40,7 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    return SvmModel(model, with_search_of(model, settings), is_shipped=path is None)
-
-
-def with_search_of(model: LinearModel, settings: SvmSettings) -> SvmSettings:
-    """Return settings with the search of the camera that a model was adapted to."""
-    return settings.model_copy(update={"search": settings.search.fitted(model.camera)})
+    return SvmModel(model, settings, is_shipped=path is None)
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:

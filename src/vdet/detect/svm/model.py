@@ -19,7 +19,7 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from vdet.archives import open_archive, read_member
-from vdet.config.schema import CameraSearch, FeatureSettings
+from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import Layout
 from vdet.errors import ModelError
 from vdet.files import read_whole, staged
@@ -71,8 +71,6 @@ class LinearModel:
         Where the model comes from: data set, metrics, versions; JSON values.
     box_regression
         None where no training patch came with the box of its vehicle.
-    camera
-        The search of the camera that it was adapted to; None for a model for any camera.
     """
 
     features: FeatureSettings
@@ -82,7 +80,6 @@ class LinearModel:
     offsets: Float32Array
     provenance: dict[str, Any] = field(default_factory=dict)
     box_regression: BoxRegression | None = None
-    camera: CameraSearch | None = None
 
     def probabilities(self, vectors: Float32Array) -> Float32Array:
         """Return the probability that each vector is of a vehicle, `(m, n)` → `(m,)`."""
@@ -106,8 +103,6 @@ def save_model(model: LinearModel, path: Path, *, overwrite: bool = False) -> No
         "features": model.features.model_dump(mode="json"),
         "provenance": model.provenance,
     }
-    if model.camera is not None:
-        header["camera"] = model.camera.model_dump(mode="json")
     arrays = {name: getattr(model, name).astype(np.float32) for name in _ARRAYS}
     if model.box_regression is not None:
         parts = (model.box_regression.weights, model.box_regression.biases)
@@ -138,7 +133,6 @@ def load_model(path: Path, features: FeatureSettings | None = None) -> LinearMod
         **arrays,
         provenance=header.get("provenance", {}),
         box_regression=BoxRegression(*boxes) if boxes else None,
-        camera=_camera(header, path),
     )
     _check_arrays(model, path)
     if features is not None and features != model.features:
@@ -216,17 +210,6 @@ def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
     except (KeyError, TypeError, ValidationError) as error:
         raise ModelError(
             f"{path}: its feature settings are not understood; train it again"
-        ) from error
-
-
-def _camera(header: dict[str, Any], path: Path) -> CameraSearch | None:
-    if "camera" not in header:
-        return None
-    try:
-        return CameraSearch.model_validate(header["camera"])
-    except ValidationError as error:
-        raise ModelError(
-            f"{path}: the search of its camera is not understood; adapt it again"
         ) from error
 
 
