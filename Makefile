@@ -54,15 +54,15 @@ model: $(READY)  ## train the shipped models again: patches and video in DATA, t
 	$(BIN)/vdet train $(PATCHES) -o build/model/start.npz --overwrite
 	$(BIN)/vdet mine $(DATA)/project_video.mp4 --truth $(TRUTH) --model build/model/start.npz \
 		-o build/model/mined.zip --overwrite
-	$(BIN)/vdet train $(PATCHES) build/model/mined.zip -o build/model/default.npz --overwrite
+	$(BIN)/vdet train $(PATCHES) build/model/mined.zip -o build/model/svm.npz --overwrite
 	$(BIN)/vdet train $(PATCHES) -c seed -o build/model/seed.npz --overwrite
-	cp build/model/default.npz build/model/seed.npz src/vdet/models/
+	cp build/model/svm.npz build/model/seed.npz src/vdet/models/
 
 net: $(READY)  ## train the shipped network again (hours): sets of pictures in ROADS, video in DATA
 	mkdir -p build/net
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
-		-c net --video $(DATA)/project_video.mp4 $(TRUTH)
+		--video $(DATA)/project_video.mp4 $(TRUTH)
 	cp build/net/net.onnx src/vdet/models/
 
 unseen: $(READY)  ## measure the network on cameras that it has not seen (hours)

@@ -48,13 +48,13 @@ def main() -> None:
 
 def measure_all(folder: Path, rounds: int) -> list[Measurement]:
     path = find_video(folder)
-    default, seed = shipped_config("default"), shipped_config("seed")
+    svm, seed = shipped_config("svm"), shipped_config("seed")
     pictures = read_pictures(path)
     print(f"measuring on {path.name} …", file=sys.stderr)
     with single_threaded_libraries():
-        searched = search_times(path, pictures, default, seed, rounds)
-        by_height = times_by_height(pictures, default, rounds)
-    ran = run_times(path, default, folder, rounds)
+        searched = search_times(path, pictures, svm, seed, rounds)
+        by_height = times_by_height(pictures, svm, rounds)
+    ran = run_times(path, folder, rounds)
     short = statistics.median(seconds_of_program(path, folder, 1.0) for _ in range(rounds))
     memory = [peak_memory(path, folder, *extra) for extra in ((), ("--frames", "40"))]
     whole, first = memory
@@ -76,16 +76,15 @@ def _search_rows(times: dict[str, float]) -> list[Measurement]:
         detail = f"{1000 * times[over]:.1f} and {1000 * times[under]:.1f} ms a frame"
         return Measurement(name, times[over] / times[under], must, aim, detail)
 
-    dense, decoding = "default dense", "decoding"
+    dense, decoding = "svm dense", "decoding"
     return [
-        row("patch (seed.yaml) / dense (default.yaml)", "seed patch", dense, "≥ 20", "60"),
-        row("patch / dense, both seed.yaml", "seed patch", "seed dense", "≥ 2", "4"),
+        row("patch / dense, windows of seed.yaml", "seed patch", "seed dense", "≥ 2", "4"),
         row("detectMultiScale / dense", "detectMultiScale", dense, "≥ 3", "8"),
         row("dense / decoding to planes", f"{dense} beside decoding", decoding, "≤ 1.2", "0.8"),
         row("network / decoding to planes", "network beside decoding", decoding, "–"),
         row(
-            "network / default, detection of a frame",
-            "network detection", "default detection", "≤ 1.2", "0.8",
+            "network / svm.yaml, detection of a frame",
+            "network detection", "svm detection", "≤ 1.2", "0.8",
         ),
     ]  # fmt: skip
 
@@ -98,8 +97,7 @@ def _run_rows(times: dict[str, float], played: float) -> list[Measurement]:
     times = times | {"played": played}
     return [
         row("detect-video / plain transcode", "detect", "transcode", "≤ 1.3", "1.1"),
-        row("detect-video -c net / plain transcode", "detect with network", "transcode", "–"),
-        row("detect-video -c net / detect-video", "detect with network", "detect", "≤ 1.1", "1"),
+        row("detect-video -c svm / plain transcode", "detect with svm", "transcode", "≤ 1.3"),
         row(
             "detect-video --lanes --camera / without", "detect with lanes", "detect", "≤ 1.35",
         ),
@@ -108,7 +106,7 @@ def _run_rows(times: dict[str, float], played: float) -> list[Measurement]:
             "detect with answers", "detect", "≤ 1.03",
         ),
         row("length / detect-video --no-video", "played", "detect only", "≥ 10", "14"),
-        row("length / detect-video --no-video -c net", "played", "detect only with network", "–"),
+        row("length / detect-video --no-video -c svm", "played", "detect only with svm", "–"),
     ]  # fmt: skip
 
 

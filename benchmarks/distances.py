@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.config.lanes import LaneSettings, PlaceSettings
+from vdet.config.lanes import LaneSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
@@ -59,12 +59,10 @@ LEAST_IOU = 0.5
 
 @dataclass(frozen=True)
 class Drive:
-    """A scene, whether its camera pitches, and a setting."""
+    """A scene, and whether its camera pitches."""
 
     scene: Scene
     pitches: bool = False
-    foot: float = 0.0
-    """Setting `lanes.place.foot`."""
 
     def at(self, index: int) -> Scene:
         """Return the scene as the camera sees it in a frame."""
@@ -84,7 +82,7 @@ class Drive:
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
         view = lane_view(camera, near=max(6.0, nearest), far=42.0)
-        settings = LaneSettings(view=view, place=PlaceSettings(foot=self.foot))
+        settings = LaneSettings(view=view)
         return RoadFinder(LaneRequest(), settings, camera.width, camera.height)
 
 
@@ -109,17 +107,15 @@ def main() -> None:
     """Run the steps, and print a table of each."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.distances", description=__doc__)
     parser.add_argument("steps", nargs="*", help="truth, lane, tracks (default: all)")
-    parser.add_argument("--foot", type=float, default=0.0, help="the setting lanes.place.foot")
     parser.add_argument(
-        "-c", "--config", default="default", help="settings of the detector: default, seed, net"
+        "-c", "--config", default="default", help="settings of the detector: default, svm, seed"
     )
     options = parser.parse_args()
     settings = load_settings(find_config(options.config))
     steps: dict[str, Step] = {"truth": true_lines, "lane": found_lines, "tracks": Shown(settings)}
     for name in options.steps or steps:
         every = 3 if name == "tracks" else 1
-        chosen = [replace(drive, foot=options.foot) for drive in [*drives()][::every]]
-        by_drive = [[*steps[name](drive)] for drive in chosen]
+        by_drive = [[*steps[name](drive)] for drive in [*drives()][::every]]
         print_table(name, [sample for samples in by_drive for sample in samples])
         worst = min(_right(samples) for samples in by_drive)
         print(f"worst of {len(by_drive)} scenes, to {MOST} m: {worst:.1%} within {RIGHT:.0%}\n")
@@ -179,7 +175,7 @@ def by_true_boxes(scene: Scene, index: int, road: Road) -> Iterator[Sample]:
     places = {place.id: place for place in true_places(scene, index)}
     for each in true_boxes(scene, index):
         if must_be_found(each, scene.camera.height):
-            [track] = with_positions([Track(each.id, each.box, 1.0, predicted=False)], road)
+            [track] = with_positions([Track(each.id, each.box, 1.0, predicted=False)], road, 0.0)
             yield Sample(places[each.id], track)
 
 

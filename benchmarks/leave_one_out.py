@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
-from vdet.config.loading import find_config, load_settings
+from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.evaluate.clips.clip import Variant, open_clip
@@ -88,9 +88,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path("build/leave_one_out"))
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    settings = load_settings(
-        find_config("net"), [f"network.steps={arguments.steps}", *_UNCALIBRATED]
-    )
+    settings = load_settings(None, [f"network.steps={arguments.steps}", *_UNCALIBRATED])
     clip = LabelledClip(arguments.video, arguments.truth, settings.network.every)
     sets = sorted(path for path in arguments.roads.iterdir() if path.is_dir())
     results = []
@@ -104,7 +102,7 @@ def main() -> None:
     path = arguments.work / "results.json"
     path.write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
     job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx")
-    network = train(job, load_settings(find_config("net"), [f"network.steps={arguments.steps}"]))
+    network = train(job, load_settings(None, [f"network.steps={arguments.steps}"]))
     print("\n".join(video_lines(clip, network, settings)))
 
 

@@ -10,12 +10,11 @@ from pathlib import Path
 import av
 from av.video.frame import PictureType
 
-from benchmarks.material import ShippedConfig
 from benchmarks.rounds import Task, measure
 from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
 from vdet.config.draw import DrawSettings
 from vdet.config.regions import RegionSettings, RegionsSettings
-from vdet.config.schema import NetworkSettings, OutputSettings, Settings
+from vdet.config.schema import OutputSettings, Settings, SvmSettings
 from vdet.config.section import Section
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
@@ -49,37 +48,37 @@ ANSWERS: dict[str, Section] = {
 """A region that leaves nothing out, three lines and two zones, and trails."""
 
 
-def run_times(path: Path, default: ShippedConfig, folder: Path, rounds: int) -> dict[str, float]:
+def run_times(path: Path, folder: Path, rounds: int) -> dict[str, float]:
     """Return the seconds that the first `FRAMES` frames take.
 
     Keys: `transcode` (decoded, and encoded with the same settings), `detect` (vehicles detected,
-    drawn and written), `detect with lanes`, `detect with network`, `detect with answers`
-    (`ANSWERS`, counts and records of vehicles too), `detect only` and `detect only with network`
-    (nothing written).
+    drawn and written), `detect with lanes`, `detect with svm`, `detect with answers` (`ANSWERS`,
+    counts and records of vehicles too), `detect only` and `detect only with svm` (nothing written).
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)
     files = Output("counts", folder / "counts.csv"), Output("summary", folder / "cars.csv")
-    model, network = default.detector, load_detector(NetworkSettings())
-    answering = default.settings.model_copy(update=ANSWERS)
+    default, svm = Settings(), Settings(detector=SvmSettings())
+    answering = default.model_copy(update=ANSWERS)
+    model, linear = load_detector(default.detector), load_detector(svm.detector)
 
     def detect(
         detector: DetectorModel,
         outputs: tuple[Output, ...] = video,
-        settings: Settings = default.settings,
+        settings: Settings = default,
         lanes: LaneRequest | None = None,
     ) -> None:
         job = VideoJob(path, outputs, frames=FRAMES, lanes=lanes, overwrite=True)
         run_video(job, detector, settings)
 
     tasks: dict[str, Task] = {
-        "transcode": partial(_transcode, path, folder / "transcoded.mp4", default.settings.output),
+        "transcode": partial(_transcode, path, folder / "transcoded.mp4", default.output),
         "detect": partial(detect, model),
         "detect with lanes": partial(detect, model, lanes=LaneRequest(CAMERA)),
-        "detect with network": partial(detect, network),
+        "detect with svm": partial(detect, linear, settings=svm),
         "detect with answers": partial(detect, model, (*video, *files), answering),
         "detect only": partial(detect, model, ()),
-        "detect only with network": partial(detect, network, ()),
+        "detect only with svm": partial(detect, linear, (), svm),
     }
     return measure(tasks, rounds)
 

@@ -19,10 +19,10 @@ from vdet.media.coding import Coding
 HEIGHTS = (720, 1080, 2160)
 DECODED = 60
 RATE = 25  # frames a second of the project video
-_OF_DEFAULT, _OF_NETWORK = (each.stride_at(RATE) for each in (SvmSettings(), NetworkSettings()))
+_OF_SVM, _OF_NETWORK = (each.stride_at(RATE) for each in (SvmSettings(), NetworkSettings()))
 _STRIDES = {
-    "default dense": _OF_DEFAULT,
-    "default detection": _OF_DEFAULT,
+    "svm dense": _OF_SVM,
+    "svm detection": _OF_SVM,
     "network detection": _OF_NETWORK,
 }
 
@@ -30,7 +30,7 @@ _STRIDES = {
 def search_times(
     path: Path,
     pictures: Sequence[Picture],
-    default: ShippedConfig,
+    svm: ShippedConfig,
     seed: ShippedConfig,
     rounds: int,
 ) -> dict[str, float]:
@@ -39,18 +39,18 @@ def search_times(
     Where not every frame of the video is searched, the searched ones count for the others too.
     """
     searches = {
-        "default dense": _search(default, "dense", pictures),
+        "svm dense": _search(svm, "dense", pictures),
         "seed patch": _search(seed, "patch", pictures),
         "seed dense": _search(seed, "dense", pictures),
         "detectMultiScale": _detect_multi_scale(pictures),
-        "default detection": _detection(SvmSettings(), pictures),
+        "svm detection": _detection(SvmSettings(), pictures),
         "network detection": _detection(NetworkSettings(), pictures),
     }
     times = measure(searches, rounds)
     per_frame = {
         name: seconds / len(pictures) / _STRIDES.get(name, 1) for name, seconds in times.items()
     }
-    return per_frame | _decoding(path, default, pictures, rounds)
+    return per_frame | _decoding(path, svm, pictures, rounds)
 
 
 def _search(config: ShippedConfig, engine: str, pictures: Sequence[Picture]) -> Task:
@@ -92,7 +92,7 @@ def _detect_multi_scale(pictures: Sequence[Picture]) -> Task:
 
 
 def _decoding(
-    path: Path, default: ShippedConfig, pictures: Sequence[Picture], rounds: int
+    path: Path, svm: ShippedConfig, pictures: Sequence[Picture], rounds: int
 ) -> dict[str, float]:
     """Time decoding to planes with one thread, interleaved with search and network."""
 
@@ -105,27 +105,27 @@ def _decoding(
 
     tasks = {
         "decoding": decode,
-        "default": _search(default, "dense", pictures),
+        "svm": _search(svm, "dense", pictures),
         "network": _detection(NetworkSettings(), pictures),
     }
     times = measure(tasks, rounds)
     return {
         "decoding": times["decoding"] / DECODED,
-        "default dense beside decoding": times["default"] / len(pictures) / _OF_DEFAULT,
+        "svm dense beside decoding": times["svm"] / len(pictures) / _OF_SVM,
         "network beside decoding": times["network"] / len(pictures) / _OF_NETWORK,
     }
 
 
 def times_by_height(
-    pictures: Sequence[Picture], default: ShippedConfig, rounds: int
+    pictures: Sequence[Picture], svm: ShippedConfig, rounds: int
 ) -> dict[int, float]:
-    """Return the default search's seconds a frame for frames of several heights."""
+    """Return the dense search's seconds a frame for frames of several heights."""
     images = [picture.image for picture in pictures[:3]]
     tasks: dict[str, Task] = {}
     for height in HEIGHTS:
         width = images[0].shape[1] * height // images[0].shape[0]
         scaled = [np.asarray(cv2.resize(image, (width, height)), np.uint8) for image in images]
         planes = [Picture(Planes.of_image(image, Coding())) for image in scaled]
-        tasks[str(height)] = _search(default, "dense", planes)
+        tasks[str(height)] = _search(svm, "dense", planes)
     times = measure(tasks, rounds)
     return {int(name): seconds / len(images) for name, seconds in times.items()}

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import av
 
-from benchmarks.material import find_video, shipped_config
+from benchmarks.material import find_video
+from vdet.config.schema import Settings
+from vdet.detect.factory import load_detector
 from vdet.pipeline.loop import VideoJob, run_video
 from vdet.pipeline.sinks.protocol import Output
 
@@ -167,8 +169,9 @@ def main() -> None:
             Output("tracks", folder / "out.jsonl"),
         )
         job = VideoJob(folder / "long.mp4", outputs, frames=frames)
-        default = shipped_config("default")
-        summary = run_video(job, default.detector, default.settings, progress=monitor)
+        settings = Settings()
+        detector = load_detector(settings.detector)
+        summary = run_video(job, detector, settings, progress=monitor)
     print(file=sys.stderr)
     print("\n".join(table(monitor.samples)))
     first, last = tenths(monitor.samples)

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import settings
 
 from vdet.cli import main
-from vdet.config.schema import AugmentationSettings, Settings, TrainingSettings
+from vdet.config.schema import AugmentationSettings, Settings, SvmSettings, TrainingSettings
 from vdet.detect.svm.model import save_model
 from vdet.learn.dataset import find_patches
 from vdet.learn.training import train
@@ -67,7 +67,9 @@ def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     """A model with the default features, trained on generated patches and nothing made of them."""
     path = tmp_path_factory.mktemp("model") / "model.npz"
     plain = TrainingSettings(augmentation=AugmentationSettings(mirror=False, cut=0, parts=0))
-    model, _ = train(find_patches([patches_path]), Settings(training=plain), jobs=1)
+    model, _ = train(
+        find_patches([patches_path]), Settings(detector=SvmSettings(), training=plain), jobs=1
+    )
     save_model(model, path)
     return path
 

@@ -85,7 +85,7 @@ def test_what_is_no_bgr_image_is_refused(image: Any) -> None:
 
 def test_a_picture_too_small_is_an_image_error() -> None:
     with pytest.raises(vdet.VdetError, match="no search window fits"):
-        vdet.Detector().detect(np.zeros((8, 8, 3), np.uint8))
+        vdet.Detector(vdet.load_settings("svm")).detect(np.zeros((8, 8, 3), np.uint8))
 
 
 def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> None:

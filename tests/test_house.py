@@ -16,8 +16,9 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 400
 
 ROOMS = (
-    "__main__", "process", "cli", "testing", "api", "batch", "learn", "evaluate", "pipeline",
-    "pages", "summary", "count", "formats", "lanes", "track", "detect", "synthetic", "draw",
+    "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate",
+    "pipeline", "pages", "summary", "count", "formats", "lanes", "track", "detect", "synthetic",
+    "draw",
     "regions", "media", "config", "plugins", "workers", "archives", "files", "temporary",
     "polygons", "geometry", "errors", "__init__",
 )  # fmt: skip

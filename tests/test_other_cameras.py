@@ -15,7 +15,7 @@ from statistics import median
 import numpy as np
 import pytest
 
-from vdet.config.schema import Settings
+from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import horizon_of
@@ -33,7 +33,7 @@ from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import Light, Scene
 
-DEFAULT = Settings()
+LINEAR = Settings(detector=SvmSettings())
 FRAMES = 30
 SCORED = range(20, FRAMES)
 """Frames in which a vehicle has had time to be shown."""
@@ -72,7 +72,7 @@ each_camera = pytest.mark.parametrize("case", CASES.values(), ids=CASES.keys())
 
 @pytest.fixture(scope="module")
 def model() -> DetectorModel:
-    return load_detector(DEFAULT.detector)
+    return load_detector(LINEAR.detector)
 
 
 def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) -> LabelledVideo:
@@ -84,7 +84,7 @@ def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) ->
         detector = model.for_video(camera.width, camera.height, images)
         return LabelledVideo.from_rows(
             row(result.frame.index, track.id, track.box)
-            for result in follow_frames(clip, detector, DEFAULT, video)
+            for result in follow_frames(clip, detector, LINEAR, video)
             for track in result.tracks
             if result.frame.index in SCORED
         )
@@ -133,7 +133,7 @@ def on_vehicles(comparison: Comparison) -> dict[tuple[int, int], Float64Array]:
 @each_camera
 def test_the_horizon_is_found(case: Case) -> None:
     images, _ = peek(frames(case.scene))
-    horizon = horizon_of(DEFAULT.svm, images)
+    horizon = horizon_of(LINEAR.svm, images)
     assert horizon == pytest.approx(case.camera.horizon / case.camera.height, abs=0.03)
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from conftest import Run
 from seed import SEED
-from vdet.config.schema import Settings, SvmSettings
+from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.kind import shipped_model
@@ -28,7 +28,7 @@ from vdet.media.images import read_image
 pytestmark = pytest.mark.realdata
 
 
-DEFAULT = Settings().svm
+DEFAULT = SvmSettings()
 ORIGINAL = SEED.svm.model_copy(
     update={"search": SEED.svm.search.model_copy(update={"engine": "patch"})}
 )
@@ -53,7 +53,7 @@ def with_model(settings: SvmSettings) -> Shipped:
     return Shipped(settings, load_model(shipped_model(settings)))
 
 
-@pytest.fixture(scope="module", params=["default", "seed"])
+@pytest.fixture(scope="module", params=["svm", "seed"])
 def shipped(real_data: Path, request: pytest.FixtureRequest) -> Shipped:
     assert real_data.is_dir()
     return with_model(ORIGINAL if request.param == "seed" else DEFAULT)
@@ -115,7 +115,7 @@ def test_the_seed_finds_the_white_and_the_black_car_apart(real_data: Path) -> No
     assert white != black
 
 
-@pytest.mark.parametrize("config", ["default", "seed"])
+@pytest.mark.parametrize("config", ["default", "svm", "seed"])
 def test_every_photograph_is_searched(run: Run, real_data: Path, config: str) -> None:
     result = run("detect-image", real_data / "test_images", "--json", "-", "-c", config)
     assert result.code == 0, result.err
@@ -129,7 +129,7 @@ def test_every_photograph_is_searched(run: Run, real_data: Path, config: str) ->
             assert frame_box.intersection(box) == box
 
 
-@pytest.mark.parametrize("config", ["default", "seed"])
+@pytest.mark.parametrize("config", ["default", "svm", "seed"])
 def test_both_cars_are_followed_through_the_video(
     run: Run, real_data: Path, tmp_path: Path, config: str
 ) -> None:
@@ -157,21 +157,27 @@ def test_both_cars_are_followed_through_the_video(
     assert followed["white"].isdisjoint(followed["black"])
 
 
-def test_the_default_finds_vehicles_once_and_tightly(run: Run, real_data: Path) -> None:
-    """The README gives these figures of the labelled frames, which are also training data."""
+@pytest.mark.parametrize(
+    ("config", "f1", "iou", "delay"), [("default", 0.99, 0.92, 8), ("svm", 0.97, 0.85, 30)]
+)
+def test_vehicles_are_found_once_and_tightly(
+    run: Run, real_data: Path, config: str, f1: float, iou: float, delay: int
+) -> None:
+    """Give the figures of the labelled frames, which are also training data."""
     name = "project_video_0001-0880.txt"
     places = [real_data / name, real_data.parent / "labels" / name]
     truth = next((place for place in places if place.exists()), None)
     if truth is None:
         pytest.skip("the truth of the video is not here; data/README.md tells what it is")
     video = real_data / "project_video.mp4"
-    result = run("eval", "video", video, "--truth", truth, "--json", "-")
+    result = run("eval", "video", video, "--truth", truth, "--json", "-", "-c", config)
     assert result.code == 0, result.err
     scores = json.loads(result.out)["total"]
-    assert scores["f1"] >= 0.95
-    assert scores["mean_iou"] >= 0.85
+    assert scores["f1"] >= f1
+    assert scores["mean_iou"] >= iou
     assert scores["idf1"] >= 0.95
-    assert scores["id_switches"] == scores["false_tracks"] == 0
+    assert scores["id_switches"] == 0
+    assert scores["false_tracks"] <= 1
     delays = [each["found"] - each["appears"] for each in scores["first_detections"]]
     assert len(delays) == 2
-    assert max(delays) <= 30
+    assert max(delays) <= delay

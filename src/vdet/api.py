@@ -1,7 +1,10 @@
 """What Python users call: vehicles in NumPy frames, in pictures and in videos.
 
-Images are BGR uint8 arrays `(H, W, 3)`, as OpenCV reads them. Where `settings` is None the default
-settings are used, where `model` is None the shipped model file that fits the settings.
+Images are BGR uint8 arrays `(H, W, 3)`, as OpenCV reads them.
+
+The detector is the network where neither `settings` nor `model` is given. A model file decides
+which detector runs: the linear model with .npz, a network with .onnx. Settings choose a detector
+too, for example `load_settings("svm")`; without `model`, the shipped file that fits them is used.
 """
 
 import os
@@ -10,6 +13,7 @@ from fractions import Fraction
 from os import PathLike
 from pathlib import Path
 
+from vdet.config.kinds import kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
@@ -87,7 +91,7 @@ class Detector:
     """
 
     def __init__(self, settings: Settings | None = None, model: PathName | None = None) -> None:
-        self._settings = settings or Settings()
+        self._settings = _settings(settings, model)
         self._model = load_detector(self._settings.detector, _path(model))
 
     def detect(self, image: Image) -> Detections:
@@ -171,7 +175,7 @@ def follow(
     VideoError
         The video cannot be read or searched.
     """
-    settings = settings or Settings()
+    settings = _settings(settings, model)
     detector = load_detector(settings.detector, _path(model))
     reader = VideoReader(
         Path(source),
@@ -222,7 +226,7 @@ def detect_video(
     VdetError
         As the command `vdet detect-video`.
     """
-    settings = settings or Settings()
+    settings = _settings(settings, model)
     named = {"video": video, "tracks": tracks, **(outputs or {})}
     wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
     job = VideoJob(Path(source), wanted, overwrite=overwrite)
@@ -253,13 +257,20 @@ def detect_image(
     VdetError
         As the command `vdet detect-image`.
     """
-    settings = settings or Settings()
+    settings = _settings(settings, model)
     named = {"picture": picture, **(outputs or {})}
     wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
     check_sinks(wanted, overwrite=overwrite, inputs=[Path(source)])
     job = PictureJob(Path(source), wanted)
     detector = load_detector(settings.detector, _path(model))
     return run_picture(job, detector, settings, overwrite=overwrite).detections
+
+
+def _settings(settings: Settings | None, model: PathName | None) -> Settings:
+    """Return the settings, or those of the detector that a model file is for."""
+    if settings is not None:
+        return settings
+    return load_layers(detector=kind_of_model(Path(model)) if model else None)
 
 
 def _path(path: PathName | None) -> Path | None:

@@ -89,7 +89,7 @@ def test_what_cannot_be_is_said_before_any_work(
     run: Run, clip_path: Path, truth_path: Path, arguments: tuple[str, ...], code: int, words: str
 ) -> None:
     named = [str(truth_path.with_name(a)) if a.endswith(".txt") else a for a in arguments]
-    result = run("eval", "video", clip_path, *named)
+    result = run("eval", "video", clip_path, "-c", "svm", *named)
     assert (result.code, result.out) == (code, "")
     assert words in result.err
 
@@ -107,8 +107,8 @@ def test_a_model_that_is_given_must_fit_all_settings(
 def test_without_a_model_each_setting_has_the_shipped_one_that_fits_it(
     run: Run, clip_path: Path, truth_path: Path
 ) -> None:
-    options = ("--truth", truth_path, "--until", "2", "--sweep", TWO_SHIPPED, "--json", "-")
-    result = run("eval", "video", clip_path, *options)
+    options = ("--truth", truth_path, "--until", "2", "-c", "svm", "--json", "-")
+    result = run("eval", "video", clip_path, *options, "--sweep", TWO_SHIPPED)
     assert result.code == 0, result.err
     features = [each["settings"]["detector.features"] for each in json.loads(result.out)["sweep"]]
     assert features == ["{patch: 32, hog: {cell: 4}}", "{patch: 64, halved: [], hog: {cell: 8}}"]

@@ -24,7 +24,7 @@ NETWORK = (
 )
 
 
-@pytest.mark.parametrize(("name", "told"), [("default.npz", LINEAR), ("net.onnx", NETWORK)])
+@pytest.mark.parametrize(("name", "told"), [("svm.npz", LINEAR), ("net.onnx", NETWORK)])
 def test_a_shipped_model_says_what_it_was_trained_on(
     run: Run, name: str, told: Sequence[str]
 ) -> None:
@@ -54,7 +54,7 @@ def test_a_file_that_is_no_model_is_an_error(run: Run, tmp_path: Path) -> None:
 
 
 def test_a_model_is_described_as_json_too(run: Run) -> None:
-    for name, kind in (("default.npz", "linear model"), ("net.onnx", "network")):
+    for name, kind in (("svm.npz", "linear model"), ("net.onnx", "network")):
         result = run("info", MODELS / name, "--json", "-")
         values = json.loads(result.out)
         assert (values["kind"], values["file"]) == (kind, str(MODELS / name))

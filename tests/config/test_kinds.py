@@ -10,9 +10,9 @@ from vdet.config.loading import load_settings
 from vdet.config.rendering import render
 from vdet.config.schema import (
     MotionTrackerSettings,
+    NetworkSettings,
     RulesTrackerSettings,
     Settings,
-    SvmSettings,
 )
 from vdet.errors import ConfigError
 
@@ -37,9 +37,9 @@ def refusal(path: Path, text: str, *assignments: str) -> list[str]:
 
 
 class TestLayers:
-    def test_by_default_the_detector_is_the_svm_and_the_tracker_follows_motion(self) -> None:
+    def test_by_default_the_detector_is_the_network_and_the_tracker_follows_motion(self) -> None:
         settings = load_settings()
-        assert settings.detector == SvmSettings()
+        assert settings.detector == NetworkSettings()
         assert settings.tracker == MotionTrackerSettings()
 
     def test_a_file_chooses_a_kind_and_changes_its_keys(self, path: Path) -> None:
@@ -198,6 +198,7 @@ class TestOtherPackages:
             "kind": "fake",
             "searches": 0.0,
             "stride": 0,
+            "foot": 0.0,
             "level": 9,
             "parts": ({"size": 5},),
             "by_name": {},
@@ -224,7 +225,7 @@ class TestOtherPackages:
 
     def test_its_keys_are_known_to_belong_to_it(self) -> None:
         with pytest.raises(
-            ConfigError, match=r"detector\.level: belongs to detector\.kind: fake, .* with svm$"
+            ConfigError, match=r"detector\.level: belongs to detector\.kind: fake, .* with net$"
         ):
             load_settings(None, ["detector.level=9"])
 

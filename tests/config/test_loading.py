@@ -25,6 +25,7 @@ detector:
 """
 FIRST = WindowSettings(size=64, step=1, top=0, bottom=100)
 SECOND = WindowSettings(size=96, step=1, top=0, bottom=200)
+SVM = Settings(detector=SvmSettings())
 
 
 @pytest.fixture
@@ -34,7 +35,7 @@ def path(tmp_path: Path) -> Path:
 
 def load(path: Path, text: str, *assignments: str) -> Settings:
     path.write_text(text, encoding="utf-8")
-    return load_settings(path, assignments)
+    return load_settings(path, assignments, detector="svm")
 
 
 def refusal(path: Path, text: str, *assignments: str) -> list[str]:
@@ -49,7 +50,7 @@ def test_without_file_and_assignments_the_settings_are_the_defaults() -> None:
 
 
 def test_an_empty_file_changes_nothing(path: Path) -> None:
-    assert load(path, "") == Settings()
+    assert load(path, "") == SVM
 
 
 def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
@@ -57,7 +58,7 @@ def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
     heat = HeatSettings(frames=5)
     expected = Settings(detector=SvmSettings(heat=heat), training=TrainingSettings(C=0.001))
     assert loaded == expected
-    assert loaded.svm.heat.threshold == Settings().svm.heat.threshold
+    assert loaded.svm.heat.threshold == SVM.svm.heat.threshold
 
 
 def test_assignments_lie_over_the_file_and_later_ones_over_earlier_ones(path: Path) -> None:
@@ -82,7 +83,7 @@ def test_a_list_in_an_assignment_replaces_the_whole_list_in_the_file(path: Path)
 
 
 def test_an_assignment_may_name_one_item_of_a_list() -> None:
-    loaded = load_settings(None, ["detector.search.perspective.sizes.1=0.07"])
+    loaded = load_settings(None, ["detector.search.perspective.sizes.1=0.07"], detector="svm")
     first, _, *others = SearchSettings().perspective.sizes
     assert loaded.svm.search.perspective.sizes == (first, 0.07, *others)
 
@@ -248,7 +249,7 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
     assignment: str, message: str
 ) -> None:
     with pytest.raises(ConfigError) as error:
-        load_settings(None, [f"detector.{assignment}"])
+        load_settings(None, [f"detector.{assignment}"], detector="svm")
     (line,) = str(error.value).split("\n")
     assert line.startswith(f"--set: detector.{message}")
 
@@ -263,7 +264,7 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
 )
 def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, message: str) -> None:
     with pytest.raises(ConfigError) as error:
-        load_settings(None, [assignment])
+        load_settings(None, [assignment], detector="svm")
     (line,) = str(error.value).split("\n")
     assert line.startswith(f"--set: {message}")
 
@@ -356,7 +357,7 @@ def test_any_assignment_gives_settings_or_a_config_error(text: str) -> None:
 def test_a_section_of_which_nothing_is_given_stays_as_it_was(tmp_path: Path) -> None:
     file = tmp_path / "my.yaml"
     file.write_text("detector:\n  # kind: svm\n  heat:\n    # threshold: 2\ntracker:\n")
-    assert load_settings(file) == load_settings()
+    assert load_settings(file, detector="svm") == SVM
 
 
 @pytest.fixture
@@ -383,4 +384,4 @@ class TestFindConfig:
     def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:
         with pytest.raises(ConfigError) as error:
             find_config(name)
-        assert str(error.value) == f"{name}: no such file; shipped configs are: default, net, seed"
+        assert str(error.value) == f"{name}: no such file; shipped configs are: default, seed, svm"

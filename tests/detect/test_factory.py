@@ -14,6 +14,7 @@ from vdet.config.detector import DetectorSettings
 from vdet.config.loading import load_settings
 from vdet.config.schema import FeatureSettings, NetworkSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector, model_file, trained_on
+from vdet.detect.onnx.detector import NetworkModel
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import load_model, save_model
@@ -24,15 +25,26 @@ OTHER = FeatureSettings(color_space="HSV")
 
 
 class TestLinearModel:
-    def test_the_default_detector_is_the_shipped_linear_model(self) -> None:
-        model = load_detector(Settings().detector)
-        assert isinstance(model, SvmModel)
+    def test_the_default_detector_is_the_shipped_network(self) -> None:
+        assert isinstance(load_detector(Settings().detector), NetworkModel)
         shipped = model_file(Settings().detector)
         assert shipped is not None
-        assert shipped.stem == "default"
-        assert load_model(shipped).features == FeatureSettings()
+        assert shipped.name == "net.onnx"
 
-    @pytest.mark.parametrize("name", ["default", "seed"])
+    @pytest.mark.parametrize(
+        ("settings", "file", "kinds"),
+        [
+            (SvmSettings(), "their.onnx", "net, but the settings choose svm"),
+            (NetworkSettings(), "mine.npz", "svm, but the settings choose net"),
+        ],
+    )
+    def test_a_model_for_another_detector_than_that_of_the_settings_is_refused(
+        self, settings: DetectorSettings, file: str, kinds: str
+    ) -> None:
+        with pytest.raises(ConfigError, match=f"^{file}: is a model for detector.kind: {kinds}; "):
+            load_detector(settings, Path(file))
+
+    @pytest.mark.parametrize("name", ["svm", "seed"])
     def test_the_shipped_model_is_the_one_with_the_features_of_the_settings(
         self, name: str
     ) -> None:
@@ -68,7 +80,7 @@ class TestLinearModel:
             load_detector(SvmSettings(features=OTHER), default)
 
     def test_the_names_of_the_data_that_the_shipped_models_have_seen_are_known(self) -> None:
-        settings = Settings().detector
+        settings = SvmSettings()
         names = trained_on(settings, model_file(settings))
         assert {"KITTI_extracted", "GTI_Far", "mined_project_video"} <= set(names)
         assert trained_on(settings, None) == ()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.red_runs import video_info
-from vdet.config.lanes import LaneSettings, PlaceSettings
+from vdet.config.lanes import LaneSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.detections import Detections
 from vdet.geometry import Box
@@ -27,7 +27,7 @@ WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 SETTINGS = Settings(
-    lanes=LaneSettings(view=lane_view(CAMERA, near=6, far=42), place=PlaceSettings(foot=0)),
+    lanes=LaneSettings(view=lane_view(CAMERA, near=6, far=42)),
     tracker=MotionTrackerSettings(needed=0.05),
 )
 SCENE = Scene(
@@ -110,8 +110,8 @@ def track_at(box: Box) -> Track:
 
 def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
     box = Box(300, 200, 60, 50)
-    [plain] = with_positions([track_at(box)], road)
-    [lower] = with_positions([replace(track_at(box), whole_foot=(330.0, 270.0))], road)
+    [plain] = with_positions([track_at(box)], road, 0)
+    [lower] = with_positions([replace(track_at(box), whole_foot=(330.0, 270.0))], road, 0)
     assert plain.distance is not None
     assert lower.distance is not None
     assert lower.distance < plain.distance
@@ -119,8 +119,7 @@ def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
 
 def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road) -> None:
     low, right = track_at(Box(300, 200, 60, 50)), track_at(Box(300, 200, 60, 45))
-    shortening = replace(road, settings=PlaceSettings(foot=0.1))
-    [shortened], [expected] = with_positions([low], shortening), with_positions([right], road)
+    [shortened], [expected] = with_positions([low], road, 0.1), with_positions([right], road, 0)
     assert expected.distance is not None
     assert shortened.distance == pytest.approx(expected.distance)
     assert shortened.box == low.box
@@ -133,6 +132,6 @@ def test_a_vehicle_whose_foot_is_not_on_the_road_in_the_frame_has_none(
     road: Road, box: Box
 ) -> None:
     old = replace(track_at(box), distance=1.0, lane=1)
-    [track] = with_positions([old], road)
+    [track] = with_positions([old], road, 0)
     assert (track.distance, track.lane) == (None, None)
     assert replace(track, distance=1.0, lane=1) == old, "nothing else changes"

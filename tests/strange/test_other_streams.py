@@ -103,7 +103,7 @@ def assert_complete(shown: Shown, size: tuple[int, int]) -> None:
 def test_frames_too_small_for_any_window_pass_with_a_warning(
     size: tuple[int, int], tmp_path: Path, process: Process
 ) -> None:
-    shown = process(_tiny(tmp_path / "tiny.mkv", size))
+    shown = process(_tiny(tmp_path / "tiny.mkv", size), "-c", "svm")
     assert_complete(shown, size)
     (warning,) = shown.warnings
     width, height = size
@@ -125,7 +125,7 @@ def test_frames_with_too_many_windows_are_refused(run: Run, tmp_path: Path) -> N
         tmp_path / "wide.mkv", size=(16_000, 100), count=1, codec="ffv1", pix_fmt="bgr0"
     )
     fine = "detector.search.windows=[{size: 60, overlap: 0.9, top: 0, bottom: 720}]"
-    result = run("detect-video", source, tmp_path / "out.mp4", "--set", fine)
+    result = run("detect-video", source, tmp_path / "out.mp4", "-c", "svm", "--set", fine)
     assert result.code == 1
     assert "wide.mkv: " in result.err
     assert "search windows would be laid" in result.err

@@ -56,7 +56,7 @@ log = logging.getLogger("vdet")
 @sink_option
 @lane_options
 @model_option
-@settings_options("detector.stills.strength=0.2")
+@settings_options("detector.still_score=0.5")
 @overwrite_option
 @click.pass_obj
 def detect_image(

@@ -24,7 +24,7 @@ SHARE = click.FloatRange(0, 1)
 @click.command(
     cls=Command,
     examples=(
-        "vdet eval images pictures/ -c net",
+        "vdet eval images pictures/",
         "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
     ),
 )
@@ -45,7 +45,7 @@ SHARE = click.FloatRange(0, 1)
     help="Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
 )
 @model_option
-@settings_options("detector.kind=net")
+@settings_options("detector.still_score=0.5")
 @results_options
 @click.pass_obj
 def images(

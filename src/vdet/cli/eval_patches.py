@@ -78,7 +78,7 @@ def patches(
 
     if model_path is not None and splits:
         raise click.UsageError("--split trains new models; leave it out, or --model")
-    settings = read_settings(config_name, assignments)
+    settings = read_settings(config_name, assignments, detector="svm")
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     inputs = [*data, *([model_path] if model_path else [])]
     check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)

@@ -96,7 +96,7 @@ def mine(
         raise click.UsageError("--until must not be before --from")
     if output.suffix.lower() != ".zip":
         raise OutputError(f"{output}: patches are written as .zip; name it so")
-    settings = read_whole_frame_settings(config_name, assignments, model_path)
+    settings = read_whole_frame_settings(config_name, assignments, model_path, detector="svm")
     file = model_file(settings.detector, model_path)
     inputs = [*sources, *truths, *([file] if file else [])]
     check_output(output, overwrite=overwrite, inputs=inputs)

@@ -12,6 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from vdet.cli.messages import print_lines, progress_steps
+from vdet.config.kinds import kind_of_model
 from vdet.config.loading import find_config, load_settings, shipped_configs
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
@@ -81,7 +82,7 @@ def settings_options(example: str) -> Callable[[F], F]:
             "config_name",
             metavar="FILE",
             shell_complete=_complete_configs,
-            help="Read settings from a YAML file, or from a shipped one: default, seed or net.",
+            help="Read settings from a YAML file, or from a shipped one: default, svm or seed.",
         )(command)
 
     return add
@@ -114,29 +115,36 @@ def read_settings(
     *,
     roi: Path | None = None,
     lines: Path | None = None,
+    detector: str | None = None,
 ) -> Settings:
     """Read the settings that `settings_options`, `roi_option` and `lines_option` ask for.
 
-    A model in ONNX form is a network.
+    The model file decides which detector runs; without one, `detector` is the kind, or the default
+    where it is None.
     """
-    if config_name is None and model_path is not None and model_path.suffix.lower() == ".onnx":
-        config_name = "net"
+    if model_path is not None:
+        detector = kind_of_model(model_path) or detector
     path = find_config(config_name) if config_name else None
     named = {"regions": roi, "counts": lines}
-    return load_settings(path, assignments, {name: file for name, file in named.items() if file})
+    places = {name: file for name, file in named.items() if file}
+    return load_settings(path, assignments, places, detector=detector)
 
 
 def read_whole_frame_settings(
-    config_name: str | None, assignments: tuple[str, ...], model_path: Path | None = None
+    config_name: str | None,
+    assignments: tuple[str, ...],
+    model_path: Path | None = None,
+    *,
+    detector: str | None = None,
 ) -> Settings:
-    """Read the settings of a command that looks at whole frames.
+    """Read the settings of a command that looks at whole frames; arguments as of `read_settings`.
 
     Raises
     ------
     ConfigError
         They have regions, which would not have an effect.
     """
-    settings = read_settings(config_name, assignments, model_path)
+    settings = read_settings(config_name, assignments, model_path, detector=detector)
     if settings.regions:
         raise ConfigError("regions: this command looks at whole frames; leave the regions out")
     return settings
@@ -164,7 +172,8 @@ model_option = click.option(
     type=PATH,
     metavar="FILE",
     show_default="the shipped one that fits the settings",
-    help="Model file of the detector.",
+    help="Model file of the detector: .npz, which vdet train wrote, or .onnx, a network. It "
+    "decides which detector runs.",
 )
 
 sink_option = click.option(

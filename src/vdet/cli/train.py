@@ -68,7 +68,7 @@ def train(
 
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
-    settings = read_settings(config_name, assignments)
+    settings = read_settings(config_name, assignments, detector="svm")
     if output.suffix.lower() != ".npz":
         raise OutputError(f"{output}: models are written as .npz; name it so")
     report_path = output.with_suffix(".json")

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Hashable
 from fractions import Fraction as Rational
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
 
@@ -23,8 +23,25 @@ Searches = Annotated[
 ]
 
 
+Foot = Annotated[
+    float,
+    Field(
+        ge=-0.5,
+        le=0.5,
+        description="how far boxes end below the tyres, share of their height; taken off before "
+        "the distance of a vehicle is measured",
+    ),
+]
+
+
 class DetectorSettings(Section):
-    """Which detector finds vehicles, and its settings; each kind has its own class."""
+    """Which detector finds vehicles, and its settings; each kind has its own class.
+
+    `model_suffix` is the ending of its model files; None for a kind whose files have no ending of
+    their own.
+    """
+
+    model_suffix: ClassVar[str | None] = None
 
     kind: str
     searches: Searches = 0.0
@@ -35,6 +52,7 @@ class DetectorSettings(Section):
         description="one of so many frames is searched, whatever searches says; 0: as searches "
         "says",
     )
+    foot: Foot = 0.0
 
     def stride_at(self, rate: float | Rational) -> int:
         """Return that one of so many frames is searched in a video of `rate` frames a second."""
@@ -105,10 +123,13 @@ class ScoreSettings(Section):
 class SvmSettings(DetectorSettings):
     """The detector: a linear SVM on HOG and colour features, sliding windows and a heatmap."""
 
+    model_suffix: ClassVar[str | None] = ".npz"
+
     kind: Literal["svm"] = Field(
         "svm", description="kind of detector; svm: a linear SVM on HOG and colour features"
     )
     searches: Searches = 8.0
+    foot: Foot = 0.04
     reference_height: int = Field(
         720,
         ge=16,
@@ -139,6 +160,8 @@ class SvmSettings(DetectorSettings):
 
 class NetworkSettings(DetectorSettings):
     """The detector: a network in an ONNX file, our own or another."""
+
+    model_suffix: ClassVar[str | None] = ".onnx"
 
     kind: Literal["net"] = Field("net", description="kind of detector; net: a network")
     searches: Searches = 12.0

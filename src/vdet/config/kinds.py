@@ -1,8 +1,11 @@
 """Sections of which there are several kinds: the detectors and the trackers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from vdet.config.schema import (
+    DetectorSettings,
     MotionTrackerSettings,
     NetworkSettings,
     RulesTrackerSettings,
@@ -29,7 +32,7 @@ class SectionKinds:
 
     key: str
     group: str
-    built_in: dict[str, type[Section]]
+    built_in: Mapping[str, type[Section]]
 
     @property
     def names(self) -> list[str]:
@@ -60,10 +63,18 @@ class SectionKinds:
         )
 
 
+_DETECTORS: dict[str, type[DetectorSettings]] = {"svm": SvmSettings, "net": NetworkSettings}
+
 SECTIONS_WITH_KINDS = {
-    "detector": SectionKinds("kind", DETECTORS, {"svm": SvmSettings, "net": NetworkSettings}),
+    "detector": SectionKinds("kind", DETECTORS, _DETECTORS),
     "tracker": SectionKinds(
         "method", TRACKERS, {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings}
     ),
 }
 """By the name of the section."""
+
+
+def kind_of_model(path: Path) -> str | None:
+    """Return the kind of detector that a model file is for; None where its ending does not say."""
+    suffix = path.suffix.lower()
+    return next((kind for kind, each in _DETECTORS.items() if each.model_suffix == suffix), None)

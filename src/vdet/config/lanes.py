@@ -160,10 +160,6 @@ class PlaceSettings(Section):
         0.005, description="a box that ends this near to the left, right or lower edge of the "
         "frame, as a share of the frame, is cut off: its distance is not told"
     )  # fmt: skip
-    foot: float = Field(
-        0.04, ge=-0.5, le=0.5, description="how far boxes end below the tyres, share of their "
-        "height, taken off before the distance is measured; 0.04 is that of the linear model"
-    )  # fmt: skip
     lanes: int = Field(
         3, ge=0, le=20, description="number of lanes to each side of the own one that are told"
     )  # fmt: skip

@@ -27,6 +27,9 @@ _PACKAGE = Path(__file__).parents[1]
 # In a wheel the configs lie in the package; in a work tree beside `src`.
 _CONFIGS = (_PACKAGE / "configs", _PACKAGE.parents[1] / "configs")
 
+_ALIASES = {"net": "default"}
+"""Other names of shipped configs."""
+
 _YAML_SUFFIXES = (".yaml", ".yml")
 
 Chosen = Mapping[str, type[Section]]
@@ -45,8 +48,8 @@ def find_config(name: str) -> Path:
     if path.is_file():
         return path
     shipped = shipped_configs()
-    if name in shipped:
-        return shipped[name]
+    if (known := _ALIASES.get(name, name)) in shipped:
+        return shipped[known]
     raise ConfigError(f"{name}: no such file; shipped configs are: {', '.join(shipped)}")
 
 
@@ -59,8 +62,12 @@ def load_settings(
     path: Path | None = None,
     assignments: Sequence[str] = (),
     places: Mapping[str, Path] | None = None,
+    *,
+    detector: str | None = None,
 ) -> Settings:
     """Read settings: defaults, then the file at `path`, then assignments such as `output.crf=18`.
+
+    `detector` is the kind of detector where no layer chooses one; None for the default.
 
     `places` are files by the name of a section with places in the frame (`PlacedSection`). Such a
     file holds the keys of this section; for `regions` one that is not named `.yaml` or `.yml` is a
@@ -77,7 +84,8 @@ def load_settings(
         One line for each mistake, with file, line, column, key and what was expected.
     """
     errors: list[str] = []
-    layers = [read_document(path)] if path else []
+    layers = [Document("defaults", {"detector": {"kind": detector}})] if detector else []
+    layers += [read_document(path)] if path else []
     layers += [_read_places(name, file) for name, file in (places or {}).items()]
     layers.append(_read_assignments(assignments, errors))
     merged, chosen = _merge(layers, errors)
@@ -181,6 +189,7 @@ _KIND_KEYS: dict[Key, SectionKinds] = {
 }
 _RENAMED: dict[Key, str] = {
     ("output", "scores"): "draw.label, as in draw.label: [id, score]",
+    ("lanes", "place", "foot"): "detector.foot",
 }
 _EXPECTED = {
     "model_type": "should be a section, key: value",

@@ -86,7 +86,7 @@ __all__ = [
 class Settings(Section):
     """All settings, one field for each section."""
 
-    detector: SerializeAsAny[DetectorSettings] = SvmSettings()
+    detector: SerializeAsAny[DetectorSettings] = NetworkSettings()
     tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
     regions: RegionsSettings = RegionsSettings()
     counts: CountSettings = CountSettings()
@@ -106,7 +106,7 @@ class Settings(Section):
         """The settings of the linear SVM. Raises `ConfigError` where the detector is another."""
         if not isinstance(self.detector, SvmSettings):
             raise ConfigError(
-                f"detector.kind: is {self.detector.kind}; this command works on the linear model, "
-                "so set it to svm"
+                f"detector.kind: is {self.detector.kind}; this command works on the linear model: "
+                "leave that setting out, or give -c svm"
             )
         return self.detector

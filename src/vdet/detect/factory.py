@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vdet.config.kinds import kind_of_model
 from vdet.config.schema import DetectorSettings
 from vdet.detect.protocol import DetectorModel
+from vdet.errors import ConfigError
 from vdet.plugins import DETECTORS, load_plugin
 
 
@@ -47,10 +49,16 @@ def load_detector(settings: DetectorSettings, model: Path | None = None) -> Dete
     Raises
     ------
     ConfigError
-        There is no detector of that name.
+        There is no detector of that name, or the model file is for a detector of another kind.
     ModelError
         The model file cannot be used.
     """
+    kind = kind_of_model(model) if model else None
+    if kind and settings.model_suffix and kind != settings.kind:
+        raise ConfigError(
+            f"{model}: is a model for detector.kind: {kind}, but the settings choose "
+            f"{settings.kind}; leave out -c or --set that choose it, or give another model"
+        )
     return _kind(settings).load(settings, model)
 
 

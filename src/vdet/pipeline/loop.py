@@ -286,7 +286,7 @@ def follow_frames(
             road = roads.update(view, boxes) if roads and view else None
             if regions is not None:
                 tracks = tuple(track for track in tracks if regions.contains(track.foot))
-            placed = with_positions(tracks, road)
+            placed = with_positions(tracks, road, settings.detector.foot)
             yield FrameResult(
                 video.path, frame, detections, placed, road, detector, searched=searched
             )

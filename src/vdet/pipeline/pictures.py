@@ -186,7 +186,7 @@ def detect_picture(
     with _named(source):
         road = _road(image, tracks, settings, lanes) if lanes else None
     frame = Frame(0, Fraction(0), Picture(image))
-    placed = with_positions(tracks, road)
+    placed = with_positions(tracks, road, settings.detector.foot)
     return FrameResult(source, frame, detections, placed, road, detector)
 
 

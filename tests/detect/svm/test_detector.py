@@ -28,11 +28,9 @@ DEFAULT = THREE_SETS.svm
 """Window sets by perspective, alternating; boxes from votes."""
 
 
-def detect_video(
-    *images: Image, settings: SvmSettings = ROWS, is_shipped: bool = False
-) -> list[Detections]:
+def detect_video(*images: Image, settings: SvmSettings = ROWS) -> list[Detections]:
     """Give the detections in consecutive frames of a video."""
-    model = SvmModel(MODEL, settings, is_shipped=is_shipped)
+    model = SvmModel(MODEL, settings)
     detector = model.for_video(WIDTH, HEIGHT, images[:1])
     return [detector.detect(detector.search(Picture(image), i)) for i, image in enumerate(images)]
 
@@ -368,37 +366,3 @@ class TestScores:
             assert np.isfinite(
                 scores_of(0, 1e-3, 1, 1e6, middle=settings.middle, slope=slope)
             ).all()
-
-
-class TestUnknownRoad:
-    """A road on which many detections of the shipped model are doubtful is told, once."""
-
-    WARNING = "does not seem to know this road: 150 of 150 detections are doubtful"
-
-    def drive(
-        self,
-        middle: float,
-        caplog: pytest.LogCaptureFixture,
-        frames: int = 160,
-        *,
-        is_shipped: bool = True,
-    ) -> str:
-        *_, seen = detect_video(road(CAR), road(CAR))
-        settings = but(ROWS, "score", middle=middle * float(seen.strengths[0]))
-        caplog.clear()
-        detect_video(*[road(CAR)] * frames, settings=settings, is_shipped=is_shipped)
-        return caplog.text
-
-    def test_doubtful_detections_are_told_once(self, caplog: pytest.LogCaptureFixture) -> None:
-        assert self.drive(1.2, caplog).count(self.WARNING) == 1
-
-    def test_sure_detections_are_not(self, caplog: pytest.LogCaptureFixture) -> None:
-        assert "know this road" not in self.drive(0.5, caplog)
-
-    def test_how_sure_another_model_is_tells_nothing(
-        self, caplog: pytest.LogCaptureFixture
-    ) -> None:
-        assert "know this road" not in self.drive(1.2, caplog, is_shipped=False)
-
-    def test_a_few_detections_tell_nothing(self, caplog: pytest.LogCaptureFixture) -> None:
-        assert "know this road" not in self.drive(1.2, caplog, frames=100)

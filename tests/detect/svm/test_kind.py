@@ -24,7 +24,7 @@ def _somewhere_else(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize(("name", "length"), [("default", 4800), ("seed", 4800)])
+@pytest.mark.parametrize(("name", "length"), [("svm", 4800), ("seed", 4800)])
 def test_every_shipped_config_has_a_shipped_model(name: str, length: int) -> None:
     settings = load_settings(find_config(name)).svm
     path = shipped_model(settings)

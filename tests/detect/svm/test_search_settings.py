@@ -56,16 +56,17 @@ WINDOWS = "detector.search.windows=[{size: 64, step: 1, top: 400, bottom: 500}]"
 )
 def test_a_value_that_makes_no_sense_is_refused(assignment: str, message: str) -> None:
     with pytest.raises(ConfigError) as error:
-        load_settings(None, [assignment])
+        load_settings(None, [assignment], detector="svm")
     assert str(error.value).startswith(f"--set: {message}")
     assert len(str(error.value).splitlines()) == 1
 
 
 def test_fixed_sets_may_stand_alone_and_beside_those_of_the_perspective() -> None:
-    both = load_settings(None, [WINDOWS]).svm.search
+    both = load_settings(None, [WINDOWS], detector="svm").svm.search
     assert both.windows
     assert both.perspective.sizes
-    alone = load_settings(None, [WINDOWS, "detector.search.perspective.sizes=[]"]).svm.search
+    only = [WINDOWS, "detector.search.perspective.sizes=[]"]
+    alone = load_settings(None, only, detector="svm").svm.search
     assert alone.windows == both.windows
     assert alone.perspective.sizes == ()
 

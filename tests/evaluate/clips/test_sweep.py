@@ -61,5 +61,6 @@ def test_a_key_swept_twice_is_refused() -> None:
     ],
 )
 def test_the_value_in_force_is_always_compared(sweep: str, expected: str) -> None:
-    settings = load_settings(None, ["output.crf=30", "detector.search.perspective.sizes=[0.1]"])
+    given = ["output.crf=30", "detector.search.perspective.sizes=[0.1]"]
+    settings = load_settings(None, given, detector="svm")
     assert with_values_in_force([sweep], settings) == [expected]

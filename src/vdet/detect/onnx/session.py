@@ -1,6 +1,8 @@
 """An ONNX file as it is loaded by onnxruntime, with what it says of itself."""
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +29,7 @@ _TYPES: dict[str, type[np.generic]] = {
     "tensor(int32)": np.int32,
 }
 _WARNINGS_OFF = 3  # errors only
+_TELEMETRY = "ORT_DISABLE_TELEMETRY"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,8 @@ class Session:
 def _load(path: Path) -> "onnxruntime.InferenceSession":
     data = read_whole(path, most=MAX_BYTES, what="model", error=ModelError)
     try:
-        import onnxruntime
+        with _without_telemetry():
+            import onnxruntime
     except ImportError as error:
         raise ModelError(
             f"{path}: needs the package onnxruntime; pip install 'vdet[net]'"
@@ -75,6 +79,21 @@ def _load(path: Path) -> "onnxruntime.InferenceSession":
     except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
         reason = first_line(error)
         raise ModelError(f"{path}: cannot be loaded by onnxruntime: {reason:.200}") from error
+
+
+@contextmanager
+def _without_telemetry() -> Iterator[None]:
+    """Keep onnxruntime from reporting to its maker and from writing into the home folder.
+
+    It reads the variable when it is imported.
+    """
+    was_set = _TELEMETRY in os.environ
+    os.environ.setdefault(_TELEMETRY, "1")
+    try:
+        yield
+    finally:
+        if not was_set:
+            del os.environ[_TELEMETRY]
 
 
 def first_line(error: Exception) -> str:

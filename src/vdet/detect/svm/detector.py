@@ -13,6 +13,7 @@ from vdet.detect.detections import Detections
 from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
+from vdet.detect.svm.road_check import RoadCheck
 from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
@@ -25,26 +26,18 @@ from vdet.regions import SearchArea
 
 log = logging.getLogger("vdet")
 
-WEAK, STRONG = 0.2, 0.5
-"""Scores of the detections that are counted to tell whether the model knows the road."""
-
-COUNTED = 150
-"""So many detections are counted."""
-
-LEAST_STRONG = 0.75
-"""The share of strong ones among them on a road that the shipped model knows; it is 0.87 to 0.97 on
-the project video, and 0.33 to 0.74 in nine sets of pictures of other roads."""
-
 
 @dataclass(frozen=True, slots=True)
 class Candidates:
     """What the search of one frame gives.
 
-    `windows` are all that were searched. A still picture is no frame of a video.
+    `windows` are all that were searched. A still picture is no frame of a video. `picture` is the
+    frame, where `RoadCheck` may need it.
     """
 
     windows: Windows
     is_still: bool
+    picture: Picture | None = None
 
 
 class SvmModel:
@@ -52,17 +45,16 @@ class SvmModel:
 
     Parameters
     ----------
-    is_shipped
-        Its detectors warn of roads that the shipped model does not know. How sure another model is
-        on the roads that it knows is not known.
+    check
+        Warns of a road that the model does not know; None for no warning.
     """
 
     def __init__(
-        self, model: LinearModel, settings: SvmSettings, *, is_shipped: bool = False
+        self, model: LinearModel, settings: SvmSettings, *, check: RoadCheck | None = None
     ) -> None:
         self._model = model
         self._settings = settings
-        self._is_shipped = is_shipped
+        self._check = check
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
         """Return a detector for frames of one size; `images` show where the horizon is."""
@@ -70,12 +62,7 @@ class SvmModel:
         if self._settings.search.perspective.sizes:
             log.info("the horizon lies at %.2f of the height", horizon)
         return SvmDetector(
-            self._model,
-            self._settings,
-            width,
-            height,
-            horizon=horizon,
-            is_shipped=self._is_shipped,
+            self._model, self._settings, width, height, horizon=horizon, check=self._check
         )
 
 
@@ -90,7 +77,7 @@ class SvmDetector:
         Row of the horizon, share of the frames' height (`horizon_of`).
     area
         Where vehicles are looked for; None for the whole frame.
-    is_shipped
+    check
         As of `SvmModel`.
 
     Raises
@@ -112,34 +99,28 @@ class SvmDetector:
         *,
         horizon: float = DEFAULT_HORIZON,
         area: SearchArea | None = None,
-        is_shipped: bool = False,
+        check: RoadCheck | None = None,
     ) -> None:
-        self._is_shipped = is_shipped
+        self._check = check
         self._search = FrameSearch(model, settings, width, height, horizon=horizon, area=area)
         self._model = model
         self._horizon = horizon
+        self._area = area
         self._features = model.features
         self._size = width, height
         self._settings = settings
         self._heat = scale_lengths(settings.heat, height / settings.reference_height)
         self._map = HeatMap(width, height, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
-        self._weak = self._strong = 0
 
     def limited_to(self, area: SearchArea) -> "SvmDetector":
         """Return a detector that leaves out windows far from an area. Raises `ImageError`."""
-        return SvmDetector(
-            self._model,
-            self._settings,
-            *self._size,
-            horizon=self._horizon,
-            area=area,
-            is_shipped=self._is_shipped,
-        )
+        return self._twin(area, self._check)
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
-        return Candidates(self._search.search(picture), is_still=index is None)
+        windows = self._search.search(picture)
+        return Candidates(windows, index is None, picture if self._check else None)
 
     def detect(self, candidates: Candidates) -> Detections:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -156,12 +137,29 @@ class SvmDetector:
             regions = self._shown_in_still(regions, self._settings.stills)
         trace = Trace(candidates.windows, hits, heat, self._search.grids)
         detections = self._detections(regions, trace)
-        self._count(detections)
+        if self._check and candidates.picture and self._check.is_due():
+            self._check.compare(candidates.picture, self._as_still(candidates, detections))
         return detections
 
     def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
         """Return pictures of patches and their features, the windows, the hits and the heat."""
         return stage_pictures(image, detections.trace, self._features)
+
+    def _as_still(self, candidates: Candidates, detections: Detections) -> Detections:
+        """Return what is found where the frame is taken as a still picture."""
+        if candidates.is_still:
+            return detections
+        return self._twin(self._area).detect(replace(candidates, is_still=True))
+
+    def _twin(self, area: SearchArea | None, check: RoadCheck | None = None) -> "SvmDetector":
+        return SvmDetector(
+            self._model,
+            self._settings,
+            *self._size,
+            horizon=self._horizon,
+            area=area,
+            check=check,
+        )
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
@@ -187,20 +185,6 @@ class SvmDetector:
             and region.box.width >= stills.width * width
             and region.box.height >= stills.height * height
         )
-
-    def _count(self, detections: Detections) -> None:
-        """Warn once of a road that looks unlike those that the shipped model has learnt."""
-        if not self._is_shipped or self._weak >= COUNTED:
-            return
-        self._weak += int(np.count_nonzero(detections.scores >= WEAK))
-        self._strong += int(np.count_nonzero(detections.scores >= STRONG))
-        if self._weak >= COUNTED and self._strong < LEAST_STRONG * self._weak:
-            log.warning(
-                "the model does not seem to know this road: %d of %d detections are doubtful; "
-                "the network (-c net) knows more roads",
-                self._weak - self._strong,
-                self._weak,
-            )
 
     def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Detections:
         strengths = np.array([region.strength for region in regions], np.float32)

@@ -2,11 +2,14 @@
 
 from pathlib import Path
 
-from vdet.config.schema import FeatureSettings, SvmSettings
+from vdet.config.schema import FeatureSettings, NetworkSettings, SvmSettings
 from vdet.detect.factory import DetectorKind
+from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import load_model
+from vdet.detect.svm.road_check import RoadCheck
 from vdet.errors import ModelError
+from vdet.plugins import DETECTORS, load_plugin
 
 _MODELS = Path(__file__).parents[2] / "models"
 
@@ -40,7 +43,14 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    return SvmModel(model, settings, is_shipped=path is None)
+    check = RoadCheck(_load_network) if path is None else None
+    return SvmModel(model, settings, check=check)
+
+
+def _load_network() -> DetectorModel:
+    """Load the shipped network."""
+    network: DetectorKind = load_plugin(DETECTORS, "net")
+    return network.load(NetworkSettings(), None)
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:

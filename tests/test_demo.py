@@ -1,0 +1,70 @@
+"""`vdet demo`: both detectors on a drawn road, and what they find against the truth."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from vdet.demo import DemoFiles, check_demo
+from vdet.errors import OutputError
+from vdet.media import VideoReader
+from vdet.synthetic import demo_scene
+from vdet.synthetic.scene import Scene
+
+PATCHES = 60
+FRAMES = 60
+NAMES = {
+    *("road.mp4", "truth.txt", "lines.yaml", "found.mp4", "found.csv", "counts.csv", "page"),
+    *("patches", "model.npz", "model.json", "model.csv", "stages"),
+}
+
+
+def short_clip(seed: int) -> Scene:
+    """Return the demo's road while the camera overtakes a vehicle."""
+    return replace(demo_scene(seed), frames=FRAMES)
+
+
+def test_draws_finds_counts_trains_and_compares(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.demo.PATCHES", PATCHES)
+    monkeypatch.setattr("vdet.demo.demo_scene", short_clip)
+    folder = tmp_path / "new" / "demo"
+    result = run("demo", folder)
+    assert result.code == 0, result.err
+    assert {path.name for path in folder.iterdir()} == NAMES
+    assert len(list((folder / "patches").rglob("*.png"))) == 2 * PATCHES
+    with VideoReader(folder / "found.mp4") as reader:
+        assert sum(1 for _ in reader) == FRAMES
+    assert [step in result.err for step in ("1/4", "2/4", "3/4", "4/4")] == [True] * 4
+    _, network, linear = result.out.splitlines()[:3]
+    assert network.startswith("network")
+    assert float(network.split()[3]) > 0.8, "F1 of the network"
+    assert network.endswith("1 of 1")
+    assert linear.startswith("linear model model.npz")
+    for name in ("found.mp4", "page/report.html", "found.csv", "truth.txt", "stages", "model.json"):
+        assert str(folder / name) in result.out
+        assert (folder / name).exists()
+
+    again = run("demo", folder)
+    assert again.code == 1
+    assert "is there already; give --overwrite" in again.err
+    assert again.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", sorted(NAMES - {"page", "patches", "stages"}))
+def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    with pytest.raises(OutputError, match=f"{name}: is there already; give --overwrite"):
+        check_demo(DemoFiles(tmp_path), overwrite=False)
+    check_demo(DemoFiles(tmp_path), overwrite=True)
+
+
+def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "demo").write_text("precious")
+    result = run("demo", tmp_path / "demo")
+    assert result.code == 1
+    assert result.err.count("\n") == 1
+    assert "cannot be made a folder" in result.err
+    assert (tmp_path / "demo").read_text() == "precious"
