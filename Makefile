@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+TOOLS := $(VENV)/.tools
 DATA ?= $(or $(VDET_DATA),data)
 ROADS ?= $(DATA)/roads
 TRUTH ?= $(DATA)/project_video_0001-0880.txt
@@ -14,32 +15,32 @@ PATCHES = $(DATA)/vehicles.zip $(DATA)/non-vehicles.zip
 help:  ## print this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
-demo: $(READY)  ## draw patches and a road, train, detect, compare with the truth
+demo: $(READY)  ## find vehicles on a drawn road, train on drawn patches, compare with the truth
 	$(BIN)/vdet demo demo --overwrite
 
 test: lint types tests  ## everything that CI checks
 
-lint: $(READY)  ## check style and format
+lint: $(TOOLS)  ## check style and format
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(READY)  ## check types
+types: $(TOOLS)  ## check types
 	$(BIN)/mypy
 
-tests: $(READY)  ## run all tests
+tests: $(TOOLS)  ## run all tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
-nettest: $(READY)  ## install torch, and run the tests of training networks
+nettest: $(TOOLS)  ## install torch, and run the tests of training networks
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/pytest tests/learn/network
 
-bench: $(READY)  ## measure speed and memory, as ratios of one run
+bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks
 
-soak: $(READY)  ## check that nothing grows in a run of 20,000 frames (some minutes, 1 GB in TMPDIR)
+soak: $(TOOLS)  ## check that nothing grows in a run of 20,000 frames (some minutes, 1 GB in TMPDIR)
 	$(BIN)/python -m benchmarks.soak
 
-folds: $(READY)  ## check every threshold on frames that the model has not seen (after make model)
+folds: $(TOOLS)  ## check every threshold on frames that the model has not seen (after make model)
 	$(BIN)/python -m benchmarks.folds $(DATA)/project_video.mp4 $(TRUTH) \
 		$(PATCHES) build/model/mined.zip
 
@@ -49,7 +50,7 @@ data:  ## fetch the patch set (125 MB) into data/; data/README.md says what it i
 			https://s3.amazonaws.com/udacity-sdc/Vehicle_Tracking/$$name.zip || exit 1; \
 	done
 
-model: $(READY)  ## train the shipped models again: patches and video in DATA, truth in TRUTH
+model: $(TOOLS)  ## train the shipped models again: patches and video in DATA, truth in TRUTH
 	mkdir -p build/model
 	$(BIN)/vdet train $(PATCHES) -o build/model/start.npz --overwrite
 	$(BIN)/vdet mine $(DATA)/project_video.mp4 --truth $(TRUTH) --model build/model/start.npz \
@@ -58,18 +59,18 @@ model: $(READY)  ## train the shipped models again: patches and video in DATA, t
 	$(BIN)/vdet train $(PATCHES) -c seed -o build/model/seed.npz --overwrite
 	cp build/model/svm.npz build/model/seed.npz src/vdet/models/
 
-net: $(READY)  ## train the shipped network again (hours): sets of pictures in ROADS, video in DATA
+net: $(TOOLS)  ## train the shipped network again (hours): sets of pictures in ROADS, video in DATA
 	mkdir -p build/net
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
 		--video $(DATA)/project_video.mp4 $(TRUTH)
 	cp build/net/net.onnx src/vdet/models/
 
-unseen: $(READY)  ## measure the network on cameras that it has not seen (hours)
+unseen: $(TOOLS)  ## measure the network on cameras that it has not seen (hours)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH)
 
-picture: $(READY)  ## draw the pictures of the README
+picture: $(TOOLS)  ## draw the pictures of the README
 	$(BIN)/python -m docs.picture
 
 # The versions in constraints.txt are the ones that the tests were last run with.
@@ -77,6 +78,11 @@ $(READY): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 		|| { echo "vdet needs Python 3.11 or later; give it as PYTHON=…"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+		--editable . --constraint constraints.txt
+	touch $@
+
+$(TOOLS): $(READY)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
 		--editable '.[dev]' --constraint constraints.txt
 	touch $@

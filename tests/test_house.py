@@ -18,8 +18,7 @@ LONGEST = 400
 ROOMS = (
     "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate",
     "pipeline", "pages", "summary", "count", "formats", "lanes", "track", "detect", "synthetic",
-    "draw",
-    "regions", "media", "config", "plugins", "workers", "archives", "files", "temporary",
+    "draw", "regions", "media", "config", "plugins", "workers", "archives", "files", "temporary",
     "polygons", "geometry", "errors", "__init__",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""

@@ -19,7 +19,7 @@ from vdet.cli.options import PATH, overwrite_option
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
 @click.option(
     "--seed",
-    default=1,
+    default=5,
     show_default=True,
     type=click.IntRange(min=0),
     metavar="N",
