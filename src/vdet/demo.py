@@ -34,7 +34,7 @@ SEED = 5
 LINES = """\
 # The line of the demo: one vehicle overtakes the camera there, and one is overtaken.
 lines:
-  - {name: right lanes, start: [0.56, 0.7], end: [0.99, 0.7], left: ahead, right: back}
+  - {name: right lanes, start: [0.45, 0.72], end: [0.99, 0.72], left: ahead, right: back}
 drawn: true
 """
 

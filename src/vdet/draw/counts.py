@@ -45,8 +45,8 @@ class DrawnZone:
 def draw_counts(surface: Surface, lines: Sequence[DrawnLine], zones: Sequence[DrawnZone]) -> None:
     """Draw zones and lines with their counts.
 
-    A line has an arrow at its end, and on each side an arrow into that direction with its name and
-    count.
+    A line has an arrow at its end. At its start, where no vehicle crosses it, an arrow points into
+    each direction, with the name and the count.
     """
     for zone in zones:
         _draw_zone(surface, zone)
@@ -73,12 +73,11 @@ def _draw_line(surface: Surface, line: DrawnLine) -> None:
     draw_arrow(surface, line.start, line.end, LINE, width, tip=tip)
     across = (line.end[0] - line.start[0]) / length, (line.end[1] - line.start[1]) / length
     to_the_right = -across[1], across[0]
-    middle = (line.start[0] + line.end[0]) / 2, (line.start[1] + line.end[1]) / 2
     reach = _ARROW * surface.shape[0]
     for sign, (direction, count) in ((-1, line.left), (1, line.right)):
         dx, dy = sign * reach * to_the_right[0], sign * reach * to_the_right[1]
-        tip_at = middle[0] + dx, middle[1] + dy
-        draw_arrow(surface, middle, tip_at, LINE, width, tip=0.4)
+        tip_at = line.start[0] + dx, line.start[1] + dy
+        draw_arrow(surface, line.start, tip_at, LINE, width, tip=0.4)
         _label_beyond(surface, f"{line.name} {direction}: {count}", tip_at, (dx, dy))
 
 
