@@ -16,7 +16,7 @@ PAGES = [
     *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "data/README.md")),
     *sorted(ROOT.glob("docs/*.md")),
 ]
-LONGEST_README = 150
+LONGEST_README = 120
 
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)#?([^)\s]*)\)")
 COMMAND = re.compile(r"^ {4}(vdet .*)$|`(vdet [a-z-][^`…]*)`", re.MULTILINE)

@@ -1,7 +1,6 @@
 """Make docs/vdet.jpg and docs/counts.jpg: the program on a ray-traced motorway, and counts.
 
-What is drawn over the motorway comes from `vdet detect-video` with its shipped model. The settings
-differ from the default in `tracker.leak`, which leaves out vehicles that the detector finds weakly.
+What is drawn over the motorway comes from `vdet detect-video` with its default detector.
 """
 
 import subprocess
@@ -49,7 +48,7 @@ def last_frame_with_vehicles(folder: Path) -> Image:
     """Run `vdet detect-video` on the frames and return the last frame of its video."""
     video = folder / "found.mp4"
     program = [sys.executable, "-m", "vdet", "detect-video", folder / "%03d.png", video, "--lanes"]
-    settings = ("output.crf=6", "draw.label=[id, score]", "tracker.leak=0.6")
+    settings = ("output.crf=6", "draw.label=[id, score]")
     subprocess.run([*program, *(word for each in settings for word in ("--set", each))], check=True)
     with VideoReader(video) as reader:
         *_, last = reader
