@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -93,3 +94,18 @@ def test_every_make_target_named_is_there() -> None:
     for page in PAGES:
         for target in TARGET.findall(text_of(page)):
             assert f"\n{target}:" in makefile, f"{name_of(page)}: make {target}"
+
+
+def test_packages_that_the_program_tells_to_install_are_those_of_the_project() -> None:
+    """`vdet[report]` would name a package that is on no index: anybody could register it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    groups = [project["dependencies"], *project["optional-dependencies"].values()]
+    known = {re.split("[<>=!]", requirement)[0] for group in groups for requirement in group}
+    hints = [
+        hint
+        for path in (ROOT / "src").rglob("*.py")
+        for hint in re.findall(r"pip install ([^\n{]+?)[\n\".;]", text_of(path))
+    ]
+    assert hints
+    assert {package for hint in hints for package in hint.split()} <= known
+    assert "vdet[" not in "".join(map(text_of, [*PAGES, *(ROOT / "src").rglob("*.py")]))

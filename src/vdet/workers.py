@@ -257,7 +257,7 @@ def _connection(address: str, timeout: float) -> "Iterator[distributed.Client]":
         from distributed.versions import VersionMismatchWarning
     except ImportError as error:
         raise ClusterError(
-            '--scheduler needs Dask, which is not installed; pip install "vdet[dask]"'
+            "--scheduler needs Dask, which is not installed; pip install dask distributed"
         ) from error
     with _without_logs("distributed", "distributed.client"):  # errors are raised
         with warnings.catch_warnings():

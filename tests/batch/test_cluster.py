@@ -223,5 +223,5 @@ def test_no_scheduler_there(address: str) -> None:
 
 def test_without_dask_the_error_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterError, match=r'pip install "vdet\[dask\]"'):
+    with pytest.raises(ClusterError, match="pip install dask distributed"):
         next(DaskCluster("tcp://x:1").map(abs, [1]))

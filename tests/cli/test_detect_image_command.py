@@ -70,10 +70,18 @@ def test_a_picture_of_every_stage(run: Run, picture: Path, model_path: Path) -> 
         assert read_image(stages / name).shape == (180, 320, 3)
 
 
-def test_asks_for_an_output(run: Run, picture: Path) -> None:
-    result = run("detect-image", picture)
-    assert result.code == 2
-    assert "nothing would be written" in result.err
+def test_without_an_output_the_vehicles_are_printed(
+    run: Run, picture: Path, model_path: Path
+) -> None:
+    options = ("--model", model_path, *QUICK_OPTIONS)
+    result = run("detect-image", picture, *options)
+    assert result.code == 0, result.err
+    (item,) = json.loads(run("detect-image", picture, "--json", "-", *options).out)
+    title, *rows = result.out.splitlines()
+    assert title.startswith(f"{picture}: {len(item['boxes'])} vehicle")
+    for row, box in zip(rows, item["boxes"], strict=True):
+        place = ", ".join(str(box[side]) for side in ("x", "y", "width", "height"))
+        assert row == f"  vehicle  {box['score']:.2f}  {place}"
 
 
 def test_keeps_what_is_there(run: Run, picture: Path, model_path: Path, tmp_path: Path) -> None:

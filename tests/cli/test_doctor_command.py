@@ -29,7 +29,7 @@ def test_here_it_can_work(run: Run) -> None:
     assert all(line.startswith(("ok ", "absent ")) for line in lines)
     for name in ("vdet", "Python", "OpenCV", "PyAV", "numpy", "cores", "encoder libx264"):
         assert sum(f" {name}: " in line for line in lines) == 1
-    for config in ("default", "seed", "net"):
+    for config in ("default", "svm", "seed"):
         assert any(f"config {config}: " in line for line in lines)
 
 
@@ -38,7 +38,7 @@ def test_an_extra_that_is_not_there_is_named_with_the_command_that_installs_it(
 ) -> None:
     known = doctor._version
     monkeypatch.setattr(doctor, "_version", lambda name: None if name == "dask" else known(name))
-    assert findings(run)["extra dask"] == ("absent", "needs dask; pip install 'vdet[dask]'")
+    assert findings(run)["extra dask"] == ("absent", "needs dask; pip install dask")
     assert run("doctor").code == 0
 
 

@@ -81,13 +81,31 @@ def test_every_option_stands_under_a_heading_and_examples_can_be_run(
     assert isinstance(command, Command)
     shown = run(*names, "--help").out
     for parameter in command.params:
-        assert isinstance(parameter, click.Argument) or f"{parameter.opts[-1]} " in shown
+        row = rf"^  (-\w, )?{parameter.opts[-1]}\b"
+        assert isinstance(parameter, click.Argument) or re.search(row, shown, re.MULTILINE)
     assert command.examples
     for example in command.examples:
         words = shlex.split(example.partition(" > ")[0])
         assert words[: 1 + len(names)] == ["vdet", *names]
         command.make_context(example, words[1 + len(names) :], obj=False)
         assert f"  {example}\n" in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (("detct-video", "in.mp4"), "detect-video"),
+        (("eval", "vidoe"), "video"),
+        (("demo", "--overwite"), "--overwrite"),
+    ],
+)
+def test_a_command_or_option_that_does_not_exist_gets_a_suggestion(
+    run: Run, words: tuple[str, ...], meant: str
+) -> None:
+    result = run(*words)
+    assert result.code == 2
+    assert "Did you mean" in result.err
+    assert f"'{meant}'" in result.err
 
 
 def test_every_time_says_its_form() -> None:

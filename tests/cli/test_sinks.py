@@ -262,11 +262,6 @@ class TestDetectImage:
         assert words in result.err
         assert names(picture.parent) == ["old.json", "red.png"]
 
-    def test_asks_for_an_output(self, run: Run, picture: Path) -> None:
-        result = run("detect-image", picture)
-        assert result.code == 2
-        assert "nothing would be written; give -o, --json, --stages or --sink" in result.err
-
 
 class TestEvalVideo:
     def test_a_sink_gets_the_results_of_the_video(

@@ -73,7 +73,7 @@ class TestFolder:
         ("names", "words"),
         [
             (["a.png"], "is a folder without numbered pictures; give a video file"),
-            (["1.png", "3.png"], "picture 2 is missing, between 1 and 3"),
+            (["1.png", "3.png", "4.png"], "picture 2 is missing, between 1 and 3"),
             (
                 ["a_01.png", "a_02.png", "b_01.png"],
                 "names of several kinds; give .*/a_%02d.png or .*/b_%02d.png",
@@ -109,7 +109,9 @@ def test_an_existing_file_with_the_name_of_a_pattern_is_a_file(tmp_path: Path) -
     [
         ((), "there is no such file, and no picture of such a name"),
         (("img_1.png",), "no picture of such a name"),
-        (("img_01.png", "img_03.png"), "picture 2 is missing, between 1 and 3"),
+        (("img_01.png", "img_03.png", "img_04.png"), "picture 2 is missing, between 1 and 3"),
+        (("img_06.png", "img_09.png", "img_15.png"), "picture 12 is missing, between 9 and 15"),
+        (("img_95.png", "img_98.png", "img_101.png"), "fill them all with zeros"),
     ],
 )
 def test_no_pictures_and_a_gap_are_refused(
@@ -118,6 +120,12 @@ def test_no_pictures_and_a_gap_are_refused(
     make(tmp_path, *names)
     with pytest.raises(VideoError, match=words):
         find_sequence(tmp_path / "img_%02d.png")
+
+
+def test_numbers_may_rise_by_a_step(tmp_path: Path) -> None:
+    make(tmp_path, "7_0006.png", "7_0009.png", "7_0012.png")
+    pattern = str(tmp_path / "7_%04d.png")
+    assert find_sequence(tmp_path) == PictureSequence(pattern, 6, 3)
 
 
 def test_a_folder_that_is_missing_is_refused(tmp_path: Path) -> None:

@@ -23,7 +23,8 @@ def write_pictures(pattern: Path, numbers: range) -> Path:
 @pytest.mark.parametrize("suffix", ["png", "jpg", "bmp", "tiff", "webp"])
 def test_numbered_pictures_are_a_video(suffix: str, tmp_path: Path, process: Process) -> None:
     pattern = tmp_path / "pictures 100%" / f"img_%02d.{suffix}"
-    shown = process(write_pictures(pattern, range(9, 12)))  # not from 0, and with more digits
+    write_pictures(pattern, range(9, 12))  # not from 0, and with more digits
+    shown = process(pattern, "--set", "input.frame_rate=25")
     assert_whole(shown, [9, 10, 11])
     assert shown.warnings == []
 
@@ -32,6 +33,16 @@ def test_the_rate_of_numbered_pictures_is_a_setting(tmp_path: Path, process: Pro
     pattern = write_pictures(tmp_path / "%d.png", range(5))
     shown = process(pattern, "--set", "input.frame_rate=29.97")
     assert_whole(shown, list(range(5)), Fraction(2997, 100))
+
+
+def test_numbers_that_rise_by_a_step_and_an_assumed_rate_are_told(
+    tmp_path: Path, process: Process
+) -> None:
+    pattern = write_pictures(tmp_path / "50% [a]{b}~*?" / "0_%04d.png", range(6, 18, 3))
+    shown = process(pattern.parent)
+    assert_whole(shown, [6, 9, 12, 15])
+    (warning,) = shown.warnings
+    assert "the numbers of its pictures rise by 3; 25 pictures a second are assumed" in warning
 
 
 def test_sixteen_bits_of_grey_are_converted(tmp_path: Path, process: Process) -> None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
 
@@ -87,6 +88,19 @@ class LazyGroup(click.Group):
         module = import_module(self._modules[name])
         command: click.Command = getattr(module, name.replace("-", "_"))
         return command
+
+    def resolve_command(
+        self, context: click.Context, words: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command that the words begin with; an unknown name gets a suggestion."""
+        try:
+            return super().resolve_command(context, words)
+        except click.UsageError as error:
+            close = get_close_matches(words[0], self.list_commands(context), 1)
+            if not close:
+                raise
+            message = f"No such command '{words[0]}'. Did you mean '{close[0]}'?"
+            raise click.UsageError(message, context) from error
 
 
 def _verbosity_option(name: str) -> click.Option:

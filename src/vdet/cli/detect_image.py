@@ -4,9 +4,10 @@ import logging
 from pathlib import Path
 
 import click
+from tqdm import tqdm
 
 from vdet.cli.command import Command
-from vdet.cli.messages import progress_bar
+from vdet.cli.messages import counted, print_lines, progress_bar
 from vdet.cli.options import (
     PATH,
     lane_options,
@@ -22,6 +23,7 @@ from vdet.cli.options import (
 from vdet.detect.factory import load_detector
 from vdet.errors import failure_code
 from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
+from vdet.pipeline.result import FrameResult
 from vdet.pipeline.sinks.protocol import Output, check_sinks
 from vdet.regions import check_mask
 
@@ -31,6 +33,7 @@ log = logging.getLogger("vdet")
 @click.command(
     cls=Command,
     examples=(
+        "vdet detect-image road.jpg",
         "vdet detect-image road.jpg -o found.jpg --json -",
         "vdet detect-image pictures/ -o found/ --json boxes.json",
         "vdet detect-image road.jpg --stages stages",
@@ -77,13 +80,13 @@ def detect_image(
 ) -> int:
     """Find vehicles in pictures.
 
-    Each IMAGE is a file, or a folder of files.
+    Each IMAGE is a file, or a folder of files. Without an output, the vehicles are printed: class,
+    score, and box in pixels, as x, y, width and height.
     """
     shared = read_sinks(sinks)
     if json_target is not None:
         shared = (Output("json", json_target), *shared)
-    if not (output or stages or shared):
-        raise click.UsageError("nothing would be written; give -o, --json, --stages or --sink")
+    is_printed = not (output or stages or shared)
     request = read_lanes(lanes, camera_path)
     settings = read_settings(config_name, assignments, model_path, roi=roi)
     check_mask(settings.regions)
@@ -93,8 +96,25 @@ def detect_image(
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     with progress_bar(" pictures", quiet=quiet) as progress:
         failures = run_pictures(
-            jobs, shared, model, settings, request, overwrite=overwrite, progress=progress
+            jobs,
+            shared,
+            model,
+            settings,
+            request,
+            overwrite=overwrite,
+            progress=progress,
+            on_result=_print_vehicles if is_printed else lambda _: None,
         )
     for failure in failures:
         log.error("%s", failure)
     return failure_code(len(failures), len(jobs))
+
+
+def _print_vehicles(result: FrameResult) -> None:
+    rows = [
+        f"  {track.class_name or 'vehicle':8} {track.score:.2f}  "
+        f"{track.box.x}, {track.box.y}, {track.box.width}, {track.box.height}"
+        for track in result.tracks
+    ]
+    with tqdm.external_write_mode():  # a progress bar moves below
+        print_lines(f"{result.source}: {counted(len(rows), 'vehicle')}", *rows)

@@ -28,14 +28,16 @@ from vdet.workers import core_count
 Status = Literal["ok", "absent", "broken"]
 
 EXTRAS = {
-    "net": ("onnxruntime",),
     "report": ("matplotlib",),
     "dask": ("dask", "distributed"),
     "train": ("onnx", "torch"),
 }
 """The packages of each extra, as `pyproject.toml` has them."""
 
-NEEDED = ("scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib", "threadpoolctl", "tqdm")
+NEEDED = (
+    *("onnxruntime", "scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib"),
+    *("threadpoolctl", "tqdm"),
+)
 DECODERS = ("h264", "hevc", "av1", "vp9", "mpeg4", "mjpeg")
 DATA = ("vehicles.zip", "non-vehicles.zip", "project_video.mp4")
 _GIGABYTE = 1e9
@@ -126,7 +128,7 @@ def find_extras() -> Iterator[Finding]:
         missing = [package for package, number in found.items() if not number]
         name = f"extra {extra}"
         if missing:
-            text = f"needs {', '.join(missing)}; pip install 'vdet[{extra}]'"
+            text = f"needs {', '.join(missing)}; pip install {' '.join(missing)}"
             yield Finding(name, "absent", text)
         else:
             yield Finding(name, "ok", ", ".join(there))
@@ -138,10 +140,6 @@ def find_models() -> Iterator[Finding]:
     if not configs:
         yield Finding("configs", "broken", "there are none; install vdet again")
     for name, path in configs.items():
-        without = name == "net" and _version("onnxruntime") is None
-        if without:
-            yield Finding(f"config {name}", "absent", "its model needs the extra net")
-            continue
         try:
             load_detector(load_settings(path).detector)
         except (VdetError, OSError, ValueError) as error:

@@ -50,7 +50,7 @@ def train_net(
     Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The state of the
     training is kept beside the network, as .ckpt; a training that was stopped goes on from there
     when the same command is given again. A report is written beside the network as JSON.
-    Needs torch: pip install 'vdet[train]'.
+    Needs torch and onnx: pip install torch onnx
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; give DATA or --video")
@@ -58,9 +58,10 @@ def train_net(
         raise OutputError(f"{output}: networks are written as .onnx; name it so")
     settings = read_settings(config_name, assignments).network
     try:
+        import onnx  # noqa: F401
         import torch  # noqa: F401
     except ImportError as error:
-        raise DataError("torch is not installed; pip install 'vdet[train]'") from error
+        raise DataError("torch or onnx is not installed; pip install torch onnx") from error
     from vdet.learn.network.run import NetworkJob, train_to_file
     from vdet.learn.network.sources import LabelledClip
 

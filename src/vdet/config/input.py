@@ -12,6 +12,10 @@ class InputSettings(Section):
         0.05,
         description="tolerated share of damaged or lost frames; a video with more of them fails",
     )
-    frame_rate: float = Field(
-        25.0, ge=0.01, le=1000, description="frames per second of numbered pictures (img_%04d.png)"
+    frame_rate: float | None = Field(
+        None,
+        ge=0.01,
+        le=1000,
+        description="frames per second of numbered pictures (img_%04d.png); null: 25, with a "
+        "warning",
     )

@@ -25,7 +25,7 @@ def render(settings: Settings) -> str:
 def _section(section: Section, indent: str, *, comments: bool = True) -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
-        if value is None:
+        if value is None and not comments:  # an item says only what it has
             continue
         if isinstance(value, Section):
             if not indent:

@@ -128,4 +128,4 @@ def load_matplotlib() -> None:
         with contextlib.chdir(Path(__file__).parent):  # there is no other way to keep it from that
             importlib.import_module("matplotlib")
     except ImportError as error:
-        raise OutputError('--report needs matplotlib; pip install "vdet[report]"') from error
+        raise OutputError("--report needs matplotlib; pip install matplotlib") from error

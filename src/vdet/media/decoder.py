@@ -35,7 +35,7 @@ class Decoder:
     threads
         Of the decoder; None lets it choose.
     frame_rate
-        Of numbered pictures, per second.
+        Of numbered pictures, per second; None: `ASSUMED_RATE`.
     entry
         Where to begin; None for the first picture.
 
@@ -46,7 +46,12 @@ class Decoder:
     """
 
     def __init__(
-        self, path: Path, *, threads: int | None, frame_rate: float, entry: Entry | None = None
+        self,
+        path: Path,
+        *,
+        threads: int | None,
+        frame_rate: float | None,
+        entry: Entry | None = None,
     ) -> None:
         self._open = partial(_open, path, frame_rate)
         self._opens_once = opens_once = is_pipe(path)
@@ -194,7 +199,7 @@ def _discard_others(container: InputContainer, stream: VideoStream) -> None:
                 other.discard = Discard.all
 
 
-def _open(path: Path, frame_rate: float, threads: int) -> tuple[InputContainer, VideoStream]:
+def _open(path: Path, frame_rate: float | None, threads: int) -> tuple[InputContainer, VideoStream]:
     container = open_input(path, frame_rate)
     try:
         stream = picture_stream(container, path)

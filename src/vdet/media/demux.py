@@ -13,7 +13,7 @@ from av.stream import Stream
 from vdet.errors import VideoError
 from vdet.media.images import PICTURE_SUFFIXES
 from vdet.media.mp4_index import check_mp4_index
-from vdet.media.numbered import find_sequence
+from vdet.media.numbered import ASSUMED_RATE, find_sequence
 
 MAX_PIXELS = 8192 * 4608
 """Of a frame. 8K video, in both its widths, has fewer; a damaged header may claim far more."""
@@ -34,13 +34,13 @@ _FORMATS = (
 )  # fmt: skip
 
 
-def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
+def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
     """Open a video file, or numbered pictures (`img_%04d.png`, or a folder), for reading.
 
     Parameters
     ----------
     frame_rate
-        Of numbered pictures, per second.
+        Of numbered pictures, per second; None: `ASSUMED_RATE`.
 
     Raises
     ------
@@ -53,12 +53,14 @@ def open_input(path: Path, frame_rate: float = 25) -> InputContainer:
     name, kind, options = str(path.absolute()), None, {"format_whitelist": ",".join(_FORMATS)}
     if sequence := find_sequence(path):
         name, kind = sequence.pattern, "image2"
-        rate = Fraction(str(frame_rate))
+        rate = Fraction(str(frame_rate or ASSUMED_RATE))
         options = {
             "framerate": f"{rate.numerator}/{rate.denominator}",
             "start_number": str(sequence.first),
             "start_number_range": "1",
         }
+        if sequence.step > 1:
+            name, options["pattern_type"] = sequence.glob, "glob"
     else:
         _check_exists(path)
         check_mp4_index(path)

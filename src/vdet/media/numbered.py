@@ -15,12 +15,15 @@ from vdet.media.images import is_picture_name
 
 _PATTERN = re.compile(r"((?:[^%]|%%)*)%(?:0([1-9]\d*))?d((?:[^%]|%%)*)", re.ASCII)
 _NUMBERED = re.compile(r"(.*?)(\d+)(\D*\.\w+)", re.ASCII | re.DOTALL)  # by its last number
+ASSUMED_RATE = 25.0
+"""Pictures per second, where the settings do not say."""
+
 _MAX_WIDTH = 19  # digits; FFmpeg has no room for more
 
 
 @dataclass(frozen=True, slots=True)
 class PictureSequence:
-    """Pictures without a gap, from number `first` on.
+    """Pictures whose numbers rise by `step` without a gap, from `first` on.
 
     `pattern` is their absolute name, with ``%d`` or ``%04d`` for the number. Every other per cent
     sign in it is doubled.
@@ -28,12 +31,29 @@ class PictureSequence:
 
     pattern: str
     first: int
+    step: int = 1
+
+    @property
+    def first_picture(self) -> Path:
+        """The file of the first picture."""
+        return Path(self.pattern % self.first)
+
+    @property
+    def glob(self) -> str:
+        """The pattern of `glob` that the pictures have, whose numbers all have as many digits."""
+        match = _PATTERN.fullmatch(self.pattern)
+        assert match is not None
+        before, digits, after = match.groups()
+        lead = "[0-9]" if digits else "[1-9]"
+        rest = "[0-9]" * (len(str(self.first).zfill(int(digits or 0))) - 1)
+        return f"{_escaped(before)}{lead}{rest}{_escaped(after)}"
 
 
 def find_sequence(path: Path) -> PictureSequence | None:
     """Return the pictures that the pattern or the folder `path` names; None where it is neither.
 
-    They may begin at any number. In the name of a folder, a per cent sign means itself.
+    They may begin at any number, and rise by any step. In the name of a folder, a per cent sign
+    means itself.
 
     Raises
     ------
@@ -60,14 +80,20 @@ def _sequence(folder: Path, name: str, *, named: Path) -> PictureSequence:
         others = " or ".join(f"{folder / printable(each)}" for each in _patterns(names)[:2])
         advice = f"give {others}" if others else f"{folder} has no numbered pictures at all"
         raise VideoError(f"{named}: there is no such file, and no picture of such a name; {advice}")
+    step = min((following - number for number, following in pairwise(numbers)), default=1)
     for number, following in pairwise(numbers):
-        if following != number + 1:
+        if following != number + step:
             raise VideoError(
-                f"{named}: picture {number + 1} is missing, between {number} and {following}; "
-                "add it, or number the pictures without a gap"
+                f"{named}: picture {number + step} is missing, between {number} and {following}; "
+                "put a copy of its neighbour there, or number the pictures anew"
             )
+    if step > 1 and len(str(numbers[-1])) > max(int(pattern[2] or 0), len(str(numbers[0]))):
+        raise VideoError(
+            f"{named}: the numbers rise by {step} and have {len(str(numbers[0]))} or more digits; "
+            "fill them all with zeros to the same length"
+        )
     whole = _doubled(str(folder.absolute()))
-    return PictureSequence(f"{whole}/{name}", numbers[0])
+    return PictureSequence(f"{whole}/{name}", numbers[0], step)
 
 
 def _numbers(names: list[str], pattern: re.Match[str]) -> list[int]:
@@ -111,6 +137,11 @@ def _conversion(numbers: list[str]) -> str:
     """Return ``%d``, or ``%04d`` where numbers are filled with zeros to four digits."""
     width = min(map(len, numbers))
     return f"%0{width}d" if any(each[0] == "0" and len(each) > 1 for each in numbers) else "%d"
+
+
+def _escaped(text: str) -> str:
+    """Return a part of a pattern as a part of a pattern of `glob`, in which it means itself."""
+    return re.sub(r"([][*?{}~\\])", r"\\\1", text.replace("%%", "%"))
 
 
 def _doubled(text: str) -> str:

@@ -14,6 +14,7 @@ from vdet.media.coding import Coding
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
 from vdet.media.frame import ColorTags, Tags, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS
+from vdet.media.numbered import find_sequence
 from vdet.media.orientation import Orientation, orientation
 from vdet.media.picture_size import jpeg_orientation
 
@@ -53,10 +54,9 @@ def check_size(path: Path, width: int, height: int) -> None:
         )
 
 
-def _orientation(container: InputContainer, first: av.VideoFrame) -> Orientation:
-    if container.format.name == "image2":  # where there are EXIF data, PyAV gives only the rotation
-        picture = Path(container.name % int(container.options["start_number"]))
-        number = jpeg_orientation(picture.read_bytes())
+def _orientation(path: Path, first: av.VideoFrame) -> Orientation:
+    if sequence := find_sequence(path):  # where there are EXIF data, PyAV gives only the rotation
+        number = jpeg_orientation(sequence.first_picture.read_bytes())
         if number is not None:
             return Orientation.of_exif(number)
     return orientation(first) or Orientation()
@@ -70,7 +70,7 @@ def describe(
     rate = _first_sensible(stream.average_rate, stream.guessed_rate)
     start = (first.pts or 0) * time_base
     duration = stated_duration(stream, start) or _longest(container)
-    turn = _orientation(container, first)
+    turn = _orientation(path, first)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
     if turn.rotation in (90, 270):
         width, height, aspect = height, width, 1 / aspect

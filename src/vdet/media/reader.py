@@ -19,6 +19,7 @@ from vdet.media.demux import MAX_PIXELS
 from vdet.media.frame import Frame, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS, StandardRange
 from vdet.media.images import Image
+from vdet.media.numbered import ASSUMED_RATE, find_sequence
 from vdet.media.orientation import Orientation, orientation, upright
 from vdet.media.picture import Picture
 from vdet.media.pixels import resized, to_bgr
@@ -106,6 +107,7 @@ class VideoReader:
                 self._length = stated_duration(self._decoder.stream, self.info.start)
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
+            self._note_what_is_assumed(settings)
             self._note_what_is_left_out(first)
             self._frames = self._deliver(*self._begin(first, open_decoder))
         except BaseException:
@@ -149,6 +151,15 @@ class VideoReader:
         """Close the file; there are no more frames."""
         self._frames.close()
         self._decoder.close()
+
+    def _note_what_is_assumed(self, settings: InputSettings) -> None:
+        sequence = find_sequence(self.info.path)
+        if sequence and sequence.step > 1:
+            self._faults.append(f"the numbers of its pictures rise by {sequence.step}")
+        if sequence and settings.frame_rate is None:
+            self._faults.append(
+                f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
+            )
 
     def _note_what_is_left_out(self, first: av.VideoFrame) -> None:
         if orientation(first) is None:

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
@@ -107,11 +107,13 @@ def run_pictures(
     *,
     overwrite: bool = False,
     progress: Progress = no_progress,
+    on_result: Callable[[FrameResult], object] = lambda _: None,
 ) -> list[ImageError]:
     """Search pictures; return the errors of those that cannot be read or searched.
 
     The outputs of one picture appear together. The `shared` outputs, which get the results of all
-    pictures, appear at the end. `progress` gets the number of pictures, and then each.
+    pictures, appear at the end. `progress` gets the number of pictures, and then each; `on_result`
+    gets the result of each.
 
     Raises
     ------
@@ -126,7 +128,9 @@ def run_pictures(
         advance = progress(len(jobs))
         for job in jobs:
             try:
-                run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
+                on_result(
+                    run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
+                )
             except ImageError as error:
                 failures.append(error)
             advance(1)

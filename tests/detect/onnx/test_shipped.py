@@ -1,8 +1,5 @@
 """The shipped network: it loads, fits the limits on size, and finds drawn vehicles."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,7 +7,6 @@ from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.onnx.kind import SHIPPED
-from vdet.errors import ModelError
 from vdet.testing import check_detector
 
 MOST_BYTES = 1_500_000
@@ -31,14 +27,3 @@ def test_it_passes_the_checks_of_detectors_in_frames_of_any_shape(width: int, he
     rng = np.random.default_rng(0)
     images = [rng.integers(0, 256, (height, width, 3), np.uint8) for _ in range(2)]
     check_detector(load_detector(NetworkSettings()), images)
-
-
-def test_without_onnxruntime_one_line_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "onnxruntime", None)
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(
-        ModelError, match=r"needs the package onnxruntime; pip install 'vdet\[net\]'"
-    ):
-        load_detector(NetworkSettings())

@@ -47,8 +47,7 @@ class Session:
     Raises
     ------
     ModelError
-        The file cannot be read or is no ONNX file that onnxruntime can run, or onnxruntime is not
-        installed.
+        The file cannot be read, or is no ONNX file that onnxruntime can run.
     """
 
     def __init__(self, path: Path) -> None:
@@ -64,13 +63,8 @@ class Session:
 
 def _load(path: Path) -> "onnxruntime.InferenceSession":
     data = read_whole(path, most=MAX_BYTES, what="model", error=ModelError)
-    try:
-        with _without_telemetry():
-            import onnxruntime
-    except ImportError as error:
-        raise ModelError(
-            f"{path}: needs the package onnxruntime; pip install 'vdet[net]'"
-        ) from error
+    with _without_telemetry():
+        import onnxruntime
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # frames run in parallel
     options.log_severity_level = _WARNINGS_OFF
