@@ -1,14 +1,18 @@
 """How well the network finds vehicles of cameras that it has not seen: `make unseen`.
 
 Each group of sets is left out of a training in turn, and searched by the network that was trained
-without it. The scores of all groups together give the calibration of the shipped network's scores.
-The last network is trained without the video, and then follows the vehicles in it. Results are
-kept in the folder `--work`; a run that was stopped goes on from there.
+without it. `traffic_cams` is split into fifths of its cameras, `overpass` into its cameras. The
+scores of all groups together give the calibration of the shipped network's scores. The last network
+is trained without the video, and then follows the vehicles in it. Results are kept in the folder
+`--work`; a run that was stopped goes on from there.
 """
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+import re
+import zlib
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -38,12 +42,69 @@ GROUPS = (
     ("uk_residential",),
     ("us_dashcams", "us_dusk"),
     ("boston_roof",),
+    *((f"traffic_cams.{fifth}",) for fifth in range(5)),
+    ("overpass.kabul",),
+    ("overpass.y",),
+    ("overpass.night",),
+    ("overpass.dense", "overpass.parking"),
 )
 LEAST_WIDTH = 0.03
 """Narrower vehicles are ignore regions, share of the picture's width."""
 
+_SAME_CAMERA = {
+    **dict.fromkeys(("c048", "c064"), "c001"),
+    **dict.fromkeys(("c013", "cp000", "cp001"), "c012"),
+    **dict.fromkeys(("cp003", "cp004"), "c018"),
+}
+"""Clips of `traffic_cams` from one camera."""
+
 _LEAST_SCORE = 0.02
 _UNCALIBRATED = ("network.score.slope=1", "network.score.offset=0")
+
+
+def _fifth(picture: str) -> str:
+    """Return the fifth of `traffic_cams` to which a picture belongs; a camera is in one."""
+    clip = picture.partition("_")[0]
+    return str(zlib.crc32(_SAME_CAMERA.get(clip, clip).encode()) % 5)
+
+
+def _camera(picture: str) -> str:
+    """Return the camera of a picture of `overpass`, the first word of its name."""
+    return re.split(r"[^a-z]", picture)[0]
+
+
+SPLITS = {"traffic_cams": _fifth, "overpass": _camera}
+"""Functions from the name of a picture to that of its part, by the sets that are split."""
+
+
+def split_sets(roads: Path, folder: Path) -> list[Path]:
+    """Return all sets; those of `SPLITS` in parts, which are written into `folder`."""
+    sets = []
+    for path in sorted(each for each in roads.iterdir() if each.is_dir()):
+        if path.name in SPLITS:
+            sets += _split(path, SPLITS[path.name], folder)
+        else:
+            sets.append(path)
+    return sets
+
+
+def _split(path: Path, part_of: Callable[[str], str], folder: Path) -> list[Path]:
+    labels = json.loads((path / "annotations.json").read_text(encoding="utf-8"))
+    parts = defaultdict(list)
+    for image in labels["images"]:
+        parts[part_of(image["file_name"])].append(image)
+    for name, images in parts.items():
+        part = folder / f"{path.name}.{name}"
+        part.mkdir(parents=True, exist_ok=True)
+        numbers = {image["id"] for image in images}
+        boxes = [each for each in labels["annotations"] if each["image_id"] in numbers]
+        text = json.dumps({**labels, "images": images, "annotations": boxes})
+        (part / "annotations.json").write_text(text, encoding="utf-8")
+        for image in images:
+            picture = part / image["file_name"]
+            if not picture.exists():
+                picture.symlink_to((path / image["file_name"]).resolve())
+    return sorted(folder / f"{path.name}.{name}" for name in parts)
 
 
 def train(job: NetworkJob, settings: Settings) -> Path:
@@ -53,12 +114,13 @@ def train(job: NetworkJob, settings: Settings) -> Path:
     return job.output
 
 
-def measure(group: Sequence[str], roads: Path, network: Path) -> ImagesResult:
-    """Search the sets of a group."""
+def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
+    """Search sets of pictures."""
     detector = NetworkSettings(least=_LEAST_SCORE).showing_all()
     counting = Counting(detector.shown_score, LEAST_WIDTH, detector.classes)
-    sets = [read_labelled_images(roads / name) for name in group]
-    return evaluate_images(sets, load_detector(detector, network), counting, threads=core_count())
+    labelled = [read_labelled_images(path) for path in sets]
+    model = load_detector(detector, network)
+    return evaluate_images(labelled, model, counting, threads=core_count())
 
 
 def ranked_logits(sources: Sequence[Source]) -> tuple[Float64Array, BoolArray]:
@@ -86,22 +148,25 @@ def main() -> None:
     parser.add_argument("truth", type=Path, help="its true boxes")
     parser.add_argument("--steps", type=int, default=4000, help="steps of each training")
     parser.add_argument("--work", type=Path, default=Path("build/leave_one_out"))
+    parser.add_argument("--base", type=Path, help="network that has seen no group: the start")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     settings = load_settings(None, [f"network.steps={arguments.steps}", *_UNCALIBRATED])
     clip = LabelledClip(arguments.video, arguments.truth, settings.network.every)
-    sets = sorted(path for path in arguments.roads.iterdir() if path.is_dir())
+    sets = split_sets(arguments.roads, arguments.work / "sets")
     results = []
     for group in GROUPS:
+        left_out = [path for path in sets if path.name in group]
         learnt = tuple(path for path in sets if path.name not in group)
-        job = NetworkJob(learnt, (clip,), arguments.work / f"without_{group[0]}.onnx")
-        results.append(measure(group, arguments.roads, train(job, settings)))
+        output = arguments.work / f"without_{group[0]}.onnx"
+        job = NetworkJob(learnt, (clip,), output, arguments.base)
+        results.append(measure(left_out, train(job, settings)))
         print(f"without {', '.join(group)}: {results[-1].mean.best_f1:.3f}", flush=True)
     summary = summarize(results)
     print("\n".join(summary.lines()))
     path = arguments.work / "results.json"
     path.write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
-    job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx")
+    job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx", arguments.base)
     network = train(job, load_settings(None, [f"network.steps={arguments.steps}"]))
     print("\n".join(video_lines(clip, network, settings)))
 

@@ -32,6 +32,12 @@ from vdet.files import check_output
     metavar="CLIP TRUTH",
     help="Learn from every n-th frame of a labelled video too (network.every). Can be repeated.",
 )
+@click.option(
+    "--base",
+    type=PATH,
+    metavar="FILE",
+    help="Start from the weights of this network, which vdet train-net has written.",
+)
 @settings_options("network.steps=4000")
 @overwrite_option
 @click.pass_obj
@@ -41,6 +47,7 @@ def train_net(
     data: tuple[Path, ...],
     output: Path,
     clips: tuple[tuple[Path, Path], ...],
+    base: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
     overwrite: bool,
@@ -66,8 +73,8 @@ def train_net(
     from vdet.learn.network.sources import LabelledClip
 
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
-    job = NetworkJob(data, labelled, output, overwrite)
-    inputs = [*data, *(path for clip in clips for path in clip)]
+    job = NetworkJob(data, labelled, output, base, overwrite)
+    inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     for path in (job.output, job.report):
         check_output(path, overwrite=overwrite, inputs=inputs)
     with steps_bar(settings.steps, quiet=quiet) as advance:

@@ -42,6 +42,9 @@ class NetworkTrainingSettings(Section):
         (0.5, 1.5), description="least and most scale of the four pictures of a mosaic"
     )
     plain: Fraction = Field(0.12, description="share of the steps, the last ones, without mosaics")
+    weights: dict[str, float] = Field(
+        {}, description="pictures of the set of this name are drawn so many times as often"
+    )
     least_side: float = Field(
         10.0,
         ge=0,

@@ -1,12 +1,14 @@
 """Training pictures: their boxes lie where the vehicles are, whatever was changed."""
 
+import cv2
 import numpy as np
 import pytest
 
 from learn.network.blocks import block_picture, block_source
 from vdet.config.network import NetworkTrainingSettings
-from vdet.learn.network.augmentation import Drawing, SampleDrawer
+from vdet.learn.network.augmentation import Drawing, SampleDrawer, _turned
 from vdet.learn.network.samples import MAX_PIXELS, Sample, Source
+from vdet.learn.network.weather import with_weather
 
 PLAIN = Drawing(width=256, height=128, magnified=1.0, mosaics=0.0)
 MOSAIC = Drawing(width=256, height=128, magnified=1.0, mosaics=1.0)
@@ -91,3 +93,35 @@ def test_small_sources_are_drawn_more_often_than_their_share() -> None:
     drawn = [drawer.draw(np.random.default_rng(seed), PLAIN) for seed in range(200)]
     with_blocks = sum(len(sample.boxes) > 0 for sample in drawn)
     assert 30 <= with_blocks <= 70  # one in four, not one in ten
+
+
+def test_a_weight_makes_a_source_come_more_often() -> None:
+    one, other = Source("one", [block_picture(0)]), Source("other", [black_on_white().samples[0]])
+    settings = NetworkTrainingSettings(weights={"other": 3})
+    drawer = SampleDrawer([one, other], settings)
+    picks = [drawer._pick(np.random.default_rng(seed)) for seed in range(200)]
+    assert 130 <= sum(pick is other.samples[0] for pick in picks) <= 170  # three in four
+
+
+def test_a_turned_box_lies_around_the_ellipse_in_it() -> None:
+    turn = cv2.getRotationMatrix2D((0, 0), 90, 1.0)
+    [turned] = _turned(np.array([[10, 20, 50, 40]], np.float32), turn)
+    assert turned == pytest.approx([20, -50, 40, -10], abs=1e-4)
+
+
+def test_a_circle_keeps_its_size_at_any_angle() -> None:
+    turn = cv2.getRotationMatrix2D((100, 100), 30, 1.0)
+    [turned] = _turned(np.array([[90, 90, 110, 110]], np.float32), turn)
+    assert turned == pytest.approx([90, 90, 110, 110], abs=1e-4)
+
+
+def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:
+    day = np.full((128, 256, 3), 200, np.uint8)
+    boxes = np.array([[40, 40, 100, 90]], np.float32)
+    drawn = [with_weather(np.random.default_rng(seed), day, boxes) for seed in range(400)]
+    changed = [image for image in drawn if not np.array_equal(image, day)]
+    dark = [image for image in changed if np.median(image) < 120]
+    assert {image.shape for image in drawn} == {day.shape}
+    assert 50 <= len(changed) <= 140
+    assert 20 <= len(dark) <= 90
+    assert any(image.max() > 220 for image in dark)  # lamps

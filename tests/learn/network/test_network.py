@@ -133,6 +133,27 @@ def test_the_exported_network_gives_what_the_trained_one_gives(
     assert cells == pytest.approx(expected.numpy(), abs=1e-3)
 
 
+def test_a_training_goes_on_from_the_weights_of_an_exported_network(
+    trained: tuple[Network, list[TrainingState]], tmp_path: Path
+) -> None:
+    path = tmp_path / "base.onnx"
+    export_network(trained[0], Header(classes=CLASSES), path)
+    settings = QUICK.model_copy(update={"steps": 3, "warm_up": 0, "rate": 1e-6})
+    losses: list[float] = []
+    train_network(
+        [block_source()], 2, settings, tmp_path / "a.ckpt", base=path,
+        progress=lambda state: losses.append(state.loss),
+    )  # fmt: skip
+    assert losses[0] < 0.6 * trained[1][0].loss
+
+
+def test_a_base_of_another_form_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "junk.onnx"
+    path.write_bytes(b"junk")
+    with pytest.raises(DataError, match="is not a network that vdet train-net has written"):
+        train_network([block_source(4)], 2, QUICK, tmp_path / "a.ckpt", base=path)
+
+
 def test_what_was_learnt_is_found_again(
     trained: tuple[Network, list[TrainingState]], tmp_path: Path
 ) -> None:

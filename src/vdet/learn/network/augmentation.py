@@ -11,10 +11,13 @@ from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
 from vdet.geometry import Float32Array
 from vdet.learn.network.samples import Sample, Source, join
+from vdet.learn.network.weather import with_weather
 from vdet.media.images import Image
 
 _LEAST_VISIBLE = 0.25  # share of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
+_TILTED = 0.25  # share of pictures that are turned
+_TILT = 3.0  # deviation of their angles, degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +34,7 @@ class Drawing:
 
 
 class SampleDrawer:
-    """Draws training pictures from sources, each as often as the root of its size.
+    """Draws training pictures from sources, each as often as the root of its size times its weight.
 
     Parameters
     ----------
@@ -42,7 +45,12 @@ class SampleDrawer:
     def __init__(self, sources: Sequence[Source], settings: NetworkTrainingSettings) -> None:
         self._sources = sources
         self._settings = settings
-        weights = np.sqrt([len(source.samples) for source in sources])
+        weights = np.array(
+            [
+                np.sqrt(len(source.samples)) * settings.weights.get(source.name, 1.0)
+                for source in sources
+            ]
+        )
         self._shares = weights / weights.sum()
 
     def draw(self, rng: np.random.Generator, drawing: Drawing) -> Sample:
@@ -56,7 +64,9 @@ class SampleDrawer:
             sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
-        image = _with_noise(rng, _recolored(rng, sample.image))
+        visible = sample.boxes[~sample.ignored]
+        image = with_weather(rng, _recolored(rng, sample.image), visible)
+        image = _with_noise(rng, image)
         return _cleaned(replace(sample, image=image), settings.least_side)
 
     def _pick(self, rng: np.random.Generator) -> Sample:
@@ -103,9 +113,12 @@ def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scal
     kept_x, kept_y = columns / image.shape[1], rows / image.shape[0]
     a, b = x_factor * kept_x, y_factor * kept_y
     shift_x, shift_y = left + a / 2 - 0.5, top + b / 2 - 0.5  # middles of pixels
+    angle = rng.normal(0, _TILT) if rng.random() < _TILTED else 0.0
+    turn = cv2.getRotationMatrix2D((width / 2, height / 2), angle, 1.0)
+    placing = np.array([[a, 0, shift_x], [0, b, shift_y], [0, 0, 1]])
     warped = cv2.warpAffine(
         image,
-        np.array([[a, 0, shift_x], [0, b, shift_y]]),
+        turn @ placing,
         size,
         flags=cv2.INTER_LINEAR,
         borderMode=cv2.BORDER_CONSTANT,
@@ -113,9 +126,16 @@ def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scal
     )
     factors = np.array([x_factor, y_factor] * 2, np.float32)
     offset = np.array([left, top] * 2, np.float32)
-    return _cropped(
-        Sample(_image(warped), sample.boxes * factors + offset, sample.classes, sample.ignored)
-    )
+    boxes = _turned(sample.boxes * factors + offset, turn)
+    return _cropped(Sample(_image(warped), boxes, sample.classes, sample.ignored))
+
+
+def _turned(boxes: Float32Array, turn: npt.ArrayLike) -> Float32Array:
+    """Return boxes around the ellipses in boxes, `(n, 4)`, of a picture that was turned."""
+    matrix = np.asarray(turn)
+    middles = (boxes[:, :2] + boxes[:, 2:]) / 2 @ matrix[:, :2].T + matrix[:, 2]
+    halves = np.sqrt(((boxes[:, 2:] - boxes[:, :2]) / 2) ** 2 @ (matrix[:, :2] ** 2).T)
+    return np.concatenate([middles - halves, middles + halves], axis=1).astype(np.float32)
 
 
 def _cropped(sample: Sample) -> Sample:

@@ -36,6 +36,8 @@ class NetworkJob:
         Labelled videos.
     output
         The file of the network; report and checkpoint, the training's state, lie beside it.
+    base
+        An exported network from whose weights the training starts.
     overwrite
         Replace an earlier network and its report.
     """
@@ -43,6 +45,7 @@ class NetworkJob:
     pictures: tuple[Path, ...]
     clips: tuple[LabelledClip, ...]
     output: Path
+    base: Path | None = None
     overwrite: bool = False
 
     @property
@@ -106,7 +109,9 @@ def train_to_file(
         del recent[:-_AVERAGED]
         progress(state)
 
-    network = train_network(sources, len(CLASSES), settings, job.checkpoint, progress=note)
+    network = train_network(
+        sources, len(CLASSES), settings, job.checkpoint, base=job.base, progress=note
+    )
     report = NetworkReport(
         sources=reports,
         steps=settings.steps,

@@ -9,7 +9,7 @@ import numpy as np
 from vdet.geometry import BoolArray, Float32Array, Int64Array
 from vdet.media.images import Image
 
-MAX_PIXELS = 360_000
+MAX_PIXELS = 640_000
 """Pictures are held with at most this many pixels; larger ones are made smaller."""
 
 UNKNOWN = -1

@@ -19,6 +19,7 @@ from vdet.files import OutputFiles
 from vdet.learn.network.architecture import Network, cell_centers, decode, flatten
 from vdet.learn.network.assignment import Vehicles, assign
 from vdet.learn.network.augmentation import Drawing, SampleDrawer
+from vdet.learn.network.base import start_from
 from vdet.learn.network.losses import (
     BOX_WEIGHT,
     CLASS_WEIGHT,
@@ -84,6 +85,7 @@ def train_network(
     settings: NetworkTrainingSettings,
     checkpoint: Path,
     *,
+    base: Path | None = None,
     progress: Callable[[TrainingState], object] = lambda _: None,
 ) -> Network:
     """Train a network and return it with the moving average of its weights.
@@ -97,17 +99,22 @@ def train_network(
         At least one, each with at least one sample.
     checkpoint
         File of the last checkpoint; it is made and replaced, and read where it exists.
+    base
+        An exported network from whose weights the training starts.
 
     Raises
     ------
     DataError
-        No source has a vehicle, or the checkpoint belongs to another training.
+        No source has a vehicle, the base is not such a network, or the checkpoint belongs to
+        another training.
     """
     if not any((~sample.ignored).any() for each in sources for sample in each.samples):
         raise DataError("no picture has a vehicle; give labelled pictures")
     run = _Run(class_count, settings)
     if checkpoint.exists():
         run.restore(checkpoint)
+    elif base is not None:
+        run.start_from(base, next(_batches(sources, settings, 0)))
     began, first = time.monotonic(), run.step
     with single_threaded_libraries(), prefetch(_batches(sources, settings, first)) as batches:
         for batch in batches:
@@ -139,6 +146,11 @@ class _Run:
             lr=settings.rate,
         )
         self.step = 0
+
+    def start_from(self, path: Path, batch: Batch) -> None:
+        """Take the first weights from an exported network. Raises `DataError`."""
+        start_from(self._network, path, _inputs(batch))
+        self.averaged.load_state_dict(self._network.state_dict())
 
     @property
     def rate(self) -> float:
@@ -205,8 +217,7 @@ class _Run:
 def _loss(network: Network, batch: Batch) -> Tensor:
     height, width = batch.pictures.shape[1:3]
     centers, strides = cell_centers(height, width)
-    pictures = batch.pictures.permute(0, 3, 1, 2).float()
-    raw = flatten(network(pictures.contiguous(memory_format=torch.channels_last)))
+    raw = flatten(network(_inputs(batch)))
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
     found = assign(scores, boxes, batch.vehicles, centers, strides)
     targets = torch.zeros_like(scores)
@@ -226,6 +237,12 @@ def _loss(network: Network, batch: Batch) -> Tensor:
         reduction="sum",
     )
     return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(found.iou), 1)
+
+
+def _inputs(batch: Batch) -> Tensor:
+    """Return the pictures as the network takes them."""
+    pictures = batch.pictures.permute(0, 3, 1, 2).float()
+    return pictures.contiguous(memory_format=torch.channels_last)
 
 
 def _inside(batch: Batch, centers: Tensor) -> tuple[Tensor, Tensor]:
