@@ -18,7 +18,7 @@ MODELS = Path(__file__).parents[2] / "src" / "vdet" / "models"
 LINEAR = ("a linear model of vdet", "sides of boxes: learnt", "data_sha256: ")
 NETWORK = (
     "a network of the form vdet",
-    "input: 512×288 for a frame of 1280×720, BGR up to 255",
+    "input: 640×352 for a frame of 1280×720, BGR up to 255",
     "vehicles: car, truck, bus",
     '"steps": ',
 )

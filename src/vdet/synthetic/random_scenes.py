@@ -72,7 +72,7 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
         )
         for number, path in enumerate(paths, start=1)
     )
-    roadside = tuple(each for each in scene.roadside if each.kind not in ("bin", "hut"))
+    roadside = tuple(each for each in scene.roadside if each.kind in ("tree", "bush"))
     return replace(scene, roadside=roadside, vehicles=vehicles, rate=Fraction(25), frames=250)
 
 

@@ -23,13 +23,20 @@ def load_network(settings: NetworkSettings, path: Path | None) -> NetworkModel:
 
 
 def trained_on(path: Path) -> tuple[str, ...]:
-    """Return the names of the sets that a network of ours was trained on; of others, nothing."""
+    """Return the names of the sets that a network of ours was trained on; of others, nothing.
+
+    Those of the networks that it was trained from are among them.
+    """
     header = read_header(Session(path), path)
+    provenance = header.provenance if header else None
+    names: list[str] = []
     try:
-        sources = header.provenance["report"]["sources"] if header else []
-        return tuple(str(source["name"]) for source in sources)
-    except (LookupError, TypeError):
+        while provenance:
+            names += (str(source["name"]) for source in provenance["report"]["sources"])
+            provenance = provenance.get("base")
+    except (LookupError, TypeError, AttributeError):
         return ()
+    return tuple(dict.fromkeys(names))
 
 
 NET = DetectorKind(NetworkSettings, load_network, lambda _: SHIPPED, trained_on)

@@ -4,10 +4,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import vdet
 from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.header import Header
+from vdet.detect.onnx.recognition import read_header
+from vdet.detect.onnx.session import Session
 from vdet.evaluate.images.reading import read_labelled_images
 from vdet.files import write_json
 from vdet.learn.network.export import export_network
@@ -127,12 +130,18 @@ def train_to_file(
             "program": f"vdet {vdet.__version__}",
             "training": settings.model_dump(mode="json"),
             "report": asdict(report),
+            **({"base": _provenance(job.base)} if job.base else {}),
         },
     )
     export_network(network, header, job.output, overwrite=job.overwrite)
     write_json(asdict(report), str(job.report), overwrite=job.overwrite)
     job.checkpoint.unlink(missing_ok=True)
     return report
+
+
+def _provenance(path: Path) -> dict[str, Any]:
+    header = read_header(Session(path), path)
+    return header.provenance if header else {}
 
 
 def _read(job: NetworkJob) -> tuple[list[Source], tuple[SourceReport, ...]]:
