@@ -68,7 +68,7 @@ net: $(TOOLS)  ## train the shipped network on (hours): sets of pictures in ROAD
 		every=4 least_side=8 scales=[0.5,2.0] 'weights={"traffic_cams":3,"overpass":2.2}')
 	cp build/net/net.onnx src/vdet/models/
 
-unseen: $(TOOLS)  ## measure the network on cameras that it has not seen (hours)
+unseen: $(TOOLS)  ## measure the network on cameras that it has not seen (many hours)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH)
 

@@ -17,12 +17,12 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     ),
     "What is processed": (
         *("--truth", "--video", "--start", "--end", "--frames", "--stride", "--every", "--from"),
-        *("--until", "--roi", "--lines", "--size", "--rate", "--base", "--seed", "--split"),
-        *("--sweep", "--pattern", "--score", "--least-width"),
+        *("--until", "--roi", "--lines", "--size", "--rate", "--seed", "--split", "--sweep"),
+        *("--pattern", "--score", "--least-width"),
     ),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),
     "Lanes": ("--lanes", "--camera"),
-    "Model and settings": ("--model", "--config", "--set"),
+    "Model and settings": ("--model", "--base", "--config", "--set"),
     "Parallel work": ("--jobs", "--threads", "--scheduler"),
     "General": ("--quiet", "--verbose", "--version", "--help"),
 }

@@ -1,5 +1,7 @@
 """The section `network`: how `vdet train-net` trains the network."""
 
+from typing import Annotated
+
 from pydantic import Field, model_validator
 
 from vdet.config.section import Fraction, Section
@@ -42,7 +44,7 @@ class NetworkTrainingSettings(Section):
         (0.5, 1.5), description="least and most scale of the four pictures of a mosaic"
     )
     plain: Fraction = Field(0.12, description="share of the steps, the last ones, without mosaics")
-    weights: dict[str, float] = Field(
+    weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field(
         {}, description="pictures of the set of this name are drawn so many times as often"
     )
     least_side: float = Field(

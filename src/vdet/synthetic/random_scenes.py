@@ -51,7 +51,7 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     The camera drives in the left lane. Vehicle 1 drives far ahead in the same lane, vehicle 2 two
     lanes to the right. The camera overtakes vehicle 3, which leaves at the right edge. Vehicle 4
     enters at the right edge, overtakes, and hides vehicle 2 for about two seconds. There are no
-    bins and huts beside the road: drawn ones look like drawn vehicles.
+    signs, bins and huts beside the road: drawn ones look like drawn vehicles.
     """
     rng = np.random.default_rng(seed)
     scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)

@@ -210,6 +210,8 @@ def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
     other = settings.model_copy(update={"rate": 1e-4})
     with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with other settings"):
         train_network(source, 2, other, path)
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* another base"):
+        train_network(source, 2, settings, path, base=tmp_path / "base.onnx")
     path.write_bytes(b"junk")
     with pytest.raises(DataError, match=r"net\.ckpt: is no checkpoint of this training"):
         train_network(source, 2, settings, path)

@@ -84,3 +84,20 @@ def test_a_stopped_training_goes_on_and_other_scores_need_no_step(
     header = recognize(Session(tmp_path / "net.onnx"), tmp_path / "net.onnx").header
     assert header is not None
     assert header.calibration.slope == 2
+
+
+def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: Path) -> None:
+    base, output = tmp_path / "base.onnx", tmp_path / "net.onnx"
+    assert run("train-net", write_set(tmp_path / "one"), "-o", base, *QUICK).code == 0
+    command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
+    result = run(*command, "--base", base)
+    assert result.code == 0, result.err
+    assert trained_on(NetworkSettings(), output) == ("two", "one")
+
+
+def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path: Path) -> None:
+    command = ("train-net", write_set(tmp_path / "set"), "-o", tmp_path / "net.onnx", *QUICK)
+    result = run(*command, "--base", tmp_path / "base.onnx")
+    assert result.code == 1
+    assert "base.onnx: cannot be read: No such file" in result.err
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]

@@ -5,7 +5,7 @@ and bottom-up after PANet (Liu et al., 2018), boxes as distances from the middle
 FCOS (Tian et al., 2019). All widths are multiples of 16, which onnxruntime computes fastest.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor, nn
@@ -108,29 +108,6 @@ class Network(nn.Module):
             head(tower(level))
             for level, tower, head in zip((low, middle, high), self.towers, self.heads, strict=True)
         ]
-
-    def convolutions(self) -> Iterator[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
-        """Yield each convolution and its normalisation, in the order of the exported graph."""
-        parts = [*self.stages, *self.lateral, self.down, self.up[0], self.up[1]]
-        yield from _pairs([self.stem, self.stem_norm])
-        for part in parts:
-            yield from _pairs(part.modules())
-        for tower, head in zip(self.towers, self.heads, strict=True):
-            yield from _pairs([*tower.modules(), head])
-
-
-def _pairs(layers: Iterable[nn.Module]) -> Iterator[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
-    """Yield the convolutions among the layers with the normalisations that follow them."""
-    last: nn.Conv2d | None = None
-    for layer in layers:
-        if isinstance(layer, nn.BatchNorm2d):
-            assert last is not None
-            yield last, layer
-            last = None
-        elif isinstance(layer, nn.Conv2d):
-            last = layer
-    if last is not None:
-        yield last, None
 
 
 def cell_centers(height: int, width: int) -> tuple[Tensor, Tensor]:

@@ -11,6 +11,7 @@ from torch import Tensor, nn
 
 from vdet.errors import DataError
 from vdet.learn.network.architecture import Network
+from vdet.learn.network.export import convolutions
 
 
 @torch.no_grad()
@@ -31,8 +32,7 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
         The file is not a network of this form.
     """
     try:
-        folded = _convolutions(path)
-        _load(network, folded)
+        _load(network, _read(path))
     except Exception as error:  # onnx and torch raise many kinds for a file of another form
         raise DataError(f"{path}: is not a network that vdet train-net has written") from error
     hooks = [
@@ -45,7 +45,7 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
         hook.remove()
 
 
-def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
+def _read(path: Path) -> list[tuple[Tensor, Tensor]]:
     """Return weight and bias of all convolutions, in the order of the graph."""
     graph = onnx.load(str(path)).graph
     constants = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
@@ -61,10 +61,8 @@ def _tensor(values: npt.NDArray[Any]) -> Tensor:
 
 
 def _load(network: Network, folded: list[tuple[Tensor, Tensor]]) -> None:
-    layers = list(network.convolutions())
-    for (layer, norm), (weight, bias) in zip(layers, folded, strict=True):
-        scale = 255 if layer is network.stem else 1
-        layer.weight.copy_(weight.reshape(layer.weight.shape) * scale)
+    for (layer, norm, factor), (weight, bias) in zip(convolutions(network), folded, strict=True):
+        layer.weight.copy_(weight.reshape(layer.weight.shape) / factor)
         target = layer.bias if norm is None else norm.bias
         assert target is not None
         target.copy_(bias.reshape(target.shape))

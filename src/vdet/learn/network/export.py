@@ -7,7 +7,7 @@ cells, float32 `(1, cells, 5 + classes)`. Batch normalisation is part of the con
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,6 +37,13 @@ def export_network(
         temporary.write_bytes(model.SerializeToString())
 
 
+def convolutions(network: Network) -> list["Convolution"]:
+    """Return the convolutions of a network in the order of the exported graph."""
+    graph = _Graph()
+    _add_network(graph, network)
+    return graph.convolutions
+
+
 def _add_network(graph: "_Graph", network: Network) -> str:
     """Add all layers; return the name of the output."""
     values = graph.add("Cast", "image", to=TensorProto.FLOAT)
@@ -63,12 +70,21 @@ def _add_network(graph: "_Graph", network: Network) -> str:
     return graph.add("Concat", *tables, axis=1)
 
 
+class Convolution(NamedTuple):
+    """A convolution, the normalisation that follows it, and the factor of its input."""
+
+    layer: nn.Conv2d
+    norm: nn.BatchNorm2d | None
+    factor: float
+
+
 class _Graph:
     """An ONNX graph that grows layer by layer; values are named by numbers."""
 
     def __init__(self) -> None:
         self._nodes: list[onnx.NodeProto] = []
         self._constants: list[onnx.TensorProto] = []
+        self.convolutions: list[Convolution] = []
 
     def add(self, kind: str, *inputs: str, **attributes: Any) -> str:
         """Add a node and return the name of its output."""
@@ -99,6 +115,8 @@ class _Graph:
     ) -> str:
         """Add a convolution whose input is multiplied by `factor`, with its normalisation."""
         assert isinstance(layer, nn.Conv2d)
+        assert norm is None or isinstance(norm, nn.BatchNorm2d)
+        self.convolutions.append(Convolution(layer, norm, factor))
         weight, bias = _folded(layer, norm)
         return self.add(
             "Conv",
@@ -144,9 +162,9 @@ class _Graph:
 
 
 @torch.no_grad()
-def _folded(layer: nn.Conv2d, norm: nn.Module | None) -> tuple[Tensor, Tensor]:
+def _folded(layer: nn.Conv2d, norm: nn.BatchNorm2d | None) -> tuple[Tensor, Tensor]:
     """Return weight and bias of a convolution with the normalisation that follows it."""
-    if not isinstance(norm, nn.BatchNorm2d):
+    if norm is None:
         assert layer.bias is not None
         return layer.weight, layer.bias
     assert norm.running_var is not None

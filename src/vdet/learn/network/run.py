@@ -98,12 +98,16 @@ def train_to_file(
     ------
     TruthError, ImageError, VideoError
         Pictures, videos or their labels cannot be read.
+    ModelError
+        The base cannot be read.
     DataError
-        There is no vehicle to learn, or the checkpoint is that of another training.
+        There is no vehicle to learn, the base is not such a network, or the checkpoint is that of
+        another training.
     OutputError
         A file cannot be written.
     """
     began = time.monotonic()
+    base = {"base": _provenance(job.base)} if job.base else {}
     sources, reports = _read(job)
     recent: list[float] = []
 
@@ -130,7 +134,7 @@ def train_to_file(
             "program": f"vdet {vdet.__version__}",
             "training": settings.model_dump(mode="json"),
             "report": asdict(report),
-            **({"base": _provenance(job.base)} if job.base else {}),
+            **base,
         },
     )
     export_network(network, header, job.output, overwrite=job.overwrite)

@@ -110,11 +110,11 @@ def train_network(
     """
     if not any((~sample.ignored).any() for each in sources for sample in each.samples):
         raise DataError("no picture has a vehicle; give labelled pictures")
-    run = _Run(class_count, settings)
+    run = _Run(class_count, settings, base)
     if checkpoint.exists():
         run.restore(checkpoint)
     elif base is not None:
-        run.start_from(base, next(_batches(sources, settings, 0)))
+        run.start_from(base, next(_batches(sources, settings, run.step)))
     began, first = time.monotonic(), run.step
     with single_threaded_libraries(), prefetch(_batches(sources, settings, first)) as batches:
         for batch in batches:
@@ -129,11 +129,14 @@ def train_network(
 class _Run:
     """The state of a training between two steps."""
 
-    def __init__(self, class_count: int, settings: NetworkTrainingSettings) -> None:
+    def __init__(
+        self, class_count: int, settings: NetworkTrainingSettings, base: Path | None
+    ) -> None:
         torch.manual_seed(settings.seed)
         torch.set_num_threads(1)  # two threads that wait for each other are slower than one
         torch.set_flush_denormal(True)
         self._settings = settings
+        self._base = base
         self._network = Network(class_count).to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [each for each in self._network.parameters() if each.ndim > 1]
@@ -196,8 +199,8 @@ class _Run:
             torch.save(state, files.stage(path))
 
     def _learnt_with(self) -> dict[str, Any]:
-        """Return the settings without those that change no weight."""
-        return self._settings.model_dump(exclude={"score"})
+        """Return the base, and the settings without those that change no weight."""
+        return {"base": str(self._base)} | self._settings.model_dump(exclude={"score"})
 
     def restore(self, path: Path) -> None:
         """Go on from a file that `save` has written. Raises `DataError`."""
@@ -211,7 +214,9 @@ class _Run:
         except Exception as error:  # torch raises many kinds for a file of another form
             raise DataError(f"{path}: is no checkpoint of this training; remove it") from error
         if not same:
-            raise DataError(f"{path}: belongs to a training with other settings; remove it")
+            raise DataError(
+                f"{path}: belongs to a training with other settings or another base; remove it"
+            )
 
 
 def _loss(network: Network, batch: Batch) -> Tensor:
