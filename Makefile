@@ -32,7 +32,7 @@ tests: $(TOOLS)  ## run all tests
 
 nettest: $(TOOLS)  ## install torch, and run the tests of training networks
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
-	$(BIN)/pytest tests/learn/network
+	$(BIN)/pytest tests/learn/net
 
 bench: $(TOOLS)  ## measure speed and memory, as ratios of one run
 	$(BIN)/python -m benchmarks

@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.material import find_video, read_pictures, shipped_config
 from benchmarks.runs import peak_memory, run_times, seconds_of_program, seconds_of_video
 from benchmarks.searches import search_times, times_by_height
-from vdet.pipeline.threads import single_threaded_libraries
+from vdet.run.threads import single_threaded_libraries
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,9 @@ from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
-from vdet.pipeline.loop import follow_frames, peek
-from vdet.pipeline.positions import with_positions
-from vdet.pipeline.threads import single_threaded_libraries
+from vdet.run.loop import follow_frames, peek
+from vdet.run.positions import with_positions
+from vdet.run.threads import single_threaded_libraries
 from vdet.synthetic import must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.lane_view import lane_view

@@ -21,20 +21,20 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.scores import score
-from vdet.evaluate.truth import read_truth
-from vdet.formats.rows import Row
-from vdet.learn.augmentation import augment
-from vdet.learn.box_regression import extract_box_patches, fit_boxes
-from vdet.learn.dataset import PatchFile, find_boxed, find_patches
-from vdet.learn.extraction import extract
-from vdet.learn.fitting import fit_patches
-from vdet.learn.training_set import training_set
+from vdet.labels.rows import Row
+from vdet.labels.truth import read_truth
+from vdet.labels.video import LabelledVideo
+from vdet.learn.svm.augmentation import augment
+from vdet.learn.svm.box_regression import extract_box_patches, fit_boxes
+from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
+from vdet.learn.svm.extraction import extract
+from vdet.learn.svm.fitting import fit_patches
+from vdet.learn.svm.training_set import training_set
 from vdet.media import VideoReader
-from vdet.pipeline.loop import peek
-from vdet.pipeline.stride import search_frame
-from vdet.pipeline.threads import single_threaded_libraries
+from vdet.run.loop import peek
+from vdet.run.stride import search_frame
+from vdet.run.threads import single_threaded_libraries
 from vdet.track.factory import make_tracker
 from vdet.workers import make_workers
 

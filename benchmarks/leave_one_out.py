@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
+from vdet.boxes import BoolArray, Float64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
@@ -28,11 +29,10 @@ from vdet.evaluate.clips.text import result_lines
 from vdet.evaluate.comparison import pool
 from vdet.evaluate.detection_metrics import rank_predictions
 from vdet.evaluate.images.evaluate import ImagesResult, evaluate_images
-from vdet.evaluate.images.reading import read_labelled_images
 from vdet.evaluate.images.scores import Counting, Source
-from vdet.geometry import BoolArray, Float64Array
-from vdet.learn.network.run import NetworkJob, train_to_file
-from vdet.learn.network.sources import LabelledClip
+from vdet.labels.pictures.reading import read_labelled_images
+from vdet.learn.net.run import NetworkJob, train_to_file
+from vdet.learn.net.sources import LabelledClip
 from vdet.workers import core_count
 
 GROUPS = (

@@ -16,8 +16,8 @@ from hypothesis import settings
 from vdet.cli import main
 from vdet.config.schema import AugmentationSettings, Settings, SvmSettings, TrainingSettings
 from vdet.detect.svm.model import save_model
-from vdet.learn.dataset import find_patches
-from vdet.learn.training import train
+from vdet.learn.svm.dataset import find_patches
+from vdet.learn.svm.training import train
 from vdet.synthetic import demo_scene, write_clip, write_patches
 from vdet.synthetic.scene import Scene
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vdet.batch.task import Work
+from vdet.boxes import Box
 from vdet.config.schema import (
     FeatureSettings,
     HeatSettings,
@@ -24,7 +25,6 @@ from vdet.config.schema import (
 )
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
-from vdet.geometry import Box
 from vdet.media import Frame, Picture
 from vdet.media.images import Image
 

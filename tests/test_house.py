@@ -16,10 +16,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 LONGEST = 400
 
 ROOMS = (
-    "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate",
-    "pipeline", "pages", "summary", "count", "formats", "lanes", "track", "detect", "synthetic",
-    "draw", "regions", "media", "config", "plugins", "workers", "archives", "files", "temporary",
-    "polygons", "geometry", "errors", "__init__",
+    "__main__", "process", "cli", "demo", "testing", "api", "batch", "learn", "evaluate", "run",
+    "pages", "traffic", "labels", "lanes", "track", "detect", "synthetic", "draw", "regions",
+    "media", "config", "plugins", "workers", "archives", "files", "temporary", "polygons", "boxes",
+    "errors", "progress", "__init__", "version",
 )  # fmt: skip
 """From top to bottom: a room imports only what stands below it."""
 
@@ -97,7 +97,7 @@ def test_a_module_imports_only_what_stands_below_its_room() -> None:
     assert upward == []
 
 
-@pytest.mark.parametrize("room", ["errors", "geometry"])
+@pytest.mark.parametrize("room", ["errors", "boxes"])
 def test_the_foundations_import_nothing_of_vdet(room: str) -> None:
     assert list(imports_of(NAMES[room])) == []
 

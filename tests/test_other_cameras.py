@@ -15,20 +15,20 @@ from statistics import median
 import numpy as np
 import pytest
 
+from vdet.boxes import Box, Float64Array
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import horizon_of
 from vdet.evaluate.comparison import Comparison, compare
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
 from vdet.evaluate.scores import score, score_comparison
-from vdet.formats.rows import Row
-from vdet.geometry import Box, Float64Array
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.coding import Coding
-from vdet.pipeline.loop import follow_frames, peek
-from vdet.pipeline.threads import single_threaded_libraries
+from vdet.run.loop import follow_frames, peek
+from vdet.run.threads import single_threaded_libraries
 from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import Light, Scene

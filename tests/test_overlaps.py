@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.geometry import Box, coverage, iou_matrix, visible
+from vdet.boxes import Box, coverage, iou_matrix, visible
 
 SIDES = st.integers(1, 50)
 PLACES = st.integers(-50, 50)

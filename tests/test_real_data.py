@@ -14,14 +14,14 @@ import pytest
 
 from conftest import Run
 from seed import SEED
+from vdet.boxes import Box
 from vdet.config.schema import SvmSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
-from vdet.geometry import Box
-from vdet.learn.dataset import find_patches, read_patches
-from vdet.learn.training_set import hold_out
+from vdet.learn.svm.dataset import find_patches, read_patches
+from vdet.learn.svm.training_set import hold_out
 from vdet.media import Picture, VideoReader
 from vdet.media.images import read_image
 

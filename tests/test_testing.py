@@ -15,7 +15,7 @@ from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.svm.detector import SvmModel
 from vdet.media import Picture
 from vdet.media.images import Image
-from vdet.pipeline.sinks.protocol import SinkContext, SinkKind, sink_kind
+from vdet.run.sinks.protocol import SinkContext, SinkKind, sink_kind
 from vdet.testing import check_detector, check_sink, check_tracker
 from vdet.track.factory import make_tracker
 from vdet.track.track import Track

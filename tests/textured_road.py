@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vdet.geometry import Box
+from vdet.boxes import Box
 from vdet.media.images import Image
 
 

@@ -23,7 +23,7 @@ from docs.picture.light import (
     unit,
 )
 
-from vdet.geometry import Float32Array
+from vdet.boxes import Float32Array
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH
 

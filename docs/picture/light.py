@@ -7,7 +7,7 @@ displayable. Directions are unit vectors `(…, 3)`: x to the right, y up, z ahe
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from vdet.geometry import Float32Array
+from vdet.boxes import Float32Array
 from vdet.media.images import Image
 
 EXPOSURE = 0.52

@@ -5,7 +5,7 @@ import numpy as np
 from docs.picture.light import ramp, rgb
 from docs.picture.shapes import VAN, Car, to_rounded_rectangle
 
-from vdet.geometry import Float32Array
+from vdet.boxes import Float32Array
 
 MATT, CLEAR_COAT, GLASS = 0.1, 1.0, 2.0
 

@@ -21,7 +21,7 @@ from docs.picture.light import (
 from docs.picture.paint import Surface, paint_car, paint_lorry
 from docs.picture.shapes import Car, Shape
 
-from vdet.geometry import Float32Array
+from vdet.boxes import Float32Array
 from vdet.media.images import Image
 
 Distance = Callable[[Float32Array], Float32Array]

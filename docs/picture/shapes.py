@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vdet.geometry import Float32Array
+from vdet.boxes import Float32Array
 
 
 class Shape(Protocol):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         load_settings,
     )
 
-__version__ = "0.1.0"
+from vdet.version import __version__ as __version__  # noqa: E402
 
 __all__ = [
     "Box",

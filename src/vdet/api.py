@@ -13,6 +13,7 @@ from fractions import Fraction
 from os import PathLike
 from pathlib import Path
 
+from vdet.boxes import Box
 from vdet.config.kinds import kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
@@ -21,14 +22,13 @@ from vdet.detect.detections import Detections
 from vdet.detect.factory import DetectorKind, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ImageError, VdetError, VideoError
-from vdet.geometry import Box
 from vdet.media import Frame, Picture, VideoReader
 from vdet.media.images import Image
-from vdet.pipeline.loop import Summary, VideoJob, check_job, follow_frames, peek, run_video
-from vdet.pipeline.pictures import PictureJob, detect_picture, run_picture
-from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
-from vdet.pipeline.threads import prefetch, single_threaded_libraries
+from vdet.run.loop import Summary, VideoJob, check_job, follow_frames, peek, run_video
+from vdet.run.pictures import PictureJob, detect_picture, run_picture
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
+from vdet.run.threads import prefetch, single_threaded_libraries
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import Track

@@ -7,23 +7,24 @@ from pathlib import Path
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.count.counter import count_events
-from vdet.count.layout import lay_out
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
-from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.scores import Scores, score
-from vdet.evaluate.truth import read_truth
 from vdet.files import check_output, make_folder, staged
-from vdet.formats.registry import read_tracks
-from vdet.learn.dataset import find_patches
-from vdet.learn.report import TrainingReport
-from vdet.learn.training import train
+from vdet.labels.predictions import read_predictions
+from vdet.labels.registry import read_tracks
+from vdet.labels.truth import read_truth
+from vdet.learn.svm.dataset import find_patches
+from vdet.learn.svm.report import TrainingReport
+from vdet.learn.svm.training import train
 from vdet.media.writer import may_replace_video
-from vdet.pipeline.loop import Steps, VideoJob, check_job, no_steps, run_video
-from vdet.pipeline.sinks.protocol import Output
+from vdet.progress import Steps, no_steps
+from vdet.run.loop import VideoJob, check_job, run_video
+from vdet.run.sinks.protocol import Output
 from vdet.synthetic import demo_scene, write_clip, write_patches, write_truth
 from vdet.synthetic.scene import Scene
+from vdet.traffic.counter import count_events
+from vdet.traffic.layout import lay_out
 
 PATCHES = 1200
 """Of each class."""

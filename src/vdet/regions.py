@@ -5,9 +5,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vdet.boxes import BoolArray, Int32Array
 from vdet.config.regions import RegionsSettings
 from vdet.errors import ConfigError
-from vdet.geometry import BoolArray, Int32Array
 from vdet.media.images import Image, read_image, read_size
 from vdet.polygons import Outline, Point
 

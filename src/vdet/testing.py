@@ -11,16 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.files import OutputFiles
-from vdet.geometry import Box
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
-from vdet.pipeline.loop import NullDetector
-from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import SinkContext, SinkKind
+from vdet.run.loop import NullDetector
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.track.protocol import CarryingTracker, VideoTracker
 from vdet.track.track import Track
 

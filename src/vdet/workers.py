@@ -24,8 +24,8 @@ from concurrent.futures import (
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-import vdet
 from vdet.errors import INTERRUPTED, ClusterError
+from vdet.version import __version__
 
 if TYPE_CHECKING:
     import distributed
@@ -293,13 +293,13 @@ def _check_workers(client: "distributed.Client", address: str, timeout: float) -
             f"{address}: the scheduler has no worker; start some with `dask worker {address}`"
         ) from error
     for worker, version in client.run(_version, on_error="return").items():
-        if version != vdet.__version__:
+        if version != __version__:
             has = f"vdet {version}" if isinstance(version, str) else f"no vdet ({version})"
             raise ClusterError(
-                f"{worker}: this worker has {has}, here is vdet {vdet.__version__}; install the "
+                f"{worker}: this worker has {has}, here is vdet {__version__}; install the "
                 "same version everywhere"
             )
 
 
 def _version() -> str:
-    return vdet.__version__
+    return __version__

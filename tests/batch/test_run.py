@@ -14,8 +14,8 @@ from vdet.batch.run import each_once, run_batch, write_totals
 from vdet.batch.task import Work
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import BatchTotal
+from vdet.run.loop import VideoJob
+from vdet.run.sinks.protocol import BatchTotal
 from vdet.workers import WorkerKilledError
 
 T = TypeVar("T")

@@ -20,7 +20,7 @@ QUICK = (
 
 @pytest.fixture(autouse=True)
 def _few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vdet.learn.patch_eval.metrics.RESAMPLES", 20)
+    monkeypatch.setattr("vdet.learn.svm.patch_eval.metrics.RESAMPLES", 20)
 
 
 def test_trains_a_model_for_a_split(run: Run, patches_path: Path, tmp_path: Path) -> None:

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from formats.saving import car, written
+from labels.saving import car, written
+from vdet.boxes import Box
 from vdet.config.schema import InputSettings
 from vdet.detect.svm.model import load_model
-from vdet.evaluate.truth import read_truth
-from vdet.formats.coco import COCO
-from vdet.formats.mot import read_mot
-from vdet.geometry import Box
-from vdet.learn.dataset import find_boxed, find_patches, read_patches
+from vdet.labels.coco import COCO
+from vdet.labels.mot import read_mot
+from vdet.labels.truth import read_truth
+from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
 from vdet.media import VideoReader
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
@@ -261,7 +261,7 @@ def test_input_settings_apply(
         given.append(settings)
         return VideoReader(*arguments, settings=settings, **others)
 
-    monkeypatch.setattr("vdet.learn.mining.sources.VideoReader", reader)
+    monkeypatch.setattr("vdet.learn.svm.mining.sources.VideoReader", reader)
     tolerant = ("--set", "input.max_damaged=0.5")
     assert (
         run(

@@ -77,7 +77,7 @@ def test_a_command_loads_neither_the_other_commands_nor_what_learning_needs() ->
         "import sys\n"
         "from vdet.cli import main\n"
         "try:\n    main(['detect-video', 'missing.mp4', 'out.mp4'])\n"
-        "except SystemExit:\n    assert 'vdet.pipeline.loop' in sys.modules\n"
+        "except SystemExit:\n    assert 'vdet.run.loop' in sys.modules\n"
         "print({'sklearn', 'scipy', 'vdet.cli.train', 'vdet.cli.demo'} & set(sys.modules))\n"
     )
     run = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)

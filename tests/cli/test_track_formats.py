@@ -7,7 +7,7 @@ import pytest
 
 from conftest import Run
 from running import names, write_drive
-from vdet.formats.registry import ENDINGS, read_tracks
+from vdet.labels.registry import ENDINGS, read_tracks
 
 RESULTS = [each for each in ENDINGS if each != ".txt"]
 """Endings of tracks that are truth too; MOTChallenge has another form for it."""

@@ -1,4 +1,4 @@
-"""`vdet train-net` before the training: what it refuses. `tests/learn/network` has the rest."""
+"""`vdet train-net` before the training: what it refuses. `tests/learn/net` has the rest."""
 
 import sys
 from pathlib import Path

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vdet.boxes import Box
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.geometry import Box
 
 BOXES: list[list[float]] = [[10, 20, 40, 60], [0.5, 1.5, 3.25, 4.75], [-5, -6, 7, 8]]
 SCORES: list[float] = [0.9, 0.5, 0.125]

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdet.boxes import Box
 from vdet.draw.boxes import (
     BLACK,
     GREEN,
@@ -17,7 +18,6 @@ from vdet.draw.boxes import (
     text_color,
 )
 from vdet.draw.paint import Color
-from vdet.geometry import Box
 from vdet.media.images import Image
 
 HEIGHTS = [180, 240, 360, 480, 540, 720, 1080, 2160]

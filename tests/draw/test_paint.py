@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from vdet.boxes import Box
 from vdet.draw.boxes import draw_box, draw_label
 from vdet.draw.counts import DrawnLine, DrawnZone, draw_counts
 from vdet.draw.paint import (
@@ -24,7 +25,6 @@ from vdet.draw.paint import (
     write_text,
 )
 from vdet.draw.trails import draw_trail
-from vdet.geometry import Box
 from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from vdet.evaluate.labelled_video import LabelledVideo, checked_video
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo, checked_video
 
 TEN = range(1, 11)
 

@@ -4,9 +4,9 @@ import pytest
 
 from evaluate.scenes import TEN, drive, video
 from vdet.evaluate.comparison import compare, pool
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.scores import score, score_comparison
-from vdet.formats.rows import NO_ID, Row
+from vdet.labels.rows import NO_ID, Row
+from vdet.labels.video import LabelledVideo
 
 
 def box(id_: int, x: float, width: float = 100, frame: int = 1) -> Row:

@@ -3,8 +3,8 @@ import pytest
 from evaluate.scenes import video
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.detection_metrics import average_precisions
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo
 
 
 def box(id_: int, x: float, score: float = 1, width: float = 100, frame: int = 1) -> Row:

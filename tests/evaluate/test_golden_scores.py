@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from vdet.evaluate.comparison import compare, pool
-from vdet.evaluate.labelled_video import LabelledVideo, checked_video
 from vdet.evaluate.scores import score, score_comparison
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo, checked_video
 
 CASES = sorted(Path(__file__).parent.glob("golden/*.json"))
 

@@ -1,7 +1,7 @@
 from evaluate.scenes import drive, video
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
+from vdet.labels.video import LabelledVideo
 
 
 def partners(prediction: LabelledVideo, truth: LabelledVideo) -> list[dict[int, int]]:

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluate.scenes import TEN, drive, video
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.scores import score
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo
 
 
 def test_predictions_equal_to_the_truth_are_perfect() -> None:

@@ -2,11 +2,11 @@ import pytest
 
 from evaluate.scenes import drive, video
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
 from vdet.evaluate.scores import score
 from vdet.evaluate.timelines import FirstDetection, Stretch, Timeline, timelines
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo
 
 
 def found_timelines(found: LabelledVideo, truth: LabelledVideo) -> list[Timeline]:

@@ -10,11 +10,12 @@ import pytest
 from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.errors import TruthError
-from vdet.evaluate.comparison import MAX_IDS, MAX_IN_FRAME, compare
-from vdet.evaluate.predictions import read_predictions
-from vdet.evaluate.truth import read_truth
-from vdet.formats import rows
-from vdet.formats.xml_reader import MAX_DEPTH
+from vdet.evaluate.comparison import MAX_IDS, compare
+from vdet.labels import rows
+from vdet.labels.predictions import read_predictions
+from vdet.labels.rows import MAX_IN_FRAME
+from vdet.labels.truth import read_truth
+from vdet.labels.xml_reader import MAX_DEPTH
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
 GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)

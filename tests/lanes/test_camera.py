@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdet.boxes import Box
 from vdet.errors import ConfigError
-from vdet.geometry import Box
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.media.images import Image
 

@@ -14,11 +14,11 @@ import yaml
 
 from conftest import Outcome, Run
 from red_cars import SETTINGS, red_finder
+from vdet.boxes import Box
 from vdet.config.lanes import LaneSettings
 from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
-from vdet.geometry import Box
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.camera_file import save_camera
 from vdet.media import Frame, Picture, VideoInfo, VideoReader, VideoWriter

@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
+from vdet.boxes import Box, Float64Array
 from vdet.config.lanes import LaneSettings, MaskSettings
-from vdet.geometry import Box, Float64Array
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.paint import HIDDEN, PAINT, find_base, hide, paint_along, paint_mask, slide_windows
 from vdet.lanes.top_view import TopView

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdet.boxes import Box
 from vdet.config.lanes import LaneSettings, PlaceSettings
-from vdet.geometry import Box
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.position import RoadPosition, position_on_road

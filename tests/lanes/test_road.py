@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
+from vdet.boxes import Float64Array
 from vdet.config.lanes import LaneSettings
-from vdet.geometry import Float64Array
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.media.images import Image

@@ -16,11 +16,11 @@ from av.video.frame import PictureType
 
 import vdet
 from clips import write_clip
+from vdet.boxes import Box
 from vdet.config.schema import OutputSettings
 from vdet.draw.paint import fill
 from vdet.errors import OutputError, VideoError
 from vdet.files import staged
-from vdet.geometry import Box
 from vdet.media import ColorTags, Frame, Picture, VideoInfo, VideoReader, VideoWriter
 from vdet.media.coding import Coding
 from vdet.media.frame import Tags

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from summary.passing import HEIGHT, WIDTH, frame, passing, track
+from traffic.passing import HEIGHT, WIDTH, frame, passing, track
+from vdet.boxes import Box
 from vdet.config.schema import SummarySettings
 from vdet.errors import OutputError
-from vdet.geometry import Box
 from vdet.pages.charts import Series
 from vdet.pages.facts import Facts, facts_html, read_facts
 from vdet.pages.frame import jpeg_uri
 from vdet.pages.index_page import write_index
 from vdet.pages.player import Player
 from vdet.pages.video_page import Thumbnail, VideoReport, video_page
-from vdet.summary.levels import Levels
-from vdet.summary.records import VehicleRecord, summarize
 from vdet.track.track import FrameTracks
+from vdet.traffic.levels import Levels
+from vdet.traffic.records import VehicleRecord, summarize
 
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)

@@ -6,7 +6,7 @@ import numpy.typing as npt
 import pytest
 
 from vdet.errors import OutputError
-from vdet.learn.dataset import find_patches
+from vdet.learn.svm.dataset import find_patches
 from vdet.synthetic.patches import background_patches, vehicle_patches, write_patches
 
 Float64Array = npt.NDArray[np.float64]

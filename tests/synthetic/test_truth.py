@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from vdet.geometry import Box
+from vdet.boxes import Box
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes, true_places

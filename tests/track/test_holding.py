@@ -1,5 +1,5 @@
+from vdet.boxes import Box
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.geometry import Box
 from vdet.media import Picture
 from vdet.track.holding import HoldingTracker
 from vdet.track.track import Track

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.geometry import Box
+from vdet.boxes import Box
 from vdet.track.steady import GAP, LIMIT, SteadyBoxes
 from vdet.track.track import Track
 

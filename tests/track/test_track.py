@@ -2,7 +2,7 @@
 
 import pytest
 
-from vdet.geometry import Box
+from vdet.boxes import Box
 from vdet.track.track import Track
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vdet.batch.manifest import Origin
 from vdet.config.schema import Settings
-from vdet.pipeline.loop import VideoJob
+from vdet.run.loop import VideoJob
 
 _NO_EFFECT = {"training", "mining"}  # sections that detection does not read
 

@@ -11,8 +11,8 @@ from vdet.batch.inputs import Source, find_sources
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
-from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import (
+from vdet.run.loop import VideoJob
+from vdet.run.sinks.protocol import (
     BatchTotal,
     Output,
     check_sinks,

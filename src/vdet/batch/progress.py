@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import BoolArray, Float64Array
-from vdet.pipeline.loop import Advance, Progress, no_progress
+from vdet.boxes import BoolArray, Float64Array
+from vdet.progress import Advance, Progress, no_progress
 
 _ROW = np.dtype([("began", "f8"), ("done", "i8"), ("expected", "i8"), ("ended", "?")])
 """Of a file: when it was begun, seconds since 1970; frames done and expected, 0 for unknown."""

@@ -15,8 +15,9 @@ from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import in_one_line
-from vdet.pipeline.loop import Progress, VideoJob, no_progress, run_video
-from vdet.pipeline.sinks.protocol import make_folders, output_size
+from vdet.progress import Progress, no_progress
+from vdet.run.loop import VideoJob, run_video
+from vdet.run.sinks.protocol import make_folders, output_size
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,6 @@ from typing import Any, TypeVar
 
 import click
 
-import vdet
 from vdet.batch.digest import work_digest
 from vdet.batch.manifest import Origin, Record
 from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
@@ -23,8 +22,9 @@ from vdet.cli.options import PATH, PROCESSES, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
 from vdet.errors import failure_code
-from vdet.pipeline.loop import VideoJob
-from vdet.pipeline.sinks.protocol import Output, sink_kind
+from vdet.run.loop import VideoJob
+from vdet.run.sinks.protocol import Output, sink_kind
+from vdet.version import __version__
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -205,7 +205,7 @@ def _is_limited(plan: Plan) -> bool:
 
 
 def _origin(settings: Settings, model: Path | None) -> Origin:
-    program = f"vdet {vdet.__version__}"
+    program = f"vdet {__version__}"
     path = model_file(settings.detector, model)
     if path is None:
         return Origin(program, None, None)

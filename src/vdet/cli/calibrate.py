@@ -15,7 +15,7 @@ from vdet.files import check_output
 from vdet.lanes.calibration import Pattern, check_previews, write_previews
 from vdet.lanes.calibration import calibrate as fit_camera
 from vdet.lanes.camera_file import save_camera
-from vdet.pipeline.pictures import find_images
+from vdet.run.pictures import find_images
 
 log = logging.getLogger("vdet")
 

@@ -10,8 +10,8 @@ from vdet.cli.options import Facts
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, seen_horizon
 from vdet.media.images import read_image
 from vdet.media.inspection import SoundReport, VideoReport, inspect_video
-from vdet.pipeline.loop import FIRST_FRAMES
-from vdet.pipeline.sinks.overlay import time_text
+from vdet.run.loop import FIRST_FRAMES
+from vdet.run.sinks.overlay import time_text
 
 
 def clip_facts(path: Path) -> Facts:

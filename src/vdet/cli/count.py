@@ -17,13 +17,13 @@ from vdet.cli.options import (
     settings_options,
 )
 from vdet.config.counts import CountSettings
-from vdet.count.counter import count_events
-from vdet.count.files import SUFFIXES, sum_totals, write_counts, write_counts_of_all
-from vdet.count.layout import lay_out
-from vdet.count.totals import Counts, Total
 from vdet.errors import TruthError
 from vdet.files import check_output, printable, staged
-from vdet.formats.registry import read_tracks
+from vdet.labels.registry import read_tracks
+from vdet.traffic.count_files import SUFFIXES, sum_totals, write_counts, write_counts_of_all
+from vdet.traffic.counter import count_events
+from vdet.traffic.layout import lay_out
+from vdet.traffic.totals import Counts, Total
 
 _SIZE = re.compile(r"([1-9][0-9]{0,4})[x×]([1-9][0-9]{0,4})", re.ASCII)
 

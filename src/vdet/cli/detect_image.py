@@ -22,10 +22,10 @@ from vdet.cli.options import (
 )
 from vdet.detect.factory import load_detector
 from vdet.errors import failure_code
-from vdet.pipeline.pictures import find_images, plan_pictures, run_pictures
-from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, check_sinks
 from vdet.regions import check_mask
+from vdet.run.pictures import find_images, plan_pictures, run_pictures
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, check_sinks
 
 log = logging.getLogger("vdet")
 

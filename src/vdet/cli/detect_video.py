@@ -33,9 +33,9 @@ from vdet.cli.options import (
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.media.writer import may_replace_video
-from vdet.pipeline.loop import VideoJob, check_job, run_video
-from vdet.pipeline.sinks.protocol import Output
 from vdet.regions import check_mask
+from vdet.run.loop import VideoJob, check_job, run_video
+from vdet.run.sinks.protocol import Output
 
 
 @click.command(

@@ -23,6 +23,7 @@ from vdet.config.loading import load_settings, shipped_configs
 from vdet.detect.factory import load_detector
 from vdet.errors import VdetError, in_one_line
 from vdet.files import check_output
+from vdet.version import __version__
 from vdet.workers import core_count
 
 Status = Literal["ok", "absent", "broken"]
@@ -80,7 +81,7 @@ def doctor(json_target: str | None, overwrite: bool) -> int:
 def find_programs() -> Iterator[Finding]:
     """Look at the versions of the program and of what it needs."""
     system = f"{platform.system()} {platform.machine()}"
-    yield Finding("vdet", "ok", f"{vdet.__version__}, {Path(vdet.__file__).parent}")
+    yield Finding("vdet", "ok", f"{__version__}, {Path(vdet.__file__).parent}")
     yield Finding("Python", "ok", f"{platform.python_version()}, {sys.executable}, {system}")
     if hasattr(cv2, "HOGDescriptor"):
         yield Finding("OpenCV", "ok", cv2.__version__)

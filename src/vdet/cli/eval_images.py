@@ -67,10 +67,10 @@ def images(
     searched for itself, and compared with its labels.
     """
     from vdet.evaluate.images.evaluate import evaluate_images
-    from vdet.evaluate.images.reading import read_labelled_images
     from vdet.evaluate.images.scores import Counting
     from vdet.evaluate.images.text import lines, plain
     from vdet.evaluate.report.images_page import images_page
+    from vdet.labels.pictures.reading import read_labelled_images
 
     detector = read_whole_frame_settings(config_name, assignments, model_path).detector
     model = load_detector(detector.showing_all(), model_path)

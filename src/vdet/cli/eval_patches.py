@@ -17,7 +17,7 @@ from vdet.cli.options import (
 from vdet.detect.svm.kind import requested_features, trained_on
 from vdet.detect.svm.model import load_model
 from vdet.evaluate.output import RunName, check_outputs, plain_run, run_lines
-from vdet.learn.dataset import find_patches
+from vdet.learn.svm.dataset import find_patches
 
 
 @click.command(
@@ -72,9 +72,9 @@ def patches(
 
     Each DATA is a folder or a zip file, as vdet train takes it.
     """
-    from vdet.learn.patch_eval import SPLITS, evaluate_model, evaluate_splits
-    from vdet.learn.patch_eval.page import patch_page
-    from vdet.learn.patch_eval.text import lines, plain
+    from vdet.learn.svm.patch_eval import SPLITS, evaluate_model, evaluate_splits
+    from vdet.learn.svm.patch_eval.page import patch_page
+    from vdet.learn.svm.patch_eval.text import lines, plain
 
     if model_path is not None and splits:
         raise click.UsageError("--split trains new models; leave it out, or --model")

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-import vdet
 from vdet.cli.command import Command
 from vdet.cli.messages import progress_steps
 from vdet.cli.options import PATH, POSITIVE, print_results, results_options
 from vdet.evaluate.output import check_outputs
+from vdet.version import __version__
 
 
 @click.command(
@@ -60,7 +60,7 @@ def tracks(
     print_results(
         result_lines([run]),
         plain_clip(run.clips[0]),
-        lambda: video_page([run], f"compared with {truth} by vdet {vdet.__version__}"),
+        lambda: video_page([run], f"compared with {truth} by vdet {__version__}"),
         json_target=json_target,
         report=report,
         overwrite=overwrite,

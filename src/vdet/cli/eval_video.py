@@ -19,7 +19,7 @@ from vdet.cli.options import (
 )
 from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.evaluate.output import RunName, check_outputs, run_lines
-from vdet.pipeline.sinks.protocol import check_sinks
+from vdet.run.sinks.protocol import check_sinks
 
 
 @click.command(

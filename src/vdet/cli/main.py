@@ -8,13 +8,13 @@ from typing import NoReturn
 
 import click
 
-import vdet
 from vdet.cli.command import Command, LazyGroup
 from vdet.cli.messages import print_lines, set_up_logs
 from vdet.cli.options import read_settings, settings_options
 from vdet.config.rendering import render
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
+from vdet.version import __version__
 
 _COMMANDS = (
     *("calibrate", "count", "demo", "detect-image", "detect-video", "doctor", "info", "mine"),
@@ -28,7 +28,7 @@ _EVALUATIONS = "images", "patches", "tracks", "video"
     modules={name: f"vdet.cli.{name.replace('-', '_')}" for name in _COMMANDS},
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-@click.version_option(vdet.__version__, prog_name="vdet")
+@click.version_option(__version__, prog_name="vdet")
 @click.option("-v", "--verbose", is_flag=True, help="Print more about what is done.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no progress and no warnings, only errors.")
 @click.pass_context

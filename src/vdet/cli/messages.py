@@ -14,10 +14,10 @@ from tqdm import tqdm
 
 from vdet.batch.progress import FrameCounts, batch_state, frame_counts
 from vdet.files import escaped, output_errors
-from vdet.pipeline.loop import Advance, Progress, Steps
+from vdet.progress import Advance, Progress, Steps
 
 if TYPE_CHECKING:
-    from vdet.learn.network.training import TrainingState
+    from vdet.learn.net.training import TrainingState
 
 
 REFRESH_INTERVAL = 1.0  # seconds
@@ -69,7 +69,7 @@ def set_up_logs(*, verbose: bool, quiet: bool) -> None:
 
 @contextmanager
 def progress_bar(unit: str, *, quiet: bool) -> Iterator[Progress]:
-    """Give a function that starts a bar; see `vdet.pipeline.loop.run_video`.
+    """Give a function that starts a bar; see `vdet.run.loop.run_video`.
 
     There is no bar where standard error is no terminal.
     """

@@ -88,9 +88,9 @@ def mine(
     out too: windows that the model takes for vehicles where there is none, or only a part of one.
     Nothing is cut out of ignore regions.
     """
-    from vdet.evaluate.images.reading import holds_labelled_images
-    from vdet.learn.mining import MiningJob, PictureSource, VideoSource
-    from vdet.learn.mining import mine as mine_patches
+    from vdet.labels.pictures.reading import holds_labelled_images
+    from vdet.learn.svm.mining import MiningJob, PictureSource, VideoSource
+    from vdet.learn.svm.mining import mine as mine_patches
 
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")

@@ -20,7 +20,7 @@ from vdet.evaluate.output import write_page
 from vdet.files import write_json
 from vdet.lanes.camera_file import load_camera
 from vdet.lanes.road import LaneRequest
-from vdet.pipeline.sinks.protocol import Output
+from vdet.run.sinks.protocol import Output
 
 PATH = click.Path(path_type=Path)
 """A path; whether something is there is checked later."""

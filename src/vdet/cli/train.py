@@ -18,7 +18,7 @@ from vdet.cli.options import (
 from vdet.detect.svm.model import save_model
 from vdet.errors import OutputError
 from vdet.files import check_output
-from vdet.learn.dataset import find_boxed, find_patches
+from vdet.learn.svm.dataset import find_boxed, find_patches
 
 
 @click.command(
@@ -62,9 +62,9 @@ def train(
     a patch the vehicle is; vdet mine writes it. With it the model learns where the sides of
     vehicles are. A report is printed, and written beside the model as JSON.
     """
-    from vdet.evaluate.images.reading import holds_labelled_images
-    from vdet.learn.mining import MiningJob, PictureSource, mine
-    from vdet.learn.training import train as fit_model
+    from vdet.labels.pictures.reading import holds_labelled_images
+    from vdet.learn.svm.mining import MiningJob, PictureSource, mine
+    from vdet.learn.svm.training import train as fit_model
 
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")

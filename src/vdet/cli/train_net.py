@@ -69,8 +69,8 @@ def train_net(
         import torch  # noqa: F401
     except ImportError as error:
         raise DataError("torch or onnx is not installed; pip install torch onnx") from error
-    from vdet.learn.network.run import NetworkJob, train_to_file
-    from vdet.learn.network.sources import LabelledClip
+    from vdet.learn.net.run import NetworkJob, train_to_file
+    from vdet.learn.net.sources import LabelledClip
 
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
     job = NetworkJob(data, labelled, output, base, overwrite)

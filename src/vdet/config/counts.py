@@ -32,7 +32,7 @@ class ZoneSettings(PolygonSection):
 
 
 class CountSettings(PlacedSection):
-    """Lines and zones at which vehicles are counted (`vdet.count` explains the rule)."""
+    """Lines and zones at which vehicles are counted (`vdet.traffic` explains the rule)."""
 
     lines: tuple[LineSettings, ...] = Field(
         (), max_length=MOST_SHAPES, description="lines ([] for none)"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import Box, Float32Array, Int32Array
+from vdet.boxes import Box, Float32Array, Int32Array
 
 if TYPE_CHECKING:
     import supervision

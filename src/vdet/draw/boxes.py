@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.draw.paint import Color, Surface, TextStyle, fill, text_size, write_text
-from vdet.geometry import Box
 
 GREEN: Color = (80, 220, 60)
 WHITE: Color = (255, 255, 255)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.draw.boxes import draw_label, label_tag, line_width
 from vdet.draw.paint import Color, Surface, blend, draw_arrow
 from vdet.draw.regions import draw_outline
-from vdet.geometry import Box
 
 Point = tuple[float, float]
 

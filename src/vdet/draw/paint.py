@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import Box, Int32Array
+from vdet.boxes import Box, Int32Array
 from vdet.media.coding import LUMA_SHARES, Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes

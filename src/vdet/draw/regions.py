@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from vdet.boxes import BoolArray
 from vdet.draw.boxes import GREEN, draw_label, label_tag, line_width
 from vdet.draw.paint import Color, Surface, draw_lines
-from vdet.geometry import BoolArray
 from vdet.media.images import Image
 
 Point = tuple[float, float]

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from vdet.boxes import Float64Array
 from vdet.draw.paint import Color, Surface, draw_lines
-from vdet.geometry import Float64Array
 
 _PARTS = 4
 """Pieces of a trail, each of one width."""

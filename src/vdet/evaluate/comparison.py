@@ -15,17 +15,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.errors import TruthError
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.geometry import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
+from vdet.labels.rows import MAX_IN_FRAME
+from vdet.labels.video import LabelledVideo
 
 MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
 
 MAX_IDS = 10_000
 """Most vehicles, and most tracks, in one video."""
-MAX_IN_FRAME = 1000
-"""Most boxes of either kind in one frame."""
 MAX_PAIRS = 25_000_000
 """Most pairs of a vehicle and a track; also most pairs of their boxes, summed over the frames."""
 

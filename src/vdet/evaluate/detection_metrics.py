@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdet.boxes import BoolArray, Float64Array
 from vdet.evaluate.comparison import ComparedFrame, Comparison
 from vdet.evaluate.matching import MatchedFrame
-from vdet.geometry import BoolArray, Float64Array
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdet.boxes import Float64Array, Int64Array
 from vdet.evaluate.comparison import MATCH_IOU, ComparedFrame, Comparison, assign, at_least
-from vdet.geometry import Float64Array, Int64Array
 
 UNMATCHED = -1
 """Stands for the partner of a vehicle that no track has found."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import vdet
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder, staged
 from vdet.pages.frame import PAGE
+from vdet.version import __version__
 
 ABSENT = "–"
 
@@ -35,7 +35,7 @@ def run_lines(run: RunName) -> list[str]:
     """Return which detector was measured, and what its model was trained on."""
     model = f", model {run.model.name}" if run.model else ""
     settings = " ".join([run.config or "default", *run.assignments])
-    lines = [f"vdet {vdet.__version__}, detector {run.kind}{model}, settings {settings}"]
+    lines = [f"vdet {__version__}, detector {run.kind}{model}, settings {settings}"]
     if run.trained_on:
         lines.append(f"trained on {', '.join(run.trained_on)}")
     return lines
@@ -44,7 +44,7 @@ def run_lines(run: RunName) -> list[str]:
 def plain_run(run: RunName) -> dict[str, Any]:
     """Return which detector was measured as values for JSON."""
     return {
-        "program": f"vdet {vdet.__version__}",
+        "program": f"vdet {__version__}",
         "detector": run.kind,
         "model": str(run.model) if run.model else None,
         "config": run.config or "default",

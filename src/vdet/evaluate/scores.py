@@ -4,7 +4,6 @@ from dataclasses import asdict, dataclass
 
 from vdet.evaluate.comparison import Comparison, compare
 from vdet.evaluate.detection_metrics import detection_metrics
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
 from vdet.evaluate.timelines import FirstDetection, first_detections, timelines
 from vdet.evaluate.tracking_metrics import (
@@ -13,6 +12,7 @@ from vdet.evaluate.tracking_metrics import (
     hota_metrics,
     identity_metrics,
 )
+from vdet.labels.video import LabelledVideo
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,9 +13,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vdet.boxes import Float32Array, Float64Array
 from vdet.errors import ImageError, OutputError
 from vdet.files import check_output, make_folder
-from vdet.geometry import Float32Array, Float64Array
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.media.images import Image, read_image, write_image
 

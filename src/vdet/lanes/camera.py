@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from vdet.boxes import Box, Float64Array
 from vdet.errors import ConfigError
-from vdet.geometry import Box, Float64Array
 from vdet.media.images import Image
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 from vdet.lanes.paint import LinePaint, LinePositions
 
 _MIN_SCALE = 0.3  # the pitch of a real vehicle keeps the scale above this

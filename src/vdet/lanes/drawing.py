@@ -4,9 +4,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float64Array
 from vdet.draw.boxes import draw_label, line_width
 from vdet.draw.paint import Color
-from vdet.geometry import Float64Array
 from vdet.lanes.lane import Lane
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdet.boxes import Float64Array
 from vdet.config.lanes import LaneCheckSettings, LaneSettings
-from vdet.geometry import Float64Array
 from vdet.lanes.curves import LaneCurves, NormalEquations, normal_equations, solve
 from vdet.lanes.paint import (
     NO_PAINT,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 
 
 @dataclass(frozen=True, slots=True)

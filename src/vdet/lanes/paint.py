@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from vdet.boxes import Box, Float64Array
 from vdet.config.lanes import LaneSettings, MaskSettings
-from vdet.geometry import Box, Float64Array
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vdet.boxes import Box, Float64Array
 from vdet.config.lanes import LaneSettings, LaneTrackSettings, PlaceSettings
-from vdet.geometry import Box, Float64Array
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves, NormalEquations, solve
 from vdet.lanes.drawing import stage_pictures

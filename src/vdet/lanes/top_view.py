@@ -8,8 +8,8 @@ the camera looks along the road and does not roll.
 import cv2
 import numpy as np
 
+from vdet.boxes import Float64Array
 from vdet.config.lanes import TopViewSettings
-from vdet.geometry import Float64Array
 from vdet.media.images import Image
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from av.video.reformatter import ColorRange
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 from vdet.media.images import Image
 
 Layers = tuple[Image, Image, Image]

@@ -11,7 +11,6 @@ from typing import Self
 import av
 from av.video.reformatter import ColorRange
 
-import vdet
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.coding import Coding
@@ -21,6 +20,7 @@ from vdet.media.mp4_index import begins_like_mp4
 from vdet.media.picture import Picture
 from vdet.media.planes import Planes
 from vdet.media.sound import SoundCopy
+from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
 
@@ -167,7 +167,7 @@ class _Encoder:
         self._container = av.open(
             str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
         )
-        self._container.metadata["comment"] = f"{_MARK} {vdet.__version__}"
+        self._container.metadata["comment"] = f"{_MARK} {__version__}"
         self._stream = self._add_picture(info, settings, threads)
         self._container.metadata.update(_tags(info, origin))
         self._sound = None

@@ -7,8 +7,8 @@ from html import escape
 
 import cv2
 
-import vdet
 from vdet.media.images import Image
+from vdet.version import __version__
 
 PAGE = "report.html"
 """Name of the file in the folder of a report."""
@@ -80,7 +80,7 @@ def page(
         f"<title>{escape(title)}</title>\n<style>{_STYLE}{style}</style>\n</head>\n<body>\n"
         f"<header><h1>{escape(title)}</h1><p>{escape(subtitle)}</p></header>\n<main>\n"
         + "\n".join(sections)
-        + f"\n</main>\n<footer>vdet {escape(vdet.__version__)}</footer>\n{end}</body>\n</html>\n"
+        + f"\n</main>\n<footer>vdet {escape(__version__)}</footer>\n{end}</body>\n</html>\n"
     )
 
 

@@ -16,8 +16,8 @@ from vdet.pages.charts import Series, Span, clock, level_chart, minute_chart, sp
 from vdet.pages.facts import Facts, facts_html
 from vdet.pages.frame import cards, jpeg_uri, page, paragraph, section
 from vdet.pages.player import SCRIPT, Player, jump, player_html
-from vdet.summary.levels import Levels
-from vdet.summary.records import VehicleRecord
+from vdet.traffic.levels import Levels
+from vdet.traffic.records import VehicleRecord
 
 _STEPS = 160  # of the chart of levels
 _TILE = 104  # of a vehicle's picture, pixels

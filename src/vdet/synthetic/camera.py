@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 
 NEAR = 0.5
 """Metres; nothing nearer than this is drawn."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from vdet.geometry import Float32Array, Float64Array
+from vdet.boxes import Float32Array, Float64Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, distances
 from vdet.synthetic.painting import fill, mixed

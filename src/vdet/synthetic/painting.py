@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
-from vdet.geometry import Float64Array
 from vdet.media.images import Image
 
 _SHIFT = 4  # fractional bits of the coordinates given to OpenCV

@@ -13,8 +13,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.errors import OutputError
-from vdet.geometry import Box
 from vdet.media.images import Image, write_image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint

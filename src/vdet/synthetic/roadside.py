@@ -3,8 +3,8 @@
 import cv2
 import numpy as np
 
+from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
-from vdet.geometry import Float64Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, PinholeCamera, distances
 from vdet.synthetic.painting import fill, shaded

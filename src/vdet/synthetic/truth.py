@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vdet.geometry import Box, Float64Array
+from vdet.boxes import Box, Float64Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.painting import fill_mask

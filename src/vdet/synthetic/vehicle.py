@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
-from vdet.geometry import Float64Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near
 from vdet.synthetic.painting import fill, mixed, shaded

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from vdet.geometry import Box
+from vdet.boxes import Box
 from vdet.track.track import Track
 
 LIMIT = 0.025

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vdet.geometry import Box
+from vdet.boxes import Box
 
 
 @dataclass(frozen=True, slots=True)

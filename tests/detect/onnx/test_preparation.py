@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from codings import in_any_coding, smooth_picture
+from vdet.boxes import Float64Array
 from vdet.detect.onnx.preparation import Fit, InputForm
-from vdet.geometry import Float64Array
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 from vdet.synthetic import demo_scene, render

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from vdet.pipeline.threads import single_threaded_libraries
+from vdet.run.threads import single_threaded_libraries
 
 
 @pytest.fixture(scope="module", autouse=True)

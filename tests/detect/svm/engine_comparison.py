@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from seed import SEED
+from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings, WindowSettings
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import FeatureExtractor, to_patch
@@ -14,7 +15,6 @@ from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
-from vdet.geometry import Float32Array
 from vdet.media import Picture, Planes
 from vdet.media.images import Image
 from vdet.synthetic import background_patches, demo_scene, render, vehicle_patches

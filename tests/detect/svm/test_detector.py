@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
+from vdet.boxes import Box, Float32Array
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
 from vdet.detect.detections import Detections
 from vdet.detect.svm.detector import SvmModel, horizon_of
@@ -17,7 +18,6 @@ from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
-from vdet.geometry import Box, Float32Array
 from vdet.media import Picture
 from vdet.media.images import Image
 

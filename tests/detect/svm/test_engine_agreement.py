@@ -20,6 +20,7 @@ from detect.svm.engine_comparison import (
     with_boxes,
 )
 from seed import SEED
+from vdet.boxes import iou_matrix
 from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
@@ -41,7 +42,6 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.detect.svm.strips import Strip, describe_blocks
 from vdet.detect.svm.windows import WindowGrid, Windows
-from vdet.geometry import iou_matrix
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 from vdet.media.images import Image

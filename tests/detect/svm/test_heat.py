@@ -5,10 +5,10 @@ import cv2
 import numpy as np
 import pytest
 
+from vdet.boxes import Box, Float32Array
 from vdet.config.schema import HeatSettings, WindowSettings
 from vdet.detect.svm.heat import Heat, HeatMap, find_regions
 from vdet.detect.svm.windows import Windows, lay_grid
-from vdet.geometry import Box, Float32Array
 
 
 def found(*windows: tuple[int, int, int, int, float], share: float = 1) -> Windows:

@@ -6,6 +6,7 @@ import pytest
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder, road
 from seed import SEED
 from textured_road import textured_road
+from vdet.boxes import Box
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.protocol import LimitableDetector
 from vdet.detect.svm.detector import SvmDetector, SvmModel
@@ -14,7 +15,6 @@ from vdet.detect.svm.limits import limited_grid
 from vdet.detect.svm.model import load_model
 from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.errors import ImageError
-from vdet.geometry import Box
 from vdet.media import Picture
 from vdet.regions import SearchArea
 

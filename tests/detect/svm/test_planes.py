@@ -9,11 +9,11 @@ from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder
 from red_cars import road as plain_road
+from vdet.boxes import Float32Array, Float64Array, iou_matrix, to_sides
 from vdet.config.schema import FeatureSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.search import FrameSearch
-from vdet.geometry import Float32Array, Float64Array, iou_matrix, to_sides
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 from vdet.media.images import Image

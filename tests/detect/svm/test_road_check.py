@@ -15,7 +15,7 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.road_check import RoadCheck
 from vdet.media import Picture, VideoReader
 from vdet.media.images import Image, read_image
-from vdet.pipeline.loop import NullDetector
+from vdet.run.loop import NullDetector
 
 PICTURE = Picture(np.zeros((100, 200, 3), np.uint8))
 CARS = ((10, 10, 40, 30), (60, 10, 90, 30), (110, 10, 140, 30))

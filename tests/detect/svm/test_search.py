@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import seed
+from vdet.boxes import Int32Array
 from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
@@ -22,7 +23,6 @@ from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.detect.svm.windows import Windows
 from vdet.errors import ConfigError, FrameSizeError, ImageError
-from vdet.geometry import Int32Array
 from vdet.media import Picture
 from vdet.media.images import Image
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, red_finder, road
+from vdet.boxes import Box
 from vdet.config.schema import FeatureSettings, SvmSettings, WindowSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.stages import Trace, blend_heat, stage_pictures
 from vdet.detect.svm.windows import Windows
 from vdet.draw.boxes import GREEN, color_of, draw_box, draw_label
-from vdet.geometry import Box
 from vdet.media import Picture
 from vdet.media.images import Image
 

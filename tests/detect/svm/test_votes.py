@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vdet.boxes import Box
 from vdet.config.schema import VoteSettings
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.votes import MAX_VOTES, Votes, split_regions
 from vdet.detect.svm.windows import Windows
-from vdet.geometry import Box
 
 Vote = tuple[float, float, float, float, float]
 """x, y, width, height, weight."""

@@ -6,9 +6,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from seed import SEED
+from vdet.boxes import Int32Array
 from vdet.config.schema import WindowSettings
 from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
-from vdet.geometry import Int32Array
 
 LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that is higher than all bands here

@@ -16,11 +16,12 @@ from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
 from vdet.evaluate.clips.clip import Variant, find_tracks, follow_variants, open_clip
 from vdet.evaluate.clips.evaluate import evaluate_clips
-from vdet.evaluate.predictions import read_predictions
+from vdet.labels.predictions import read_predictions
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
-from vdet.pipeline.loop import follow_frames, no_progress, peek
-from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output
+from vdet.progress import no_progress
+from vdet.run.loop import follow_frames, peek
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output
 from vdet.synthetic.clip import write_truth
 from vdet.synthetic.scene import Scene
 

@@ -2,10 +2,10 @@ from pathlib import Path
 
 from vdet.evaluate.clips.evaluate import RunResult, best, score_files, score_video, total
 from vdet.evaluate.clips.text import plain, result_lines, sweep_rows
-from vdet.evaluate.labelled_video import LabelledVideo, checked_video
 from vdet.evaluate.output import RunName
 from vdet.evaluate.report.video_page import video_page
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo, checked_video
 
 TEN = range(1, 11)
 NAME = RunName("svm", None, None, ("b=1",))

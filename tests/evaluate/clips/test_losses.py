@@ -3,9 +3,9 @@ import pytest
 from evaluate.scenes import TEN, drive, video
 from vdet.evaluate.clips.losses import Loss, losses
 from vdet.evaluate.comparison import compare
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo
 
 
 def found_losses(found: LabelledVideo, truth: LabelledVideo) -> list[Loss]:

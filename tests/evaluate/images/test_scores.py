@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vdet.evaluate.images.labelled import LabelledImage
 from vdet.evaluate.images.scores import (
     Counting,
     ImageScores,
@@ -17,6 +16,7 @@ from vdet.evaluate.images.scores import (
     score_source,
 )
 from vdet.evaluate.images.search import SearchedImage
+from vdet.labels.pictures.labelled import LabelledImage
 
 ALL = ("car", "truck", "bus", "vehicle")
 PLAIN = Counting(score=0.5, least_width=0, classes=ALL)

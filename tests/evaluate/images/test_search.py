@@ -7,14 +7,14 @@ import pytest
 
 from evaluate.images.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
+from vdet.boxes import Box
 from vdet.detect.svm.detector import SvmModel
 from vdet.errors import ImageError
 from vdet.evaluate.images.evaluate import evaluate_images
-from vdet.evaluate.images.labelled import LabelledImages
-from vdet.evaluate.images.reading import read_labelled_images
 from vdet.evaluate.images.scores import Counting
 from vdet.evaluate.images.search import search_images
-from vdet.geometry import Box
+from vdet.labels.pictures.labelled import LabelledImages
+from vdet.labels.pictures.reading import read_labelled_images
 
 DETECTOR = PERSPECTIVE.svm
 COUNTING = Counting(DETECTOR.shown_score, 0, DETECTOR.vehicle_classes)

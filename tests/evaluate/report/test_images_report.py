@@ -6,12 +6,12 @@ import numpy as np
 
 from evaluate.images.writers import Boxed, Labelled, write_coco
 from vdet.evaluate.images.evaluate import ImagesResult
-from vdet.evaluate.images.reading import read_labelled_images
 from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, score_source
 from vdet.evaluate.images.search import SearchedImage
 from vdet.evaluate.output import RunName
 from vdet.evaluate.report.images_page import images_page, worst_pictures
 from vdet.evaluate.report.video_page import FOUND_COLOR, TRUE_COLOR
+from vdet.labels.pictures.reading import read_labelled_images
 
 COUNTING = Counting(0.5, 0.0, ("car",))
 CAR = Boxed("car", (20, 10, 40, 30))

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from vdet.evaluate.clips.evaluate import RunResult, score_video, total
-from vdet.evaluate.labelled_video import LabelledVideo, checked_video
 from vdet.evaluate.report.video_charts import sweep_chart, tightness_chart, timeline_chart
 from vdet.evaluate.report.video_page import FOUND_COLOR, TILE, TRUE_COLOR, loss_pictures
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo, checked_video
 
 TEN = range(1, 11)
 

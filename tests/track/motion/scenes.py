@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 
+from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.geometry import Box
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
 

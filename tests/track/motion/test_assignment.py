@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 from vdet.track.motion.assignment import assign
 
 SHAPES = array_shapes(min_dims=2, max_dims=2, min_side=0, max_side=9)

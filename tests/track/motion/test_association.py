@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from vdet.boxes import Float64Array, iou_matrix
 from vdet.config.schema import MotionTrackerSettings
-from vdet.geometry import Float64Array, iou_matrix
 from vdet.track.motion.association import (
     WIDEST_BUFFER,
     buffered_iou,

@@ -7,9 +7,9 @@ import pytest
 
 from track.motion.scenes import HEIGHT, WIDTH, detections, ids, inside
 from track.motion.traffic import Noise, random_traffic, track_scores, truth_at
+from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
-from vdet.geometry import Box
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
 

@@ -15,9 +15,9 @@ from track.motion.traffic import (
     track_scores,
     truth_at,
 )
+from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
-from vdet.geometry import Box
 from vdet.synthetic import demo_scene
 from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker

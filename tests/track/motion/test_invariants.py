@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from track.motion.scenes import HEIGHT, WIDTH, follow
-from vdet.geometry import Box
+from vdet.boxes import Box
 
 
 @st.composite

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 from vdet.track.motion.overlapping import (
     are_hidden,
     are_parts,

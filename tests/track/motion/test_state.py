@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 from vdet.track.motion.state import MotionState, measure, measurement_of
 
 FRAME = 0.04

@@ -18,8 +18,8 @@ from track.motion.scenes import (
     inside,
     moving,
 )
+from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
-from vdet.geometry import Box
 from vdet.track.motion.tracker import MotionTracker
 
 CAR = Box(400, 400, 100, 70)

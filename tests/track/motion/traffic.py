@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from track.motion.scenes import HEIGHT, WIDTH
+from vdet.boxes import Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.scores import Scores, score
-from vdet.formats.rows import NO_ID, Row
-from vdet.geometry import Float64Array, coverage
+from vdet.labels.rows import NO_ID, Row
+from vdet.labels.video import LabelledVideo
 from vdet.track.motion.tracker import MotionTracker
 
 _FOCAL = 1150.0

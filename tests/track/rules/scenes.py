@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from vdet.boxes import Box
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.geometry import Box
 
 
 def detections(boxes: Sequence[Box], peak: float = 2.0, score: float = 1.0) -> Detections:

@@ -4,8 +4,8 @@ import pytest
 
 from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
+from vdet.boxes import Box
 from vdet.config.schema import RulesTrackerSettings
-from vdet.geometry import Box
 from vdet.media.images import Image
 from vdet.track.rules.association import (
     Association,

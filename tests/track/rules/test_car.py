@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from seed import SEED_TRACKER, tracker_but
-from vdet.geometry import Box
+from vdet.boxes import Box
 from vdet.media.images import Image
 from vdet.track.rules.car import Car, MatchMethod, Region, find_template
 

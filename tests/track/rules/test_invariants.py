@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seed import tracker_but
+from vdet.boxes import Box
 from vdet.config.schema import RulesTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.geometry import Box
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.tracker import RulesTracker

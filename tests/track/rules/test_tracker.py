@@ -6,8 +6,8 @@ import pytest
 from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from track.rules.scenes import detections
+from vdet.boxes import Box
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.geometry import Box
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.car import Region

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from vdet.boxes import Box, Int32Array
 from vdet.config.schema import NetworkSettings
 from vdet.detect.detections import Detections
 from vdet.detect.onnx.classes import our_classes
@@ -16,7 +17,6 @@ from vdet.detect.onnx.session import Session
 from vdet.detect.onnx.suppression import suppress
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
-from vdet.geometry import Box, Int32Array
 from vdet.media import Picture
 from vdet.media.images import Image
 

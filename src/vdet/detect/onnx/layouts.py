@@ -6,9 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
+from vdet.boxes import Float32Array, Int32Array
 from vdet.config.network import NetworkScoreSettings
 from vdet.detect.onnx.session import Array
-from vdet.geometry import Float32Array, Int32Array
 
 STRIDES = (8, 16, 32)
 """Pixels of the input between the cells of each level, of our networks and of YOLOX."""
@@ -39,7 +39,7 @@ class Layout(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OurCells:
-    """Our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.network.architecture`.
+    """Our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.architecture`.
 
     `cells` are those of the input, from `cell_centers`.
     """

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import Float32Array
+from vdet.boxes import Float32Array
 from vdet.media import Picture
 from vdet.media.images import Image
 

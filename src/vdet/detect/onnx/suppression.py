@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.geometry import Float32Array, Int64Array, to_sides
+from vdet.boxes import Float32Array, Int64Array, to_sides
 
 
 def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64Array:

@@ -11,6 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import Channels, Layout, patch_descriptors
 from vdet.detect.svm.model import LinearModel
@@ -24,7 +25,6 @@ from vdet.detect.svm.strips import (
     window_blocks,
 )
 from vdet.detect.svm.windows import GridResult, IndexArray, WindowGrid
-from vdet.geometry import Float32Array
 
 MAX_PHASES = 2
 """Of `PhasedSearch`, across and down. With more, `LocatedSearch` is faster."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vdet.boxes import are_nested
 from vdet.config.schema import StillSettings, SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.detections import Detections
@@ -19,7 +20,6 @@ from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows
-from vdet.geometry import are_nested
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.regions import SearchArea

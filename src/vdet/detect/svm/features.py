@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings
-from vdet.geometry import Float32Array
 from vdet.media.images import Image, split_channels
 
 _CONVERSIONS = {

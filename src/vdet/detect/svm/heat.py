@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Box, Float32Array
 from vdet.config.schema import HeatSettings
 from vdet.detect.svm.windows import Windows
-from vdet.geometry import Box, Float32Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 from vdet.media.images import Image
 
 DEFAULT_HORIZON = 0.58

@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 
+from vdet.boxes import Int64Array
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.windows import WindowGrid
-from vdet.geometry import Int64Array
 from vdet.regions import SearchArea
 
 _MARGIN = Fraction(1, 2)

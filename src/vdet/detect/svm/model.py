@@ -19,11 +19,11 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from vdet.archives import open_archive, read_member
+from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import Layout
 from vdet.errors import ModelError
 from vdet.files import read_whole, staged
-from vdet.geometry import Float32Array
 
 FORMAT_VERSION = 2
 MAX_MEMBERS = 20

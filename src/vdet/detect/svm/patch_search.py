@@ -5,11 +5,11 @@ It is slow and simple, and the reference for the dense engine. Source: seed sect
 
 import numpy as np
 
+from vdet.boxes import Float32Array
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import GridResult, IndexArray, WindowGrid
-from vdet.geometry import Float32Array
 
 BATCH = 1024
 """Number of windows that are described before they are classified; it bounds the memory."""

@@ -3,9 +3,9 @@
 import logging
 from collections.abc import Callable
 
+from vdet.boxes import Float64Array, iou_matrix, to_sides
 from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
-from vdet.geometry import Float64Array, iou_matrix, to_sides
 from vdet.media import Picture
 
 log = logging.getLogger("vdet")

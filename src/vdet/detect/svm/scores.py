@@ -22,8 +22,8 @@ Source: Platt, "Probabilistic Outputs for Support Vector Machines", 1999.
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float32Array
 from vdet.config.schema import ScoreSettings
-from vdet.geometry import Float32Array
 
 
 def detection_scores(strengths: npt.ArrayLike, settings: ScoreSettings) -> Float32Array:

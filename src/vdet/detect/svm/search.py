@@ -5,6 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
+from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings, SearchSettings, SvmSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense_search import dense_search, why_not_dense
@@ -16,7 +17,6 @@ from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, join_windows, lay_grid
 from vdet.errors import ConfigError, FrameSizeError, ImageError
-from vdet.geometry import Float32Array
 from vdet.media import Picture
 from vdet.regions import SearchArea
 

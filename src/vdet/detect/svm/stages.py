@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from vdet.boxes import Box
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import cut_window
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.patch_sheet import patch_sheet
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, label_tag
-from vdet.geometry import Box
 from vdet.media.images import Image
 
 

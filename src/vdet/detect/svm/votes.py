@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdet.boxes import Box, Float64Array, coverage, iou_matrix, visible
 from vdet.config.schema import VoteSettings
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
-from vdet.geometry import Box, Float64Array, coverage, iou_matrix, visible
 
 MAX_VOTES = 400
 """In a region: the time grows with the square of their number, so of more the best are kept."""

@@ -11,8 +11,8 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float32Array, Int32Array
 from vdet.config.schema import WindowSettings
-from vdet.geometry import Float32Array, Int32Array
 
 IndexArray = npt.NDArray[np.intp]
 

@@ -12,16 +12,17 @@ from pathlib import Path
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import ImageError, VideoError
-from vdet.evaluate.labelled_video import LabelledVideo
-from vdet.evaluate.truth import read_truth
 from vdet.files import OutputFiles
-from vdet.formats.rows import Row
+from vdet.labels.rows import Row
+from vdet.labels.truth import read_truth
+from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, VideoInfo, VideoReader
-from vdet.pipeline.loop import Progress, peek
-from vdet.pipeline.result import FrameResult
-from vdet.pipeline.sinks.protocol import Output, SinkContext, open_sink
-from vdet.pipeline.stride import follow_frame, search_frame
-from vdet.pipeline.threads import single_threaded_libraries
+from vdet.progress import Progress
+from vdet.run.loop import peek
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+from vdet.run.stride import follow_frame, search_frame
+from vdet.run.threads import single_threaded_libraries
 from vdet.track.factory import make_tracker
 from vdet.track.track import Track
 
@@ -128,7 +129,7 @@ def follow_variants(
     """Return for each frame a result for each of the settings, in their order.
 
     The results under one of the settings do not depend on the others, and are those of
-    `vdet.pipeline.loop.follow_frames`.
+    `vdet.run.loop.follow_frames`.
 
     Raises
     ------

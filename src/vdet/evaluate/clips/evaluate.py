@@ -7,14 +7,14 @@ from pathlib import Path
 from vdet.evaluate.clips.clip import Clip, Variant, find_tracks
 from vdet.evaluate.clips.losses import Loss, losses
 from vdet.evaluate.comparison import Comparison, compare, pool
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import match
-from vdet.evaluate.predictions import read_predictions
 from vdet.evaluate.scores import Scores, score_comparison
 from vdet.evaluate.timelines import Timeline, timelines
-from vdet.evaluate.truth import read_truth
-from vdet.pipeline.loop import Progress, no_progress
-from vdet.pipeline.sinks.protocol import Output
+from vdet.labels.predictions import read_predictions
+from vdet.labels.truth import read_truth
+from vdet.labels.video import LabelledVideo
+from vdet.progress import Progress, no_progress
+from vdet.run.sinks.protocol import Output
 
 
 @dataclass(frozen=True, slots=True, eq=False)

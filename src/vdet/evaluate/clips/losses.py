@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
+from vdet.boxes import Int64Array
 from vdet.evaluate.comparison import Comparison
 from vdet.evaluate.matching import MatchedFrame
-from vdet.geometry import Int64Array
 
 LossKind = Literal["missed", "false alarm"]
 

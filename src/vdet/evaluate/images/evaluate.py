@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.images.labelled import LabelledImages
 from vdet.evaluate.images.scores import (
     Counting,
     ImageScores,
@@ -14,7 +13,8 @@ from vdet.evaluate.images.scores import (
     score_source,
 )
 from vdet.evaluate.images.search import search_images
-from vdet.pipeline.loop import Progress, no_progress
+from vdet.labels.pictures.labelled import LabelledImages
+from vdet.progress import Progress, no_progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)

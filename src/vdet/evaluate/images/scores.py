@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vdet.boxes import BoolArray, Float64Array, Int64Array
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.detection_metrics import (
     RankedPredictions,
@@ -13,9 +14,8 @@ from vdet.evaluate.detection_metrics import (
     ratio,
 )
 from vdet.evaluate.images.search import SearchedImage
-from vdet.evaluate.labelled_video import LabelledVideo
 from vdet.evaluate.matching import MatchedFrame, match
-from vdet.geometry import BoolArray, Float64Array, Int64Array
+from vdet.labels.video import LabelledVideo
 
 SIZES = (0.03, 0.06, 0.12)
 """Where the classes of width begin and end, shares of the picture's width."""

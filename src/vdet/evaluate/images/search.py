@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vdet.boxes import Float64Array, to_sides
 from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.comparison import MAX_IN_FRAME
-from vdet.evaluate.images.labelled import LabelledImage
-from vdet.geometry import Float64Array, to_sides
-from vdet.pipeline.pictures import search_picture
-from vdet.pipeline.threads import map_ordered, single_threaded_libraries
+from vdet.labels.pictures.labelled import LabelledImage
+from vdet.labels.rows import MAX_IN_FRAME
+from vdet.run.pictures import search_picture
+from vdet.run.threads import map_ordered, single_threaded_libraries
 
 
 @dataclass(frozen=True, slots=True, eq=False)

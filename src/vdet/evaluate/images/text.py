@@ -5,10 +5,10 @@ from dataclasses import asdict
 from typing import Any
 
 from vdet.evaluate.images.evaluate import ImagesResult
-from vdet.evaluate.images.labelled import LabelledImages
 from vdet.evaluate.images.scores import SIZE_NAMES, ImageScores, SizeScores
 from vdet.evaluate.output import ABSENT, RunName, plain_run, run_lines, share, table
 from vdet.files import printable
+from vdet.labels.pictures.labelled import LabelledImages
 
 HEADINGS = (
     *("source", "pictures", "vehicles", "precision", "recall", "F1", "AP50", "AP50:95", "IoU"),

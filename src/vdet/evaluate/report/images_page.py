@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
+from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
 from vdet.evaluate.images.evaluate import ImagesResult
-from vdet.evaluate.images.labelled import LabelledImages
 from vdet.evaluate.images.scores import SIZE_NAMES, MeasuredImage, Source
 from vdet.evaluate.images.text import (
     HEADINGS,
@@ -24,7 +24,7 @@ from vdet.evaluate.matching import match
 from vdet.evaluate.output import RunName, run_lines, share
 from vdet.evaluate.report.page import COLORS, SOFT, charts, draw, unit_axis
 from vdet.evaluate.report.video_page import FOUND_COLOR, TRUE_COLOR
-from vdet.geometry import Float64Array
+from vdet.labels.pictures.labelled import LabelledImages
 from vdet.media.images import Image
 from vdet.pages.frame import Picture, cards, contact_sheet, html_table, page, paragraph, section
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from vdet.boxes import Float64Array
 from vdet.config.schema import InputSettings
 from vdet.draw.paint import Color
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
@@ -28,7 +29,6 @@ from vdet.evaluate.output import share
 from vdet.evaluate.report.page import charts
 from vdet.evaluate.report.video_charts import sweep_chart, tightness_chart, timeline_chart
 from vdet.evaluate.scores import Scores
-from vdet.geometry import Float64Array
 from vdet.media import VideoReader
 from vdet.media.images import Image
 from vdet.pages.frame import Picture, cards, contact_sheet, html_table, page, paragraph, section

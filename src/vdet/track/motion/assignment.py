@@ -7,7 +7,7 @@ Dense and Sparse Linear Assignment Problems", 1987, without its first phases.
 
 import numpy as np
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 
 _FREE = -1
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vdet.boxes import Float64Array, iou, visible
 from vdet.config.schema import MotionTrackerSettings
-from vdet.geometry import Float64Array, iou, visible
 from vdet.track.motion.assignment import assign
 from vdet.track.motion.overlapping import CLEAR, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle

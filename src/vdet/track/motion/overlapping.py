@@ -8,7 +8,7 @@ vehicle: two would be in the same place.
 import numpy as np
 import numpy.typing as npt
 
-from vdet.geometry import Float64Array, coverage, iou_matrix
+from vdet.boxes import Float64Array, coverage, iou_matrix
 
 _LEVEL = 0.15
 """Bottoms that differ by less than this share of the lesser height are level."""

@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from vdet.geometry import Float64Array
+from vdet.boxes import Float64Array
 
 BORDER = 0.005
 """A box that ends this near to the frame's side, as a share of the frame, touches it."""

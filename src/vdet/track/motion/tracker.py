@@ -5,9 +5,9 @@ from itertools import count, product
 
 import numpy as np
 
+from vdet.boxes import Box, Float64Array, are_nested, to_sides, visible
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
-from vdet.geometry import Box, Float64Array, are_nested, to_sides, visible
 from vdet.media import Picture
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
 from vdet.track.motion.overlapping import are_hidden, are_parts, around, shows_both, stretched

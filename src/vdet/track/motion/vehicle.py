@@ -8,9 +8,9 @@ It is measured in seconds of detections with score 1, so that it does not depend
 import math
 from dataclasses import dataclass, field
 
+from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.classes import ClassScores
-from vdet.geometry import Float64Array
 from vdet.track.motion.state import MotionState, measure
 
 LONGEST_LOOK = 0.1

@@ -29,8 +29,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+from vdet.boxes import Box
 from vdet.config.schema import RulesTrackerSettings
-from vdet.geometry import Box
 from vdet.media.images import Image
 from vdet.track.rules.car import Car, Region
 

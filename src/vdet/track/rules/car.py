@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Box
 from vdet.config.schema import RulesTrackerSettings
-from vdet.geometry import Box
 from vdet.media.images import Image
 
 Point = tuple[float, float]

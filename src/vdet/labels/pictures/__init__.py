@@ -1,0 +1,1 @@
+"""Labelled pictures: one module a format, and the checks that all share."""

@@ -1,0 +1,154 @@
+"""A training from files to files: labelled pictures and videos → network and report."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from vdet.config.network import NetworkTrainingSettings
+from vdet.detect.onnx.header import Header
+from vdet.detect.onnx.recognition import read_header
+from vdet.detect.onnx.session import Session
+from vdet.files import write_json
+from vdet.labels.pictures.reading import read_labelled_images
+from vdet.learn.net.export import export_network
+from vdet.learn.net.samples import Source
+from vdet.learn.net.sources import (
+    CLASSES,
+    LabelledClip,
+    SourceReport,
+    clip_source,
+    image_source,
+)
+from vdet.learn.net.training import TrainingState, train_network
+from vdet.version import __version__
+
+_AVERAGED = 100  # last steps whose mean loss is reported
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkJob:
+    """What a training reads and writes.
+
+    Attributes
+    ----------
+    pictures
+        Sets of labelled pictures.
+    clips
+        Labelled videos.
+    output
+        The file of the network; report and checkpoint, the training's state, lie beside it.
+    base
+        An exported network from whose weights the training starts.
+    overwrite
+        Replace an earlier network and its report.
+    """
+
+    pictures: tuple[Path, ...]
+    clips: tuple[LabelledClip, ...]
+    output: Path
+    base: Path | None = None
+    overwrite: bool = False
+
+    @property
+    def report(self) -> Path:
+        """The file of the report."""
+        return self.output.with_suffix(".json")
+
+    @property
+    def checkpoint(self) -> Path:
+        """The file of the training's state."""
+        return self.output.with_suffix(".ckpt")
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkReport:
+    """The report of a training: its sources, how long it took, and the mean loss of its last steps.
+
+    `seconds` are those since the training was started or went on.
+    """
+
+    sources: tuple[SourceReport, ...]
+    steps: int
+    parameters: int
+    seconds: float
+    loss: float | None
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report as lines of text."""
+        for source in self.sources:
+            yield f"{source.name:<28}{source.pictures:6d} pictures {source.vehicles:8d} vehicles"
+        loss = "" if self.loss is None else f"; loss at the end {self.loss:.3f}"
+        yield (
+            f"{self.parameters:,} parameters after {self.steps:,} steps, "
+            f"{self.seconds / 60:.1f} minutes{loss}"
+        )
+
+
+def train_to_file(
+    job: NetworkJob,
+    settings: NetworkTrainingSettings,
+    *,
+    progress: Callable[[TrainingState], object] = lambda _: None,
+) -> NetworkReport:
+    """Train a network, write it with its report, and remove the checkpoint.
+
+    Raises
+    ------
+    TruthError, ImageError, VideoError
+        Pictures, videos or their labels cannot be read.
+    ModelError
+        The base cannot be read.
+    DataError
+        There is no vehicle to learn, the base is not such a network, or the checkpoint is that of
+        another training.
+    OutputError
+        A file cannot be written.
+    """
+    began = time.monotonic()
+    base = {"base": _provenance(job.base)} if job.base else {}
+    sources, reports = _read(job)
+    recent: list[float] = []
+
+    def note(state: TrainingState) -> None:
+        recent.append(state.loss)
+        del recent[:-_AVERAGED]
+        progress(state)
+
+    network = train_network(
+        sources, len(CLASSES), settings, job.checkpoint, base=job.base, progress=note
+    )
+    report = NetworkReport(
+        sources=reports,
+        steps=settings.steps,
+        parameters=sum(each.numel() for each in network.parameters()),
+        seconds=round(time.monotonic() - began, 1),
+        loss=round(sum(recent) / len(recent), 4) if recent else None,
+    )
+    header = Header(
+        classes=CLASSES,
+        pixels=settings.width * settings.height,
+        calibration=settings.score,
+        provenance={
+            "program": f"vdet {__version__}",
+            "training": settings.model_dump(mode="json"),
+            "report": asdict(report),
+            **base,
+        },
+    )
+    export_network(network, header, job.output, overwrite=job.overwrite)
+    write_json(asdict(report), str(job.report), overwrite=job.overwrite)
+    job.checkpoint.unlink(missing_ok=True)
+    return report
+
+
+def _provenance(path: Path) -> dict[str, Any]:
+    header = read_header(Session(path), path)
+    return header.provenance if header else {}
+
+
+def _read(job: NetworkJob) -> tuple[list[Source], tuple[SourceReport, ...]]:
+    read = [image_source(read_labelled_images(path)) for path in job.pictures]
+    read += [clip_source(clip) for clip in job.clips]
+    return [source for source, _ in read], tuple(report for _, report in read)

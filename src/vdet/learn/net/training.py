@@ -1,0 +1,272 @@
+"""The training of the network: steps, learning rate, moving average, checkpoints."""
+
+import copy
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional
+
+from vdet.config.network import NetworkTrainingSettings
+from vdet.errors import DataError
+from vdet.files import OutputFiles
+from vdet.learn.net.architecture import Network, cell_centers, decode, flatten
+from vdet.learn.net.assignment import Vehicles, assign
+from vdet.learn.net.augmentation import Drawing, SampleDrawer
+from vdet.learn.net.base import start_from
+from vdet.learn.net.losses import (
+    BOX_WEIGHT,
+    CLASS_WEIGHT,
+    giou,
+    quality_focal_loss,
+)
+from vdet.learn.net.samples import UNKNOWN, Sample, Source
+from vdet.run.threads import prefetch, single_threaded_libraries
+
+_MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingState:
+    """What a training says of itself: the steps done of all, loss, rate and seconds left."""
+
+    step: int
+    steps: int
+    loss: float
+    rate: float
+    seconds_left: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """Training pictures of one step.
+
+    `pictures` is uint8 `(B, H, W, 3)`, BGR. `picture` is the number of the picture of each box,
+    `boxes` are x1, y1, x2, y2 in pixels; the first rows are `vehicles`, the others ignore regions.
+    """
+
+    pictures: Tensor
+    vehicles: Vehicles
+    ignored_picture: Tensor
+    ignored_boxes: Tensor
+
+
+def _batches(
+    sources: Sequence[Source], settings: NetworkTrainingSettings, first: int
+) -> Iterator[Batch]:
+    """Yield the batches from step `first` on; each depends on the step and the seed alone."""
+    drawer = SampleDrawer(sources, settings)
+    for step in range(first, settings.steps):
+        rng = np.random.default_rng((settings.seed, step))
+        drawing = _drawing(settings, step)
+        yield _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
+
+
+def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
+    is_small = step < settings.small * settings.steps
+    is_plain = step >= (1 - settings.plain) * settings.steps
+    return Drawing(
+        width=settings.width // 2 if is_small else settings.width,
+        height=settings.height // 64 * 32 if is_small else settings.height,
+        magnified=_MAGNIFIED if is_small else 1.0,
+        mosaics=0.0 if is_plain else settings.mosaics,
+    )
+
+
+def train_network(
+    sources: Sequence[Source],
+    class_count: int,
+    settings: NetworkTrainingSettings,
+    checkpoint: Path,
+    *,
+    base: Path | None = None,
+    progress: Callable[[TrainingState], object] = lambda _: None,
+) -> Network:
+    """Train a network and return it with the moving average of its weights.
+
+    The same seed gives the same network on the same machine. A training that was stopped goes on
+    from its last checkpoint.
+
+    Parameters
+    ----------
+    sources
+        At least one, each with at least one sample.
+    checkpoint
+        File of the last checkpoint; it is made and replaced, and read where it exists.
+    base
+        An exported network from whose weights the training starts.
+
+    Raises
+    ------
+    DataError
+        No source has a vehicle, the base is not such a network, or the checkpoint belongs to
+        another training.
+    """
+    if not any((~sample.ignored).any() for each in sources for sample in each.samples):
+        raise DataError("no picture has a vehicle; give labelled pictures")
+    run = _Run(class_count, settings, base)
+    if checkpoint.exists():
+        run.restore(checkpoint)
+    elif base is not None:
+        run.start_from(base, next(_batches(sources, settings, run.step)))
+    began, first = time.monotonic(), run.step
+    with single_threaded_libraries(), prefetch(_batches(sources, settings, first)) as batches:
+        for batch in batches:
+            loss = run.learn(batch)
+            left = (time.monotonic() - began) / (run.step - first) * (settings.steps - run.step)
+            progress(TrainingState(run.step, settings.steps, loss, run.rate, left))
+            if run.step % settings.checkpoint == 0 or run.step == settings.steps:
+                run.save(checkpoint)
+    return run.averaged.eval()
+
+
+class _Run:
+    """The state of a training between two steps."""
+
+    def __init__(
+        self, class_count: int, settings: NetworkTrainingSettings, base: Path | None
+    ) -> None:
+        torch.manual_seed(settings.seed)
+        torch.set_num_threads(1)  # two threads that wait for each other are slower than one
+        torch.set_flush_denormal(True)
+        self._settings = settings
+        self._base = base
+        self._network = Network(class_count).to(memory_format=torch.channels_last).train()
+        self.averaged = copy.deepcopy(self._network)
+        weights = [each for each in self._network.parameters() if each.ndim > 1]
+        others = [each for each in self._network.parameters() if each.ndim <= 1]
+        self._optimizer = torch.optim.AdamW(
+            [
+                {"params": weights, "weight_decay": settings.weight_decay},
+                {"params": others, "weight_decay": 0.0},
+            ],
+            lr=settings.rate,
+        )
+        self.step = 0
+
+    def start_from(self, path: Path, batch: Batch) -> None:
+        """Take the first weights from an exported network. Raises `DataError`."""
+        start_from(self._network, path, _inputs(batch))
+        self.averaged.load_state_dict(self._network.state_dict())
+
+    @property
+    def rate(self) -> float:
+        """The learning rate of the next step: it rises, stays, and falls as a cosine."""
+        settings, step = self._settings, self.step
+        if step < settings.warm_up:
+            return settings.rate * (step + 1) / settings.warm_up
+        share = max(0.0, 2 * step / settings.steps - 1)  # of the second half
+        low = settings.last_rate
+        return settings.rate * (low + (1 - low) * (1 + math.cos(math.pi * share)) / 2)
+
+    def learn(self, batch: Batch) -> float:
+        """Do one step and return its loss."""
+        for group in self._optimizer.param_groups:
+            group["lr"] = self.rate
+        loss = _loss(self._network, batch)
+        self._optimizer.zero_grad()
+        loss.backward()  # type: ignore[no-untyped-call]
+        torch.nn.utils.clip_grad_norm_(self._network.parameters(), self._settings.gradient)
+        self._optimizer.step()
+        self.step += 1
+        self._average()
+        return float(loss.detach())
+
+    @torch.no_grad()
+    def _average(self) -> None:
+        keep = min(self._settings.average, self.step / (self.step + 10))
+        averages = self.averaged.state_dict()
+        for name, value in self._network.state_dict().items():
+            if value.dtype.is_floating_point:
+                averages[name].lerp_(value, 1 - keep)
+
+    def save(self, path: Path) -> None:
+        """Write the state to a file."""
+        state = {
+            "settings": self._learnt_with(),
+            "step": self.step,
+            "network": self._network.state_dict(),
+            "averaged": self.averaged.state_dict(),
+            "optimizer": self._optimizer.state_dict(),
+        }
+        with OutputFiles(overwrite=True) as files:
+            torch.save(state, files.stage(path))
+
+    def _learnt_with(self) -> dict[str, Any]:
+        """Return the base, and the settings without those that change no weight."""
+        return {"base": str(self._base)} | self._settings.model_dump(exclude={"score"})
+
+    def restore(self, path: Path) -> None:
+        """Go on from a file that `save` has written. Raises `DataError`."""
+        try:
+            state: dict[str, Any] = torch.load(path, weights_only=True)
+            same = state["settings"] == self._learnt_with()
+            self._network.load_state_dict(state["network"])
+            self.averaged.load_state_dict(state["averaged"])
+            self._optimizer.load_state_dict(state["optimizer"])
+            self.step = state["step"]
+        except Exception as error:  # torch raises many kinds for a file of another form
+            raise DataError(f"{path}: is no checkpoint of this training; remove it") from error
+        if not same:
+            raise DataError(
+                f"{path}: belongs to a training with other settings or another base; remove it"
+            )
+
+
+def _loss(network: Network, batch: Batch) -> Tensor:
+    height, width = batch.pictures.shape[1:3]
+    centers, strides = cell_centers(height, width)
+    raw = flatten(network(_inputs(batch)))
+    scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
+    found = assign(scores, boxes, batch.vehicles, centers, strides)
+    targets = torch.zeros_like(scores)
+    targets[found.picture, found.cell] = found.iou
+    counted = torch.ones_like(scores)
+    inside = _inside(batch, centers)
+    counted[inside] = 0
+    counted[found.picture, found.cell] = 1
+    whole = found.iou.sum().clamp(min=1)
+    score_loss = (quality_focal_loss(scores, targets) * counted).sum() / whole
+    overlap = giou(boxes[found.picture, found.cell], batch.vehicles.boxes[found.vehicle])
+    box_loss = ((1 - overlap) * found.iou).sum() / whole
+    class_loss = functional.cross_entropy(
+        raw[found.picture, found.cell, 5:],
+        batch.vehicles.classes[found.vehicle],
+        ignore_index=UNKNOWN,
+        reduction="sum",
+    )
+    return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(found.iou), 1)
+
+
+def _inputs(batch: Batch) -> Tensor:
+    """Return the pictures as the network takes them."""
+    pictures = batch.pictures.permute(0, 3, 1, 2).float()
+    return pictures.contiguous(memory_format=torch.channels_last)
+
+
+def _inside(batch: Batch, centers: Tensor) -> tuple[Tensor, Tensor]:
+    """Return the picture and the cell of all cells whose middle lies in an ignore region."""
+    boxes = batch.ignored_boxes[:, None]
+    inside = ((centers > boxes[..., :2]) & (centers < boxes[..., 2:])).all(-1)
+    row, cell = torch.nonzero(inside, as_tuple=True)
+    return batch.ignored_picture[row], cell
+
+
+def _to_batch(samples: Sequence[Sample]) -> Batch:
+    counts = [len(sample.boxes) for sample in samples]
+    picture = torch.repeat_interleave(torch.arange(len(samples)), torch.tensor(counts))
+    boxes = torch.from_numpy(np.concatenate([sample.boxes for sample in samples]))
+    classes = torch.from_numpy(np.concatenate([sample.classes for sample in samples]))
+    ignored = torch.from_numpy(np.concatenate([sample.ignored for sample in samples]))
+    return Batch(
+        torch.from_numpy(np.stack([sample.image for sample in samples])),
+        Vehicles(picture[~ignored], boxes[~ignored].float(), classes[~ignored]),
+        picture[ignored],
+        boxes[ignored].float(),
+    )

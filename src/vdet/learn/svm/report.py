@@ -1,0 +1,143 @@
+"""The report of `vdet train` on a model: numbers, printed and written as JSON."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vdet.boxes import BoolArray
+from vdet.files import write_json
+
+
+@dataclass(frozen=True, slots=True)
+class Confusion:
+    """Test patches by truth and prediction."""
+
+    true_positives: int
+    false_positives: int
+    false_negatives: int
+    true_negatives: int
+
+    @staticmethod
+    def of(truth: BoolArray, predicted: BoolArray) -> "Confusion":
+        """Count the patches of two bool arrays `(n,)`."""
+        return Confusion(
+            int(np.count_nonzero(truth & predicted)),
+            int(np.count_nonzero(~truth & predicted)),
+            int(np.count_nonzero(truth & ~predicted)),
+            int(np.count_nonzero(~truth & ~predicted)),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class GroupAccuracy:
+    """Share of a group's test patches that are classified correctly."""
+
+    group: str
+    patches: int
+    accuracy: float
+
+
+@dataclass(frozen=True, slots=True)
+class BoxError:
+    """Error of the regression on the known box sides of held-out patches.
+
+    `mean` is the mean absolute error as a share of the patch's side, `patches` their number.
+    """
+
+    patches: int
+    mean: float
+
+
+@dataclass(frozen=True, slots=True)
+class SplitReport:
+    """A model fitted on one part of the patches and tested on the other.
+
+    `train_augmented` is the number of samples made of the training patches. `boxes` is None if no
+    boxes are known.
+    """
+
+    split: str
+    train_patches: int
+    train_augmented: int
+    test_patches: int
+    train_accuracy: float
+    test_accuracy: float
+    confusion: Confusion
+    groups: tuple[GroupAccuracy, ...]
+    boxes: BoxError | None
+    fit_seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingReport:
+    """The report of a training run; the saved model is that of the first split.
+
+    `boxed` is the number of patches with a known box, including those of neither class; `groups`
+    has the number of patches of each group.
+    """
+
+    vehicles: int
+    non_vehicles: int
+    boxed: int
+    broken: int
+    groups: dict[str, int]
+    features: int
+    extract_seconds: float
+    milliseconds_per_prediction: float
+    splits: tuple[SplitReport, ...]
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report as lines of text."""
+        broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
+        yield (
+            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}; "
+            f"{self.features} features each, described in {self.extract_seconds:.1f} s"
+        )
+        if self.boxed:
+            yield f"patches with the box of their vehicle: {self.boxed}"
+        for group, count in self.groups.items():
+            yield f"  {group:<28}{count:6d} patches"
+        for split in self.splits:
+            yield from _split_lines(split)
+        yield ""
+        yield f"one prediction: {self.milliseconds_per_prediction:.2f} ms, features included"
+        if not self.boxed:
+            yield ""
+            yield (
+                "no patch came from vdet mine: in video, such a model finds far fewer vehicles; "
+                "docs/training.md says how to mine labelled video"
+            )
+
+    def write(self, path: Path, *, overwrite: bool = False) -> None:
+        """Write the report as JSON. Raises `OutputError`."""
+        write_json(asdict(self), str(path), overwrite=overwrite)
+
+
+_SPLITS = {
+    "random": "random split (near-duplicates on both sides)",
+    "tail": "tail split (leak-free: the last patches of each folder)",
+}
+
+
+def _split_lines(report: SplitReport) -> Iterator[str]:
+    confusion = report.confusion
+    yield ""
+    yield _SPLITS[report.split]
+    more = f" + {report.train_augmented} augmented" if report.train_augmented else ""
+    yield (
+        f"  train accuracy {report.train_accuracy:.4f} ({report.train_patches} patches{more}), "
+        f"test accuracy {report.test_accuracy:.4f} ({report.test_patches} patches), "
+        f"fitted in {report.fit_seconds:.1f} s"
+    )
+    yield "                        said vehicle   said non-vehicle"
+    yield (f"  is vehicle      {confusion.true_positives:18d} {confusion.false_negatives:18d}")
+    yield (f"  is non-vehicle  {confusion.false_positives:18d} {confusion.true_negatives:18d}")
+    for group in report.groups:
+        yield f"  {group.group:<28}{group.patches:6d} patches  accuracy {group.accuracy:.4f}"
+    if report.boxes is not None:
+        yield (
+            f"  sides of vehicles' boxes: {report.boxes.mean:.3f} of a patch's side off on average "
+            f"({report.boxes.patches} patches)"
+        )

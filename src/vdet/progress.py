@@ -1,0 +1,22 @@
+"""How library code reports progress: it calls functions that the caller gives."""
+
+from collections.abc import Callable
+
+Advance = Callable[[int], object]
+"""Called with the number of items done since the last call."""
+
+Progress = Callable[[int | None], Advance]
+"""Called once with the expected number of items, None if it is unknown."""
+
+Steps = Callable[[str, int | None], Advance]
+"""A `Progress` for work in several steps: it also gets the name of each step."""
+
+
+def no_steps(_: str, __: int | None) -> Advance:
+    """Show no progress."""
+    return no_progress(None)
+
+
+def no_progress(_: int | None) -> Advance:
+    """Show no progress."""
+    return lambda _: None

@@ -1,0 +1,243 @@
+"""Vehicles in still pictures: read the picture, detect, give the result to sinks."""
+
+import contextlib
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from vdet.config.schema import Settings
+from vdet.detect.detections import Detections
+from vdet.detect.protocol import DetectorModel, VideoDetector, limited
+from vdet.errors import ConfigError, ImageError, OutputError
+from vdet.files import OutputFiles, make_folder
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.media import Frame, Picture
+from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
+from vdet.progress import Progress, no_progress
+from vdet.regions import Regions, lay_regions
+from vdet.run.positions import with_positions
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
+from vdet.run.threads import single_threaded_libraries
+from vdet.track.track import Track
+
+
+@dataclass(frozen=True, slots=True)
+class PictureJob:
+    """A picture, and the outputs that are written for it alone."""
+
+    source: Path
+    outputs: tuple[Output, ...]
+
+
+def find_images(paths: Sequence[Path]) -> list[Path]:
+    """Return the pictures that `paths` name: files, and the pictures in folders.
+
+    Folders inside these folders are not searched.
+
+    Raises
+    ------
+    ImageError
+        A path does not exist, or a folder holds no picture.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if is_picture_name(p) and p.is_file())
+            if not inside:
+                names = ", ".join(sorted(PICTURE_SUFFIXES))
+                raise ImageError(f"{path}: holds no pictures ({names})")
+            found += inside
+        elif path.exists():
+            found.append(path)
+        else:
+            raise ImageError(f"{path}: no such file or folder")
+    return list(dict.fromkeys(found))
+
+
+def plan_pictures(
+    sources: Sequence[Path], out: Path | None, stages: Path | None, *, overwrite: bool
+) -> list[PictureJob]:
+    """Choose the outputs of each picture, and check them before any work.
+
+    Parameters
+    ----------
+    out
+        A file, if there is a single source and `out` has the suffix of a picture; else a folder,
+        which is made, and in which the pictures keep their names. None: no pictures.
+    stages
+        Folder of the stage pictures; several sources get a folder in it each. None: no such.
+
+    Raises
+    ------
+    OutputError
+        An output exists already (and not `overwrite`), is a source, or is that of two sources.
+    """
+    is_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
+    jobs = []
+    for source in sources:
+        picture = out if is_file or out is None else out / source.name
+        folder = stages / source.stem if stages and len(sources) > 1 else stages
+        named = {"picture": picture, "stages": folder}
+        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
+        jobs.append(PictureJob(source, own))
+    outputs = [output for job in jobs for output in job.outputs]
+    for output, count in Counter(outputs).items():
+        if count > 1:
+            raise OutputError(
+                f"{output.path}: is wanted by two inputs of one name; run them separately"
+            )
+    if out is not None and not is_file:
+        make_folder(out)
+    check_sinks(outputs, overwrite=overwrite, inputs=sources)
+    return jobs
+
+
+def run_pictures(
+    jobs: Sequence[PictureJob],
+    shared: Sequence[Output],
+    model: DetectorModel,
+    settings: Settings,
+    lanes: LaneRequest | None = None,
+    *,
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+    on_result: Callable[[FrameResult], object] = lambda _: None,
+) -> list[ImageError]:
+    """Search pictures; return the errors of those that cannot be read or searched.
+
+    The outputs of one picture appear together. The `shared` outputs, which get the results of all
+    pictures, appear at the end. `progress` gets the number of pictures, and then each; `on_result`
+    gets the result of each.
+
+    Raises
+    ------
+    OutputError
+        An output cannot be written.
+    """
+    failures: list[ImageError] = []
+    with ExitStack() as stack:
+        files = stack.enter_context(OutputFiles(overwrite=overwrite))
+        context = SinkContext(files, settings)
+        sinks = [stack.enter_context(open_sink(output, context)) for output in shared]
+        advance = progress(len(jobs))
+        for job in jobs:
+            try:
+                on_result(
+                    run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
+                )
+            except ImageError as error:
+                failures.append(error)
+            advance(1)
+    return failures
+
+
+def run_picture(
+    job: PictureJob,
+    model: DetectorModel,
+    settings: Settings,
+    lanes: LaneRequest | None = None,
+    *,
+    shared: Sequence[Sink] = (),
+    overwrite: bool = False,
+) -> FrameResult:
+    """Search a picture, write its outputs together, and give the result to the shared sinks.
+
+    Raises
+    ------
+    ImageError
+        The picture cannot be read or searched.
+    OutputError
+        An output cannot be written.
+    """
+    result = detect_picture(job.source, read_image(job.source), model, settings, lanes)
+    with ExitStack() as stack:
+        files = stack.enter_context(OutputFiles(overwrite=overwrite))
+        context = SinkContext(files, settings)
+        own = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
+        for sink in (*own, *shared):
+            sink.write(result)
+    return result
+
+
+def detect_picture(
+    source: Path,
+    image: Image,
+    model: DetectorModel,
+    settings: Settings,
+    lanes: LaneRequest | None = None,
+) -> FrameResult:
+    """Search a picture, BGR uint8 `(H, W, 3)`; `source` is its name in messages.
+
+    Each detection becomes a track, with ids from 1.
+
+    Raises
+    ------
+    ImageError
+        The picture cannot be searched.
+    """
+    height, width = image.shape[:2]
+    with single_threaded_libraries():
+        with _named(source):
+            regions = lay_regions(settings.regions, width, height)
+        detector, detections = search_picture(source, image, model, regions)
+    tracks = _tracks(detections)
+    with _named(source):
+        road = _road(image, tracks, settings, lanes) if lanes else None
+    frame = Frame(0, Fraction(0), Picture(image))
+    placed = with_positions(tracks, road, settings.detector.foot)
+    return FrameResult(source, frame, detections, placed, road, detector)
+
+
+def search_picture(
+    source: Path, image: Image, model: DetectorModel, regions: Regions | None = None
+) -> tuple[VideoDetector, Detections]:
+    """Return what a picture shows, and the detector that found it; threads may call this at once.
+
+    With `regions`, only vehicles that stand in them are found.
+
+    Arguments and errors as in `detect_picture`.
+    """
+    height, width = image.shape[:2]
+    with _named(source):
+        detector = limited(model.for_video(width, height, [image]), regions)
+        detections = detector.detect(detector.search(Picture(image), None))
+    if regions is None:
+        return detector, detections
+    boxes = detections.rounded
+    return detector, detections[[n for n, box in enumerate(boxes) if regions.contains(box.foot)]]
+
+
+@contextlib.contextmanager
+def _named(source: Path) -> Iterator[None]:
+    """Put the name of the picture before what is wrong with it."""
+    try:
+        yield
+    except (ConfigError, ImageError) as error:
+        raise ImageError(f"{source}: {error}") from error
+
+
+def _tracks(detections: Detections) -> tuple[Track, ...]:
+    return tuple(
+        Track(
+            number + 1,
+            box,
+            float(np.float64(score)),
+            predicted=False,
+            class_name=name,
+        )
+        for number, (box, score, name) in enumerate(
+            zip(detections.rounded, detections.scores.tolist(), detections.class_names, strict=True)
+        )
+    )
+
+
+def _road(image: Image, tracks: Iterable[Track], settings: Settings, lanes: LaneRequest) -> Road:
+    height, width = image.shape[:2]
+    roads = RoadFinder(lanes, settings.lanes, width, height)
+    return roads.update(roads.observe(image), (track.box for track in tracks))

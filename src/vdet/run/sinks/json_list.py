@@ -1,0 +1,69 @@
+"""The sink `json`: the vehicles of still pictures as one JSON list."""
+
+import json
+from pathlib import Path
+from typing import Any, Self
+
+from vdet.files import print_now
+from vdet.lanes.lane import lane_record
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
+from vdet.track.track import Track
+
+
+class JsonSink:
+    """Collects an item per picture, and writes the list at the end, if there is an item.
+
+    Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
+    `height` (pixels of the input picture) and `score`. If lanes are searched for, it also has
+    `lane`, as in `.jsonl` tracks, and each box has `distance` (metres, two decimals) and `lane`, as
+    in `Track`, null where they are not known.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self._path = path
+        self._context = context
+        self._items: list[dict[str, Any]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        if kind is not None or not self._items:
+            return
+        text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
+        if self._path == STANDARD_OUTPUT:
+            print_now(text)
+        else:
+            self._context.files.stage(self._path).write_text(text, encoding="utf-8")
+
+    def write(self, result: FrameResult) -> None:
+        """Add the item of a picture."""
+        item: dict[str, Any] = {
+            "image": str(result.source),
+            "width": result.frame.picture.width,
+            "height": result.frame.picture.height,
+            "boxes": [_box(track, on_road=result.road is not None) for track in result.tracks],
+        }
+        if result.road:
+            item["lane"] = lane_record(result.road.lane)
+        self._items.append(item)
+
+
+def _box(track: Track, *, on_road: bool) -> dict[str, Any]:
+    """Return the values of a vehicle; with `on_road` also its place on the road."""
+    values: dict[str, Any] = {
+        "x": track.box.x,
+        "y": track.box.y,
+        "width": track.box.width,
+        "height": track.box.height,
+        "score": round(track.score, 4),
+    }
+    if on_road:
+        metres = track.distance
+        values["distance"] = None if metres is None else round(metres, 2)
+        values["lane"] = track.lane
+    return values
+
+
+JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")

@@ -1,0 +1,190 @@
+"""What the section `draw` asks for, drawn into a copy of each frame."""
+
+import zlib
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from vdet.config.draw import AUTO
+from vdet.config.schema import Settings
+from vdet.detect.classes import OUR_NAMES
+from vdet.draw.boxes import (
+    BLACK,
+    GREEN,
+    WHITE,
+    color_of,
+    draw_box,
+    draw_label,
+    line_width,
+)
+from vdet.draw.paint import Color, Surface
+from vdet.draw.trails import draw_trail
+from vdet.lanes.drawing import draw_lane
+from vdet.lanes.road import Road
+from vdet.media import Picture, VideoInfo
+from vdet.regions import Regions
+from vdet.run.result import FrameResult
+from vdet.track.steady import SteadyBoxes
+from vdet.track.track import Track
+
+VIDEO_LABEL = ("id",)
+PICTURE_LABEL = ("id", "score")
+_OTHER_CLASSES = 10
+"""Colours for classes that are not among `OUR_NAMES`."""
+
+Points = deque[tuple[float, float, float]]
+"""Time in seconds, x and y in pixels."""
+
+
+class Overlay:
+    """Draws the vehicles and the lane of one video, or of one still picture.
+
+    Parameters
+    ----------
+    video
+        The video; None for a picture, which has no trails, no time and no smoothing.
+    """
+
+    def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
+        self._settings = settings.draw
+        self._region_settings = settings.regions
+        self._regions: Regions | None = None
+        self._start = video.start if video else None
+        automatic = VIDEO_LABEL if video else PICTURE_LABEL
+        self._label = automatic if AUTO in settings.draw.label else settings.draw.label
+        self._steady = (
+            SteadyBoxes(settings.draw.smoothing) if video and settings.draw.smoothing else None
+        )
+        self._trails: dict[int, Points] = {}
+        self._missed: set[int] = set()
+
+    def draw(self, result: FrameResult) -> Surface:
+        """Return a copy of the frame with its vehicles: BGR or planes, as the frame came.
+
+        If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
+        are drawn where they lie in it.
+        """
+        shown = self._shown(result)
+        picture = result.frame.picture
+        surface = self._surface(result)
+        colors = {track.id: self._color(track, picture) for track in shown}
+        shown = _placed(shown, result.road, surface)
+        self._draw_trails(surface, shown, colors, float(result.frame.time))
+        self._draw_vehicles(surface, shown, colors)
+        if self._settings.time and self._start is not None:
+            time = time_text(result.frame.time - self._start)
+            draw_label(surface, time, (0, surface.shape[0]), BLACK)
+        return surface
+
+    def _surface(self, result: FrameResult) -> Surface:
+        """Return what is drawn into: a copy of the frame, or of the road with its lane."""
+        if result.road is None:
+            return result.frame.picture.pixels.copy()
+        image = result.road.image.copy()
+        if result.road.lane:
+            draw_lane(image, result.road.lane)
+        return image
+
+    def _shown(self, result: FrameResult) -> list[Track]:
+        """Return the vehicles to draw, with the boxes to draw, the farthest first."""
+        if result.searched:  # in the other frames, a vehicle is not missed
+            self._missed = {track.id for track in result.tracks if track.predicted}
+        tracks = list(result.tracks)
+        if self._steady:
+            tracks = self._steady.update(tracks, float(result.frame.time))
+        if self._settings.predicted == "hidden":
+            tracks = [track for track in tracks if track.id not in self._missed]
+        return sorted(tracks, key=lambda track: track.box.bottom)
+
+    def _draw_trails(
+        self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color], now: float
+    ) -> None:
+        longest = self._settings.trails
+        if self._start is None or not longest:
+            return
+        for track in shown:
+            self._trails.setdefault(track.id, deque()).append((now, *track.foot))
+        for points in self._trails.values():
+            while points and now - points[0][0] > longest:
+                points.popleft()
+        self._trails = {id_: points for id_, points in self._trails.items() if points}
+        width = line_width(surface, self._settings.thickness)
+        for track in shown:
+            path = [(x, y) for _, x, y in self._trails[track.id]]
+            draw_trail(surface, path, colors[track.id], width)
+
+    def _draw_vehicles(
+        self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color]
+    ) -> None:
+        settings = self._settings
+        if settings.boxes:
+            for track in shown:
+                dashed = settings.predicted == "dashed" and track.id in self._missed
+                color, thickness = colors[track.id], settings.thickness
+                draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
+        for track in shown:
+            if text := label_text(track, self._label):
+                draw_label(surface, text, (track.box.x, track.box.y), colors[track.id])
+
+    def _color(self, track: Track, picture: Picture) -> Color:
+        match self._settings.colors:
+            case "id":
+                return color_of(track.id)
+            case "class":
+                return _class_color(track.class_name)
+            case "region":
+                return self._region_color(track, picture)
+            case "one":
+                return GREEN
+
+    def _region_color(self, track: Track, picture: Picture) -> Color:
+        """Return the colour of the first polygon in which a vehicle stands; white in none."""
+        if self._regions is None:
+            self._regions = Regions(self._region_settings, picture.width, picture.height)
+        name = self._regions.name_at(track.foot)
+        return WHITE if name is None else color_of(list(self._regions.included).index(name) + 1)
+
+
+def label_text(track: Track, parts: Sequence[str]) -> str:
+    """Return the text of a label: those of its parts that are known of the vehicle."""
+    texts: Mapping[str, str | None] = {
+        "id": f"#{track.id}",
+        "class": track.class_name,
+        "score": f"{track.score:.2f}",
+        "distance": None if track.distance is None else f"{track.distance:.0f} m",
+    }
+    return " ".join(text for part in parts if (text := texts[part]))
+
+
+def time_text(time: Fraction) -> str:
+    """Write a time in seconds as hours, minutes and seconds: 0:01:02.345."""
+    thousandths = round(time * 1000)
+    minutes, rest = divmod(max(0, thousandths), 60_000)
+    return f"{minutes // 60}:{minutes % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
+
+
+def _class_color(name: str | None) -> Color:
+    """Return the colour of a class; white where the detector does not tell it."""
+    if name is None:
+        return WHITE
+    if name in OUR_NAMES:
+        return color_of(OUR_NAMES.index(name) + 1)
+    return color_of(len(OUR_NAMES) + 1 + zlib.crc32(name.encode()) % _OTHER_CLASSES)
+
+
+def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> list[Track]:
+    """Return where the vehicles lie in the picture; those outside it are left out."""
+    height, width = surface.shape[:2]
+    placed = []
+    for track in tracks:
+        box = track.box.clipped(width, height)
+        foot = track.foot
+        if road:
+            x, y = road.place_points(np.array([foot]))[0].tolist()
+            box, foot = road.place(box), (x, y)
+        if box.area:
+            placed.append(replace(track, box=box, whole_foot=foot))
+    return placed

@@ -1,0 +1,273 @@
+"""The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Literal, Protocol, Self
+
+from vdet.config.schema import Settings
+from vdet.errors import OutputError
+from vdet.files import (
+    MayReplace,
+    OutputFiles,
+    any_file,
+    check_output,
+    make_folder,
+    output_errors,
+)
+from vdet.media import VideoInfo
+from vdet.plugins import SINKS, load_plugin
+from vdet.run.result import FrameResult
+from vdet.run.waits import Waits
+
+STANDARD_OUTPUT = Path("-")
+
+
+class Sink(Protocol):
+    """Takes the results of a run, frame by frame; a context manager.
+
+    It writes into files that it gets from `SinkContext.files`. They appear under their names when
+    the whole run ends without an error, and not at all otherwise. When the `with` block of the sink
+    ends without an error, its files must be complete.
+    """
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+        /,
+    ) -> None: ...
+
+    def write(self, result: FrameResult) -> None:
+        """Take the next result. It must not change the frame's image."""
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """An output of a run: the name of its sink, and its path."""
+
+    sink: str
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class SinkContext:
+    """What a sink gets when it is opened.
+
+    Attributes
+    ----------
+    files
+        Gives temporary files: `files.stage(path)`.
+    video
+        The video that is read; None if the results are of still pictures.
+    is_part
+        Whether only a part of the video is read.
+    at
+        The option `--at`: seconds from the first frame.
+    codec_threads
+        Number of threads of an encoder; None lets it choose.
+    timeout
+        Seconds after which a write that does not end is an error.
+    outputs
+        All outputs of the run, for a sink that refers to another.
+    waits
+        Counts how long the run waits for an encoder.
+    """
+
+    files: OutputFiles
+    settings: Settings
+    video: VideoInfo | None = None
+    is_part: bool = False
+    at: Fraction = Fraction(0)
+    codec_threads: int | None = None
+    timeout: float | None = None
+    outputs: tuple[Output, ...] = ()
+    waits: Waits = field(default_factory=Waits)
+
+
+@dataclass(frozen=True, slots=True)
+class BatchTotal:
+    """A file over all videos of a batch, made from the outputs of each.
+
+    Attributes
+    ----------
+    name
+        Its name in the folder of the batch, without suffix.
+    write
+        Function that gets the outputs that are there, by the name of their video (as in the folder
+        of the batch, without suffix), and the file to write.
+    suffix
+        Suffix of the file; None for that of the outputs.
+    """
+
+    name: str
+    write: Callable[[Mapping[str, Path], Path], None]
+    suffix: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SinkKind:
+    """A kind of sink, which is registered under a name.
+
+    Attributes
+    ----------
+    open
+        Function that takes the path of the output and a `SinkContext`, and returns the sink.
+    suffixes
+        What the name of the output may end in, lower case, such as ".csv" or ".coco.json"; empty
+        for any.
+    what
+        Noun for what it writes, for messages: "tracks".
+    marker
+        Only if the output is a folder, which is made: pattern of the files in it. If there is such
+        a file, the folder is the output of an earlier run.
+    writes_standard_output
+        Whether the path `-` means standard output.
+    one_frame
+        Whether it takes only the frame at `SinkContext.at`. If all outputs of a run do, no other
+        frames are read than it needs.
+    takes
+        "videos" or "pictures" if the sink can take results of these only.
+    may_replace
+        Says whether `--overwrite` may replace a file that is there. `OutputFiles.stage` takes it
+        too, for a file that appears during the run.
+    total
+        What a batch writes in addition, over all its videos.
+    """
+
+    open: Callable[[Path, SinkContext], Sink]
+    suffixes: Sequence[str] = ()
+    what: str = "outputs"
+    marker: str = ""
+    writes_standard_output: bool = False
+    one_frame: bool = False
+    takes: Literal["videos", "pictures", "both"] = "both"
+    may_replace: MayReplace = any_file
+    total: BatchTotal | None = None
+
+    def takes_name(self, name: str) -> bool:
+        """Return whether an output may have this name, without its folder."""
+        ends = [len(each) for each in self.suffixes if name.lower().endswith(each)]
+        return not self.suffixes or 0 < max(ends, default=0) < len(name)
+
+
+def sink_kind(name: str) -> SinkKind:
+    """Return the kind of sink with this name. Raises `ConfigError` if there is none."""
+    kind: SinkKind = load_plugin(SINKS, name)
+    return kind
+
+
+def check_sinks(
+    outputs: Sequence[Output],
+    *,
+    overwrite: bool,
+    inputs: Sequence[Path] = (),
+    makes_folder: bool = False,
+) -> None:
+    """Refuse outputs that cannot be written, before any work; arguments as in `check_output`.
+
+    Raises
+    ------
+    OutputError
+        Two outputs have one path, a suffix is not one of the sink's, or an output cannot be written
+        or exists already.
+    ConfigError
+        There is no sink with such a name.
+    """
+    seen: set[Path] = set()
+    for output in outputs:
+        kind, path = _kind_for(output), output.path
+        if path.resolve() in seen:
+            raise OutputError(f"{path}: is given for two outputs; name another file for one")
+        seen.add(path.resolve())
+        if _is_standard_output(output):
+            continue
+        if kind.marker:
+            if not makes_folder:
+                make_folder(path)
+            path = min(path.glob(kind.marker), default=path / kind.marker)
+        check_output(
+            path,
+            overwrite=overwrite,
+            inputs=inputs,
+            makes_folder=makes_folder,
+            may_replace=kind.may_replace,
+        )
+
+
+def make_folders(output: Output) -> None:
+    """Make the folder of an output, or the folder that it is. Raises `OutputError`."""
+    make_folder(output.path if sink_kind(output.sink).marker else output.path.parent)
+
+
+def output_size(output: Output) -> int | None:
+    """Return the bytes of an output, of a folder those of all its files; None if it is not there.
+
+    In a folder only the files count that the sink writes.
+    """
+    marker, path = sink_kind(output.sink).marker, output.path
+    if not marker:
+        return path.stat().st_size if path.is_file() else None
+    return sum(file.stat().st_size for file in path.glob(marker)) if path.is_dir() else None
+
+
+def open_sink(output: Output, context: SinkContext) -> Sink:
+    """Open the sink of an output. An `OSError` of the sink becomes an `OutputError` with its path.
+
+    Raises
+    ------
+    OutputError
+        The sink does not take such results, the suffix is not one of the sink's, or the output
+        cannot be written.
+    ConfigError
+        There is no sink with that name.
+    """
+    kind = _kind_for(output)
+    source = "pictures" if context.video is None else "videos"
+    if kind.takes not in ("both", source):
+        raise OutputError(
+            f"{output.path}: the sink {output.sink} is for {kind.takes}; give another for {source}"
+        )
+    with output_errors(output.path):
+        return _NamedSink(kind.open(output.path, context), output.path)
+
+
+class _NamedSink:
+    """A `Sink` whose `OSError` becomes an `OutputError` with the path of its output."""
+
+    def __init__(self, sink: Sink, path: Path) -> None:
+        self._sink = sink
+        self._path = path
+
+    def __enter__(self) -> Self:
+        with output_errors(self._path):
+            self._sink.__enter__()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        with output_errors(self._path):
+            self._sink.__exit__(*raised)
+
+    def write(self, result: FrameResult) -> None:
+        with output_errors(self._path):
+            self._sink.write(result)
+
+
+def _is_standard_output(output: Output) -> bool:
+    return output.path == STANDARD_OUTPUT and sink_kind(output.sink).writes_standard_output
+
+
+def _kind_for(output: Output) -> SinkKind:
+    """Return the kind of an output's sink; refuse a suffix that is not one of the sink's."""
+    kind, path = sink_kind(output.sink), output.path
+    if _is_standard_output(output):
+        return kind
+    if not kind.takes_name(path.name):
+        names = ", ".join(kind.suffixes)
+        raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
+    return kind

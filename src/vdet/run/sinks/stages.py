@@ -1,0 +1,75 @@
+"""The sink `stages`: a folder with a picture of every stage of one frame."""
+
+from pathlib import Path
+from typing import Self
+
+from vdet.config.regions import RegionsSettings
+from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
+from vdet.draw.regions import draw_regions
+from vdet.files import make_folder
+from vdet.media.images import Image, encode_image
+from vdet.regions import Regions
+from vdet.run.result import FrameResult
+from vdet.run.sinks.overlay import PICTURE_LABEL, label_text
+from vdet.run.sinks.protocol import SinkContext, SinkKind
+
+_BOXES = "boxes"
+
+
+class StagesSink:
+    """Writes the pictures of the first searched frame at or after the time `SinkContext.at`."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self._folder = path
+        self._context = context
+        start = context.video.start if context.video else 0
+        self._time = start + context.at
+        self._is_done = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: the pictures are whole, or there was no such frame."""
+
+    def write(self, result: FrameResult) -> None:
+        """Write the pictures if it is the frame."""
+        if self._is_done or not result.searched or result.frame.time < self._time:
+            return
+        self._is_done = True
+        make_folder(self._folder)
+        pictures = result.stage_pictures()
+        if self._context.settings.regions:
+            pictures["regions"] = _with_regions(result, self._context.settings.regions)
+        pictures[_BOXES] = _with_boxes(result)
+        if result.road:
+            pictures |= result.road.pictures()
+        for number, (name, picture) in enumerate(pictures.items(), start=1):
+            path = self._folder / f"{number}-{name}.png"
+            self._context.files.stage(path).write_bytes(encode_image(picture, path))
+
+
+def _with_regions(result: FrameResult, settings: RegionsSettings) -> Image:
+    picture = result.frame.picture
+    regions = Regions(settings, picture.width, picture.height)
+    included, excluded = (
+        {name: each.corners for name, each in outlines.items()}
+        for outlines in (regions.included, regions.excluded)
+    )
+    return draw_regions(result.frame.image, regions.pixels(), included, excluded)
+
+
+def _with_boxes(result: FrameResult) -> Image:
+    """Draw the detections in white with their scores, and the shown vehicles over them."""
+    picture = result.frame.image.copy()
+    detections = result.detections
+    for box, score in zip(detections.rounded, detections.scores.tolist(), strict=True):
+        draw_box(picture, box, WHITE)
+        draw_label(picture, f"{score:.2f}", (box.x, box.bottom), WHITE)
+    for track in result.tracks:
+        text = label_text(track, PICTURE_LABEL)
+        draw_box(picture, track.box, color_of(track.id), text, dashed=track.predicted)
+    return picture
+
+
+STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png", one_frame=True)

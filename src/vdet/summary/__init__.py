@@ -1,1 +1,0 @@
-"""What is known of each vehicle after a video: a record, and its best picture."""

@@ -1,0 +1,73 @@
+"""The best picture of each vehicle: where it is large and sure, and whole in the frame."""
+
+from dataclasses import dataclass
+
+from vdet.boxes import Box
+from vdet.config.summary import CropSettings
+from vdet.media import Picture
+from vdet.media.images import Image
+from vdet.track.track import FrameTracks, Track
+
+_Merit = tuple[bool, float]
+"""Whether the vehicle is whole in the frame; its area in pixels times its score."""
+
+
+@dataclass(frozen=True, slots=True)
+class Crop:
+    """A picture of a vehicle.
+
+    `time` is that of the frame in seconds, `image` BGR uint8 `(H, W, 3)`.
+    """
+
+    id: int
+    time: float
+    image: Image
+
+
+class BestCrops:
+    """Finds the best picture of each vehicle, frame by frame.
+
+    It keeps pictures only of vehicles that the last frame shows. Those of other vehicles are given
+    back, so the memory does not grow with the length of the video.
+    """
+
+    def __init__(self, settings: CropSettings) -> None:
+        self._settings = settings
+        self._best: dict[int, Crop] = {}
+        self._merits: dict[int, _Merit] = {}
+
+    def add(self, frame: FrameTracks, picture: Picture) -> list[Crop]:
+        """Look at the next frame.
+
+        Returns
+        -------
+        The best pictures so far of the vehicles that this frame no longer shows. A vehicle that
+        comes back is returned again if it gets a better one.
+        """
+        shown = {track.id for track in frame.tracks}
+        gone = [self._best.pop(number) for number in sorted(self._best.keys() - shown)]
+        for track in frame.tracks:
+            merit = self._merit(track, picture)
+            if merit and merit > self._merits.get(track.id, (False, 0.0)):
+                self._merits[track.id] = merit
+                self._best[track.id] = Crop(track.id, frame.time, self._cut(track.box, picture))
+        return gone
+
+    def end(self) -> list[Crop]:
+        """Return the pictures of the vehicles that the last frame shows."""
+        return [crop for _, crop in sorted(self._best.items())]
+
+    def _merit(self, track: Track, picture: Picture) -> _Merit | None:
+        """Return None where the vehicle was not seen, or is too small."""
+        box = track.box
+        if track.predicted or min(box.width, box.height) < self._settings.least:
+            return None
+        inside = box.right < picture.width and box.bottom < picture.height
+        is_whole = inside and min(box.x, box.y) > 0
+        return is_whole, box.area * track.score
+
+    def _cut(self, box: Box, picture: Picture) -> Image:
+        x, y = (round(side * self._settings.padding) for side in (box.width, box.height))
+        padded = Box(box.x - x, box.y - y, box.width + 2 * x, box.height + 2 * y)
+        part = padded.clipped(picture.width, picture.height)
+        return picture.image[part.y : part.bottom, part.x : part.right].copy()

@@ -1,0 +1,470 @@
+"""Labelled pictures, read from each of the four forms."""
+
+import json
+import shutil
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evaluate.images.writers import (
+    NAMES,
+    WRITERS,
+    Boxed,
+    Labelled,
+    Pictures,
+    write_coco,
+    write_kitti,
+    write_pictures,
+    write_voc,
+    write_yolo,
+)
+from vdet.errors import ImageError, TruthError
+from vdet.labels.pictures import labelled
+from vdet.labels.pictures.labelled import LabelledImages
+from vdet.labels.pictures.reading import read_labelled_images
+
+FORMS = list(WRITERS)
+WIDTH, HEIGHT = 64, 32
+SCENE: Pictures = {
+    "a": Labelled(
+        WIDTH,
+        HEIGHT,
+        (
+            Boxed("car", (1, 2, 20, 10)),
+            Boxed("truck", (30.5, 4, 10, 20)),
+            Boxed("ignore", (0, 0, 5, 5)),
+            Boxed("person", (50, 10, 4, 12)),
+        ),
+    ),
+    "b": Labelled(WIDTH, HEIGHT),
+}
+
+lengths = st.tuples(st.integers(0, 2 * WIDTH - 1), st.integers(1, 2 * WIDTH)).map(
+    lambda pair: (pair[0] / 2, min(pair[1], 2 * WIDTH - pair[0]) / 2)
+)
+
+
+@st.composite
+def boxes(draw: st.DrawFn) -> Boxed:
+    (x, width), (y, height) = draw(lengths), draw(lengths)
+    return Boxed(draw(st.sampled_from(NAMES)), (x, y / 2, width, height / 2))
+
+
+scenes = st.dictionaries(
+    st.sampled_from(["0001", "0002", "some name", "ü"]),
+    st.lists(boxes(), max_size=5).map(lambda each: Labelled(WIDTH, HEIGHT, tuple(each))),
+    min_size=1,
+    max_size=3,
+)
+numbers = count()
+
+
+def fresh(factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of its own for an example; hypothesis runs many in one test."""
+    return factory.getbasetemp() / f"set-{next(numbers)}"
+
+
+@pytest.mark.parametrize("form", FORMS)
+@settings(max_examples=20)
+@given(scene=scenes)
+def test_what_is_written_is_read_back(
+    tmp_path_factory: pytest.TempPathFactory, form: str, scene: Pictures
+) -> None:
+    folder = fresh(tmp_path_factory)
+    WRITERS[form](folder, scene)
+    found = read_labelled_images(folder)
+    assert found.name == str(folder)
+    assert sorted(each.path.stem for each in found.images) == sorted(scene)
+    for image in found.images:
+        expected = [b for b in scene[image.path.stem].boxes if b.name != "person"]
+        written = np.array([b.box for b in expected]).reshape(-1, 4)
+        assert np.allclose(image.boxes, written, atol=1e-6)
+        assert image.ignored.tolist() == [b.name == "ignore" for b in expected]
+        vehicles = [
+            name for name, is_out in zip(image.classes, image.ignored, strict=True) if not is_out
+        ]
+        assert vehicles == [b.name for b in expected if b.name != "ignore"]
+    shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_labels_of_others_are_left_out_and_named(tmp_path: Path, form: str) -> None:
+    WRITERS[form](tmp_path, SCENE)
+    found = read_labelled_images(tmp_path)
+    assert [len(image.boxes) for image in found.images] == [3, 0]
+    ((name, times),) = found.others
+    assert (name.lower() in ("person", "pedestrian"), times) == (True, 1)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_missing_picture_is_named(tmp_path: Path, form: str) -> None:
+    WRITERS[form](tmp_path, SCENE)
+    next(tmp_path.rglob("a.png")).unlink()
+    with pytest.raises(TruthError, match=r"\ba\b"):
+        read_labelled_images(tmp_path)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_box_without_an_area_is_refused_with_its_place(tmp_path: Path, form: str) -> None:
+    flat = {"a": Labelled(WIDTH, HEIGHT, (Boxed("car", (1, 2, 20, 0)),))}
+    WRITERS[form](tmp_path, flat)
+    with pytest.raises(TruthError, match=r"(:\d+|annotations\.0): the box has no area"):
+        read_labelled_images(tmp_path)
+
+
+@pytest.mark.parametrize("form", ["COCO", "YOLO", "VOC"])
+def test_a_picture_of_another_size_than_its_labels_say_is_refused(
+    tmp_path: Path, form: str
+) -> None:
+    WRITERS[form](tmp_path, SCENE)
+    image = read_labelled_images(tmp_path).images[0]
+    assert image.read().shape == (HEIGHT, WIDTH, 3)
+    write_pictures(image.path.parent, {"a": Labelled(HEIGHT, WIDTH)})
+    with pytest.raises(ImageError, match=r"a\.png: has 32×64 pixels, .* labels are for 64×32"):
+        image.read()
+
+
+def test_too_many_pictures_or_boxes_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_coco(tmp_path, SCENE)
+    for name, most in (("MAX_IMAGES", 1), ("MAX_ROWS", 3)):
+        with monkeypatch.context() as patch:
+            patch.setattr(labelled, name, most)
+            with pytest.raises(TruthError, match="cut it into parts"):
+                read_labelled_images(tmp_path)
+    monkeypatch.setattr(labelled, "MAX_IN_FRAME", 2)
+    with pytest.raises(TruthError, match=r"annotations\.2: the picture has more than 2 boxes"):
+        read_labelled_images(tmp_path)
+
+
+class TestWhichForm:
+    def test_a_coco_file_may_be_given_itself(self, tmp_path: Path) -> None:
+        path = write_coco(tmp_path, SCENE)
+        assert len(read_labelled_images(path).images) == 2
+
+    def test_nothing_known_says_what_was_looked_for(self, tmp_path: Path) -> None:
+        with pytest.raises(TruthError, match=r"looked for one \.json file \(COCO\), image_2 and"):
+            read_labelled_images(tmp_path)
+
+    @pytest.mark.parametrize("name", ["none", "labels.txt"])
+    def test_neither_a_folder_nor_json(self, tmp_path: Path, name: str) -> None:
+        with pytest.raises(TruthError, match=r"is no folder and no \.json file"):
+            read_labelled_images(tmp_path / name)
+
+    def test_of_several_json_files_one_must_be_given(self, tmp_path: Path) -> None:
+        path = write_coco(tmp_path, SCENE)
+        shutil.copy(path, tmp_path / "other.json")
+        with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); give the one"):
+            read_labelled_images(tmp_path)
+
+    @pytest.mark.parametrize("form", ["KITTI", "VOC"])
+    def test_without_a_label_file_there_is_nothing(self, tmp_path: Path, form: str) -> None:
+        WRITERS[form](tmp_path, SCENE)
+        for path in [*tmp_path.rglob("*.txt"), *tmp_path.rglob("*.xml")]:
+            path.unlink()
+        with pytest.raises(TruthError, match="has no labelled picture"):
+            read_labelled_images(tmp_path)
+
+
+class TestCoco:
+    def edited(self, folder: Path, key: str, index: int, **values: Any) -> Path:
+        """Write the scene with other values in one of its entries."""
+        path = write_coco(folder, SCENE)
+        document = json.loads(path.read_text(encoding="utf-8"))
+        document[key][index].update(values)
+        path.write_text(json.dumps(document), encoding="utf-8")
+        return path
+
+    @pytest.mark.parametrize("place", ["labels.json", "annotations/labels.json"])
+    def test_the_file_may_lie_above_or_beside_the_pictures(
+        self, tmp_path: Path, place: str
+    ) -> None:
+        written = write_coco(tmp_path / "set" / "val", SCENE)
+        path = tmp_path / "set" / place
+        path.parent.mkdir(exist_ok=True)
+        written.rename(path)
+        assert [each.path.parent.name for each in read_labelled_images(path).images] == ["val"] * 2
+        assert len(read_labelled_images(tmp_path / "set").images) == 2
+
+    def test_pictures_of_another_set_are_not_taken(self, tmp_path: Path) -> None:
+        path = write_coco(tmp_path / "one", SCENE)
+        write_coco(tmp_path / "two", SCENE)
+        (path.parent / "a.png").unlink()
+        with pytest.raises(TruthError, match=r"first picture, a\.png, is missing"):
+            read_labelled_images(tmp_path / "one")
+
+    def test_two_folders_with_the_first_picture_are_refused(self, tmp_path: Path) -> None:
+        path = write_coco(tmp_path / "train", SCENE).rename(tmp_path / "labels.json")
+        write_pictures(tmp_path / "val", SCENE)
+        with pytest.raises(TruthError, match=r"first picture, a\.png, lies in .*train and .*val"):
+            read_labelled_images(path)
+
+    @pytest.mark.parametrize(
+        ("key", "index", "values", "words"),
+        [
+            ("annotations", 1, {"image_id": 7}, "annotations.1: no image has the id 7"),
+            ("annotations", 1, {"category_id": 70}, "annotations.1: no category has the id 70"),
+            ("annotations", 1, {"bbox": [1, 2, 3]}, "annotations.1.bbox.3: Field required"),
+            ("annotations", 1, {"bbox": [1, 2, 3, "4"]}, "annotations.1.bbox.3: Input should be"),
+            ("annotations", 1, {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
+            ("annotations", 1, {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
+            ("images", 1, {"id": 0}, "an id of images comes twice"),
+            ("images", 1, {"file_name": "a.png"}, "has the picture a.png twice"),
+            ("images", 0, {"file_name": "../a.png"}, "images.0: the file_name ../a.png leads out"),
+            ("images", 1, {"file_name": "/a.png"}, "images.1: the file_name /a.png leads out"),
+            ("images", 1, {"file_name": "x" * 300}, "is no name of a file"),
+            ("images", 1, {"file_name": "a\u202eb"}, "is no name of a file"),
+            ("images", 1, {"width": -3}, "images.1.width: Input should be greater"),
+            ("categories", 1, {"id": 1}, "an id of categories comes twice"),
+            ("categories", 1, {"name": None}, "categories.1.name: Input should be a valid string"),
+        ],
+    )
+    def test_a_wrong_entry_is_refused_by_its_number(
+        self, tmp_path: Path, key: str, index: int, values: dict[str, Any], words: str
+    ) -> None:
+        path = self.edited(tmp_path, key, index, **values)
+        with pytest.raises(TruthError) as caught:
+            read_labelled_images(path)
+        assert words in str(caught.value)
+        assert str(caught.value).isprintable()
+
+    def test_sizes_and_iscrowd_may_be_missing(self, tmp_path: Path) -> None:
+        path = write_coco(tmp_path, SCENE)
+        document = json.loads(path.read_text(encoding="utf-8"))
+        for each in document["images"]:
+            del each["width"], each["height"]
+        for each in document["annotations"]:
+            del each["iscrowd"]
+        path.write_text(json.dumps(document), encoding="utf-8")
+        image = read_labelled_images(path).images[0]
+        assert image.size is None
+        assert not image.ignored.any()
+
+    @pytest.mark.parametrize("text", ["", "{}", "[]", '{"images": [', "[" * 100_000])
+    def test_other_json_is_refused(self, tmp_path: Path, text: str) -> None:
+        (tmp_path / "x.json").write_text(text, encoding="utf-8")
+        with pytest.raises(TruthError, match=r"x\.json: is not COCO: "):
+            read_labelled_images(tmp_path)
+
+
+class TestKitti:
+    def test_what_each_type_means(self, tmp_path: Path) -> None:
+        path = write_kitti(tmp_path, SCENE)
+        kinds = ("Car", "Van", "Truck", "Tram", "Misc", "DontCare", "Person_sitting", "Cyclist")
+        rest = "0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6\n"
+        path.write_text("".join(f"{kind} {rest}" for kind in kinds), encoding="utf-8")
+        image = read_labelled_images(tmp_path).images[0]
+        assert image.classes == ("car", "car", "truck", "vehicle", "vehicle", "vehicle")
+        assert image.ignored.tolist() == [False, False, False, True, True, True]
+        assert image.boxes[0].tolist() == [1, 2, 10, 20]
+
+    @pytest.mark.parametrize(
+        ("line", "words"),
+        [
+            ("Car 0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6 0.9", "KITTI has 15 columns .* has 16"),
+            ("Car 0 0 0 1 2 11", "KITTI has 15 columns .* has 7"),
+            ("Car 0 0 0 1 2 nan 22 1 1 4 2 1 20 -1.6", "'nan' is not a number"),
+        ],
+    )
+    def test_a_wrong_line_is_refused_with_its_number(
+        self, tmp_path: Path, line: str, words: str
+    ) -> None:
+        path = write_kitti(tmp_path, SCENE)
+        path.write_text(f"\n\n{line}\n", encoding="utf-8")
+        with pytest.raises(TruthError, match=rf"a\.txt:3: {words}"):
+            read_labelled_images(tmp_path)
+
+    def test_a_picture_without_a_label_file_does_not_belong_to_the_set(
+        self, tmp_path: Path
+    ) -> None:
+        write_kitti(tmp_path, SCENE)
+        write_pictures(tmp_path / "image_2", {"c": Labelled(WIDTH, HEIGHT)})
+        assert len(read_labelled_images(tmp_path).images) == 2
+
+    def test_two_pictures_of_one_name_are_refused(self, tmp_path: Path) -> None:
+        write_kitti(tmp_path, SCENE)
+        shutil.copy(tmp_path / "image_2" / "a.png", tmp_path / "image_2" / "a.PNG.jpg")
+        shutil.copy(tmp_path / "image_2" / "a.png", tmp_path / "image_2" / "a.jpg")
+        with pytest.raises(TruthError, match=r"a\.txt: there is two pictures a in"):
+            read_labelled_images(tmp_path)
+
+
+class TestYolo:
+    def test_names_may_lie_above_and_be_numbered(self, tmp_path: Path) -> None:
+        write_yolo(tmp_path / "train", SCENE)
+        (tmp_path / "train" / "data.yaml").unlink()
+        names = "".join(f"  {number}: {name}\n" for number, name in enumerate(NAMES))
+        (tmp_path / "data.yaml").write_text(f"names:\n{names}", encoding="utf-8")
+        image = read_labelled_images(tmp_path / "train").images[0]
+        assert image.classes == ("car", "truck", "vehicle")
+
+    def test_folders_below_are_searched(self, tmp_path: Path) -> None:
+        write_yolo(tmp_path, SCENE)
+        for name in ("images", "labels"):
+            (tmp_path / name).rename(tmp_path / "val")
+            (tmp_path / name).mkdir()
+            (tmp_path / "val").rename(tmp_path / name / "val")
+        assert [len(each.boxes) for each in read_labelled_images(tmp_path).images] == [3, 0]
+
+    @pytest.mark.parametrize(
+        ("line", "words"),
+        [
+            ("0 0.5 0.5 0.1", "YOLO has 5 columns .* has 4"),
+            ("0 0.1 0.1 0.2 0.1 0.2 0.2", "YOLO has 5 columns .* has 7"),
+            ("5 0.5 0.5 0.1 0.1", r"class 5 has no name; data\.yaml has 5 names"),
+            ("-1 0.5 0.5 0.1 0.1", "class -1 has no name"),
+            ("0.5 0.5 0.5 0.1 0.1", "'0.5' is not a whole number"),
+            ("0 320 200 40 30", "a number is not between 0 and 1"),
+            ("0 0.5 inf 0.1 0.1", "'inf' is not a number"),
+        ],
+    )
+    def test_a_wrong_line_is_refused_with_its_number(
+        self, tmp_path: Path, line: str, words: str
+    ) -> None:
+        path = write_yolo(tmp_path, SCENE)
+        path.write_text(f"0 0.5 0.5 0.1 0.1\n{line}\n", encoding="utf-8")
+        with pytest.raises(TruthError, match=rf"a\.txt:2: {words}"):
+            read_labelled_images(tmp_path)
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            (None, r"needs data\.yaml with the names of the classes"),
+            ("names: 3\n", r"data\.yaml: names must be a list"),
+            ("nc: 3\n", r"data\.yaml: names must be a list"),
+            ("names: {0: car, 2: bus}\n", r"data\.yaml: names must be a list"),
+            ("names: [car, 1]\n", r"data\.yaml: names must be a list"),
+            ("names: [car\n", r"data\.yaml:\d+:\d+: is not YAML"),
+            ("a: &a [x]\nnames: *a\n", "aliases .* are not accepted"),
+        ],
+    )
+    def test_names_that_cannot_be_used(self, tmp_path: Path, text: str | None, words: str) -> None:
+        folder = tmp_path / "set"
+        write_yolo(folder, SCENE)
+        (folder / "data.yaml").unlink()
+        if text is not None:
+            (folder / "data.yaml").write_text(text, encoding="utf-8")
+        with pytest.raises(TruthError, match=words):
+            read_labelled_images(folder)
+
+    def test_labels_without_a_picture_are_refused(self, tmp_path: Path) -> None:
+        path = write_yolo(tmp_path, SCENE)
+        (path.parent / "classes.txt").write_text("car\n", encoding="utf-8")
+        assert len(read_labelled_images(tmp_path).images) == 2
+        path.rename(path.with_name("c.txt"))
+        with pytest.raises(TruthError, match=r"c\.txt: has no picture of its name below"):
+            read_labelled_images(tmp_path)
+
+    def test_a_labelled_picture_must_be_one(self, tmp_path: Path) -> None:
+        write_yolo(tmp_path, SCENE)
+        (tmp_path / "images" / "a.png").write_bytes(b"no picture")
+        with pytest.raises(TruthError, match=r"a\.png: is not a picture"):
+            read_labelled_images(tmp_path)
+
+
+class TestVoc:
+    BOX = "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>9</xmax><ymax>9</ymax></bndbox>"
+
+    def test_pixels_count_from_1_and_the_last_belongs_to_the_box(self, tmp_path: Path) -> None:
+        path = write_voc(tmp_path, SCENE)
+        path.write_text(
+            f"<annotation><object><name>car</name>{self.BOX}</object></annotation>", "utf-8"
+        )
+        image = read_labelled_images(tmp_path).images[0]
+        assert image.boxes.tolist() == [[0, 0, 9, 9]]
+        assert image.size is None
+
+    def test_parts_of_an_object_are_not_objects(self, tmp_path: Path) -> None:
+        path = write_voc(tmp_path, SCENE)
+        part = f"<part><name>wheel</name>{self.BOX.replace('9', '5')}</part>"
+        text = f"<object><name>bus</name>{part}{self.BOX}{part}</object>"
+        path.write_text(f"<annotation>{text}</annotation>", encoding="utf-8")
+        image = read_labelled_images(tmp_path).images[0]
+        assert (image.classes, image.boxes.tolist()) == (("bus",), [[0, 0, 9, 9]])
+
+    @pytest.mark.parametrize(
+        ("text", "words"),
+        [
+            ("<annotations/>", "1: <annotations> where Pascal VOC has <annotation>"),
+            ("<annotation>", "1: broken XML: no element found"),
+            (
+                '<!DOCTYPE a [<!ENTITY b "x">]>\n<annotation>&b;</annotation>',
+                "1: the XML declares a document type",
+            ),
+            (
+                "<annotation>\n<object><name>car</name></object></annotation>",
+                "2: <object> without its <xmin>",
+            ),
+            (
+                f"<annotation>\n<object>{BOX}</object></annotation>",
+                "2: <object> without its <name>",
+            ),
+            (
+                f"<annotation><object><name>a</name><name>b</name>{BOX}</object></annotation>",
+                "1: <name> is given twice",
+            ),
+            (
+                f"<annotation><object><name>a</name>{BOX.replace('9', 'x')}</object></annotation>",
+                "1: 'x' is not a number",
+            ),
+            ("<annotation><size><width>3</width></size></annotation>", "without its <height>"),
+            (f"<annotation>{'x' * 2000}</annotation>", "more than 1000 characters"),
+            ("<annotation>" + "<a>" * 100, "more than 32 nested elements"),
+        ],
+    )
+    def test_a_wrong_file_is_refused_with_its_line(
+        self, tmp_path: Path, text: str, words: str
+    ) -> None:
+        path = write_voc(tmp_path, SCENE)
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(TruthError) as caught:
+            read_labelled_images(tmp_path)
+        assert f"a.xml:{words}" in str(caught.value) or words in str(caught.value)
+        assert str(caught.value).isprintable()
+
+
+def read_or_refuse(folder: Path) -> None:
+    """Fail on any other exception, and on a message that is not one printable line."""
+    try:
+        result: LabelledImages | str = read_labelled_images(folder)
+    except TruthError as error:
+        result = str(error)
+    assert isinstance(result, LabelledImages) or result.isprintable()
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, bytes]]:
+    """Of each form, a label file and what it holds; tests damage the file."""
+    paths = {form: write(fresh(tmp_path_factory), SCENE) for form, write in WRITERS.items()}
+    return {form: (path, path.read_bytes()) for form, path in paths.items()}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@settings(max_examples=50)
+@given(content=st.binary(max_size=200))
+def test_any_bytes_are_labels_or_a_truth_error(
+    written: dict[str, tuple[Path, bytes]], form: str, content: bytes
+) -> None:
+    path, _ = written[form]
+    path.write_bytes(content)
+    read_or_refuse(path.parent if form == "COCO" else path.parents[1])
+
+
+@pytest.mark.parametrize("form", FORMS)
+@settings(max_examples=50)
+@given(data=st.data())
+def test_damaged_labels_are_labels_or_a_truth_error(
+    written: dict[str, tuple[Path, bytes]], form: str, data: st.DataObject
+) -> None:
+    path, content = written[form]
+    at = data.draw(st.integers(0, len(content)))
+    end = data.draw(st.integers(at, min(len(content), at + 12)))
+    damage = data.draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=6))
+    path.write_bytes(content[:at] + damage.encode() + content[end:])
+    read_or_refuse(path.parent if form == "COCO" else path.parents[1])

@@ -1,0 +1,175 @@
+import io
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from labels.saving import VIDEO, car, frame, read_back, written
+from vdet.errors import TruthError
+from vdet.labels import cvat
+from vdet.labels.cvat import CVAT, read_cvat
+from vdet.labels.protocol import SourceVideo
+from vdet.labels.rows import Row
+from vdet.track.track import FrameTracks
+
+FILE = Path("annotations.xml")
+BOX = '<box frame="0" outside="0" occluded="0" xtl="10" ytl="20" xbr="40.5" ybr="60"/>'
+
+
+def document(content: str) -> str:
+    return (
+        '<?xml version="1.0" encoding="utf-8"?>\n<annotations>\n<version>1.1</version>\n'
+        "<meta><task><size>100</size><original_size><width>640</width><height>360</height>"
+        f"</original_size></task></meta>\n{content}\n</annotations>\n"
+    )
+
+
+def track(content: str, label: str = "car") -> str:
+    return document(f'<track id="3" label="{label}" source="manual">{content}</track>')
+
+
+def rows(text: str) -> tuple[Row, ...]:
+    return read_cvat(FILE, text.encode()).rows
+
+
+class TestReading:
+    def test_frames_count_from_0_and_boxes_are_corners(self) -> None:
+        assert rows(track(BOX)) == (Row(5, 1, 3, 10, 20, 30.5, 40, label="car"),)
+
+    def test_a_box_outside_is_left_out(self) -> None:
+        assert not rows(track(BOX.replace('outside="0"', 'outside="1"')))
+
+    def test_an_occluded_box_is_predicted(self) -> None:
+        (row,) = rows(track(BOX.replace('occluded="0"', 'occluded="1"')))
+        assert row.predicted
+
+    def test_attributes_of_a_box_are_passed_over(self) -> None:
+        box = BOX.replace("/>", '><attribute name="colour">red</attribute></box>')
+        assert len(rows(track(box))) == 1
+
+    def test_a_file_without_tracks_has_no_rows(self) -> None:
+        assert rows(document("")) == ()
+
+    def test_the_size_of_the_frames_is_read(self) -> None:
+        assert read_cvat(FILE, document("").encode()).size == (640, 360)
+        assert read_cvat(FILE, b"<annotations/>").size is None
+
+    def test_the_zip_file_that_cvat_exports_is_read(self, tmp_path: Path) -> None:
+        path = tmp_path / "task.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("annotations.xml", track(BOX))
+        assert len(read_cvat(path, path.read_bytes()).rows) == 1
+
+
+class TestWriting:
+    def tracks(self, frames: list[FrameTracks], video: SourceVideo = VIDEO) -> list[ET.Element]:
+        return ET.fromstring(written(CVAT, frames, video)).findall("track")
+
+    def frames_of(self, track: ET.Element, **values: str) -> list[int]:
+        boxes = track.findall("box")
+        wanted = [box for box in boxes if values.items() <= box.attrib.items()]
+        return [int(box.attrib["frame"]) for box in wanted]
+
+    def test_every_box_is_a_key_frame_as_others_are_not_imported(self) -> None:
+        (track,) = self.tracks([frame(index, car()) for index in (0, 1, 2)])
+        assert self.frames_of(track, keyframe="1") == self.frames_of(track) == [0, 1, 2]
+
+    def test_a_gap_begins_with_a_box_outside(self) -> None:
+        (track,) = self.tracks([frame(0, car()), frame(1), frame(2), frame(3, car())])
+        assert self.frames_of(track, outside="0") == [0, 3]
+        assert self.frames_of(track, outside="1") == [1]
+
+    def test_a_track_that_ends_before_the_video_ends_with_a_box_outside(self) -> None:
+        (track,) = self.tracks([frame(0, car()), frame(1, car()), frame(2)])
+        assert self.frames_of(track, outside="1", keyframe="1") == [2]
+
+    def test_after_the_last_frame_of_the_video_there_is_none(self) -> None:
+        (track,) = self.tracks([frame(0, car()), frame(1, car())])
+        assert self.frames_of(track, outside="1") == []
+
+    def test_a_part_of_a_video_ends_with_a_box_outside(self) -> None:
+        part = SourceVideo("in.mp4", 1280, 720, frames=100)
+        (track,) = self.tracks([frame(0, car()), frame(1, car())], part)
+        assert self.frames_of(track, outside="1") == [2]
+
+    def test_a_predicted_box_is_occluded(self) -> None:
+        (track,) = self.tracks([frame(0, car()), frame(1, car(predicted=True))])
+        assert self.frames_of(track, occluded="1") == [1]
+
+    def test_the_label_is_the_class_with_most_score(self) -> None:
+        cars, trucks = [car(score=0.3)] * 2, [car(score=0.9, class_name="truck")]
+        (track,) = self.tracks([frame(k, each) for k, each in enumerate([*cars, *trucks])])
+        assert track.attrib["label"] == "truck"
+
+    def test_the_task_is_described_as_cvat_exports_it(self) -> None:
+        text = written(CVAT, [frame(0, car(), car(2, class_name="bus")), frame(1)])
+        root = ET.fromstring(text)
+        assert root.findtext("version") == "1.1"
+        task = root.find("meta/task")
+        assert task is not None
+        values = {each: task.findtext(each) for each in ("name", "size", "mode", "stop_frame")}
+        assert values == {
+            "name": "road & rail.mp4",
+            "size": "2",
+            "mode": "interpolation",
+            "stop_frame": "1",
+        }
+        assert [each.text for each in task.findall("labels/label/name")] == ["bus", "car"]
+        assert task.findtext("original_size/width") == "1280"
+
+    def test_names_that_xml_cannot_hold_are_escaped(self, tmp_path: Path) -> None:
+        text = written(CVAT, [frame(0, car(class_name='<"\x1b">'))])
+        (only,) = read_back(CVAT, tmp_path, text).frames
+        assert only.tracks[0].class_name == '<"\\x1b">'
+
+
+BOMB = (
+    '<?xml version="1.0"?>\n<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>\n'
+    "<annotations><version>&b;</version></annotations>"
+)
+EXTERNAL = '<!DOCTYPE annotations SYSTEM "http://example.org/evil.dtd"><annotations></annotations>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (BOMB, "2: the XML declares a document type"),
+        (EXTERNAL, "1: the XML declares a document type"),
+        (document("<version>&b;</version>"), "5: broken XML: undefined entity"),
+        (document("<meta>"), "6: broken XML: mismatched tag"),
+        (document('<track label="car"/>'), "5: <track> without its 'id'"),
+        (document('<track id="3"/>'), "5: <track> without its 'label'"),
+        (document('<image id="0" name="a.png"/>'), "5: CVAT for images"),
+        ("<svg/>", "1: <svg> where CVAT for video 1.1 has <annotations>"),
+        (track('<polygon frame="0" points="1,2;3,4"/>'), "5: <polygon> in a track; only boxes"),
+        (track(BOX.replace(' xtl="10"', "")), "5: <box> without its 'xtl'"),
+        (track(BOX.replace("10", "NaN")), "5: 'NaN' is not a number"),
+        (track(BOX.replace("/>", ' rotation="30"/>')), "5: the box is rotated"),
+        (document("").replace("640", "wide"), "4: 'wide' is not a number"),
+        (document("").replace("640", "6" * 2000), "4: a value has more than 1000 characters"),
+    ],
+)
+def test_other_xml_than_cvat_video_is_refused_with_its_line(text: str, message: str) -> None:
+    with pytest.raises(TruthError) as caught:
+        rows(text)
+    assert str(caught.value).startswith(f"annotations.xml:{message}")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_bomb_in_a_zip_file_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cvat, "MAX_BYTES", 100_000)
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("annotations.xml", " " * 100_001)
+    assert len(file.getvalue()) < 1000
+    with pytest.raises(TruthError, match=r"annotations\.xml is larger than 100,000 bytes"):
+        read_cvat(Path("a.zip"), file.getvalue())
+
+
+def test_a_zip_file_without_annotations_is_refused() -> None:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("readme.txt", "nothing")
+    with pytest.raises(TruthError, match=r"its member annotations\.xml is damaged or missing"):
+        read_cvat(Path("a.xml"), file.getvalue())

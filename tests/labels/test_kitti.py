@@ -1,0 +1,79 @@
+from pathlib import Path
+
+import pytest
+
+from labels.saving import car, frame, written
+from vdet.errors import TruthError
+from vdet.labels.kitti import KITTI, read_kitti
+from vdet.labels.registry import read_tracks
+from vdet.labels.rows import Row
+
+FILE = Path("0000.txt")
+REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
+
+
+def kitti_line(frame: int, track: int, name: str, box: str = "10.5 20 40.5 60") -> str:
+    return f"{frame} {track} {name} 0 2 -1.57 {box} {REST}"
+
+
+def rows(text: str) -> tuple[Row, ...]:
+    return read_kitti(FILE, text.encode()).rows
+
+
+def test_frames_count_from_0_and_boxes_are_corners() -> None:
+    assert rows(kitti_line(0, 3, "Car")) == (Row(1, 1, 3, 10.5, 20, 30, 40, label="Car"),)
+
+
+def test_results_have_a_score() -> None:
+    (row,) = rows(kitti_line(0, 3, "Car") + " 0.25")
+    assert row.score == 0.25
+
+
+def test_what_is_not_known_is_written_as_the_format_says() -> None:
+    assert written(KITTI, [frame(4, car())]) == (
+        b"4 1 Car -1 -1 -10 10.00 20.00 40.00 60.00 -1 -1 -1 -1000 -1000 -1000 -10 0.7500\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "kitti"),
+    [
+        ("car", "Car"),
+        ("truck", "Truck"),
+        ("bus", "Truck"),
+        ("motorcycle", "Misc"),
+        ("vehicle", "Car"),
+        ("tractor", "Misc"),
+        (None, "Car"),
+    ],
+)
+def test_every_class_has_a_type_and_there_is_no_bus(name: str | None, kitti: str) -> None:
+    (line,) = written(KITTI, [frame(0, car(class_name=name))]).decode().splitlines()
+    assert line.split()[2] == kitti
+
+
+def test_read_as_tracks_regions_are_left_out_and_types_are_classes(tmp_path: Path) -> None:
+    path = tmp_path / "0000.txt"  # as KITTI calls it
+    names = ("Van", "Truck", "Pedestrian", "DontCare")
+    lines = [kitti_line(0, -1 if name == "DontCare" else k, name) for k, name in enumerate(names)]
+    path.write_text("\n".join(lines))
+    (only,) = read_tracks(path).frames
+    assert [track.class_name for track in only.tracks] == ["car", "truck", "Pedestrian"]
+
+
+@pytest.mark.parametrize(
+    ("second", "message"),
+    [
+        (
+            kitti_line(1, 3, "Car") + " 0.9",
+            "KITTI tracking has 17 columns between spaces; this line has 18",
+        ),
+        ("2,7,1,1,20,10,1,3,1", "KITTI tracking has 17 columns between spaces; this line has 1"),
+        (kitti_line(1, 3, "Car", "10 20 nan 60"), "'nan' is not a number"),
+        (kitti_line(1, 3, "Car").replace("1 3", "1 x", 1), "'x' is not a number"),
+    ],
+)
+def test_a_wrong_line_is_refused_with_its_number(second: str, message: str) -> None:
+    with pytest.raises(TruthError) as caught:
+        rows(kitti_line(0, 3, "Car") + "\n" + second)
+    assert str(caught.value).startswith(f"0000.txt:2: {message}")

@@ -1,0 +1,80 @@
+from pathlib import Path
+
+import pytest
+
+from labels.saving import car, frame, written
+from vdet.errors import TruthError
+from vdet.labels.mot import MOT, flagged, read_mot
+from vdet.labels.registry import read_tracks
+from vdet.labels.rows import Row
+
+FILE = Path("gt.txt")
+
+
+def rows(text: str) -> tuple[Row, ...]:
+    return read_mot(FILE, text.encode()).rows
+
+
+def test_pixels_count_from_1_in_the_file_and_from_0_in_memory() -> None:
+    assert rows("1,7,1,1,20,10,1,3,1") == (Row(1, 1, 7, 0, 0, 20, 10),)
+
+
+def test_flag_0_marks_an_ignore_region() -> None:
+    text = "1,7,1,1,20,10,0,3,1\n1,8,1,1,20,10,1,3,1\n"
+    assert [row.ignored for row in rows(text)] == [True, False]
+
+
+def test_truth_of_the_older_form_has_ten_columns_and_a_flag() -> None:
+    found = rows("4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1\n4,8,1,1,9,9,0,-1,-1,-1")
+    assert [flagged(FILE, row) for row in found] == [
+        Row(1, 4, 7, 10.5, 20, 20, 10),
+        Row(2, 4, 8, 0, 0, 9, 9, ignored=True),
+    ]
+
+
+def test_tracks_are_no_truth() -> None:
+    (row,) = rows("4,7,11,21,20,10,0.9,-1,-1,-1")
+    with pytest.raises(TruthError, match=r"gt\.txt:1: the flag \(column 7\) is 0\.9; it must be 0"):
+        flagged(FILE, row)
+
+
+def test_tracks_have_a_confidence() -> None:
+    (row,) = rows("3,1,11,21,30,40,0.5,-1,-1,-1")
+    assert (row.score, row.frame, row.x, row.y) == (0.5, 3, 10, 20)
+
+
+def test_tracks_are_written_without_a_heading() -> None:
+    assert written(MOT, [frame(4, car())]) == b"5,1,11,21,30,40,0.7500,-1,-1,-1\n"
+
+
+def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_text("1,7,1,1,20,10,0,3,1\n1,8,1,1,20,10,1,3,1\n")
+    assert [row.id for row in read_tracks(path).rows] == [8]
+
+
+@pytest.mark.parametrize(
+    ("second", "message"),
+    [
+        ("2,7,1,1,20,10,1,3", "MOTChallenge has 9 columns between commas; this line has 8"),
+        ("2,7,1,1,20,10,1,3,1,1", "MOTChallenge has 9 columns between commas; this line has 10"),
+        (
+            "1 0 Car 0 0 0 1 1 9 9 1 1 1 1 1 1 1",
+            "MOTChallenge has 9 columns between commas; this line has 1",
+        ),
+        ("2,7,1,1,20,wide,1,3,1", "'wide' is not a number"),
+        ("2,7,nan,1,20,10,1,3,1", "'nan' is not a number"),
+        ("2.5,7,1,1,20,10,1,3,1", "'2.5' is not a whole number"),
+        ("2,7,1,1,20,10,0.9,3,1", "the flag (column 7) is 0.9; it must be 0 or 1"),
+        ("2,7,1,1,20,10,1,Car,1", "'Car' is not a number"),
+    ],
+)
+def test_a_wrong_line_is_refused_with_its_number(second: str, message: str) -> None:
+    with pytest.raises(TruthError) as caught:
+        rows(f"1,7,1,1,20,10,1,3,1\n\n{second}\n")
+    assert str(caught.value).startswith(f"gt.txt:3: {message}")
+
+
+def test_lines_have_nine_columns_or_ten() -> None:
+    with pytest.raises(TruthError, match="has 9 or 10 columns between commas; this line has 3"):
+        rows("1,7,1")

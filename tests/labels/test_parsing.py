@@ -1,0 +1,78 @@
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.errors import TruthError
+from vdet.labels.parsing import LIMIT, numbered_lines, parse_number, parse_whole, read_text
+
+
+def test_blank_lines_count_and_any_line_ending_is_read() -> None:
+    assert list(numbered_lines("a\r\n\r\n b \rc\n")) == [(1, "a"), (3, "b"), (4, "c")]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("3", 3), (" -2.5 ", -2.5), (".5", 0.5), ("1e3", 1000), ("+7.", 7)]
+)
+def test_a_decimal_number_is_read(text: str, value: float) -> None:
+    assert parse_number(text) == value
+
+
+@given(st.floats(-LIMIT, LIMIT))
+def test_every_float_within_the_limit_is_read_back(value: float) -> None:
+    assert parse_number(repr(value)) == value
+
+
+@given(st.text(st.sampled_from("0123456789+-.eE_xnaif ٣"), max_size=12))
+def test_what_is_read_as_a_number_is_a_number_in_python(text: str) -> None:
+    try:
+        value = parse_number(text)
+    except ValueError:
+        return
+    assert value == float(text)
+
+
+def test_a_long_row_of_digits_is_refused_quickly() -> None:
+    with pytest.raises(ValueError, match="is not a number"):  # with backtracking it takes hours
+        parse_number("1" * 1_000_000 + "x")
+
+
+@pytest.mark.parametrize("text", ["", "nan", "inf", "-inf", "1_0", "0x1", "1,5", "٣", "car", "1 2"])
+def test_text_that_is_no_decimal_number_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="is not a number"):
+        parse_number(text)
+
+
+@pytest.mark.parametrize("text", ["10000001", "-1e300", "9" * 5000])
+def test_a_number_beyond_the_limit_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="is beyond 10000000"):
+        parse_number(text)
+
+
+def test_a_whole_number_may_have_a_decimal_point() -> None:
+    assert parse_whole("3.0") == 3
+
+
+def test_a_fraction_is_not_a_whole_number() -> None:
+    with pytest.raises(ValueError, match=r"'3\.5' is not a whole number"):
+        parse_whole("3.5")
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"1,2\x003", bytes(range(256))])
+def test_a_file_that_is_not_text_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_bytes(content)
+    with pytest.raises(TruthError, match="is not text"):
+        read_text(path)
+
+
+def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(TruthError, match=r"gone\.txt: cannot be read: No such file"):
+        read_text(tmp_path / "gone.txt")
+
+
+def test_a_byte_order_mark_is_not_part_of_the_text(tmp_path: Path) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_bytes(b"\xef\xbb\xbf1,2")
+    assert read_text(path) == "1,2"

@@ -1,0 +1,213 @@
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.errors import TruthError
+from vdet.evaluate.scores import score
+from vdet.labels.predictions import read_predictions
+from vdet.labels.rows import Row
+from vdet.labels.video import LabelledVideo
+
+HEADER = "frame,time,id,x,y,width,height,predicted\n"
+TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
+CSV = f"{HEADER}0,0.0,1,10,20,30,40,False\n2,0.08,1,11,20,30,40,True\n"
+JSONL = "".join(
+    json.dumps({"frame": frame, "time": frame * 0.04, "tracks": tracks}) + "\n"
+    for frame, tracks in enumerate(
+        [
+            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "predicted": False}],
+            [],
+            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "predicted": True}],
+            [],
+        ]
+    )
+)
+FORMATS = {"txt": TXT, "csv": CSV, "jsonl": JSONL}
+
+
+def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
+    path = folder / f"tracks.{suffix}"
+    path.write_text(content, encoding="utf-8", newline="")
+    return read_predictions(path)
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_the_same_tracks_are_read_from_every_format(tmp_path: Path, suffix: str) -> None:
+    video = read(tmp_path, suffix, FORMATS[suffix])
+    assert video.frames.tolist() == [1, 3]
+    assert video.ids.tolist() == [1, 1]
+    assert video.boxes.tolist() == [[10, 20, 30, 40], [11, 20, 30, 40]]
+    assert video.scores.tolist() == [1, 1]
+    assert not video.ignored.any()
+
+
+SCORED_CSV = "frame,time,id,x,y,width,height,score,predicted\n0,0.0,1,10,20,30,40,{score},False\n"
+SCORED_JSONL = (
+    '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
+    '"score": {score}, "predicted": false}}]}}\n'
+)
+SCORED_TXT = "1,1,11,21,30,40,{score},-1,-1,-1\n"
+SCORED = {"txt": SCORED_TXT, "csv": SCORED_CSV, "jsonl": SCORED_JSONL}
+
+
+@pytest.mark.parametrize("suffix", SCORED)
+@pytest.mark.parametrize("value", [0, 0.25, 1])
+def test_every_format_may_give_scores(tmp_path: Path, suffix: str, value: float) -> None:
+    video = read(tmp_path, suffix, SCORED[suffix].format(score=value))
+    assert video.scores.tolist() == [value]
+    assert video.boxes.tolist() == [[10, 20, 30, 40]]
+
+
+def test_scores_rank_the_boxes_for_average_precision(tmp_path: Path) -> None:
+    row = "0,0.0,{},{},0,100,100,{}\n"
+    header = "frame,time,id,x,y,width,height,score\n"
+    found = row.format(1, 0, 0.9) + row.format(2, 500, 0.2)
+    truth = LabelledVideo.from_rows([Row(0, 1, 1, 0, 0, 100, 100)])
+    assert score(read(tmp_path, "csv", header + found), truth).ap50 == 1
+    swapped = row.format(1, 0, 0.2) + row.format(2, 500, 0.9)
+    assert score(read(tmp_path, "csv", header + swapped), truth).ap50 == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "value", "message"),
+    [
+        ("csv", "1.5", ":2: the score 1.5 is not between 0 and 1"),
+        ("csv", "-0.1", ":2: the score -0.1 is not between 0 and 1"),
+        ("csv", "", ":2: '' is not a number"),
+        ("csv", "nan", ":2: 'nan' is not a number"),
+        ("jsonl", "1.5", ":1: tracks.0.score: Input should be less than or equal to 1"),
+        ("jsonl", "-0.1", ":1: tracks.0.score: Input should be greater than or equal to 0"),
+        ("jsonl", "null", ":1: tracks.0.score: Input should be a valid number"),
+        ("jsonl", "NaN", ":1: tracks.0.score: Input should be a finite number"),
+    ],
+)
+def test_a_score_outside_0_to_1_is_refused_with_its_line(
+    tmp_path: Path, suffix: str, value: str, message: str
+) -> None:
+    with pytest.raises(TruthError) as caught:
+        read(tmp_path, suffix, SCORED[suffix].format(score=value))
+    assert f"tracks.{suffix}{message}" in str(caught.value)
+
+
+def test_a_header_with_two_scores_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TruthError, match=r":1: the header names the column score twice"):
+        read(tmp_path, "csv", "frame,time,id,x,y,width,height,score,score\n")
+
+
+def test_only_jsonl_tells_how_many_frames_the_video_has(tmp_path: Path) -> None:
+    counts = {suffix: read(tmp_path, suffix, text).frame_count for suffix, text in FORMATS.items()}
+    assert counts == {"txt": None, "csv": None, "jsonl": 4}
+
+
+def test_times_tell_the_rate(tmp_path: Path) -> None:
+    rates = {suffix: read(tmp_path, suffix, text).rate for suffix, text in FORMATS.items()}
+    assert rates == {"txt": None, "csv": pytest.approx(25), "jsonl": pytest.approx(25)}
+
+
+def test_a_single_time_tells_no_rate(tmp_path: Path) -> None:
+    assert read(tmp_path, "csv", HEADER + "5,0.2,1,10,20,30,40,False\n").rate is None
+
+
+@pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])
+def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, content: str) -> None:
+    assert len(read(tmp_path, suffix, content)) == 0
+
+
+def test_the_columns_of_a_csv_may_have_any_order(tmp_path: Path) -> None:
+    video = read(tmp_path, "csv", "id,x,y,width,height,time,frame\n1,10,20,30,40,0.0,0\n")
+    assert video.boxes.tolist() == [[10, 20, 30, 40]]
+
+
+def record(**changes: object) -> str:
+    track = {"id": 1, "x": 10, "y": 20, "width": 30, "height": 40}
+    return json.dumps({"frame": 4, "time": 0.16, "tracks": [track]} | changes)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "content", "message"),
+    [
+        ("txt", TXT + "4,1,12,21,30,40\n", ":3: MOTChallenge has 10 columns"),
+        ("txt", TXT + "3,1,50,21,30,40,1,-1,-1,-1\n", ":3: id 1 is in the same frame already"),
+        ("txt", "0,1,12,21,30,40,1,-1,-1,-1\n", ":1: the frame comes before the video's first"),
+        ("csv", "", ":1: the header must name each of these columns once: frame, time"),
+        ("csv", "frame,time,id,x,y,width\n", ":1: the header must name each of these columns"),
+        ("csv", CSV + "3,0.12,1,11,20,30\n", ":4: the header has 8 columns; this line has 6"),
+        ("csv", CSV + "3,soon,1,11,20,30,40,False\n", ":4: 'soon' is not a number"),
+        ("csv", CSV + "3,0.12,1,11,20,0,40,False\n", ":4: the box has no area"),
+        ("csv", CSV + '3,"0.12\n', ":4: unexpected end of data"),
+        ("jsonl", "", ": is empty; it should have a record for every frame"),
+        ("jsonl", JSONL + "{\n", ":5: Invalid JSON"),
+        ("jsonl", JSONL + "[" * 100_000 + "\n", ":5: Invalid JSON"),
+        ("jsonl", JSONL + record(frame=3), ":5: frame 3 comes after frame 3"),
+        ("jsonl", JSONL + record(frame="4"), ":5: frame: Input should be a valid integer"),
+        ("jsonl", JSONL + record(time=float("nan")), ":5: time: Input should be a finite number"),
+        ("jsonl", JSONL + record(tracks=[{}]), ":5: tracks.0.id: Field required"),
+        ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
+    ],
+)
+def test_a_wrong_line_is_refused_with_its_number(
+    tmp_path: Path, suffix: str, content: str, message: str
+) -> None:
+    with pytest.raises(TruthError) as caught:
+        read(tmp_path, suffix, content)
+    assert f"tracks.{suffix}{message}" in str(caught.value)
+
+
+@given(
+    st.sampled_from(sorted(FORMATS)),
+    st.one_of(st.binary(max_size=200), st.text(max_size=80).map(lambda text: text.encode())),
+    st.booleans(),
+    st.integers(0, 300),
+)
+def test_any_bytes_are_tracks_or_a_truth_error(
+    tmp_path_factory: pytest.TempPathFactory, suffix: str, content: bytes, good: bool, at: int
+) -> None:
+    start = FORMATS[suffix].encode()
+    path = tmp_path_factory.getbasetemp() / f"any-bytes.{suffix}"
+    path.write_bytes(start[:at] + content + start[at:] if good else content)
+    try:
+        result: LabelledVideo | str = read_predictions(path)
+    except TruthError as error:
+        result = str(error)
+    assert isinstance(result, LabelledVideo) or "\n" not in result
+
+
+PLACES = st.floats(-4000, 4000)
+SIDES = st.floats(0.5, 2000)
+TRACKS = st.dictionaries(
+    st.tuples(st.integers(0, 30), st.integers(1, 5)), st.tuples(PLACES, PLACES, SIDES, SIDES)
+)
+
+
+def written(tracks: dict[tuple[int, int], tuple[float, float, float, float]], suffix: str) -> str:
+    """Return tracks in one of the formats; the keys are frame from 0 and id."""
+    if suffix == "csv":
+        lines = [
+            f"{frame},{frame / 25},{id_},{','.join(map(repr, box))},False\n"
+            for (frame, id_), box in tracks.items()
+        ]
+        return HEADER + "".join(lines)
+    records = []
+    for frame in range(31):
+        boxes = [
+            dict(zip(("id", "x", "y", "width", "height"), (id_, *box), strict=True))
+            for (at, id_), box in tracks.items()
+            if at == frame
+        ]
+        records.append(json.dumps({"frame": frame, "time": frame / 25, "tracks": boxes}))
+    return "\n".join(records)
+
+
+@given(TRACKS, st.sampled_from(["csv", "jsonl"]))
+def test_tracks_that_are_written_are_read_back(
+    tmp_path_factory: pytest.TempPathFactory,
+    tracks: dict[tuple[int, int], tuple[float, float, float, float]],
+    suffix: str,
+) -> None:
+    video = read(tmp_path_factory.getbasetemp(), suffix, written(tracks, suffix))
+    keys = zip((video.frames - 1).tolist(), video.ids.tolist(), strict=True)
+    boxes = (tuple(box) for box in video.boxes.tolist())
+    assert dict(zip(keys, boxes, strict=True)) == tracks

@@ -1,0 +1,55 @@
+from pathlib import Path
+
+import pytest
+
+from labels.saving import car, frame, written
+from vdet.errors import TruthError
+from vdet.labels.coco import COCO
+from vdet.labels.cvat import CVAT
+from vdet.labels.kitti import KITTI
+from vdet.labels.mot import MOT
+from vdet.labels.protocol import Format
+from vdet.labels.registry import ENDINGS, FORMATS, format_for, read_tracks
+from vdet.labels.yolo import YOLO
+
+
+def test_every_format_has_an_ending_of_its_own() -> None:
+    assert len(set(ENDINGS)) == len(FORMATS)
+    assert [format_for(Path(f"a.b{ending.upper()}")) for ending in ENDINGS] == list(FORMATS)
+
+
+def test_a_name_that_ends_otherwise_has_no_format() -> None:
+    assert format_for(Path("a.json")) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [
+        ("gt.txt", MOT),
+        ("gt", MOT),
+        ("gt.csv", MOT),
+        ("0000.txt", KITTI),
+        ("annotations.zip", YOLO),
+        ("instances_default.json", COCO),
+        ("task", CVAT),
+    ],
+)
+def test_the_content_tells_the_format_where_the_name_leaves_it_open(
+    tmp_path: Path, name: str, form: Format
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(written(form, [frame(2, car(5))]))
+    (row,) = read_tracks(path).rows
+    assert (row.frame, row.id) == (3, 5)
+
+
+def test_an_empty_file_of_another_name_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.json").touch()
+    with pytest.raises(TruthError, match=r"a\.json: is empty; give tracks or truth, as in \.txt"):
+        read_tracks(tmp_path / "a.json")
+
+
+def test_a_broken_zip_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.zip").write_bytes(b"PK")
+    with pytest.raises(TruthError, match=r"a\.zip: is neither a folder nor a readable zip file"):
+        read_tracks(tmp_path / "a.zip")

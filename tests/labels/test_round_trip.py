@@ -1,0 +1,156 @@
+"""Every format of the registry: what is written is read again, and what is damaged is refused."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from labels.saving import VIDEO, car, frame, read_back, written
+from vdet.boxes import Box
+from vdet.detect.classes import OUR_NAMES
+from vdet.errors import TruthError
+from vdet.labels.coco import COCO
+from vdet.labels.csv_table import CSV
+from vdet.labels.cvat import CVAT
+from vdet.labels.json_lines import JSON_LINES
+from vdet.labels.kitti import KITTI
+from vdet.labels.mot import MOT
+from vdet.labels.protocol import Format, SourceVideo
+from vdet.labels.registry import FORMATS
+from vdet.labels.saved import SavedTracks
+from vdet.labels.yolo import YOLO
+from vdet.track.track import FrameTracks, Track
+
+WHOLE = {CSV, JSON_LINES}
+"""Formats that keep all that is known of a track."""
+TIMED = WHOLE | {COCO}
+LISTING = {JSON_LINES, COCO, YOLO}
+SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI}
+SIZED = {COCO, CVAT, YOLO}
+MARKING = WHOLE | {COCO, CVAT}
+"""Formats that tell which boxes are predicted."""
+
+every_format = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
+
+
+@st.composite
+def boxes(draw: st.DrawFn) -> Box:
+    """Give boxes inside the frame."""
+    x, y = draw(st.integers(0, VIDEO.width - 1)), draw(st.integers(0, VIDEO.height - 1))
+    right, bottom = draw(st.integers(x + 1, VIDEO.width)), draw(st.integers(y + 1, VIDEO.height))
+    return Box(x, y, right - x, bottom - y)
+
+
+CLASSES = st.sampled_from([None, *OUR_NAMES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
+PLACES = st.floats(-3000, 3000).map(lambda value: round(value, 2))
+
+
+@st.composite
+def videos(draw: st.DrawFn) -> list[FrameTracks]:
+    """Give frames in order, some left out, with tracks that each keep their class."""
+    classes = {number: draw(CLASSES) for number in range(1, 5)}
+    frames = []
+    for index in sorted(draw(st.sets(st.integers(0, 20), max_size=6))):
+        ids = sorted(draw(st.sets(st.sampled_from(sorted(classes)))))
+        tracks = [
+            Track(
+                number,
+                draw(boxes()),
+                draw(st.integers(1, 10_000)) / 10_000,
+                draw(st.booleans()),
+                classes[number],
+                (draw(PLACES), draw(PLACES)),
+                draw(st.none() | st.integers(0, 9999).map(lambda value: value / 100)),
+                draw(st.none() | st.integers(-3, 3)),
+            )
+            for number in ids
+        ]
+        frames.append(frame(index, *tracks))
+    return frames
+
+
+def kept(form: Format, track: Track) -> Track:
+    """Return what a format keeps of a track."""
+    kitti = {"car": "car", "truck": "truck", "bus": "truck", "vehicle": "car", None: "car"}
+    names: dict[Format, str | None] = {
+        MOT: None,
+        KITTI: kitti.get(track.class_name, "Misc"),
+        **dict.fromkeys(WHOLE, track.class_name),
+    }
+    whole = form in WHOLE
+    return replace(
+        track,
+        score=track.score if form in SCORED else 1.0,
+        predicted=track.predicted and form in MARKING,
+        class_name=names.get(form, track.class_name or "vehicle"),
+        whole_foot=track.whole_foot if whole else None,
+        distance=track.distance if whole else None,
+        lane=track.lane if whole else None,
+    )
+
+
+@every_format
+@settings(max_examples=30)
+@given(videos())
+def test_what_is_written_is_read_again(
+    tmp_path_factory: pytest.TempPathFactory, form: Format, frames: list[FrameTracks]
+) -> None:
+    if form is JSON_LINES and not frames:
+        return  # a file without a record is no such file
+    saved = read_back(form, tmp_path_factory.getbasetemp(), written(form, frames))
+    found = {each.index: each.tracks for each in saved.frames}
+    assert found == {
+        each.index: tuple(kept(form, track) for track in each.tracks)
+        for each in frames
+        if each.tracks or form in LISTING
+    }
+    for each in saved.frames:
+        seconds = each.index / 25 if form in TIMED else math.nan
+        assert each.time == pytest.approx(seconds, nan_ok=True)
+    if saved.frames:
+        assert saved.size == ((1280, 720) if form in SIZED else None)
+
+
+@every_format
+def test_equal_tracks_give_equal_files(form: Format) -> None:
+    frames = [frame(0, car(1), car(2)), frame(1, car(2))]
+    assert written(form, frames) == written(form, frames)
+
+
+@every_format
+@settings(max_examples=40)
+@given(st.data())
+def test_a_damaged_file_is_read_or_refused_in_one_line(
+    tmp_path_factory: pytest.TempPathFactory, form: Format, data: st.DataObject
+) -> None:
+    content = written(form, [frame(index, car(1), car(2)) for index in (0, 1, 3)])
+    at = data.draw(st.integers(0, len(content)))
+    end = data.draw(st.integers(at, min(len(content), at + 12)))
+    damage = data.draw(st.binary(max_size=6) | st.text(max_size=6).map(str.encode))
+    try:
+        result: SavedTracks | str = read_back(
+            form, tmp_path_factory.getbasetemp(), content[:at] + damage + content[end:]
+        )
+    except TruthError as error:
+        result = str(error)
+    assert isinstance(result, SavedTracks) or "\n" not in result
+
+
+@every_format
+def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
+    box = Box(-5, 700, 30, 60)
+    saved = read_back(form, tmp_path, written(form, [frame(2, car(1, box))]))
+    inside = box.clipped(1280, 720)
+    assert saved.frames[0].tracks[0].box == (inside if form is YOLO else box)
+
+
+@every_format
+@pytest.mark.parametrize("size", [(1, 1), (319, 241), (7680, 4320)])
+def test_frames_may_have_any_size(tmp_path: Path, form: Format, size: tuple[int, int]) -> None:
+    box = Box(size[0] // 3, size[1] // 3, max(1, size[0] // 7), max(1, size[1] // 7))
+    video = SourceVideo("in.mp4", *size)
+    saved = read_back(form, tmp_path, written(form, [frame(0, car(1, box))], video))
+    assert saved.frames[0].tracks[0].box == box

@@ -1,0 +1,175 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from labels.saving import car, frame, written
+from vdet.errors import TruthError
+from vdet.labels import mot
+from vdet.labels.coco import COCO
+from vdet.labels.protocol import Format
+from vdet.labels.registry import FORMATS
+from vdet.labels.truth import read_truth
+from vdet.labels.video import LabelledVideo
+
+MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
+KITTI = "".join(
+    f"{frame} 7 Car 0 0 -1 10 20 40 60 1.5 1.6 4.0 2.0 1.5 20.0 -1.6\n" for frame in (0, 1)
+)
+CVAT = (
+    '<annotations><track id="7" label="car">\n'
+    + "".join(
+        f'<box frame="{frame}" outside="0" xtl="10" ytl="20" xbr="40" ybr="60"/>\n'
+        for frame in (0, 1)
+    )
+    + "</track></annotations>"
+)
+
+
+def write(tmp_path: Path, content: str) -> Path:
+    path = tmp_path / "truth"
+    path.write_text(content, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("content", [MOT, KITTI, CVAT], ids=["MOT", "KITTI", "CVAT"])
+def test_the_same_truth_is_read_from_every_format(tmp_path: Path, content: str) -> None:
+    video = read_truth(write(tmp_path, content))
+    assert video.frames.tolist() == [1, 2]
+    assert video.ids.tolist() == [7, 7]
+    assert video.boxes.tolist() == [[10, 20, 30, 40]] * 2
+    assert not video.ignored.any()
+
+
+@pytest.mark.parametrize("content", [MOT, KITTI, CVAT], ids=["MOT", "KITTI", "CVAT"])
+def test_a_frame_beyond_the_video_is_refused_with_its_line(tmp_path: Path, content: str) -> None:
+    with pytest.raises(TruthError, match=r"truth:[23]: the frame is number 2 of a video of 1;"):
+        read_truth(write(tmp_path, content), frame_count=1)
+
+
+@pytest.mark.parametrize("content", ["", " \n\n"])
+def test_an_empty_file_is_refused(tmp_path: Path, content: str) -> None:
+    with pytest.raises(TruthError, match="truth: is empty; give MOTChallenge"):
+        read_truth(write(tmp_path, content))
+
+
+@pytest.mark.parametrize("content", [MOT + KITTI, KITTI + MOT, MOT + CVAT])
+def test_mixed_formats_are_refused_where_the_second_begins(tmp_path: Path, content: str) -> None:
+    with pytest.raises(TruthError, match=r"truth:3: \w+( tracking)? has .* columns"):
+        read_truth(write(tmp_path, content))
+
+
+def read_or_refuse(path: Path) -> None:
+    """Fail on any other exception, and on a message of several lines."""
+    try:
+        result: LabelledVideo | str = read_truth(path)
+    except TruthError as error:
+        result = str(error)
+    assert isinstance(result, LabelledVideo) or "\n" not in result
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_are_truth_or_a_truth_error(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "any-bytes"
+    path.write_bytes(content)
+    read_or_refuse(path)
+
+
+@given(st.data(), st.sampled_from([MOT, KITTI, CVAT]))
+def test_damaged_truth_is_truth_or_a_truth_error(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject, content: str
+) -> None:
+    at = data.draw(st.integers(0, len(content)))
+    end = data.draw(st.integers(at, min(len(content), at + 12)))
+    damage = data.draw(st.text(st.characters(exclude_categories=["Cs"]), max_size=6))
+    path = tmp_path_factory.getbasetemp() / "damaged"
+    path.write_text(content[:at] + damage + content[end:], encoding="utf-8", newline="")
+    read_or_refuse(path)
+
+
+BOXES = st.tuples(
+    st.integers(-2000, 2000), st.integers(-2000, 2000), st.integers(1, 900), st.integers(1, 900)
+)
+
+
+@given(st.dictionaries(st.tuples(st.integers(1, 50), st.integers(0, 9)), BOXES, min_size=1))
+def test_truth_that_is_written_is_read_back(
+    tmp_path_factory: pytest.TempPathFactory,
+    truth: dict[tuple[int, int], tuple[int, int, int, int]],
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "written"
+    lines = [
+        f"{frame},{id_},{x + 1},{y + 1},{width},{height},1,3,1\n"
+        for (frame, id_), (x, y, width, height) in truth.items()
+    ]
+    path.write_text("".join(lines))
+    video = read_truth(path)
+    keys = zip(video.frames.tolist(), video.ids.tolist(), strict=True)
+    boxes = (tuple(box) for box in video.boxes.tolist())
+    assert dict(zip(keys, boxes, strict=True)) == truth
+
+
+KITTI_REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
+
+
+def kitti(*names: str) -> str:
+    """Return KITTI labels of a frame with a box for each name."""
+    lines = [
+        f"0 {-1 if name == 'DontCare' else number} {name} 0 2 -1.57 10.5 20 40.5 60 {KITTI_REST}\n"
+        for number, name in enumerate(names)
+    ]
+    return "".join(lines)
+
+
+def cvat(label: str, occluded: int = 0) -> str:
+    box = f'<box frame="0" outside="0" occluded="{occluded}" xtl="1" ytl="2" xbr="4" ybr="6"/>'
+    return f'<annotations>\n<track id="3" label="{label}">{box}</track></annotations>'
+
+
+def test_cars_vans_and_trucks_are_vehicles_in_kitti(tmp_path: Path) -> None:
+    video = read_truth(write(tmp_path, kitti("Car", "Van", "Truck")))
+    assert video.ignored.tolist() == [False] * 3
+
+
+def test_what_nobody_must_find_is_an_ignore_region(tmp_path: Path) -> None:
+    assert read_truth(write(tmp_path, kitti("DontCare", "Tram"))).ignored.tolist() == [True] * 2
+    assert read_truth(write(tmp_path, cvat("ignore"))).ignored.tolist() == [True]
+
+
+def test_people_are_neither_vehicles_nor_ignore_regions(tmp_path: Path) -> None:
+    assert len(read_truth(write(tmp_path, kitti("Pedestrian", "Cyclist")))) == 0
+    assert len(read_truth(write(tmp_path, cvat("pedestrian")))) == 0
+
+
+def test_an_occluded_vehicle_counts(tmp_path: Path) -> None:
+    assert read_truth(write(tmp_path, cvat("car", occluded=1))).ignored.tolist() == [False]
+
+
+@pytest.mark.parametrize("content", [kitti("Car", "Spaceship"), cvat("cow")])
+def test_an_unknown_label_is_refused_with_its_line(tmp_path: Path, content: str) -> None:
+    with pytest.raises(TruthError, match=r"truth:2: label '(Spaceship|cow)' is unknown; use one"):
+        read_truth(write(tmp_path, content))
+
+
+@pytest.mark.parametrize("form", [each for each in FORMATS if each is not mot.MOT])
+def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> None:
+    path = tmp_path / f"truth{form.ending}"
+    kinds = (None, "bus", "motorcycle")
+    tracks = [car(number, class_name=name) for number, name in enumerate(kinds, start=1)]
+    path.write_bytes(written(form, [frame(2, *tracks)]))
+    video = read_truth(path)
+    assert video.frames.tolist() == [3, 3, 3]
+    assert video.ids.tolist() == [1, 2, 3]
+    assert np.allclose(video.boxes, [[10, 20, 30, 40]] * 3, atol=0.01)
+    assert video.scores.tolist() == [1, 1, 1]
+    assert video.ignored.tolist() == [False, False, True]
+
+
+def test_a_crowd_in_coco_is_an_ignore_region(tmp_path: Path) -> None:
+    path = tmp_path / "truth.json"
+    path.write_bytes(written(COCO, [frame(0, car())]).replace(b'"iscrowd": 0', b'"iscrowd": 1'))
+    assert read_truth(path).ignored.tolist() == [True]

@@ -1,0 +1,127 @@
+"""Training pictures: their boxes lie where the vehicles are, whatever was changed."""
+
+import cv2
+import numpy as np
+import pytest
+
+from learn.net.blocks import block_picture, block_source
+from vdet.config.network import NetworkTrainingSettings
+from vdet.learn.net.augmentation import Drawing, SampleDrawer, _turned
+from vdet.learn.net.samples import MAX_PIXELS, Sample, Source
+from vdet.learn.net.weather import with_weather
+
+PLAIN = Drawing(width=256, height=128, magnified=1.0, mosaics=0.0)
+MOSAIC = Drawing(width=256, height=128, magnified=1.0, mosaics=1.0)
+SETTINGS = NetworkTrainingSettings()
+
+
+def draw(seed: int, drawing: Drawing, source: Source | None = None) -> Sample:
+    drawer = SampleDrawer([source or block_source(8)], SETTINGS)
+    return drawer.draw(np.random.default_rng(seed), drawing)
+
+
+def black_on_white() -> Source:
+    """Return a source of one picture: a black block in the middle of white."""
+    image = np.full((128, 256, 3), 255, np.uint8)
+    image[48:80, 96:160] = 0
+    boxes = np.array([[96, 48, 160, 80]], np.float32)
+    return Source("block", [Sample(image, boxes, np.array([0]), np.array([False]))])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_box_lies_around_what_it_is_the_box_of(seed: int) -> None:
+    sample = draw(seed, PLAIN, black_on_white())
+    dark = sample.image.mean(axis=2)
+    for box in sample.boxes[~sample.ignored]:
+        left, top, right, bottom = box.round().astype(int)
+        if min(right - left, bottom - top) < 8:
+            continue
+        inside = dark[top + 3 : bottom - 3, left + 3 : right - 3]
+        border = np.ones(dark.shape, bool)
+        border[max(0, top - 3) : bottom + 3, max(0, left - 3) : right + 3] = False
+        assert np.median(inside) < 90
+        assert np.median(dark[border]) > np.median(inside)
+
+
+@pytest.mark.parametrize("drawing", [PLAIN, MOSAIC], ids=["plain", "mosaic"])
+@pytest.mark.parametrize("seed", range(6))
+def test_every_box_lies_in_the_picture_and_has_an_area(seed: int, drawing: Drawing) -> None:
+    sample = draw(seed, drawing)
+    assert sample.image.shape == (128, 256, 3)
+    assert sample.image.dtype == np.uint8
+    assert (sample.boxes[:, :2] >= 0).all()
+    assert (sample.boxes[:, 2:] <= [256, 128]).all()
+    assert (sample.boxes[:, 2:] > sample.boxes[:, :2]).all()
+    assert len(sample.boxes) == len(sample.classes) == len(sample.ignored)
+
+
+def test_the_same_seed_draws_the_same_picture() -> None:
+    assert np.array_equal(draw(3, MOSAIC).image, draw(3, MOSAIC).image)
+    assert not np.array_equal(draw(3, MOSAIC).image, draw(4, MOSAIC).image)
+
+
+def test_vehicles_that_are_too_small_are_ignored() -> None:
+    for seed in range(20):
+        sample = draw(seed, MOSAIC)
+        sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
+        small = sides.max(axis=1) < SETTINGS.least_side
+        assert sample.ignored[small].all()
+
+
+def test_a_vehicle_of_which_little_is_left_is_ignored() -> None:
+    image = np.zeros((128, 256, 3), np.uint8)
+    wide = np.array([[0, 0, 256, 128]], np.float32)
+    source = Source("wide", [Sample(image, wide, np.array([0]), np.array([False]))])
+    drawing = Drawing(width=256, height=128, magnified=4.0, mosaics=0.0)
+    assert all(draw(seed, drawing, source).ignored.all() for seed in range(5))
+
+
+def test_large_pictures_are_held_smaller_with_their_boxes() -> None:
+    sample = block_picture(1, width=1280, height=720).shrunk()
+    height, width = sample.image.shape[:2]
+    assert height * width == pytest.approx(MAX_PIXELS, rel=0.01)
+    factor = width / 1280
+    assert sample.boxes == pytest.approx(block_picture(1, 1280, 720).boxes * factor, rel=0.01)
+
+
+def test_small_sources_are_drawn_more_often_than_their_share() -> None:
+    small = Source("small", [block_picture(0)])
+    white = np.full((128, 256, 3), 255, np.uint8)
+    none = Sample(white, np.zeros((0, 4), np.float32), np.zeros(0, np.int64), np.zeros(0, np.bool_))
+    large = Source("large", [none] * 9)
+    drawer = SampleDrawer([small, large], SETTINGS)
+    drawn = [drawer.draw(np.random.default_rng(seed), PLAIN) for seed in range(200)]
+    with_blocks = sum(len(sample.boxes) > 0 for sample in drawn)
+    assert 30 <= with_blocks <= 70  # one in four, not one in ten
+
+
+def test_a_weight_makes_a_source_come_more_often() -> None:
+    one, other = Source("one", [block_picture(0)]), Source("other", [black_on_white().samples[0]])
+    settings = NetworkTrainingSettings(weights={"other": 3})
+    drawer = SampleDrawer([one, other], settings)
+    picks = [drawer._pick(np.random.default_rng(seed)) for seed in range(200)]
+    assert 130 <= sum(pick is other.samples[0] for pick in picks) <= 170  # three in four
+
+
+def test_a_turned_box_lies_around_the_ellipse_in_it() -> None:
+    turn = cv2.getRotationMatrix2D((0, 0), 90, 1.0)
+    [turned] = _turned(np.array([[10, 20, 50, 40]], np.float32), turn)
+    assert turned == pytest.approx([20, -50, 40, -10], abs=1e-4)
+
+
+def test_a_circle_keeps_its_size_at_any_angle() -> None:
+    turn = cv2.getRotationMatrix2D((100, 100), 30, 1.0)
+    [turned] = _turned(np.array([[90, 90, 110, 110]], np.float32), turn)
+    assert turned == pytest.approx([90, 90, 110, 110], abs=1e-4)
+
+
+def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:
+    day = np.full((128, 256, 3), 200, np.uint8)
+    boxes = np.array([[40, 40, 100, 90]], np.float32)
+    drawn = [with_weather(np.random.default_rng(seed), day, boxes) for seed in range(400)]
+    changed = [image for image in drawn if not np.array_equal(image, day)]
+    dark = [image for image in changed if np.median(image) < 120]
+    assert {image.shape for image in drawn} == {day.shape}
+    assert 50 <= len(changed) <= 140
+    assert 20 <= len(dark) <= 90
+    assert any(image.max() > 220 for image in dark)  # lamps

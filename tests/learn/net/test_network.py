@@ -1,0 +1,224 @@
+"""The network: which cells find which vehicle, the loss, a training of seconds, the ONNX file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip(
+    "torch", reason="torch is not installed; `make nettest` installs it and runs these tests"
+)
+
+from torch import Tensor  # noqa: E402
+
+from learn.net.blocks import block_picture, block_source  # noqa: E402
+from vdet.config.network import NetworkTrainingSettings  # noqa: E402
+from vdet.config.schema import NetworkSettings  # noqa: E402
+from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
+from vdet.detect.onnx.header import Header  # noqa: E402
+from vdet.detect.onnx.layouts import cell_centers as runtime_cells  # noqa: E402
+from vdet.errors import DataError  # noqa: E402
+from vdet.learn.net.architecture import (  # noqa: E402
+    Network,
+    cell_centers,
+    decode,
+    flatten,
+)
+from vdet.learn.net.assignment import Assignment, Vehicles, assign  # noqa: E402
+from vdet.learn.net.export import export_network  # noqa: E402
+from vdet.learn.net.losses import giou, paired_iou, quality_focal_loss  # noqa: E402
+from vdet.learn.net.samples import Source  # noqa: E402
+from vdet.learn.net.training import TrainingState, train_network  # noqa: E402
+from vdet.media import Picture  # noqa: E402
+from vdet.testing import check_detector  # noqa: E402
+
+QUICK = NetworkTrainingSettings(
+    steps=120, batch=4, width=256, height=128, small=0.0, warm_up=10, average=0.9, checkpoint=40,
+    rate=3e-3, scales=(0.8, 1.2),
+)  # fmt: skip
+CLASSES = ("car", "bus")
+
+
+def box(*sides: float) -> Tensor:
+    return torch.tensor([sides], dtype=torch.float32)
+
+
+class TestLosses:
+    def test_overlap_of_boxes_that_share_a_third(self) -> None:
+        assert paired_iou(box(0, 0, 2, 2), box(1, 0, 3, 2)).item() == pytest.approx(1 / 3)
+        assert giou(box(0, 0, 2, 2), box(1, 0, 3, 2)).item() == pytest.approx(1 / 3)
+
+    def test_boxes_apart_have_a_negative_generalised_overlap(self) -> None:
+        # Union 2, smallest box around both 3: 0 - 1/3.
+        assert giou(box(0, 0, 1, 1), box(2, 0, 3, 1)).item() == pytest.approx(-1 / 3)
+
+    def test_a_score_that_is_its_target_costs_nothing(self) -> None:
+        targets = torch.tensor([0.2, 0.7])
+        assert quality_focal_loss(torch.logit(targets), targets).sum().item() < 1e-6
+
+
+class TestAssignment:
+    CENTERS, STRIDES = cell_centers(128, 256)
+
+    def assigned(self, *boxes: tuple[float, float, float, float]) -> Assignment:
+        vehicles = Vehicles(
+            torch.zeros(len(boxes), dtype=torch.long),
+            torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4),
+            torch.zeros(len(boxes), dtype=torch.long),
+        )
+        cells = len(self.CENTERS)
+        guesses = decode(torch.zeros(1, cells, 4), self.CENTERS, self.STRIDES)
+        found: Assignment = assign(
+            torch.zeros(1, cells), guesses, vehicles, self.CENTERS, self.STRIDES
+        )
+        return found
+
+    def test_a_vehicle_gets_cells_inside_it(self) -> None:
+        found = self.assigned((40, 40, 100, 90))
+        assert len(found.cell)
+        middles = self.CENTERS[found.cell]
+        assert (middles > torch.tensor([40, 40])).all()
+        assert (middles < torch.tensor([100, 90])).all()
+
+    @pytest.mark.parametrize("x", range(20, 36))
+    def test_a_small_vehicle_gets_a_cell_wherever_it_is(self, x: int) -> None:
+        assert len(self.assigned((x, 33, x + 10, 39)).cell)
+
+    def test_a_cell_finds_one_vehicle_only(self) -> None:
+        found = self.assigned((40, 40, 100, 90), (50, 44, 108, 92))
+        assert len(set(found.cell.tolist())) == len(found.cell)
+        assert set(found.vehicle.tolist()) == {0, 1}
+
+    def test_a_picture_without_vehicles_gets_none(self) -> None:
+        assert len(self.assigned().cell) == 0
+
+
+def test_training_and_runtime_number_the_cells_alike() -> None:
+    for mine, theirs in zip(cell_centers(96, 160), runtime_cells(160, 96), strict=True):
+        assert np.array_equal(mine.numpy(), theirs)
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[Network, list[TrainingState]]:
+    reports: list[TrainingState] = []
+    checkpoint = tmp_path_factory.mktemp("trained") / "net.ckpt"
+    network = train_network(
+        [block_source()], len(CLASSES), QUICK, checkpoint, progress=reports.append
+    )
+    return network, reports
+
+
+def test_a_training_says_how_far_it_is(trained: tuple[Network, list[TrainingState]]) -> None:
+    _, reports = trained
+    assert [report.step for report in reports] == list(range(1, 121))
+    assert reports[0].rate < reports[20].rate
+    assert reports[-1].rate < reports[60].rate
+    assert reports[-1].seconds_left == 0
+    first, last = reports[:10], reports[-10:]
+    assert sum(r.loss for r in last) < 0.7 * sum(r.loss for r in first)
+
+
+def test_the_exported_network_gives_what_the_trained_one_gives(
+    trained: tuple[Network, list[TrainingState]], tmp_path: Path
+) -> None:
+    import onnxruntime
+
+    network, _ = trained
+    path = tmp_path / "net.onnx"
+    export_network(network, Header(classes=CLASSES), path)
+    image = block_picture(1).image
+    [cells] = onnxruntime.InferenceSession(path).run(None, {"image": image[np.newaxis]})
+    with torch.no_grad():
+        expected = flatten(network(torch.from_numpy(image[np.newaxis]).permute(0, 3, 1, 2).float()))
+    assert cells == pytest.approx(expected.numpy(), abs=1e-3)
+
+
+def test_a_training_goes_on_from_the_weights_of_an_exported_network(
+    trained: tuple[Network, list[TrainingState]], tmp_path: Path
+) -> None:
+    path = tmp_path / "base.onnx"
+    export_network(trained[0], Header(classes=CLASSES), path)
+    settings = QUICK.model_copy(update={"steps": 3, "warm_up": 0, "rate": 1e-6})
+    losses: list[float] = []
+    train_network(
+        [block_source()], 2, settings, tmp_path / "a.ckpt", base=path,
+        progress=lambda state: losses.append(state.loss),
+    )  # fmt: skip
+    assert losses[0] < 0.6 * trained[1][0].loss
+
+
+def test_a_base_of_another_form_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "junk.onnx"
+    path.write_bytes(b"junk")
+    with pytest.raises(DataError, match="is not a network that vdet train-net has written"):
+        train_network([block_source(4)], 2, QUICK, tmp_path / "a.ckpt", base=path)
+
+
+def test_what_was_learnt_is_found_again(
+    trained: tuple[Network, list[TrainingState]], tmp_path: Path
+) -> None:
+    network, _ = trained
+    path = tmp_path / "net.onnx"
+    export_network(network, Header(classes=CLASSES, pixels=256 * 128), path)
+    model = NetworkModel(path, NetworkSettings(least=0.05, still_score=0.2))
+    found = wanted = right_class = 0
+    for seed in range(100, 120):
+        sample = block_picture(seed)
+        detector = model.for_video(256, 128, [sample.image])
+        detections = detector.detect(detector.search(Picture(sample.image), None))
+        assert detections.classes is not None
+        names = [detections.names[each] for each in detections.classes.tolist()]
+        boxes = torch.tensor(detections.boxes)
+        wanted += len(sample.boxes)
+        for truth, kind in zip(sample.boxes, sample.classes, strict=True):
+            overlaps = paired_iou(boxes, torch.tensor(truth).expand(len(boxes), 4))
+            if len(boxes) and overlaps.max() > 0.5:
+                found += 1
+                right_class += names[int(overlaps.argmax())] == CLASSES[kind]
+    assert found >= 0.8 * wanted
+    assert right_class >= 0.8 * found
+    check_detector(model, [block_picture(7).image, block_picture(8).image])
+
+
+def test_a_stopped_training_goes_on_and_ends_the_same(tmp_path: Path) -> None:
+    settings = QUICK.model_copy(update={"steps": 12, "checkpoint": 4})
+    source = [block_source(8)]
+    whole = train_network(source, 2, settings, tmp_path / "whole.ckpt")
+
+    class Stopped(Exception):  # noqa: N818
+        pass
+
+    def stop(progress: TrainingState) -> None:
+        if progress.step == 6:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        train_network(source, 2, settings, tmp_path / "parts.ckpt", progress=stop)
+    steps: list[int] = []
+    parts = train_network(
+        source, 2, settings, tmp_path / "parts.ckpt", progress=lambda p: steps.append(p.step)
+    )
+    assert steps == list(range(5, 13))
+    for mine, theirs in zip(whole.parameters(), parts.parameters(), strict=True):
+        assert torch.allclose(mine, theirs, atol=1e-6)
+
+
+def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
+    settings = QUICK.model_copy(update={"steps": 2, "checkpoint": 1})
+    source, path = [block_source(4)], tmp_path / "net.ckpt"
+    train_network(source, 2, settings, path)
+    other = settings.model_copy(update={"rate": 1e-4})
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with other settings"):
+        train_network(source, 2, other, path)
+    with pytest.raises(DataError, match=r"net\.ckpt: belongs to a training with .* another base"):
+        train_network(source, 2, settings, path, base=tmp_path / "base.onnx")
+    path.write_bytes(b"junk")
+    with pytest.raises(DataError, match=r"net\.ckpt: is no checkpoint of this training"):
+        train_network(source, 2, settings, path)
+
+
+def test_pictures_without_a_vehicle_are_refused(tmp_path: Path) -> None:
+    empty = block_picture(0)
+    empty = type(empty)(empty.image, empty.boxes[:0], empty.classes[:0], empty.ignored[:0])
+    with pytest.raises(DataError, match="no picture has a vehicle"):
+        train_network([Source("empty", [empty])], 2, QUICK, tmp_path / "net.ckpt")

@@ -1,0 +1,103 @@
+"""`vdet train-net`: from labelled pictures of each form to a network, and on after a stop."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from conftest import Run
+from evaluate.images.writers import WRITERS, Boxed, Labelled
+from vdet.config.schema import NetworkSettings
+from vdet.detect.factory import trained_on
+from vdet.detect.onnx.recognition import recognize
+from vdet.detect.onnx.session import Session
+
+torch = pytest.importorskip(
+    "torch", reason="torch is not installed; `make nettest` installs it and runs these tests"
+)
+
+QUICK = tuple(
+    argument
+    for value in ("steps=2", "batch=2", "width=128", "height=64", "checkpoint=1")
+    for argument in ("--set", f"network.{value}")
+)
+CAR = Boxed("car", (20, 30, 60, 40))
+IGNORED = Boxed("ignore", (90, 0, 70, 96))
+
+
+def write_set(folder: Path, form: str = "COCO", *boxes: Boxed) -> Path:
+    picture = Labelled(160, 96, boxes or (CAR,))
+    WRITERS[form](folder, {"a": picture, "b": picture})
+    return folder
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path, form: str) -> None:
+    folder, output = write_set(tmp_path / "my_set", form), tmp_path / "net.onnx"
+    result = run("train-net", folder, "-o", output, *QUICK)
+    assert result.code == 0, result.err
+    assert result.out.splitlines()[0].split() == ["my_set", "2", "pictures", "2", "vehicles"]
+    assert trained_on(NetworkSettings(), output) == ("my_set",)
+    report = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
+    assert (report["steps"], report["sources"][0]["vehicles"]) == (2, 2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["my_set", "net.json", "net.onnx"]
+    picture = next(folder.rglob("a.png"))
+    found = run("detect-image", picture, "-c", "net", "--model", output, "--json", "-")
+    assert found.code == 0, found.err
+
+
+def test_pictures_without_a_vehicle_are_refused(run: Run, tmp_path: Path) -> None:
+    folder = write_set(tmp_path / "set", "COCO", IGNORED)
+    result = run("train-net", folder, "-o", tmp_path / "net.onnx", *QUICK)
+    assert result.code == 1
+    assert result.err == "vdet: no picture has a vehicle; give labelled pictures\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]
+
+
+def test_a_network_that_is_there_is_kept_unless_it_may_be_replaced(
+    run: Run, tmp_path: Path
+) -> None:
+    folder, output = write_set(tmp_path / "set"), tmp_path / "net.onnx"
+    output.write_text("mine")
+    refused = run("train-net", folder, "-o", output, *QUICK)
+    assert refused.code == 1
+    assert output.read_text() == "mine"
+    assert run("train-net", folder, "-o", output, *QUICK, "--overwrite").code == 0
+    assert output.stat().st_size > 100_000
+
+
+def test_a_stopped_training_goes_on_and_other_scores_need_no_step(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    command = ("train-net", write_set(tmp_path / "set"), "-o", tmp_path / "net.onnx", *QUICK)
+    with monkeypatch.context() as stopped:
+        stopped.setattr("vdet.learn.net.run.export_network", stop)
+        assert run(*command).code == 130
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["net.ckpt", "set"]
+    with monkeypatch.context() as trained:
+        trained.setattr("vdet.learn.net.training._Run.learn", stop)
+        result = run(*command, "--set", "network.score.slope=2")
+    assert result.code == 0, result.err
+    header = recognize(Session(tmp_path / "net.onnx"), tmp_path / "net.onnx").header
+    assert header is not None
+    assert header.calibration.slope == 2
+
+
+def test_a_network_has_learnt_from_the_sets_of_its_base_too(run: Run, tmp_path: Path) -> None:
+    base, output = tmp_path / "base.onnx", tmp_path / "net.onnx"
+    assert run("train-net", write_set(tmp_path / "one"), "-o", base, *QUICK).code == 0
+    command = ("train-net", write_set(tmp_path / "two"), "-o", output, *QUICK)
+    result = run(*command, "--base", base)
+    assert result.code == 0, result.err
+    assert trained_on(NetworkSettings(), output) == ("two", "one")
+
+
+def test_a_base_that_is_not_there_is_said_before_the_training(run: Run, tmp_path: Path) -> None:
+    command = ("train-net", write_set(tmp_path / "set"), "-o", tmp_path / "net.onnx", *QUICK)
+    result = run(*command, "--base", tmp_path / "base.onnx")
+    assert result.code == 1
+    assert "base.onnx: cannot be read: No such file" in result.err
+    assert [path.name for path in tmp_path.iterdir()] == ["set"]

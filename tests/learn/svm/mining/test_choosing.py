@@ -1,0 +1,272 @@
+"""Which windows of a frame become patches, and what they show of a vehicle."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.boxes import Box
+from vdet.config.schema import MiningSettings
+from vdet.detect.svm.windows import Windows
+from vdet.learn.svm.mining.choosing import (
+    ChosenWindow,
+    FrameLabels,
+    PatchKind,
+    WindowComparison,
+    choose_windows,
+    compare_windows,
+)
+
+WIDTH = 1000
+CAR = Box(400, 300, 100, 70)
+OTHER = Box(700, 300, 100, 70)
+GENEROUS = MiningSettings(probability=0.2, per_vehicle=1000, false_alarms=1000, parts=1000)
+
+
+def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> FrameLabels:
+    tables = [
+        np.array([(box.x, box.y, box.width, box.height) for box in boxes], np.float64)
+        for boxes in (vehicles, ignored)
+    ]
+    return FrameLabels(*(table.reshape(-1, 4) for table in tables))
+
+
+def about(x: float, side: int = 100, y: float = 335) -> Box:
+    """Return a square window with this centre."""
+    return Box(round(x - side / 2), round(y - side / 2), side, side)
+
+
+def windows(*boxes: Box, probability: float = 1.0) -> Windows:
+    table: npt.NDArray[np.int32] = np.array(
+        [(box.x, box.y, box.width, box.height) for box in boxes], np.int32
+    )
+    ones = np.ones(len(boxes), np.float32)
+    return Windows(
+        table, np.full(len(boxes), probability, np.float32), ones, table.astype(np.float32)
+    )
+
+
+def chosen(
+    found: Windows, labels: FrameLabels, settings: MiningSettings = GENEROUS, seed: int = 0
+) -> list[ChosenWindow]:
+    return list(choose_windows(found, labels, WIDTH, settings, np.random.default_rng(seed)))
+
+
+def kinds(choices: list[ChosenWindow]) -> dict[Box, str]:
+    return {choice.box: choice.kind for choice in choices}
+
+
+def test_windows_become_patches_of_their_kind() -> None:
+    fits, shows, part, false = about(450), about(470), about(450, 36), about(100)
+    choices = chosen(windows(fits, shows, part, false), truth(CAR))
+    assert kinds(choices) == {
+        fits: "vehicle",
+        shows: "box",
+        part: "part",
+        false: "false alarm",
+    }
+    assert {choice.box: choice.sides for choice in choices if choice.sides} == {
+        fits: (-0.5, -0.35, 0.5, 0.35),
+        shows: (-0.7, -0.35, 0.3, 0.35),
+    }
+
+
+def test_a_window_with_a_low_probability_is_no_false_alarm() -> None:
+    fits, shows, part, false, sure = about(450), about(470), about(450, 36), about(100), about(200)
+    found = windows(fits, shows, part, false, sure)
+    found.probabilities[:] = [0, 0, 0.19, 0.19, 0.21]
+    choices = chosen(found, truth(CAR))
+    assert kinds(choices) == {fits: "vehicle", shows: "box", sure: "false alarm"}
+
+
+def test_nothing_is_taken_from_ignore_regions() -> None:
+    region = Box(40, 280, 120, 120)
+    inside, touching = about(100), about(185)
+    for each, expected in ((inside, {}), (touching, {touching: "false alarm"})):
+        assert kinds(chosen(windows(each), truth(ignored=(region,)))) == expected
+
+
+def test_a_window_far_too_large_for_its_vehicle_is_a_false_alarm() -> None:
+    large, too_large = about(450, 190), about(450, 260)
+    assert kinds(chosen(windows(large), truth(CAR))) == {large: "box"}
+    assert kinds(chosen(windows(too_large), truth(CAR))) == {too_large: "false alarm"}
+
+
+def test_a_window_between_two_vehicles_belongs_to_the_nearer_one() -> None:
+    beside = Box(480, 300, 100, 70)
+    between = about(530)
+    assert kinds(chosen(windows(between), truth(CAR, beside))) == {between: "vehicle"}
+
+
+def test_a_part_in_an_ignore_region_is_not_taken() -> None:
+    part = about(465, 36)
+    assert kinds(chosen(windows(part), truth(CAR))) == {part: "part"}
+    assert chosen(windows(part), truth(CAR, ignored=(Box(455, 280, 90, 90),))) == []
+
+
+def many() -> Windows:
+    return windows(*(about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120)))
+
+
+def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:
+    settings = MiningSettings(probability=0, per_vehicle=4, false_alarms=7, parts=3)
+    choices = chosen(many(), truth(CAR, OTHER), settings)
+    counted = [choice.kind for choice in choices]
+    kinds_in_order: tuple[PatchKind, ...] = ("vehicle", "box", "false alarm", "part")
+    assert [counted.count(kind) for kind in kinds_in_order] == [8, 8, 7, 3]
+    fitting = [choice.box for choice in choices if choice.kind == "vehicle"]
+    assert sum(box.x < 600 for box in fitting) == 4
+
+
+def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
+    settings = MiningSettings(per_vehicle=4, false_alarms=7)
+    one, same, other = (chosen(many(), truth(CAR), settings, seed) for seed in (0, 0, 1))
+    assert one == same
+    assert set(one) != set(other)
+
+
+def test_a_window_that_two_sets_share_is_one_patch() -> None:
+    assert len(chosen(windows(about(450), about(450)), truth(CAR))) == 1
+
+
+def test_a_frame_without_vehicles_has_false_alarms_only() -> None:
+    assert {choice.kind for choice in chosen(many(), truth())} == {"false alarm"}
+    assert len(chosen(many(), truth())) == len(many())
+
+
+VEHICLE = (400, 300, 100, 70)  # x, y, width, height
+MIDDLE = (450, 335)
+
+
+def window(side: float, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> tuple[float, ...]:
+    """Return a square window with this centre."""
+    return (x - side / 2, y - side / 2, side, side)
+
+
+def compare(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> WindowComparison:
+    return compare_windows(np.array(windows, np.float64), np.array(vehicle, np.float64), WIDTH)
+
+
+def flags(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> str:
+    """Return the flags that are set for each window as a word, "-" where none is."""
+    found = compare(*windows, vehicle=vehicle)
+    words = []
+    for i in range(len(windows)):
+        values = {"fits": found.fits[i], "shows": found.shows[i], "part": found.part[i]}
+        words.append("+".join(name for name, on in values.items() if on) or "-")
+    return " ".join(words)
+
+
+def test_sides_are_measured_from_the_middle_of_the_window_in_its_sides() -> None:
+    found = compare((400, 285, 100, 100), (350, 235, 200, 200), (380, 285, 100, 100))
+    np.testing.assert_allclose(
+        found.sides,
+        [[-0.5, -0.35, 0.5, 0.35], [-0.25, -0.175, 0.25, 0.175], [-0.3, -0.35, 0.7, 0.35]],
+    )
+    np.testing.assert_allclose(found.distances, [0, 0, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("side", "expected"),
+    [
+        (34, "part"),
+        (39, "part"),
+        (41, "shows+part"),
+        (53, "shows+part"),
+        (55, "shows"),
+        (70, "shows"),
+        (80, "fits"),
+        (100, "fits"),
+        (135, "fits"),
+        (150, "shows"),
+        (170, "shows"),
+        (245, "shows"),
+        (255, "-"),
+    ],
+)
+def test_a_window_fits_a_vehicle_about_as_wide_as_itself(side: float, expected: str) -> None:
+    assert flags(window(side)) == expected
+
+
+@pytest.mark.parametrize(
+    ("shift", "expected"), [(15, "fits"), (20, "shows"), (44, "shows"), (46, "-"), (80, "-")]
+)
+@pytest.mark.parametrize("way", [-1, 1])
+def test_a_window_beside_the_middle_shows_the_vehicle(
+    shift: float, expected: str, way: int
+) -> None:
+    assert flags(window(100, MIDDLE[0] + way * shift)) == expected
+
+
+def test_a_window_in_a_large_vehicle_shows_a_part_of_it() -> None:
+    windows = (window(36, MIDDLE[0] + shift) for shift in (0, 15, 40, 48, 52))
+    assert flags(*windows) == "part part part part -"
+    assert flags(window(50, y=330), window(50, y=369), window(50, y=371)) == "shows+part part -"
+
+
+def test_a_window_shows_a_part_of_a_cut_off_vehicle_too() -> None:
+    for vehicle, x in ((RIGHT, 950), (LEFT, 50)):
+        assert flags(window(36, x), window(36, 500), vehicle=vehicle) == "part -"
+
+
+def test_a_window_too_high_or_too_low_shows_it_or_nothing() -> None:
+    heights = (window(100, y=MIDDLE[1] + shift) for shift in (10, 20, 30, -20, -30))
+    assert flags(*heights) == "fits shows - shows -"
+
+
+def test_near_are_windows_that_fit_or_show_the_vehicle_or_overlap_it_otherwise() -> None:
+    found = compare(window(100), window(150), window(36), window(200), window(20), window(100, 200))
+    assert found.near.tolist() == [True, True, True, True, False, False]
+
+
+RIGHT = (900, 300, 100, 70)  # its right side is beyond the frame
+LEFT = (0, 300, 100, 70)
+
+
+def test_the_side_of_a_cut_off_vehicle_beyond_the_frame_is_unknown() -> None:
+    for vehicle, unknown in ((RIGHT, 2), (LEFT, 0)):
+        sides = compare(window(140, 950), vehicle=vehicle).sides[0]
+        assert np.flatnonzero(np.isnan(sides)).tolist() == [unknown]
+
+
+@pytest.mark.parametrize("vehicle", [(899, 300, 99.5, 70), (1, 300, 100, 70)])
+def test_a_box_within_two_thousandths_of_the_width_from_the_side_is_cut_off(
+    vehicle: tuple[float, ...],
+) -> None:
+    assert np.isnan(compare(window(140, 950), vehicle=vehicle).sides).any()
+
+
+def test_a_window_fits_a_cut_off_vehicle_by_its_visible_side_and_its_height() -> None:
+    side = 140
+    windows = [window(side, 900 + share * side) for share in (0.1, 0.25, 0.45, 0.6, 0.7, 0.9)]
+    assert flags(*windows, vehicle=RIGHT) == "- shows fits fits shows -"
+    mirrored = [window(side, 100 - share * side) for share in (0.1, 0.25, 0.45, 0.6, 0.7, 0.9)]
+    assert flags(*mirrored, vehicle=LEFT) == "- shows fits fits shows -"
+    sizes = [window(side, 900 + 0.45 * side) for side in (60, 78, 100, 150, 190, 300)]
+    assert flags(*sizes, vehicle=RIGHT) == "- shows fits fits shows -"
+
+
+def test_a_window_on_a_vehicle_that_fills_the_frame_fits_nothing() -> None:
+    vehicle = (0, 100, 1000, 400)
+    found = compare(window(400, 500, 300), vehicle=vehicle)
+    assert flags(window(400, 500, 300), window(1000, 500, 300), vehicle=vehicle) == "- -"
+    assert np.isnan(found.sides[0, [0, 2]]).all()
+
+
+@given(
+    st.tuples(st.floats(-200, 1200), st.floats(0, 600), st.floats(20, 500)),
+    st.tuples(st.floats(0, 900), st.floats(0, 500), st.floats(10, 100), st.floats(10, 100)),
+)
+def test_mirrored_windows_compare_alike(at: tuple[float, ...], vehicle: tuple[float, ...]) -> None:
+    x, y, side = at
+    ours = compare((x, y, side, side), vehicle=vehicle)
+    there = (WIDTH - vehicle[0] - vehicle[2], *vehicle[1:])
+    theirs = compare((WIDTH - x - side, y, side, side), vehicle=there)
+    np.testing.assert_allclose(
+        theirs.sides[:, [2, 1, 0, 3]] * [-1, 1, -1, 1], ours.sides, atol=1e-6
+    )
+    for flags in ("fits", "shows", "part", "near"):
+        assert getattr(ours, flags) == getattr(theirs, flags)
+    assert not (ours.fits[0] and (ours.shows[0] or ours.part[0]))
+    assert ours.near[0] >= (ours.fits[0] or ours.shows[0])

@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.config.schema import AugmentationSettings
+from vdet.learn.svm.augmentation import Sample, augment, cut_off, mirrored, zoom_in
+
+NOISE = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
+OFF = AugmentationSettings(mirror=False, cut=0, parts=0)
+ALL = AugmentationSettings(mirror=True, cut=1, parts=1)
+
+
+def patch(*sides: float, vehicle: bool = True) -> Sample:
+    return Sample(NOISE, vehicle, np.array(sides or (np.nan,) * 4, np.float32))
+
+
+def augmented(
+    settings: AugmentationSettings, sample: Sample | None = None, seed: int = 0
+) -> list[Sample]:
+    return list(augment(sample or patch(), (seed,), settings))
+
+
+def test_with_everything_off_nothing_is_added() -> None:
+    assert augmented(OFF) == []
+
+
+def test_a_mirror_image_flips_the_picture_and_its_box() -> None:
+    sample = mirrored(patch(-0.4, -0.3, 0.2, 0.1))
+    np.testing.assert_array_equal(sample.image, NOISE[:, ::-1])
+    np.testing.assert_allclose(sample.sides, [-0.2, -0.3, 0.4, 0.1], rtol=1e-6)
+
+
+def test_an_unknown_side_is_the_opposite_side_in_the_mirror_image() -> None:
+    np.testing.assert_array_equal(
+        np.isnan(mirrored(patch(-0.4, -0.3, np.nan, 0.1)).sides), [True, False, False, False]
+    )
+
+
+@given(st.tuples(*[st.floats(-2, 2, width=32)] * 4))
+def test_the_mirror_image_of_the_mirror_image_is_the_patch(sides: tuple[float, ...]) -> None:
+    twice = mirrored(mirrored(patch(*sides)))
+    np.testing.assert_array_equal(twice.image, NOISE)
+    np.testing.assert_array_equal(twice.sides, np.array(sides, np.float32))
+
+
+@pytest.mark.parametrize("vehicle", [True, False])
+def test_a_cut_repeats_the_outermost_column_that_is_left(vehicle: bool) -> None:
+    right = cut_off(patch(vehicle=vehicle), 0.25, left=False)
+    np.testing.assert_array_equal(right.image[:, :48], NOISE[:, :48])
+    np.testing.assert_array_equal(right.image[:, 48:], np.repeat(NOISE[:, 47:48], 16, axis=1))
+    left = cut_off(patch(vehicle=vehicle), 0.25, left=True)
+    np.testing.assert_array_equal(left.image[:, 16:], NOISE[:, 16:])
+    np.testing.assert_array_equal(left.image[:, :16], np.repeat(NOISE[:, 16:17], 16, axis=1))
+    assert right.vehicle is left.vehicle is vehicle
+
+
+def test_a_side_beyond_the_cut_becomes_unknown() -> None:
+    whole = patch(-0.4, -0.3, 0.2, 0.1)
+    for sample, unknown in (
+        (cut_off(whole, 0.375, left=False), [False, False, True, False]),
+        (cut_off(whole, 0.25, left=False), [False] * 4),
+        (cut_off(whole, 0.25, left=True), [True, False, False, False]),
+    ):
+        np.testing.assert_array_equal(np.isnan(sample.sides), unknown)
+        np.testing.assert_array_equal(
+            sample.sides[~np.isnan(sample.sides)], whole.sides[~np.array(unknown)]
+        )
+
+
+def test_the_other_samples_are_made_of_the_patch_and_of_its_mirror_image() -> None:
+    mirror, *others = augmented(ALL)
+    np.testing.assert_array_equal(mirror.image, NOISE[:, ::-1])
+    assert [sample.vehicle for sample in others] == [True, False, True, False]
+    assert len(augmented(ALL.model_copy(update={"mirror": False}))) == 2
+
+
+def test_a_non_vehicle_has_no_parts() -> None:
+    assert [sample.vehicle for sample in augmented(ALL, patch(vehicle=False))] == [False] * 3
+
+
+def test_a_cut_takes_15_to_50_percent_of_either_side() -> None:
+    only = OFF.model_copy(update={"cut": 1})
+    left = []
+    for seed in range(40):
+        (sample,) = augmented(only, patch(-0.5, -0.5, 0.5, 0.5), seed)
+        kept = (sample.image == NOISE).all(axis=(0, 2))
+        assert 32 <= np.count_nonzero(kept) <= 55  # one more: the column that is repeated
+        left.append(not kept[0])
+        assert np.isnan(sample.sides).tolist() == [left[-1], False, not left[-1], False]
+    assert 10 < sum(left) < 30
+
+
+def test_a_part_is_a_crop_of_40_to_60_percent_without_a_box() -> None:
+    only = OFF.model_copy(update={"parts": 1})
+    windows = np.lib.stride_tricks.sliding_window_view(NOISE[:, :, 0], (26, 26))
+    for seed in range(20):
+        (sample,) = augmented(only, patch(-0.5, -0.5, 0.5, 0.5), seed)
+        assert sample.image.shape[0] == sample.image.shape[1]
+        assert 26 <= len(sample.image) <= 38
+        assert (windows == sample.image[:26, :26, 0]).all(axis=(2, 3)).any()
+        assert not sample.vehicle
+        assert np.isnan(sample.sides).all()
+
+
+@pytest.mark.parametrize("name", ["cut", "parts"])
+def test_a_share_of_the_patches_is_augmented(name: str) -> None:
+    settings = OFF.model_copy(update={name: 0.25})
+    with_one = sum(len(augmented(settings, seed=seed)) for seed in range(1000))
+    assert 200 < with_one < 300
+
+
+def test_the_same_seed_gives_the_same_samples_with_other_kinds_on_or_off() -> None:
+    part = augmented(OFF.model_copy(update={"parts": 1}), seed=3)[0]
+    same = augmented(ALL.model_copy(update={"mirror": False}), seed=3)[1]
+    other = augmented(OFF.model_copy(update={"parts": 1}), seed=4)[0]
+    np.testing.assert_array_equal(part.image, same.image)
+    assert part.image.shape != other.image.shape or (part.image != other.image).any()
+
+
+def test_zoomed_in_a_box_moves_and_grows_with_its_vehicle() -> None:
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[20:40, 24:44] = 255
+    box = (np.array([24, 20, 44, 40]) / 64 - 0.5).astype(np.float32)
+    for seed in range(20):
+        (sample,) = zoom_in(Sample(image, True, box), (seed,))
+        side = len(sample.image)
+        assert 38 <= side <= 64
+        rows, columns = (np.flatnonzero(sample.image[:, :, 0].any(axis=axis)) for axis in (1, 0))
+        edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1])
+        inside = (edges > 0) & (edges < side)
+        np.testing.assert_allclose(sample.sides[inside], (edges / side - 0.5)[inside], atol=1e-5)
+
+
+def test_a_patch_need_not_be_square() -> None:
+    wide = Sample(
+        np.ascontiguousarray(NOISE[:32]), True, np.array([-0.5, -0.5, 0.5, 0.5], np.float32)
+    )
+    (sample,) = zoom_in(wide, (0,))
+    height, width = sample.image.shape[:2]
+    assert abs(width - 2 * height) <= 1
+    extent = sample.sides[2:] - sample.sides[:2]
+    np.testing.assert_allclose(extent, [64 / width, 32 / height], rtol=1e-5)

@@ -1,0 +1,405 @@
+import os
+import re
+import shutil
+import stat
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vdet.errors import DataError
+from vdet.learn.svm.dataset import (
+    MAX_PATCH_BYTES,
+    PatchFile,
+    find_boxed,
+    find_patches,
+    read_patches,
+)
+
+PATCH = np.random.default_rng(0).integers(0, 256, (8, 8, 3), dtype=np.uint8)
+PNG = cv2.imencode(".png", PATCH)[1].tobytes()
+Maker = Callable[[Path, Iterable[str]], Path]
+BOTH = ["vehicles/far/1.png", "non-vehicles/road/1.png"]
+
+
+def make_folder(folder: Path, names: Iterable[str]) -> Path:
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(PNG)
+    return folder
+
+
+def make_zip(path: Path, names: Iterable[str]) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in names:
+            archive.writestr(name, PNG)
+    return path
+
+
+def listed(*sources: Path) -> list[tuple[str, str]]:
+    return [(file.name, file.group) for file in find_patches(sources)]
+
+
+def test_a_folder_holds_both_classes_and_their_groups(tmp_path: Path) -> None:
+    names = ["vehicles/far/1.png", "vehicles/left/1.png", "non-vehicles/road/1.png"]
+    files = find_patches([make_folder(tmp_path, names)])
+    assert [(file.name, file.group, file.vehicle) for file in files] == [
+        ("non-vehicles/road/1.png", "non-vehicles/road", False),
+        ("vehicles/far/1.png", "vehicles/far", True),
+        ("vehicles/left/1.png", "vehicles/left", True),
+    ]
+
+
+def test_each_class_may_be_a_zip_file_of_its_own(tmp_path: Path) -> None:
+    one = make_zip(tmp_path / "a.zip", ["vehicles/far/1.png"])
+    other = make_zip(tmp_path / "b.zip", ["non-vehicles/road/1.png"])
+    files = find_patches([one, other])
+    assert [(file.source, file.vehicle) for file in files] == [(other, False), (one, True)]
+
+
+def test_a_folder_and_a_zip_file_go_together(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "data", ["vehicles/far/1.png"])
+    archive = make_zip(tmp_path / "other.zip", ["non-vehicles/road/1.png"])
+    assert [file.vehicle for file in find_patches([folder, archive])] == [False, True]
+
+
+def test_folders_named_after_the_classes_may_be_given_themselves(tmp_path: Path) -> None:
+    make_folder(tmp_path, BOTH)
+    assert listed(tmp_path / "vehicles", tmp_path / "non-vehicles") == [
+        ("road/1.png", "non-vehicles/road"),
+        ("far/1.png", "vehicles/far"),
+    ]
+
+
+def test_classes_may_lie_below_other_folders(tmp_path: Path) -> None:
+    make_folder(tmp_path, [f"set/2/{name}" for name in BOTH])
+    assert [group for _, group in listed(tmp_path)] == ["non-vehicles/road", "vehicles/far"]
+
+
+def test_patches_without_a_group_folder_are_the_group_of_their_class(tmp_path: Path) -> None:
+    make_folder(tmp_path, ["vehicles/1.png", "non-vehicles/1.png"])
+    assert [group for _, group in listed(tmp_path)] == ["non-vehicles", "vehicles"]
+
+
+def test_patches_come_in_numeric_order_of_their_names(tmp_path: Path) -> None:
+    names = [f"vehicles/far/image{i}.png" for i in (10, 2, 1, 100)]
+    make_folder(tmp_path, [*names, "non-vehicles/road/1.png"])
+    assert [name for name, _ in listed(tmp_path)][1:] == [
+        f"vehicles/far/image{i}.png" for i in (1, 2, 10, 100)
+    ]
+
+
+def test_the_order_is_the_same_in_a_zip_file(tmp_path: Path) -> None:
+    names = [f"vehicles/far/image{i}.png" for i in (10, 2, 1)] + ["non-vehicles/road/1.png"]
+    folder = make_folder(tmp_path / "folder", names)
+    assert listed(make_zip(tmp_path / "set.zip", names)) == listed(folder)
+
+
+def test_any_picture_format_counts_with_upper_or_lower_case_suffix(tmp_path: Path) -> None:
+    names = [f"vehicles/far/{name}" for name in ("1.jpg", "2.JPEG", "3.PNG", "4.bmp")]
+    make_folder(tmp_path, [*names, "non-vehicles/road/1.png"])
+    assert [name for name, _ in listed(tmp_path)][1:] == names
+
+
+@pytest.mark.parametrize("make", [make_folder, make_zip])
+def test_other_files_than_patches_are_skipped(tmp_path: Path, make: Maker) -> None:
+    junk = [
+        "__MACOSX/vehicles/far/._1.png",
+        "vehicles/far/._1.png",
+        "vehicles/.DS_Store",
+        "vehicles/far/notes.txt",
+        "vehicles/.cache/1.png",
+        "elsewhere/1.png",
+        "Vehicles/1.png",
+    ]
+    assert [name for name, _ in listed(make(tmp_path / "set", [*BOTH, *junk]))] == BOTH[::-1]
+
+
+def test_a_source_given_twice_counts_once(tmp_path: Path) -> None:
+    make_folder(tmp_path, BOTH)
+    assert len(find_patches([tmp_path, tmp_path])) == 2
+
+
+@pytest.mark.parametrize(
+    ("present", "missing"), [("vehicles", "non-vehicles"), ("non-vehicles", "vehicles")]
+)
+def test_a_missing_class_is_named(tmp_path: Path, present: str, missing: str) -> None:
+    make_folder(tmp_path, [f"{present}/far/1.png"])
+    with pytest.raises(DataError, match=f"no patches of the class {missing}; expected pictures in"):
+        find_patches([tmp_path])
+
+
+def test_no_sources_are_no_patches() -> None:
+    with pytest.raises(DataError, match="no patches of the class vehicles"):
+        find_patches([])
+
+
+@pytest.mark.parametrize("make", [make_folder, make_zip])
+def test_a_source_without_patches_is_named(tmp_path: Path, make: Maker) -> None:
+    good = make_folder(tmp_path / "good", BOTH)
+    empty = make(tmp_path / "poor", ["cars/1.png"])
+    with pytest.raises(DataError, match="poor: no pictures in vehicles/<group>/"):
+        find_patches([good, empty])
+
+
+def test_a_missing_source_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"no\.zip: no such folder or zip file"):
+        find_patches([tmp_path / "no.zip"])
+
+
+@pytest.mark.parametrize("data", [b"", b"text", b"PK\x03\x04 and no more"])
+def test_a_file_that_is_no_zip_file_is_named(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "set.zip"
+    path.write_bytes(data)
+    with pytest.raises(DataError, match=r"set\.zip: is neither a folder nor a readable zip file"):
+        find_patches([path])
+
+
+def test_a_mutated_zip_file_is_refused_or_read(tmp_path: Path) -> None:
+    path = make_zip(tmp_path / "set.zip", BOTH)
+    whole = np.frombuffer(path.read_bytes(), np.uint8)
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        mutated = whole.copy()
+        mutated[rng.integers(len(whole), size=2)] = rng.integers(256)
+        path.write_bytes(mutated.tobytes())
+        try:
+            files = find_patches([path])
+        except DataError as error:
+            assert "set.zip" in str(error)  # noqa: PT017
+        else:
+            assert len(list(read_patches(files))) == len(files)
+
+
+def test_patches_are_read_in_the_order_given_with_their_checksum(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "folder", BOTH)
+    files = find_patches([folder, make_zip(tmp_path / "set.zip", BOTH)])
+    patches = list(read_patches(reversed(files)))
+    assert [patch.file for patch in patches] == files[::-1]
+    for patch in patches:
+        np.testing.assert_array_equal(patch.image, PATCH)
+        assert patch.checksum == zlib.crc32(PNG)
+
+
+def test_a_broken_patch_has_no_image_and_the_others_are_read(tmp_path: Path) -> None:
+    make_folder(tmp_path, [*BOTH, "vehicles/far/2.png", "vehicles/far/3.png"])
+    (tmp_path / "vehicles/far/1.png").write_bytes(PNG[:30])
+    (tmp_path / "vehicles/far/2.png").write_text("text")
+    patches = list(read_patches(find_patches([tmp_path])))
+    assert [patch.image is None for patch in patches] == [False, True, True, False]
+
+
+def test_a_patch_that_is_gone_when_it_is_read_is_broken(tmp_path: Path) -> None:
+    files = find_patches([make_folder(tmp_path, BOTH)])
+    shutil.rmtree(tmp_path / "vehicles")
+    assert [patch.image is None for patch in read_patches(files)] == [False, True]
+
+
+def test_an_archive_that_is_gone_when_it_is_read_has_broken_patches(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", BOTH)
+    files = find_patches([archive])
+    archive.unlink()
+    assert [patch.image for patch in read_patches(files)] == [None, None]
+
+
+def first_of(archive: Path) -> PatchFile:
+    return find_patches([archive])[0]
+
+
+def test_an_encrypted_patch_is_broken(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", BOTH)
+    data = bytearray(archive.read_bytes())
+    for mark, offset in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        at = data.find(mark)
+        while at >= 0:
+            data[at + offset] |= 1  # the flag says: encrypted
+            at = data.find(mark, at + 1)
+    archive.write_bytes(data)
+    assert [patch.image for patch in read_patches(find_patches([archive]))] == [None, None]
+
+
+def test_a_patch_whose_checksum_is_wrong_is_broken(tmp_path: Path) -> None:
+    archive = tmp_path / "set.zip"
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as file:
+        for name in BOTH:
+            file.writestr(name, PNG)
+    data = archive.read_bytes()
+    at = data.find(PNG) + len(PNG) // 2
+    archive.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
+    assert sorted(patch.image is None for patch in read_patches(find_patches([archive]))) == [
+        False,
+        True,
+    ]
+
+
+def test_a_patch_of_unreasonable_size_is_not_unpacked(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", BOTH)
+    with zipfile.ZipFile(archive, "a", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("non-vehicles/bomb/1.png", PNG + bytes(MAX_PATCH_BYTES))
+    (patch,) = read_patches([first_of(archive)])
+    assert patch.file.group == "non-vehicles/bomb"
+    assert patch.image is None
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("../vehicles/far/1.png", "has '..' in its name"),
+        ("vehicles/../../far/1.png", "has '..' in its name"),
+        ("vehicles\\..\\1.png", "has '..' in its name"),
+        ("/vehicles/far/2.png", "has an absolute name"),
+        ("\\vehicles\\far\\2.png", "has an absolute name"),
+        ("C:/vehicles/far/2.png", "has an absolute name"),
+        (BOTH[0], "is in it twice"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_a_zip_file_with_an_unsafe_name_is_refused(tmp_path: Path, name: str, words: str) -> None:
+    archive = make_zip(tmp_path / "set.zip", [*BOTH, name])
+    with pytest.raises(DataError, match=r"set\.zip: its member .*" + re.escape(words)):
+        find_patches([archive])
+
+
+def test_a_symbolic_link_in_a_zip_file_is_refused(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", BOTH)
+    link = zipfile.ZipInfo("vehicles/far/link.png")
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    with zipfile.ZipFile(archive, "a") as file:
+        file.writestr(link, "/etc/passwd")
+    with pytest.raises(DataError, match=r"its member vehicles/far/link\.png is a symbolic link"):
+        find_patches([archive])
+
+
+def test_a_name_from_a_zip_file_is_shown_without_control_characters(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", [*BOTH, "vehicles/far/\x1b[2J\n.png"])
+    shown = [str(file) for file in find_patches([archive])]
+    assert shown[2] == rf"{archive}: vehicles/far/\x1b[2J\n.png"
+
+
+def test_a_folder_whose_name_is_no_text_is_a_group(tmp_path: Path) -> None:
+    make_folder(tmp_path, [*BOTH, os.fsdecode(b"vehicles/\xff\x1b[2J/1.png")])
+    groups = [file.group for file in find_patches([tmp_path])]
+    assert groups == ["non-vehicles/road", r"vehicles/\udcff\x1b[2J", "vehicles/far"]
+    assert all(patch.image is not None for patch in read_patches(find_patches([tmp_path])))
+
+
+def test_a_number_in_a_name_may_have_any_number_of_digits(tmp_path: Path) -> None:
+    names = [f"vehicles/{digits}.png" for digits in ("2" * 5000, "1" * 5000, "0003", "20")]
+    archive = make_zip(tmp_path / "set.zip", [*names, BOTH[1]])
+    ordered = [names[2], names[3], names[1], names[0]]
+    assert [name for name, _ in listed(archive)][1:] == ordered
+
+
+@given(st.lists(st.integers(0, 10**30), min_size=2, max_size=6, unique=True), st.integers(0, 3))
+def test_numbers_of_any_length_are_ordered_by_value(
+    tmp_path_factory: pytest.TempPathFactory, numbers: list[int], zeros: int
+) -> None:
+    names = [f"vehicles/{'0' * zeros}{number}.png" for number in numbers]
+    path = make_zip(tmp_path_factory.getbasetemp() / "numbers.zip", [*names, BOTH[1]])
+    ordered = [name for _, name in sorted(zip(numbers, names, strict=True))]
+    assert [name for name, _ in listed(path)][1:] == ordered
+
+
+def test_devices_and_pipes_in_a_folder_are_no_patches(tmp_path: Path) -> None:
+    make_folder(tmp_path, BOTH)
+    os.mkfifo(tmp_path / "vehicles/far/2.png")
+    (tmp_path / "vehicles/far/3.png").symlink_to("/dev/zero")
+    assert [name for name, _ in listed(tmp_path)] == BOTH[::-1]
+
+
+def test_a_patch_names_its_source_and_its_place_in_it(tmp_path: Path) -> None:
+    archive = make_zip(tmp_path / "set.zip", BOTH)
+    assert str(first_of(archive)) == f"{archive}: non-vehicles/road/1.png"
+
+
+BOXED = [*BOTH, "boxes/far/2.png", "boxes/far/1.png"]
+ROWS = (
+    "name,left,top,right,bottom",
+    "vehicles/far/1.png,-0.5,-0.25,0.5,0.25",
+    "boxes/far/1.png,-0.75,-0.25,,0.5",
+    "boxes/far/2.png,,,,",
+)
+
+
+def with_table(tmp_path: Path, make: Maker, names: Iterable[str], *rows: str) -> Path:
+    source = make(tmp_path / "mined", names)
+    text = "\n".join(rows) + "\n"
+    if source.is_dir():
+        (source / "boxes.csv").write_text(text)
+    else:
+        with zipfile.ZipFile(source, "a", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("boxes.csv", text)
+    return source
+
+
+@pytest.mark.parametrize("make", [make_folder, make_zip])
+def test_a_table_has_the_sides_of_the_vehicle_in_a_patch(tmp_path: Path, make: Maker) -> None:
+    source = with_table(tmp_path, make, BOXED, *ROWS)
+    assert [(file.group, file.vehicle, file.sides) for file in find_patches([source])] == [
+        ("non-vehicles/road", False, None),
+        ("vehicles/far", True, (-0.5, -0.25, 0.5, 0.25)),
+    ]
+    assert [(file.name, file.group, file.vehicle, file.sides) for file in find_boxed([source])] == [
+        ("boxes/far/1.png", "boxes/far", True, (-0.75, -0.25, None, 0.5)),
+        ("boxes/far/2.png", "boxes/far", True, (None,) * 4),
+    ]
+
+
+def test_a_table_applies_to_its_own_source_alone(tmp_path: Path) -> None:
+    mined = with_table(tmp_path, make_folder, BOXED, *ROWS)
+    other = make_folder(tmp_path / "other", BOTH)
+    vehicles = [file for file in find_patches([mined, other]) if file.vehicle]
+    assert [(file.source, file.sides is None) for file in vehicles] == [
+        (mined, False),
+        (other, True),
+    ]
+    assert {file.source for file in find_boxed([other, mined])} == {mined}
+
+
+def test_a_picture_in_boxes_that_is_not_in_the_table_is_skipped(tmp_path: Path) -> None:
+    source = with_table(tmp_path, make_folder, BOXED, *ROWS[:3])
+    assert [file.name for file in find_boxed([source])] == ["boxes/far/1.png"]
+    assert len(find_patches([source])) == 2
+
+
+def test_without_a_table_boxes_is_an_ordinary_folder(tmp_path: Path) -> None:
+    make_folder(tmp_path, ["vehicles/boxes/1.png", "non-vehicles/1.png"])
+    assert listed(tmp_path)[1] == ("vehicles/boxes/1.png", "vehicles/boxes")
+    assert find_boxed([tmp_path]) == []
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        (),
+        ("name,left,top,right",),
+        ("vehicles/far/1.png,-0.5,-0.25,0.5,0.25",),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5"),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,0.25,0"),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,wide"),
+        (ROWS[0], "vehicles/far/1.png,-0.5,-0.25,0.5,nan"),
+        (ROWS[0], ""),
+    ],
+)
+@pytest.mark.parametrize("make", [make_folder, make_zip])
+def test_a_damaged_table_is_refused(tmp_path: Path, make: Maker, rows: tuple[str, ...]) -> None:
+    source = with_table(tmp_path, make, BOXED, *rows)
+    with pytest.raises(DataError, match=r"mined: boxes\.csv is damaged .*; mine it again"):
+        find_patches([source])
+
+
+def test_a_table_that_cannot_be_unpacked_is_refused(tmp_path: Path) -> None:
+    source = with_table(tmp_path, make_zip, BOXED, *ROWS)
+    data = bytearray(source.read_bytes())
+    at = data.find(b"boxes.csv") + len(b"boxes.csv")
+    data[at + 8] ^= 0xFF
+    source.write_bytes(data)
+    with pytest.raises(DataError, match=r"boxes\.csv is damaged"):
+        find_boxed([source])

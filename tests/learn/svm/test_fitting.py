@@ -1,0 +1,206 @@
+import logging
+import tracemalloc
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from sklearn.calibration import CalibratedClassifierCV
+from sklearn.model_selection import StratifiedKFold
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from sklearn.svm import LinearSVC
+
+from vdet.boxes import Float32Array
+from vdet.config.schema import (
+    CalibrationSettings,
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    Settings,
+    SvmSettings,
+    TrainingSettings,
+)
+from vdet.errors import DataError
+from vdet.learn.svm.extraction import LabelledVectors, SampleVectors
+from vdet.learn.svm.fitting import fit, fit_patches
+from vdet.learn.svm.linear_svm import LinearSvm
+
+COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
+
+
+def clouds(count: int = 300) -> tuple[Float32Array, npt.NDArray[np.bool_]]:
+    """Return two overlapping clouds of features of very different scale, one of them constant."""
+    rng = np.random.default_rng(0)
+    vehicle = rng.random(count) < 0.4
+    vectors = rng.normal(size=(count, 24)) + 0.6 * vehicle[:, np.newaxis]
+    vectors = (vectors + 2) * np.logspace(-2, 3, 24)
+    vectors[:, 5] = 7
+    return vectors.astype(np.float32), vehicle
+
+
+def training(*, ensemble: bool = True, **changes: object) -> TrainingSettings:
+    calibration = CalibrationSettings(ensemble=ensemble)
+    return TrainingSettings(C=0.01, calibration=calibration).model_copy(update=changes)
+
+
+@pytest.mark.parametrize("ensemble", [True, False])
+def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool) -> None:
+    vectors, vehicle = clouds()
+    model = fit(vectors, vehicle, COLOUR, training(ensemble=ensemble))
+    svm = CalibratedClassifierCV(
+        LinearSVC(C=0.01, random_state=0),
+        cv=StratifiedKFold(3, shuffle=True, random_state=0),
+        ensemble=ensemble,
+    )
+    reference = make_pipeline(StandardScaler(), svm).fit(vectors, vehicle)
+    expected = reference.predict_proba(vectors)[:, 1]
+    assert expected.std() > 0.2
+    np.testing.assert_allclose(model.probabilities(vectors), expected, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("ensemble", "folds", "members"), [(True, 3, 3), (True, 5, 5), (False, 3, 1)]
+)
+def test_an_ensemble_has_a_member_for_each_fold_and_otherwise_there_is_one(
+    ensemble: bool, folds: int, members: int
+) -> None:
+    vectors, vehicle = clouds()
+    calibration = CalibrationSettings(folds=folds, ensemble=ensemble)
+    model = fit(vectors, vehicle, COLOUR, training(calibration=calibration))
+    assert model.weights.shape == (members, 24)
+    assert model.biases.shape == model.slopes.shape == model.offsets.shape == (members,)
+    assert model.features == COLOUR
+
+
+def test_a_model_is_of_float32() -> None:
+    model = fit(*clouds(), COLOUR, training())
+    kinds = {a.dtype for a in (model.weights, model.biases, model.slopes, model.offsets)}
+    assert kinds == {np.dtype(np.float32)}
+
+
+def test_the_same_seed_gives_the_same_model_bit_for_bit() -> None:
+    one, same, other = (fit(*clouds(), COLOUR, training(seed=seed)) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(one.weights, same.weights)
+    np.testing.assert_array_equal(one.slopes, same.slopes)
+    assert (one.weights != other.weights).any()
+
+
+def test_a_feature_that_never_changes_does_no_harm() -> None:
+    model = fit(*clouds(), COLOUR, training())
+    assert np.isfinite(model.weights).all()
+
+
+@pytest.mark.parametrize(("vehicles", "others"), [(2, 30), (30, 2), (0, 30), (30, 0), (0, 0)])
+def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, others: int) -> None:
+    vehicle = np.array([True] * vehicles + [False] * others, bool)
+    vectors = np.ones((len(vehicle), 24), np.float32)
+    message = (
+        rf"a class has {min(vehicles, others)} training patches, training\.calibration\.folds "
+        "needs 3; give more patches"
+    )
+    with pytest.raises(DataError, match=message):
+        fit(vectors, vehicle, COLOUR, training())
+
+
+def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with caplog.at_level(logging.WARNING, "vdet"):
+        fit(*clouds(), COLOUR, training(max_iterations=1, C=1e6))
+    assert "the SVM has not converged; raise training.max_iterations" in caplog.text
+
+
+def test_an_svm_that_has_converged_gives_no_warning(caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.WARNING, "vdet"):
+        fit(*clouds(), COLOUR, training())
+    assert caplog.text == ""
+
+
+def test_a_patch_and_the_samples_made_of_it_are_in_the_same_fold() -> None:
+    """Otherwise the SVM knows a sample like the patch, and the score of the patch is too good."""
+    rng = np.random.default_rng(0)
+    vehicle = np.arange(90) % 2 == 0
+    noise = rng.normal(size=(90, 24)).astype(np.float32)  # can only be learned by heart
+    twice = np.concatenate([noise, noise])
+    origins = np.tile(np.arange(90), 2)
+    loose = training(ensemble=False, C=10.0)
+    honest = fit(twice, np.tile(vehicle, 2), COLOUR, loose, origins)
+    leaking = fit(twice, np.tile(vehicle, 2), COLOUR, loose)
+    np.testing.assert_allclose(honest.weights, leaking.weights, atol=1e-3)
+    assert abs(leaking.slopes[0]) > 2 * abs(honest.slopes[0])
+
+
+def test_augmented_samples_do_not_count_in_the_calibration() -> None:
+    """They are all non-vehicles; the probabilities are those of the patches."""
+    vectors, vehicle = clouds(400)
+    augmented = vectors[~vehicle]
+    rows = np.concatenate([vectors, augmented])
+    labels = np.concatenate([vehicle, np.zeros(len(augmented), bool)])
+    origins = np.concatenate([np.arange(400), np.flatnonzero(~vehicle)])
+    model = fit(rows, labels, COLOUR, training(ensemble=False), origins)
+    assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
+
+
+def test_rows_that_are_their_own_origins_are_patches() -> None:
+    vectors, vehicle = clouds()
+    plain = fit(vectors, vehicle, COLOUR, training())
+    told = fit(vectors, vehicle, COLOUR, training(), np.arange(len(vehicle)))
+    np.testing.assert_array_equal(plain.weights, told.weights)
+
+
+def test_augmented_samples_do_not_replace_missing_patches() -> None:
+    vectors, _ = clouds(40)
+    vehicle = np.arange(40) % 20 == 0
+    origins = np.where(vehicle, 0, np.arange(40))
+    with pytest.raises(DataError, match="a class has 1 training patches"):
+        fit(vectors, vehicle, COLOUR, training(), origins)
+
+
+@pytest.mark.parametrize("penalty", [1e-4, 1.0])
+def test_the_svm_has_the_loss_of_scikit_learn_or_less(penalty: float) -> None:
+    vectors, vehicle = clouds()
+    scaled = StandardScaler().fit_transform(vectors)
+    reference = LinearSVC(C=penalty, random_state=0).fit(scaled, vehicle)
+    rows = np.arange(len(scaled))
+    found = LinearSvm(scaled, C=penalty).fit(rows, vehicle)
+
+    def loss(svm: LinearSVC | LinearSvm) -> float:
+        distances = scaled.astype(np.float64) @ svm.coef_[0] + svm.intercept_[0]
+        errors = np.maximum(0, 1 - np.where(vehicle, 1, -1) * distances)
+        penalties = np.square(svm.coef_).sum() + np.square(svm.intercept_).sum()
+        return float(penalties / 2 + penalty * np.square(errors).sum())
+
+    assert loss(found) <= loss(reference) * (1 + 1e-5)
+    assert (found.predict(rows) == reference.predict(scaled)).mean() > 0.99
+
+
+def peak_memory(call: Callable[[], object]) -> int:
+    """Return the bytes that `call` had at once."""
+    tracemalloc.start()
+    call()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    return peak
+
+
+def test_the_svm_copies_no_data() -> None:
+    vectors = np.random.default_rng(0).normal(size=(4000, 500)).astype(np.float32)
+    vehicle = vectors[:, 0] > 0
+    svm = LinearSvm(vectors, C=0.01)
+    assert peak_memory(lambda: svm.fit(np.arange(4000), vehicle)) < vectors.nbytes / 2
+
+
+def test_a_fit_has_the_training_part_in_memory_once() -> None:
+    rng = np.random.default_rng(0)
+    vectors, more = (rng.normal(size=(n, 768)).astype(np.float32) for n in (3000, 4500))
+    origins = rng.integers(0, 3000, 4500)
+    vehicle = vectors[:, 0] > 0
+    samples = SampleVectors(more, vehicle[origins], np.zeros((4500, 4), np.float32), origins)
+    data = LabelledVectors(vectors, vehicle, np.full(3000, "a"), "", 0, augmented=samples)
+    features = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=256))
+    settings = Settings(
+        detector=SvmSettings(features=features), training=training(ensemble=False, max_iterations=5)
+    )
+    peak = peak_memory(lambda: fit_patches(data, np.ones(3000, bool), settings))
+    assert peak < 1.5 * (vectors.nbytes + more.nbytes)

@@ -1,0 +1,59 @@
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vdet.errors import OutputError
+from vdet.learn.svm.dataset import Sides, find_boxed, find_patches, patch_archive, read_patches
+from vdet.media.images import Image
+
+NAMES = ("vehicles/a/1.png", "boxes/a/2.png", "non-vehicles/a/3.png")
+BOXES: tuple[Sides | None, ...] = ((-0.5, -0.25, 0.5, 0.12344), (None, -0.25, 0.5, 0.0), None)
+
+
+def patch(number: int) -> Image:
+    return np.random.default_rng(number).integers(0, 256, (8, 8, 3), dtype=np.uint8)
+
+
+def write(path: Path) -> Path:
+    with patch_archive(path) as archive:
+        for number, (name, sides) in enumerate(zip(NAMES, BOXES, strict=True)):
+            archive.add(name, patch(number), sides)
+    return path
+
+
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.zip")
+    files = [*find_patches([path]), *find_boxed([path])]
+    assert {file.name: file.sides for file in files} == {
+        NAMES[0]: (-0.5, -0.25, 0.5, 0.1234),
+        NAMES[1]: BOXES[1],
+        NAMES[2]: None,
+    }
+    for read in read_patches(files):
+        np.testing.assert_array_equal(read.image, patch(NAMES.index(read.file.name)))
+
+
+def test_the_same_patches_give_the_same_bytes(tmp_path: Path) -> None:
+    assert write(tmp_path / "a.zip").read_bytes() == write(tmp_path / "b.zip").read_bytes()
+
+
+def test_the_files_in_it_can_be_read_when_unpacked(tmp_path: Path) -> None:
+    with zipfile.ZipFile(write(tmp_path / "a.zip")) as archive:
+        assert archive.testzip() is None
+        assert {info.external_attr >> 16 for info in archive.infolist()} == {0o644}
+
+
+def test_after_an_error_an_earlier_archive_is_unchanged(tmp_path: Path) -> None:
+    path = tmp_path / "a.zip"
+    path.write_bytes(b"precious")
+    with pytest.raises(UnicodeEncodeError), patch_archive(path) as archive:
+        archive.add("vehicles/\udc80.png", patch(0))
+    assert path.read_bytes() == b"precious"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="cannot be written"):
+        write(tmp_path / "no" / "a.zip")

@@ -1,0 +1,500 @@
+import logging
+import os
+import shutil
+import signal
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+import pytest
+
+import vdet
+from vdet.config.schema import (
+    AugmentationSettings,
+    BoxSettings,
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    Settings,
+    SvmSettings,
+    TrainingSettings,
+)
+from vdet.detect.svm.features import FeatureExtractor, Layout
+from vdet.detect.svm.model import load_model, save_model
+from vdet.errors import DataError
+from vdet.learn.svm.augmentation import augment
+from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
+from vdet.learn.svm.extraction import MAX_NAMED, extract
+from vdet.learn.svm.fitting import fit
+from vdet.learn.svm.training import train
+from vdet.learn.svm.training_set import hold_out
+from vdet.media.images import Image, read_image, write_image
+from vdet.workers import LocalProcesses, ThisProcess
+
+SIZE = 16
+GROUPS = {
+    "vehicles/far": 12,
+    "vehicles/near": 20,
+    "non-vehicles/road": 15,
+    "non-vehicles/sky": 10,
+}
+SETTINGS = Settings(
+    detector=SvmSettings(
+        features=FeatureSettings(
+            patch=SIZE,
+            halved=(),
+            hog=HogSettings(cell=4, channels=(0,)),
+            histogram=HistogramSettings(bins=8),
+        )
+    ),
+    training=TrainingSettings(
+        C=0.1, augmentation=AugmentationSettings(mirror=True, cut=0.5, parts=0.5)
+    ),
+)
+
+
+def texture(rng: np.random.Generator, vehicle: bool) -> Image:
+    """Draw noise with horizontal dark bars for a vehicle, vertical ones for anything else."""
+    image = rng.integers(120, 200, (SIZE, SIZE, 3), dtype=np.uint8)
+    at = int(rng.integers(2, 6))
+    bars = image if vehicle else image.swapaxes(0, 1)
+    bars[at : at + 3] = bars[at + 6 : at + 9] = 30
+    return image
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    rng = np.random.default_rng(0)
+    for group, count in GROUPS.items():
+        (folder / group).mkdir(parents=True)
+        for i in range(count):
+            write_image(folder / group / f"{i}.png", texture(rng, group.startswith("vehicles")))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def mined(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the same set with boxes: the bars of `vehicles/near`, and more in `boxes/`."""
+    folder = tmp_path_factory.mktemp("mined") / "set"
+    shutil.copytree(data, folder)
+    rng = np.random.default_rng(1)
+    (folder / "boxes" / "near").mkdir(parents=True)
+    rows = ["name,left,top,right,bottom"]
+    for name in [f"boxes/near/{i}.png" for i in range(40)]:
+        top = int(rng.integers(0, 8))
+        image = rng.integers(120, 200, (SIZE, SIZE, 3), dtype=np.uint8)
+        image[top : top + 8] = 30
+        write_image(folder / name, image)
+        rows.append(f"{name},,{top / SIZE - 0.5},,{(top + 8) / SIZE - 0.5}")
+    rows += [f"vehicles/near/{i}.png,-0.5,,0.5," for i in range(GROUPS["vehicles/near"])]
+    (folder / "boxes.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+@pytest.fixture
+def files(data: Path) -> list[PatchFile]:
+    return find_patches([data])
+
+
+def with_broken(files: list[PatchFile], folder: Path, count: int) -> list[PatchFile]:
+    """Add patches that are no pictures, in the middle of the list."""
+    (folder / "vehicles").mkdir()
+    broken = [PatchFile(folder, f"vehicles/{i}.png", "vehicles/far", True) for i in range(count)]
+    for file in broken:
+        (folder / file.name).write_text("no picture")
+    return [*files[:9], *broken, *files[9:]]
+
+
+def but(**changes: object) -> Settings:
+    """Return the settings with some of `training` replaced."""
+    training = SETTINGS.training.model_copy(update=changes)
+    return SETTINGS.model_copy(update={"training": training})
+
+
+NO_AUGMENTATION = AugmentationSettings(mirror=False, cut=0, parts=0)
+AUGMENTER = partial(augment, settings=SETTINGS.training.augmentation)
+
+
+def tolerant(share: float) -> Settings:
+    return but(max_broken=share)
+
+
+def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
+    vectors = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
+    assert vectors.groups.tolist() == [file.group for file in files]
+    assert vectors.vehicle.tolist() == [file.vehicle for file in files]
+    assert vectors.vehicle.sum() == 32
+    assert vectors.broken == 0
+    last = cv2.imread(str(files[-1].source / files[-1].name))
+    assert last is not None
+    extractor = FeatureExtractor(SETTINGS.svm.features)
+    assert vectors.vectors.shape == (57, extractor.layout.length)
+    expected = extractor.describe(np.asarray(last, np.uint8))
+    np.testing.assert_array_equal(vectors.vectors[-1], expected)
+
+
+def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
+    larger = SETTINGS.svm.features.model_copy(update={"patch": 32})
+    vectors = extract(files, larger, max_broken=0, workers=ThisProcess()).vectors
+    np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
+
+
+def test_several_processes_give_the_same_as_one(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
+    one = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=ThisProcess()
+    )
+    two = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=LocalProcesses(2)
+    )
+    np.testing.assert_array_equal(one.vectors, two.vectors)
+    np.testing.assert_array_equal(one.groups, two.groups)
+    assert one.digest == two.digest
+    assert one.augmented is not None
+    assert two.augmented is not None
+    for name in ("vectors", "vehicle", "origins"):
+        np.testing.assert_array_equal(getattr(one.augmented, name), getattr(two.augmented, name))
+
+
+def test_augmented_samples_have_the_row_of_their_patch(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
+    mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
+    augmented = extract(
+        files, SETTINGS.svm.features, max_broken=0, augmenter=mirror, workers=ThisProcess()
+    ).augmented
+    assert augmented is not None
+    assert augmented.origins.tolist() == list(range(57))
+    assert augmented.vehicle.tolist() == [file.vehicle for file in files]
+    last = read_image(files[-1].source / files[-1].name)
+    expected = FeatureExtractor(SETTINGS.svm.features).describe(np.ascontiguousarray(last[:, ::-1]))
+    np.testing.assert_array_equal(augmented.vectors[-1], expected)
+
+
+def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile]) -> None:
+    whole, one = (
+        extract(
+            some,
+            SETTINGS.svm.features,
+            max_broken=0,
+            augmenter=AUGMENTER,
+            seed=7,
+            workers=ThisProcess(),
+        ).augmented
+        for some in (files, files[40:41])
+    )
+    assert whole is not None
+    assert one is not None
+    assert len(one.origins) >= 1
+    np.testing.assert_array_equal(whole.vectors[whole.origins == 40], one.vectors)
+
+
+def test_a_process_that_is_killed_is_an_error(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def be_killed(*_: object, **__: object) -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    monkeypatch.setattr("vdet.learn.svm.extraction._describe_chunk", be_killed)
+    with pytest.raises(DataError, match="a process that described patches was killed"):
+        extract(files, SETTINGS.svm.features, max_broken=0, workers=LocalProcesses(2))
+
+
+def test_progress_adds_up_to_the_number_of_patches(
+    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
+    steps: list[int] = []
+    extract(
+        files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess(), progress=steps.append
+    )
+    assert steps == [10, 10, 10, 10, 10, 7]
+
+
+def test_different_data_sets_have_different_digests(files: list[PatchFile]) -> None:
+    whole, same, fewer, renamed = (
+        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+        for some in (
+            files,
+            files,
+            files[1:],
+            [replace(files[0], group="non-vehicles/x"), *files[1:]],
+        )
+    )
+    assert whole == same
+    assert len({whole, fewer, renamed}) == 3
+    assert len(whole) == 64
+
+
+def test_a_file_name_that_is_no_text_is_part_of_the_digest(tmp_path: Path) -> None:
+    picture = texture(np.random.default_rng(0), vehicle=True)
+    digests = set()
+    for name in (b"\xff.png", b"\xfe.png"):
+        path = tmp_path / name.hex() / "vehicles" / os.fsdecode(name)
+        path.parent.mkdir(parents=True)
+        write_image(path, picture)
+        odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
+        digests.add(
+            extract([odd], SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+        )
+    assert len(digests) == 2
+
+
+def test_broken_patches_are_named_skipped_and_counted(
+    files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    mixed = with_broken(files, tmp_path, 2)
+    with caplog.at_level(logging.WARNING, "vdet"):
+        vectors = extract(mixed, SETTINGS.svm.features, max_broken=0.1, workers=ThisProcess())
+    assert vectors.broken == 2
+    assert vectors.groups.tolist() == [file.group for file in files]
+    whole = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
+    np.testing.assert_array_equal(vectors.vectors, whole.vectors)
+    assert [record.message for record in caplog.records] == [
+        f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(2)
+    ]
+
+
+def test_only_the_first_broken_patches_are_named(
+    files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    mixed = with_broken(files, tmp_path, MAX_NAMED + 3)
+    with caplog.at_level(logging.WARNING, "vdet"):
+        extract(mixed, SETTINGS.svm.features, max_broken=0.5, workers=ThisProcess())
+    assert len(caplog.records) == MAX_NAMED + 1
+    assert caplog.records[-1].message == "… and 3 more"
+
+
+def test_more_broken_patches_than_are_tolerated_are_an_error(
+    files: list[PatchFile], tmp_path: Path
+) -> None:
+    mixed = with_broken(files, tmp_path, 3)
+    message = r"vehicles/0\.png: 3 of 60 patches are broken, more than the 4\.0% of training\.max_b"
+    with pytest.raises(DataError, match=message):
+        train(mixed, tolerant(0.04), jobs=1)
+    _, report = train(mixed, tolerant(0.05), jobs=1)
+    assert report.broken == 3
+
+
+def test_only_broken_patches_are_an_error_at_any_tolerance(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(DataError, match="patches"):
+        train(with_broken([], tmp_path, 5), tolerant(1), jobs=1)
+
+
+def test_the_report_counts_patches_and_features(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    assert (report.vehicles, report.non_vehicles, report.broken) == (32, 25, 0)
+    assert report.features == FeatureExtractor(SETTINGS.svm.features).layout.length
+    assert report.milliseconds_per_prediction > 0
+
+
+def test_a_separable_set_is_learned(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    for split in report.splits:
+        assert split.train_accuracy == 1
+        assert split.test_accuracy >= 0.9
+
+
+def test_the_parts_of_each_split_add_up(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    for split in report.splits:
+        assert split.train_patches + split.test_patches == 57
+        assert sum(asdict(split.confusion).values()) == split.test_patches
+        assert sum(group.patches for group in split.groups) == split.test_patches
+        right = split.confusion.true_positives + split.confusion.true_negatives
+        assert split.test_accuracy == pytest.approx(right / split.test_patches)
+        by_group = sum(group.patches * group.accuracy for group in split.groups)
+        assert by_group == pytest.approx(right)
+
+
+def test_the_tail_split_is_reported_by_group(files: list[PatchFile]) -> None:
+    _, report = train(files, SETTINGS, jobs=1)
+    tail = report.splits[1]
+    assert {group.group: group.patches for group in tail.groups} == {
+        "non-vehicles/road": 3,
+        "non-vehicles/sky": 2,
+        "vehicles/far": 2,
+        "vehicles/near": 4,
+    }
+
+
+@pytest.mark.parametrize("name", ["random", "tail"])
+def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_held_out(
+    files: list[PatchFile], name: Literal["random", "tail"]
+) -> None:
+    settings = but(split=name, augmentation=NO_AUGMENTATION)
+    model, report = train(files, settings, jobs=1)
+    data = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
+    kept = ~hold_out(data.groups, name, settings.training.test_fraction, settings.training.seed)
+    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.svm.features, settings.training)
+    np.testing.assert_array_equal(model.weights, expected.weights)
+    assert [split.train_augmented for split in report.splits] == [0, 0]
+
+
+@pytest.mark.parametrize("name", ["random", "tail"])
+def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
+    mined: Path, tmp_path: Path, name: Literal["random", "tail"]
+) -> None:
+    """Other pictures in place of the held-out ones give the same model."""
+    settings = but(split=name)
+    lists = find_patches([mined]), find_boxed([mined])
+    spoilt = tmp_path / "spoilt"
+    shutil.copytree(mined, spoilt)
+    for files in lists:
+        groups = np.array([file.group for file in files])
+        held = hold_out(groups, name, settings.training.test_fraction, settings.training.seed)
+        for row in np.flatnonzero(held):
+            flat = np.full((SIZE, SIZE, 3), row, np.uint8)
+            write_image(spoilt / files[row].name, flat, overwrite=True)
+    one, _ = train(lists[0], settings, boxed=lists[1], jobs=1)
+    files, boxed = find_patches([spoilt]), find_boxed([spoilt])
+    other, report = train(files, settings, boxed=boxed, jobs=1)
+    np.testing.assert_array_equal(one.weights, other.weights)
+    np.testing.assert_array_equal(one.slopes, other.slopes)
+    assert one.box_regression is not None
+    assert other.box_regression is not None
+    np.testing.assert_array_equal(one.box_regression.weights, other.box_regression.weights)
+    assert report.splits[0].train_augmented > report.splits[0].train_patches
+
+
+@pytest.mark.parametrize(("split", "order"), [("random", "random tail"), ("tail", "tail random")])
+def test_the_model_is_that_of_the_configured_split_which_comes_first(
+    files: list[PatchFile], split: str, order: str
+) -> None:
+    settings = but(split=split)
+    model, report = train(files, settings, jobs=1)
+    assert [part.split for part in report.splits] == order.split()
+    vectors = extract(files, settings.svm.features, max_broken=0, workers=ThisProcess())
+    right = (model.probabilities(vectors.vectors) >= 0.5) == vectors.vehicle
+    first = report.splits[0]
+    accuracy = first.train_patches * first.train_accuracy + first.test_patches * first.test_accuracy
+    assert right.sum() == pytest.approx(accuracy)
+
+
+def test_the_same_seed_gives_the_same_model_and_another_seed_another(
+    files: list[PatchFile],
+) -> None:
+    one, same, different = (
+        train(files, each, jobs=1)[0] for each in (SETTINGS, SETTINGS, but(seed=1))
+    )
+    for name in ("weights", "biases", "slopes", "offsets"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(same, name))
+    assert (one.weights != different.weights).any()
+
+
+def test_a_trained_model_has_its_provenance_and_can_be_saved(
+    files: list[PatchFile], tmp_path: Path
+) -> None:
+    model, report = train(files, SETTINGS, jobs=1)
+    save_model(model, tmp_path / "model.npz")
+    loaded = load_model(tmp_path / "model.npz", SETTINGS.svm.features)
+    provenance = loaded.provenance
+    assert provenance["program"] == f"vdet {vdet.__version__}"
+    assert provenance["training"] == SETTINGS.training.model_dump(mode="json")
+    assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
+    digest = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+    assert provenance["data_sha256"] == digest
+    np.testing.assert_array_equal(loaded.weights, model.weights)
+
+
+def test_too_few_patches_for_the_folds_are_an_error(files: list[PatchFile]) -> None:
+    few = [files[0], files[1], *[file for file in files if file.vehicle]]
+    with pytest.raises(DataError, match=r"a class has [0-2] training patches"):
+        train(few, SETTINGS, jobs=1)
+
+
+def test_groups_of_one_patch_each_have_no_tail_to_test(
+    files: list[PatchFile],
+) -> None:
+    lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]
+    with pytest.raises(DataError, match="no folder has two patches"):
+        train(lonely, SETTINGS, jobs=1)
+
+
+def test_without_boxes_a_model_finds_no_sides(files: list[PatchFile]) -> None:
+    model, report = train(files, SETTINGS, jobs=1)
+    assert model.box_regression is None
+    assert report.boxed == 0
+    assert {split.boxes for split in report.splits} == {None}
+
+
+def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
+    settings = but(split="tail", boxes=BoxSettings(penalty=1e-3))
+    files, boxed = find_patches([mined]), find_boxed([mined])
+    model, report = train(files, settings, boxed=boxed, jobs=1)
+    assert model.box_regression is not None
+    last = boxed[-1]
+    assert last.sides is not None
+    described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
+    hogs = described[: Layout.of(SETTINGS.svm.features).hog_length]
+    found = model.box_regression.sides(hogs[np.newaxis])[0]
+    np.testing.assert_allclose(found[[1, 3]], np.array(last.sides, float)[[1, 3]], atol=0.1)
+    np.testing.assert_allclose(found[[0, 2]], [-0.5, 0.5], atol=0.05)
+    error = report.splits[0].boxes
+    assert error is not None
+    assert error.patches == 4 + 8
+    assert error.mean < 0.06
+    assert report.boxed == 60
+    assert report.groups["boxes/near"] == 40
+    assert report.vehicles == 32, "patches of boxes/ belong to neither class"
+    assert model.provenance["boxes_sha256"] != model.provenance["data_sha256"]
+
+
+def test_patches_of_boxes_are_not_learned_from_as_vehicles(mined: Path) -> None:
+    files = find_patches([mined])
+    with_them, _ = train(files, SETTINGS, boxed=find_boxed([mined]), jobs=1)
+    without, _ = train(files, SETTINGS, jobs=1)
+    np.testing.assert_array_equal(with_them.weights, without.weights)
+
+
+@pytest.mark.parametrize("assumed", [0.0, 0.5])
+def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
+    data: Path, mined: Path, tmp_path: Path, assumed: float
+) -> None:
+    """The boxes of the mined vehicles are small; the other set makes the boxes larger."""
+    small = tmp_path / "small"
+    shutil.copytree(mined, small)
+    table = small / "boxes.csv"
+    table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,-0.1,0.2,0.1"))
+    settings = but(boxes=BoxSettings(penalty=100, assumed=assumed))
+    files = find_patches([small, data])
+    model, _ = train(files, settings, jobs=1)
+    assert model.box_regression is not None
+    vehicles = [file for file in files if file.vehicle]
+    described = extract(
+        vehicles, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()
+    ).vectors
+    hogs = described[:, : Layout.of(SETTINGS.svm.features).hog_length]
+    left, top, right, bottom = model.box_regression.sides(hogs).mean(axis=0).tolist()
+    if assumed:
+        assert max(left, -right) < -0.25
+        assert max(top, -bottom) < -0.15
+    else:
+        assert (left, right) == pytest.approx((-0.2, 0.2), abs=0.02)
+        assert (top, bottom) == pytest.approx((-0.1, 0.1), abs=0.02)
+
+
+def test_without_hog_no_sides_are_found(mined: Path) -> None:
+    colour = FeatureSettings(patch=SIZE, hog=HogSettings(channels=()))
+    settings = SETTINGS.model_copy(update={"detector": SvmSettings(features=colour)})
+    files, boxed = find_patches([mined]), find_boxed([mined])
+    assert train(files, settings, boxed=boxed, jobs=1)[0].box_regression is None
+
+
+def test_different_boxes_have_different_digests(mined: Path) -> None:
+    boxed = find_boxed([mined])
+    moved = [replace(boxed[0], sides=(None, 0.0, None, 0.1)), *boxed[1:]]
+    one, other = (
+        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
+        for some in (boxed, moved)
+    )
+    assert one != other

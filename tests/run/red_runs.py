@@ -1,0 +1,113 @@
+"""Runs of the pipeline that find red cars, and results as they give them."""
+
+from collections.abc import Iterable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
+from vdet.boxes import Box
+from vdet.config.schema import Settings
+from vdet.detect.detections import NO_DETECTIONS
+from vdet.detect.svm.detector import SvmModel
+from vdet.files import OutputFiles
+from vdet.lanes.road import Road
+from vdet.media import Frame, Picture, VideoInfo, VideoReader
+from vdet.media.images import Image
+from vdet.run.loop import NullDetector, Summary, VideoJob, follow_frames, peek, run_video
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+from vdet.track.track import Track
+
+COUNT = 60
+"""Frames of the fixture `red_clip`."""
+
+
+def video_info(width: int = WIDTH, height: int = HEIGHT) -> VideoInfo:
+    """Describe a video of `COUNT` frames, 25 a second."""
+    rate = Fraction(25)
+    return VideoInfo(Path("red.mp4"), width, height, rate, 1 / rate, frames=COUNT)
+
+
+VIDEO = video_info()
+
+
+def model_for(settings: Settings) -> SvmModel:
+    """Return the detector of red cars under these settings."""
+    return SvmModel(red_finder(), settings.svm)
+
+
+def with_search(settings: Settings, **changes: Any) -> Settings:
+    """Replace some settings of the section `detector.search`."""
+    search = settings.svm.search.model_copy(update=changes)
+    detector = settings.svm.model_copy(update={"search": search})
+    return settings.model_copy(update={"detector": detector})
+
+
+def outputs(**paths: Path) -> tuple[Output, ...]:
+    """Return outputs by the names of their sinks: `video=…`, `tracks=…`."""
+    return tuple(Output(sink, path) for sink, path in paths.items())
+
+
+def run_red(job: VideoJob, settings: Settings = SETTINGS, **options: Any) -> Summary:
+    """Run a job that finds red cars."""
+    return run_video(job, model_for(settings), settings, **options)
+
+
+def follow(
+    frames: Iterable[Frame],
+    settings: Settings = SETTINGS,
+    *,
+    width: int = WIDTH,
+    height: int = HEIGHT,
+    **options: Any,
+) -> Iterator[FrameResult]:
+    """Find and follow red cars through some frames."""
+    images, frames = peek(frames)
+    detector = model_for(settings).for_video(width, height, images)
+    return follow_frames(frames, detector, settings, video_info(width, height), **options)
+
+
+def result_of(
+    *vehicles: Box | Track,
+    image: Image | None = None,
+    found: Road | None = None,
+    source: Path = Path("red.mp4"),
+    index: int = 0,
+    time: Fraction = Fraction(0),
+) -> FrameResult:
+    """Return a result with these tracks; a box becomes a track of its number, from 1.
+
+    `found` is the road; without an `image` the red car is in the frame.
+    """
+    frame = Frame(index, time, Picture(road(CAR) if image is None else image))
+    tracks = tuple(
+        Track(number, each, 0.9, predicted=False) if isinstance(each, Box) else each
+        for number, each in enumerate(vehicles, start=1)
+    )
+    return FrameResult(source, frame, NO_DETECTIONS, tracks, found, NullDetector())
+
+
+def write(
+    output: Output,
+    results: Iterable[FrameResult],
+    *,
+    settings: Settings = SETTINGS,
+    video: VideoInfo | None = VIDEO,
+    at: Fraction = Fraction(0),
+) -> None:
+    """Give results to a sink of its own run.
+
+    Without a `video` they are those of pictures. `at` is the moment that is asked for.
+    """
+    with OutputFiles(overwrite=True) as files:
+        context = SinkContext(files, settings, video, at=at)
+        with open_sink(output, context) as sink:
+            for result in results:
+                sink.write(result)
+
+
+def read(path: Path) -> list[Frame]:
+    """Read all frames of a video."""
+    with VideoReader(path) as reader:
+        return list(reader)

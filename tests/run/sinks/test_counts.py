@@ -1,0 +1,144 @@
+"""The sink `counts`, and the running counts in the video."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from red_cars import SETTINGS
+from run.red_runs import outputs, read, result_of, run_red, video_info, write
+from vdet.boxes import Box
+from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
+from vdet.config.schema import Settings
+from vdet.errors import OutputError
+from vdet.pages.facts import read_facts
+from vdet.pages.frame import PAGE
+from vdet.run.loop import VideoJob
+from vdet.run.sinks.counts import COUNTS
+from vdet.run.sinks.protocol import Output
+from vdet.testing import check_sink
+from vdet.traffic.count_files import join_counts
+
+COUNTS_AT = CountSettings(
+    size=(320, 240),
+    lines=(LineSettings(name="gate", start=(100, 0), end=(100, 240), left="out", right="in"),),
+    zones=(ZoneSettings(name="yard", points=((110, 0), (320, 0), (320, 240), (110, 240))),),
+)
+"""The middle of the red car goes from 72 to 131 in 60 frames."""
+
+
+def with_counts(counts: CountSettings = COUNTS_AT) -> Settings:
+    return SETTINGS.model_copy(update={"counts": counts})
+
+
+@pytest.mark.parametrize("name", ["counts.csv", "counts.json"])
+def test_it_passes_the_checks_of_every_sink(name: str, tmp_path: Path) -> None:
+    settings = with_counts(
+        CountSettings(lines=(LineSettings(name="a", start=(0, 0.5), end=(1, 1)),))
+    )
+    check_sink(COUNTS, tmp_path / name, settings)
+
+
+def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
+    wanted = (
+        Output("counts", tmp_path / "c.csv"),
+        Output("counts", tmp_path / "c.json"),
+        *outputs(tracks=tmp_path / "t.jsonl"),
+    )
+    run_red(VideoJob(red_clip, wanted), with_counts())
+    with (tmp_path / "c.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["name"], row["direction"]) for row in rows] == [
+        ("gate", "out"), ("yard", "enter"), ("yard", "vanish"),
+    ]  # fmt: skip
+    assert list(rows[0]) == [
+        *("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds"),
+    ]
+    assert float(rows[0]["time"]) == pytest.approx(28 / 25, abs=0.3)  # boxes are means of ten
+    assert int(rows[0]["frame"]) == pytest.approx(25 * float(rows[0]["time"]), abs=1)
+    assert rows[0]["seconds"] == ""
+    assert float(rows[2]["seconds"]) == pytest.approx(
+        float(rows[2]["time"]) - float(rows[1]["time"]), abs=0.002
+    )
+    whole = json.loads((tmp_path / "c.json").read_text())
+    assert [event["time"] for event in whole["events"]] == [float(row["time"]) for row in rows]
+    assert {(t["name"], t["direction"]): t["count"] for t in whole["totals"]} == {
+        ("gate", "out"): 1, ("gate", "in"): 0, ("yard", "enter"): 1, ("yard", "exit"): 0,
+        ("yard", "appear"): 0, ("yard", "vanish"): 1,
+    }  # fmt: skip
+    assert whole["minutes"][0] == {"minute": 0, "name": "gate", "direction": "out", "count": 1}
+    assert whole["zones"][0]["most"] == 1
+
+
+def test_counting_does_not_change_the_tracks(red_clip: Path, tmp_path: Path) -> None:
+    run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "a.csv")))
+    wanted = outputs(tracks=tmp_path / "b.csv", counts=tmp_path / "c.csv")
+    run_red(VideoJob(red_clip, wanted), with_counts())
+    assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
+
+
+def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -> None:
+    drawn = COUNTS_AT.model_copy(update={"drawn": True})
+    for name, counts in (("plain.mp4", COUNTS_AT), ("drawn.mp4", drawn)):
+        run_red(VideoJob(red_clip, outputs(video=tmp_path / name)), with_counts(counts))
+    plain, shown = read(tmp_path / "plain.mp4"), read(tmp_path / "drawn.mp4")
+    changes = [
+        np.abs(a.image.astype(int) - b.image).max(axis=2) > 60
+        for a, b in zip(plain, shown, strict=True)
+    ]
+    assert all(change[150:230, 98:103].any() for change in changes), "the line is not drawn"
+    first, last = shown[5].image[:, :95].astype(int), shown[-1].image[:, :95]
+    assert (np.abs(first - last).max(axis=2) > 60).any(), "the number stays"
+
+
+def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="nothing to count at; give lines or zones"):
+        write(Output("counts", tmp_path / "c.csv"), [result_of(Box(1, 1, 9, 9))])
+
+
+def test_lines_for_another_shape_are_refused_before_any_work(tmp_path: Path) -> None:
+    with pytest.raises(
+        OutputError, match=r"red\.mp4: counts\.size: places are given for .*320×240"
+    ):
+        write(
+            Output("counts", tmp_path / "c.csv"),
+            iter(lambda: pytest.fail("a frame was read"), None),
+            settings=with_counts(),
+            video=video_info(320, 180),
+        )
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json"])
+def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_path: Path) -> None:
+    paths = {name: tmp_path / f"{name}{suffix}" for name in ("a", "b")}
+    for path in paths.values():
+        run_red(VideoJob(red_clip, outputs(counts=path)), with_counts())
+    join_counts(paths, tmp_path / f"all{suffix}")
+    text = (tmp_path / f"all{suffix}").read_text()
+    if suffix == ".csv":
+        rows = list(csv.DictReader(text.splitlines()))
+        assert [(row["video"], row["direction"]) for row in rows] == [
+            (video, way) for video in "ab" for way in ("out", "enter", "vanish")
+        ]
+    else:
+        whole = json.loads(text)
+        assert whole["videos"]["b"] == json.loads(paths["b"].read_text())
+        assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json"])
+def test_a_name_of_a_video_that_is_no_text_is_escaped(
+    suffix: str, red_clip: Path, tmp_path: Path
+) -> None:
+    run_red(VideoJob(red_clip, outputs(counts=tmp_path / f"a{suffix}")), with_counts())
+    join_counts({"clip\udcff": tmp_path / f"a{suffix}"}, tmp_path / f"all{suffix}")
+    assert "\\udcff" in (tmp_path / f"all{suffix}").read_text(encoding="utf-8")
+
+
+def test_a_report_shows_the_counts_by_minute(red_clip: Path, tmp_path: Path) -> None:
+    run_red(VideoJob(red_clip, outputs(report=tmp_path / "page")), with_counts())
+    facts = read_facts(tmp_path / "page" / PAGE)
+    assert facts.counts == {"gate: out": 1, "yard: enter": 1, "yard: vanish": 1}
+    assert "Counts by minute" in (tmp_path / "page" / PAGE).read_text()

@@ -1,0 +1,79 @@
+"""The list of boxes of still pictures."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from red_cars import road
+from run.red_runs import result_of, write
+from vdet.boxes import Box
+from vdet.config.lanes import LaneSettings
+from vdet.errors import OutputError
+from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.run.sinks.protocol import Output
+from vdet.track.track import Track
+
+ITEMS = (
+    {
+        "image": "a.png",
+        "width": 320,
+        "height": 240,
+        "boxes": [{"x": 1, "y": 2, "width": 3, "height": 4, "score": 0.5679}],
+    },
+    {"image": str(Path("in") / "b.png"), "width": 64, "height": 48, "boxes": []},
+)
+
+
+RESULTS = (
+    result_of(
+        Track(1, Box(1, 2, 3, 4), 0.567891, predicted=False),
+        source=Path("a.png"),
+        image=road(),
+    ),
+    result_of(source=Path("in") / "b.png", image=road()[:48, :64]),
+)
+
+
+def read(text: str) -> list[dict[str, Any]]:
+    items: list[dict[str, Any]] = json.loads(text)
+    return items
+
+
+def test_there_is_an_item_a_picture_with_a_list_of_boxes(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.json"
+    write(Output("json", path), RESULTS, video=None)
+    assert read(path.read_text(encoding="utf-8")) == list(ITEMS)
+
+
+def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.json"
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 320, 240)
+    bare = finder.update(finder.observe(road()))
+    near = Track(1, Box(1, 2, 3, 4), 0.5, predicted=False, distance=23.4567, lane=-1)
+    vehicles = (near, replace(near, distance=None, lane=None))
+    write(Output("json", path), [result_of(*vehicles, found=bare)], video=None)
+    [item] = read(path.read_text(encoding="utf-8"))
+    assert item["lane"] is None
+    assert [(box["distance"], box["lane"]) for box in item["boxes"]] == [(23.46, -1), (None, None)]
+
+
+def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    write(Output("json", Path("-")), RESULTS, video=None)
+    assert read(capsys.readouterr().out) == list(ITEMS)
+
+
+@pytest.mark.parametrize("name", ["boxes.json", "-"])
+def test_of_no_pictures_nothing_is_written(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(Output("json", Path("-") if name == "-" else tmp_path / name), [], video=None)
+    assert list(tmp_path.iterdir()) == []
+    assert capsys.readouterr().out == ""
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match=r"boxes\.json: cannot be written"):
+        write(Output("json", tmp_path / "none" / "boxes.json"), RESULTS, video=None)

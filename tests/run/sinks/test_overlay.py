@@ -1,0 +1,413 @@
+"""What is drawn on the frames of a video, and on still pictures, as the section `draw` says."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from red_cars import CAR, HEIGHT, WIDTH, road
+from run.red_runs import VIDEO, result_of
+from vdet.boxes import Box
+from vdet.config.draw import DrawSettings
+from vdet.config.lanes import LaneSettings
+from vdet.config.regions import RegionSettings, RegionsSettings
+from vdet.config.schema import Settings
+from vdet.draw.boxes import BLACK, GREEN, WHITE, color_of, draw_box, draw_label
+from vdet.lanes.camera import CalibratedCamera
+from vdet.lanes.lane import Lane
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.media import Picture, VideoInfo
+from vdet.media.coding import Coding
+from vdet.media.images import Image
+from vdet.media.planes import Planes
+from vdet.run.result import FrameResult
+from vdet.run.sinks.overlay import Overlay, time_text
+from vdet.track.track import Track
+
+LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+CORNER = Box(0, 0, 12, 12)
+LANE = Lane(
+    curvature=0.0,
+    radius=None,
+    offset=0.0,
+    width=3.7,
+    left=np.array([[40.0, 220.0], [140.0, 140.0]]),
+    right=np.array([[280.0, 220.0], [180.0, 140.0]]),
+)
+
+
+def overlay_with(*, video: VideoInfo | None = VIDEO, **settings: Any) -> Overlay:
+    return Overlay(Settings(draw=DrawSettings(**settings)), video)
+
+
+def drawn_on(result: FrameResult, *, video: VideoInfo | None = VIDEO, **settings: Any) -> Image:
+    """Return what is drawn of a single frame under these settings of `draw`."""
+    return shown(overlay_with(video=video, **settings), result)
+
+
+def shown(overlay: Overlay, result: FrameResult) -> Image:
+    """Return what is drawn of the next frame, whose picture is BGR."""
+    surface = overlay.draw(result)
+    assert not isinstance(surface, Planes)
+    return surface
+
+
+def road_seen(camera: CalibratedCamera | None) -> Road:
+    finder = RoadFinder(LaneRequest(camera), LaneSettings(), WIDTH, HEIGHT)
+    return finder.update(finder.observe(road(CAR)))
+
+
+def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1), "#1")
+    np.testing.assert_array_equal(drawn_on(result_of(CAR)), expected)
+
+
+def test_scores_stand_beside_the_ids_where_they_are_asked_for() -> None:
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1), "#1 0.90")
+    np.testing.assert_array_equal(drawn_on(result_of(CAR), label=("id", "score")), expected)
+
+
+def test_predicted_vehicles_are_drawn_dashed() -> None:
+    seen, predicted = (Track(1, CAR, 0.9, predicted=flag) for flag in (False, True))
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1), "#1", dashed=True)
+    dashed = drawn_on(result_of(predicted))
+    np.testing.assert_array_equal(dashed, expected)
+    solid = drawn_on(result_of(seen))
+    lower = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
+    drawn, gaps = (solid[lower] == color_of(1)).all(1), (dashed[lower] != solid[lower]).any(1)
+    assert drawn.all()
+    assert 0.2 < gaps.mean() < 0.8
+
+
+def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
+    undistorted = road_seen(LENS)
+    assert undistorted.place(CAR) != CAR
+    expected = undistorted.image.copy()
+    draw_box(expected, undistorted.place(CAR), color_of(1), "#1")
+    drawn = drawn_on(result_of(CAR, found=undistorted))
+    np.testing.assert_array_equal(drawn, expected)
+
+
+def test_a_vehicle_that_undistortion_moves_out_of_the_picture_is_not_drawn() -> None:
+    undistorted = road_seen(LENS)
+    assert undistorted.place(CORNER).area == 0
+    drawn = drawn_on(result_of(CORNER, found=undistorted))
+    np.testing.assert_array_equal(drawn, undistorted.image)
+
+
+def test_without_a_camera_vehicles_stay_where_they_are() -> None:
+    assert road_seen(None).place(CAR) == CAR
+    assert (road_seen(None).image == road(CAR)).all()
+
+
+def test_the_frames_of_the_result_are_not_drawn_on() -> None:
+    with_lane = replace(road_seen(LENS), lane=LANE)
+    undistorted = with_lane.image.copy()
+    for found in (None, with_lane):
+        result = result_of(CAR, found=found)
+        drawn_on(result, label=("id", "score"))
+        np.testing.assert_array_equal(result.frame.image, road(CAR))
+    np.testing.assert_array_equal(with_lane.image, undistorted)
+
+
+def test_the_lane_lies_under_the_boxes() -> None:
+    box = Box(100, 150, 120, 60)
+    with_lane = replace(road_seen(None), lane=LANE)
+    drawn = drawn_on(result_of(box, found=with_lane))
+    assert (drawn[box.bottom - 1, box.x : box.right] == color_of(1)).all()
+    blue, green, red = drawn[180, 160].astype(int) - road(CAR)[180, 160]
+    assert green > max(blue, red)
+
+
+@pytest.mark.parametrize("settings", [{}, {"trails": 1.0, "time": True}])
+def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
+    settings: dict[str, Any],
+) -> None:
+    planes = Planes.of_image(road(CAR), Coding("bt709"))
+    as_image = result_of(CAR, image=planes.to_image())
+    as_planes = replace(as_image, frame=replace(as_image.frame, picture=Picture(planes)))
+    before = planes.copy()
+    drawn = overlay_with(**settings).draw(as_planes)
+    assert isinstance(drawn, Planes)
+    assert drawn.is_own, "it may be encoded"
+    for layer, old, new in zip(planes.layers, before.layers, drawn.layers, strict=True):
+        np.testing.assert_array_equal(layer, old)
+        assert (new != old).any()
+    expected = drawn_on(as_image, **settings)
+    assert np.abs(drawn.to_image().astype(int) - expected).mean() < 1.5
+
+
+def test_a_lane_is_drawn_into_the_undistorted_image_even_if_the_frame_is_planes() -> None:
+    undistorted = road_seen(LENS)
+    result = result_of(CAR, found=undistorted)
+    planes = Picture(Planes.of_image(road(CAR), Coding()))
+    as_planes = replace(result, frame=replace(result.frame, picture=planes))
+    np.testing.assert_array_equal(drawn_on(as_planes), drawn_on(result))
+
+
+def white(width: int, height: int) -> Image:
+    return np.full((height, width, 3), 255, np.uint8)
+
+
+def test_only_boxes_and_their_labels_are_drawn_on() -> None:
+    boxes = [Box(200, 400, 120, 90), Box(800, 420, 240, 150)]
+    image = drawn_on(result_of(*boxes, image=white(1280, 720)))
+    allowed = np.zeros(image.shape[:2], bool)
+    for box in boxes:
+        allowed[box.y - 32 : box.bottom, box.x : box.right] = True
+        allowed[box.y + 5 : box.bottom - 5, box.x + 5 : box.right - 5] = False
+    drawn = (image != 255).any(axis=2)
+    assert drawn.any()
+    assert not (drawn & ~allowed).any()
+
+
+def test_each_id_has_its_own_color() -> None:
+    result = result_of(Box(20, 100, 50, 50), Box(200, 100, 50, 50), image=white(320, 240))
+    three, four = (replace(track, id=track.id + 2) for track in result.tracks)
+    image = drawn_on(replace(result, tracks=(three, four)))
+    assert tuple(image[149, 45]) == color_of(3)
+    assert tuple(image[149, 225]) == color_of(4)
+
+
+def test_no_tracks_leave_the_picture_as_it_was() -> None:
+    result = result_of(image=white(320, 240))
+    for trails in (0.0, 1.0):
+        drawn = drawn_on(result, trails=trails)
+        assert drawn.min() == 255
+        assert not np.shares_memory(drawn, result.frame.image), "a copy may be drawn into"
+
+
+# Labels
+
+
+@pytest.mark.parametrize(
+    ("label", "text"),
+    [
+        (("class", "id"), "car #3"),
+        (("score",), "0.90"),
+        (("distance", "score"), "24 m 0.90"),
+    ],
+)
+def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], text: str) -> None:
+    track = Track(3, CAR, 0.9, predicted=False, class_name="car", distance=23.6)
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(3), text)
+    np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
+
+
+def test_a_label_leaves_out_what_is_not_known() -> None:
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1), "#1")
+    drawn = drawn_on(result_of(CAR), label=("distance", "id", "class"))
+    np.testing.assert_array_equal(drawn, expected)
+
+
+@pytest.mark.parametrize("label", [(), ("class",)])
+def test_without_anything_to_say_there_is_no_label(label: tuple[str, ...]) -> None:
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1))
+    np.testing.assert_array_equal(drawn_on(result_of(CAR), label=label), expected)
+
+
+def test_a_still_picture_shows_ids_and_scores() -> None:
+    expected = road(CAR)
+    draw_box(expected, CAR, color_of(1), "#1 0.90")
+    np.testing.assert_array_equal(drawn_on(result_of(CAR), video=None), expected)
+
+
+# Boxes
+
+
+def test_boxes_can_be_hidden_and_labels_stay() -> None:
+    expected = road(CAR)
+    draw_label(expected, "#1", (CAR.x, CAR.y), color_of(1))
+    np.testing.assert_array_equal(drawn_on(result_of(CAR), boxes=False), expected)
+
+
+PREDICTED = Track(1, CAR, 0.9, predicted=True)
+SEEN = replace(PREDICTED, predicted=False)
+
+
+def test_predicted_boxes_can_be_as_the_others_or_hidden() -> None:
+    plain = drawn_on(result_of(PREDICTED), predicted="plain")
+    np.testing.assert_array_equal(plain, drawn_on(result_of(SEEN)))
+    hidden = drawn_on(result_of(PREDICTED), predicted="hidden")
+    np.testing.assert_array_equal(hidden, road(CAR))
+
+
+@pytest.mark.parametrize("predicted", ["dashed", "hidden"])
+def test_a_vehicle_is_not_missed_in_frames_that_are_not_searched(predicted: str) -> None:
+    overlay = overlay_with(predicted=predicted)
+    seen, missed = drawn_on(result_of(SEEN)), drawn_on(result_of(PREDICTED), predicted=predicted)
+    skipped = replace(result_of(PREDICTED), searched=False)
+    for result, expected in (
+        (result_of(SEEN), seen),
+        (skipped, seen),
+        (result_of(PREDICTED), missed),
+        (skipped, missed),
+    ):
+        np.testing.assert_array_equal(shown(overlay, result), expected)
+
+
+def test_lines_can_be_thicker() -> None:
+    widths = []
+    for thickness in (1.0, 3.0):
+        image = drawn_on(result_of(CAR), thickness=thickness, label=())
+        column = (image[CAR.y : CAR.bottom, CAR.x + CAR.width // 2] == color_of(1)).all(axis=1)
+        widths.append(int(column[: CAR.height // 2].sum()))
+    assert widths[1] == 3 * widths[0]
+
+
+def test_colors_can_be_those_of_the_classes() -> None:
+    boxes = [Box(10 + 60 * n, 100, 50, 50) for n in range(5)]
+    names = ["car", "car", "truck", "tram", None]
+    tracks = [
+        Track(n, box, 0.9, predicted=False, class_name=name)
+        for n, (box, name) in enumerate(zip(boxes, names, strict=True), start=1)
+    ]
+    image = drawn_on(result_of(*tracks, image=white(320, 240) // 2), colors="class")
+    colors = [tuple(image[149, box.x + 25].tolist()) for box in boxes]
+    assert colors[0] == colors[1]
+    assert len(set(colors)) == 4
+
+
+def test_colors_can_be_those_of_the_regions() -> None:
+    halves = {
+        "left": ((0, 0), (0.5, 0), (0.5, 1), (0, 1)),
+        "middle": ((0.5, 0), (0.7, 0), (0.7, 1), (0.5, 1)),
+    }
+    polygons = [RegionSettings(name=name, points=points) for name, points in halves.items()]
+    settings = Settings(
+        draw=DrawSettings(colors="region"), regions=RegionsSettings(polygons=tuple(polygons))
+    )
+    boxes = [Box(x, 100, 40, 40) for x in (10, 80, 170, 260)]
+    image = shown(Overlay(settings, None), result_of(*boxes, image=white(320, 240) // 2))
+    one, same, other, outside = (tuple(image[139, box.x + 20].tolist()) for box in boxes)
+    assert one == same
+    assert len({one, other, outside}) == 3
+    assert outside == WHITE
+
+
+def test_all_vehicles_can_have_one_color() -> None:
+    result = result_of(Box(20, 100, 50, 50), Box(200, 100, 50, 50), image=white(320, 240))
+    image = drawn_on(result, colors="one")
+    assert tuple(image[149, 45]) == tuple(image[149, 225]) == GREEN
+
+
+# Trails
+
+
+def passing(count: int, rate: int = 25) -> Iterator[FrameResult]:
+    """Give frames in which a vehicle moves to the right, 4 pixels a frame."""
+    for number in range(count):
+        box = Box(10 + 4 * number, 100, 40, 30)
+        time = Fraction(number, rate)
+        yield result_of(box, image=white(320, 240), index=number, time=time)
+
+
+def trail_columns(seconds: float, count: int = 50, **settings: Any) -> list[int]:
+    """Return the columns in which the trail of `passing` is drawn in the last frame."""
+    quiet: dict[str, Any] = {"boxes": False, "label": (), "smoothing": 0.0, **settings}
+    overlay = overlay_with(trails=seconds, **quiet)
+    *_, last = (shown(overlay, result) for result in passing(count))
+    rows, columns = np.nonzero((last != 255).any(axis=2))
+    assert not len(rows) or max(abs(rows - 130)) <= 3, "it follows the feet"
+    return sorted(set(columns.tolist()))
+
+
+def test_a_trail_is_the_path_of_the_feet_in_the_last_seconds() -> None:
+    end = 10 + 4 * 49 + 20
+    columns = trail_columns(1.0)
+    assert abs(max(columns) - end) <= 2
+    assert abs(min(columns) - (end - 100)) <= 4
+    assert columns == list(range(min(columns), max(columns) + 1)), "without a gap"
+    assert abs(min(trail_columns(0.4)) - (end - 40)) <= 4
+
+
+def test_a_vehicle_that_was_just_found_has_no_trail() -> None:
+    assert trail_columns(1.0, count=1) == []
+    assert trail_columns(0.0) == []
+
+
+def test_trails_lie_under_the_boxes() -> None:
+    overlay = overlay_with(trails=1.0, smoothing=0.0, label=())
+    *_, last = (shown(overlay, result) for result in passing(50))
+    box = Box(10 + 4 * 49, 100, 40, 30)
+    assert (last[box.bottom - 1, box.x : box.right] == color_of(1)).all()
+
+
+def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
+    seen = road_seen(LENS)
+    foot = np.array([[CAR.x + CAR.width / 2, float(CAR.bottom)]])
+    ((x, y),) = seen.place_points(foot).tolist()
+    assert abs(y - CAR.bottom) > 1, "the lens moves the foot"
+    overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=0.0)
+    for number in range(10):
+        start = CAR.moved_to(CAR.x - 4 * (9 - number), CAR.y)
+        drawn = shown(overlay, result_of(start, found=seen, time=Fraction(number, 25)))
+    rows, columns = np.nonzero((drawn != seen.image).any(axis=2))
+    assert abs(columns.max() - x) <= 2
+    assert abs(rows[columns == columns.max()].mean() - y) <= 2
+
+
+def test_trails_of_vehicles_that_are_gone_are_forgotten() -> None:
+    overlay = overlay_with(trails=1.0)
+    for result in passing(50):
+        overlay.draw(replace(result, tracks=(replace(SEEN, id=result.frame.index + 1),)))
+    assert len(overlay._trails) <= 26
+
+
+def test_a_still_picture_has_no_trail_and_no_time() -> None:
+    plain = drawn_on(result_of(CAR), video=None)
+    asked = drawn_on(result_of(CAR), video=None, trails=2.0, time=True)
+    np.testing.assert_array_equal(asked, plain)
+
+
+# Time
+
+
+def test_the_time_counts_from_the_first_frame_of_the_video() -> None:
+    late = replace(VIDEO, start=Fraction(100))
+    expected = white(320, 240)
+    draw_label(expected, "0:01:02.500", (0, 240), BLACK)
+    result = result_of(image=white(320, 240), time=Fraction(325, 2))
+    np.testing.assert_array_equal(drawn_on(result, video=late, time=True), expected)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(0, "0:00:00.000"), (59.9996, "0:01:00.000"), (3600 * 12 + 61.5, "12:01:01.500")],
+)
+def test_a_time_is_written_as_hours_minutes_and_seconds(seconds: float, text: str) -> None:
+    assert time_text(Fraction(seconds)) == text
+
+
+# Smoothing
+
+
+def test_boxes_that_tremble_are_drawn_steadily() -> None:
+    lefts = []
+    for smoothing in (0.0, 0.4):
+        overlay = overlay_with(smoothing=smoothing, label=(), thickness=0.1)
+        images = []
+        for number in range(40):
+            box = Box(100 + number % 2 * 2, 100, 100, 80)
+            time = Fraction(number, 25)
+            result = result_of(box, image=white(320, 240), index=number, time=time)
+            images.append(shown(overlay, result))
+        drawn = [np.nonzero((image != 255).any(axis=(0, 2)))[0].min() for image in images[20:]]
+        lefts.append(np.ptp(drawn))
+    assert lefts[1] < lefts[0] == 2
+
+
+def test_boxes_that_are_smoothed_stay_in_the_frame() -> None:
+    overlay = overlay_with()
+    for number in range(60):
+        box = Box(max(0, 150 - 8 * number), 100, 60, 50)
+        overlay.draw(result_of(box, image=white(320, 240), time=Fraction(number, 25)))

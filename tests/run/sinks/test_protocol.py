@@ -1,0 +1,289 @@
+"""Sinks in a run: each gets every result, and all leave their outputs or none does."""
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import pytest
+
+from red_cars import HEIGHT, SETTINGS
+from run.conftest import Register
+from run.red_runs import COUNT, outputs, read, run_red, video_info
+from vdet.config.schema import OutputSettings
+from vdet.errors import ConfigError, OutputError
+from vdet.files import OutputFiles
+from vdet.media import Frame, Picture, VideoInfo, VideoWriter
+from vdet.media.images import Image
+from vdet.run.loop import VideoJob, check_job
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import (
+    Output,
+    SinkContext,
+    SinkKind,
+    check_sinks,
+    open_sink,
+)
+
+MOMENTS = ("open", "enter", "first", "middle", "end")
+
+
+@dataclass
+class Collects:
+    """A sink that keeps what it gets: the results, and a copy of each image."""
+
+    results: list[FrameResult] = field(default_factory=list)
+    images: list[Image] = field(default_factory=list)
+    entered: int = 0
+    left: list[type[BaseException] | None] = field(default_factory=list)
+
+    def __enter__(self) -> Self:
+        self.entered += 1
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.left.append(kind)
+
+    def write(self, result: FrameResult) -> None:
+        self.results.append(result)
+        self.images.append(result.frame.image.copy())
+
+
+@pytest.fixture
+def collect(register: Register) -> Callable[[str], Collects]:
+    """Register a sink that keeps what it gets."""
+
+    def collect(name: str) -> Collects:
+        sink = Collects()
+        register(name, SinkKind(lambda *_: sink))
+        return sink
+
+    return collect
+
+
+def test_every_sink_gets_each_result_once_and_in_order(
+    red_clip: Path, tmp_path: Path, collect: Callable[[str], Collects]
+) -> None:
+    first, last = collect("first"), collect("last")
+    wanted = (
+        Output("first", tmp_path / "first"),
+        *outputs(video=tmp_path / "a.mp4", tracks=tmp_path / "a.csv"),
+        Output("last", tmp_path / "last"),
+    )
+    run_red(VideoJob(red_clip, wanted), threads=3)
+    for sink in (first, last):
+        assert [result.frame.index for result in sink.results] == list(range(COUNT))
+        assert (sink.entered, sink.left) == (1, [None])
+    assert all(one is other for one, other in zip(first.results, last.results, strict=True))
+    assert any(result.tracks for result in last.results)
+
+
+def test_no_sink_changes_the_image_that_the_others_get(
+    red_clip: Path, tmp_path: Path, collect: Callable[[str], Collects]
+) -> None:
+    before, after = collect("before"), collect("after")
+    (tmp_path / "stages").mkdir()
+    wanted = (
+        Output("before", tmp_path),
+        *outputs(video=tmp_path / "a.mp4", stages=tmp_path / "stages"),
+        Output("after", tmp_path),
+    )
+    run_red(VideoJob(red_clip, wanted, frames=20))
+    assert any(result.tracks for result in before.results), "nothing was drawn"
+    read_again = [frame.image for frame in read(red_clip)]
+    for index, result in enumerate(after.results):
+        for image in (before.images[index], after.images[index], read_again[index]):
+            np.testing.assert_array_equal(result.frame.image, image)
+
+
+@dataclass
+class Fragile:
+    """A sink that writes a line a frame, and fails at a moment, once."""
+
+    path: Path
+    context: SinkContext
+    fails_at: str
+    error: Exception
+    count: int = 0
+
+    def fail_at(self, moment: str) -> None:
+        if moment == self.fails_at:
+            raise self.error
+
+    def __enter__(self) -> Self:
+        self.file = self.context.files.stage(self.path).open("w")
+        try:
+            self.fail_at("enter")
+        except BaseException:
+            self.file.close()
+            raise
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        self.file.close()
+        if kind is None:
+            self.fail_at("end")
+
+    def write(self, result: FrameResult) -> None:
+        self.count += 1
+        self.file.write(f"{result.frame.index}\n")
+        if self.count in (1, 11):
+            self.fail_at("first" if self.count == 1 else "middle")
+
+
+class TestFailure:
+    """One sink of several fails: no output of the run appears, and nothing else is left."""
+
+    @pytest.fixture(params=["before the others", "after the others"])
+    def job(
+        self, request: pytest.FixtureRequest, red_clip: Path, tmp_path: Path
+    ) -> Iterator[VideoJob]:
+        threads = threading.active_count()
+        (tmp_path / "stages").mkdir()
+        wanted = outputs(
+            video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv", stages=tmp_path / "stages"
+        )
+        fragile = Output("fragile", tmp_path / "fragile.txt")
+        in_order = (fragile, *wanted) if "before" in request.param else (*wanted, fragile)
+        yield VideoJob(red_clip, in_order, frames=20)
+        assert threading.active_count() == threads
+
+    def set_failure(self, register: Register, moment: str, error: Exception) -> None:
+        def open_it(path: Path, context: SinkContext) -> Fragile:
+            sink = Fragile(path, context, moment, error)
+            sink.fail_at("open")
+            return sink
+
+        register("fragile", SinkKind(open_it))
+
+    @pytest.mark.parametrize("moment", MOMENTS)
+    def test_no_output_appears_and_the_same_job_runs_again(
+        self, job: VideoJob, register: Register, tmp_path: Path, moment: str
+    ) -> None:
+        self.set_failure(register, moment, RuntimeError("broken"))
+        with pytest.raises(RuntimeError, match="broken"):
+            run_red(job)
+        assert [path.name for path in tmp_path.iterdir()] == ["stages"]
+        assert list((tmp_path / "stages").iterdir()) == []
+        self.set_failure(register, "never", RuntimeError())
+        check_job(job)
+        run_red(job)
+        names = {path.name for path in tmp_path.iterdir()}
+        assert names == {"fragile.txt", "out.csv", "out.mp4", "stages"}
+        assert (tmp_path / "fragile.txt").read_text().split() == [str(n) for n in range(20)]
+        assert len(read(tmp_path / "out.mp4")) == 20
+        assert len(list((tmp_path / "stages").iterdir())) == 5
+
+    @pytest.mark.parametrize("moment", MOMENTS)
+    def test_earlier_outputs_stay_as_they_were(
+        self, job: VideoJob, register: Register, tmp_path: Path, moment: str
+    ) -> None:
+        for name in ("fragile.txt", "out.mp4", "out.csv"):
+            (tmp_path / name).write_text("precious")
+        self.set_failure(register, moment, RuntimeError("broken"))
+        with pytest.raises(RuntimeError, match="broken"):
+            run_red(job)
+        for name in ("fragile.txt", "out.mp4", "out.csv"):
+            assert (tmp_path / name).read_text() == "precious"
+
+    @pytest.mark.parametrize("moment", MOMENTS)
+    def test_an_error_of_the_disk_names_the_output_that_it_hit(
+        self, job: VideoJob, register: Register, tmp_path: Path, moment: str
+    ) -> None:
+        self.set_failure(register, moment, OSError(28, "No space left on device"))
+        path = tmp_path / "fragile.txt"
+        with pytest.raises(OutputError) as raised:
+            run_red(job)
+        assert str(raised.value) == f"{path}: cannot be written: No space left on device"
+
+
+def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, collect: Callable[[str], Collects]
+) -> None:
+    source, (width, height) = tmp_path / "tiny.mp4", (16, HEIGHT)
+    info = VideoInfo(source, width, height, rate := Fraction(25), 1 / rate, frames=5)
+    with VideoWriter(source, info, OutputSettings()) as writer:
+        for index in range(5):
+            image = np.full((height, width, 3), 90, np.uint8)
+            writer.write(Frame(index, index / rate, Picture(image)))
+    sink = collect("collects")
+    (tmp_path / "stages").mkdir()
+    wanted = outputs(
+        video=tmp_path / "out.mp4",
+        tracks=tmp_path / "out.csv",
+        stages=tmp_path / "stages",
+        collects=tmp_path,
+    )
+    summary = run_red(VideoJob(source, wanted))
+    assert (summary.frames, summary.tracks) == (5, 0)
+    assert f"{source}: gets no boxes: no search window fits into a frame" in caplog.text
+    assert [len(result.detections) for result in sink.results] == [0] * 5
+    assert len(read(tmp_path / "out.mp4")) == 5
+    assert len((tmp_path / "out.csv").read_text().splitlines()) == 1
+    assert [path.name for path in (tmp_path / "stages").iterdir()] == ["1-boxes.png"]
+
+
+@pytest.mark.parametrize(
+    ("sink", "name", "is_video", "words"),
+    [
+        ("video", "a.mp4", False, "is for videos; give another for pictures"),
+        ("picture", "a.png", True, "is for pictures; give another for videos"),
+        ("json", "a.json", True, "is for pictures; give another for videos"),
+    ],
+)
+def test_a_sink_refuses_results_that_it_cannot_take(
+    tmp_path: Path, sink: str, name: str, is_video: bool, words: str
+) -> None:
+    output = Output(sink, tmp_path / name)
+    with OutputFiles() as files:
+        context = SinkContext(files, SETTINGS, video_info() if is_video else None)
+        with pytest.raises(OutputError, match=f"{name}: the sink {sink} {words}"):
+            open_sink(output, context)
+    assert list(tmp_path.iterdir()) == []
+
+
+class TestCheck:
+    def test_an_unknown_sink_is_refused_with_those_that_are_known(self, tmp_path: Path) -> None:
+        known = "video, tracks, stages, picture, json"
+        with pytest.raises(ConfigError, match=f"nosuch: is no sink; known are {known}"):
+            check_sinks([Output("nosuch", tmp_path / "a")], overwrite=False)
+
+    @pytest.mark.parametrize(
+        ("sink", "name", "what"),
+        [
+            ("video", "a.avi", "videos"),
+            ("tracks", "a.json", "tracks"),
+            ("picture", "a", "pictures"),
+        ],
+    )
+    def test_a_suffix_that_the_sink_does_not_write_is_refused(
+        self, tmp_path: Path, sink: str, name: str, what: str
+    ) -> None:
+        with pytest.raises(OutputError, match=rf"{name}: {what} are written as \.\w+, "):
+            check_sinks([Output(sink, tmp_path / name)], overwrite=False)
+
+    @pytest.mark.parametrize(("sink", "name"), [("video", "A.MP4"), ("tracks", "a.Csv")])
+    def test_the_case_of_a_suffix_does_not_matter(
+        self, tmp_path: Path, sink: str, name: str
+    ) -> None:
+        check_sinks([Output(sink, tmp_path / name)], overwrite=False)
+
+    def test_the_folder_of_an_output_is_made_where_the_output_is_a_folder(
+        self, tmp_path: Path
+    ) -> None:
+        check_sinks([Output("stages", tmp_path / "new" / "stages")], overwrite=False)
+        assert (tmp_path / "new" / "stages").is_dir()
+
+    def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
+        (tmp_path / "3-boxes.png").touch()
+        with pytest.raises(OutputError, match=r"3-boxes\.png: is there already"):
+            check_sinks([Output("stages", tmp_path)], overwrite=False)
+        check_sinks([Output("stages", tmp_path)], overwrite=True)
+
+    def test_one_path_for_two_outputs_is_refused(self, tmp_path: Path) -> None:
+        twice = outputs(tracks=tmp_path / "a.txt", json=tmp_path / "." / "a.txt")
+        with pytest.raises(OutputError, match=r"a\.txt: is given for two outputs"):
+            check_job(VideoJob(tmp_path / "in.mp4", twice))

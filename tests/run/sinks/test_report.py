@@ -1,0 +1,109 @@
+"""The sink `report` in a run."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from pages.html import Elements
+from red_cars import CAR, SETTINGS, car_at, road
+from run.red_runs import COUNT, outputs, read, result_of, run_red, video_info, write
+from running import names
+from vdet.config.schema import ReportSettings
+from vdet.media.images import Image, decode_image
+from vdet.pages.facts import read_facts
+from vdet.run.loop import VideoJob
+from vdet.run.sinks.protocol import Output
+
+
+def page_of(folder: Path) -> Elements:
+    assert names(folder) == ["report.html"]
+    return Elements((folder / "report.html").read_text(encoding="utf-8"))
+
+
+def picture(uri: str | None) -> Image:
+    import base64
+
+    image = decode_image(base64.b64decode((uri or "").partition(",")[2]))
+    assert image is not None
+    return image
+
+
+def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
+    red_clip: Path, tmp_path: Path
+) -> None:
+    wanted = outputs(video=tmp_path / "out.mp4", report=tmp_path / "report")
+    run_red(VideoJob(red_clip, wanted))
+    made = page_of(tmp_path / "report")
+    (video,) = made.all("video")
+    assert video["src"] == "../out.mp4"
+    facts = read_facts(tmp_path / "report" / "report.html")
+    assert (facts.frames, facts.vehicles, facts.most) == (COUNT, 1, 1)
+    assert facts.seconds == pytest.approx(COUNT / 25)
+    (thumbnail,) = (each for each in made.all("img") if each.get("alt") == "vehicle 1")
+    blue, _, red = picture(thumbnail["src"]).reshape(-1, 3).mean(axis=0)
+    assert red > blue + 50
+
+
+def test_its_moments_are_those_of_the_part_that_was_written(red_clip: Path, tmp_path: Path) -> None:
+    wanted = outputs(video=tmp_path / "out.mp4", report=tmp_path / "report")
+    run_red(VideoJob(red_clip, wanted, start=Fraction(1), end=Fraction(2)))
+    length = len(read(tmp_path / "out.mp4")) / 25
+    times = [float(link["data-time"] or "") for link in page_of(tmp_path / "report").all("a")]
+    assert times
+    assert all(0 <= time < length for time in times)
+
+
+def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path: Path) -> None:
+    run_red(VideoJob(red_clip, outputs(report=tmp_path / "report"), start=Fraction(1)))
+    made = page_of(tmp_path / "report")
+    (video,) = made.all("video")
+    target = (tmp_path / "report" / (video["src"] or "")).resolve()
+    assert target == red_clip.resolve()
+    times = [float(link["data-time"] or "") for link in made.all("a")]
+    assert min(times) >= 1, "the source is there from its beginning"
+
+
+def test_numbered_pictures_are_no_video_to_show(tmp_path: Path) -> None:
+    numbered = replace(video_info(), path=tmp_path / "img_%04d.png")
+    write(Output("report", tmp_path / "report"), [result_of(CAR)], video=numbered)
+    assert page_of(tmp_path / "report").all("video") == []
+
+
+def test_the_still_is_the_first_frame_that_shows_something(tmp_path: Path) -> None:
+    black = np.zeros_like(road())
+    checks = cv2.resize(np.indices((6, 8)).sum(axis=0).astype(np.uint8) % 2 * 255, (320, 240))
+    scene = np.ascontiguousarray(np.repeat(checks[..., np.newaxis], 3, axis=2))
+    frames = [black, black, scene, 255 - scene]
+    results = [
+        result_of(image=image, index=n, time=Fraction(n, 25)) for n, image in enumerate(frames)
+    ]
+    write(Output("report", tmp_path / "report"), results)
+    (still,) = page_of(tmp_path / "report").all("img", **{"class": "still"})
+    assert abs(picture(still["src"]).astype(int) - scene).mean() < 10
+
+
+def test_pictures_have_the_sizes_that_are_set(tmp_path: Path) -> None:
+    small = SETTINGS.model_copy(update={"report": ReportSettings(picture=20, still=64, vehicles=1)})
+    results = [
+        result_of(*[car_at(n)] * (1 + n % 2), image=road(car_at(n)), index=n, time=Fraction(n, 25))
+        for n in range(9)
+    ]
+    write(Output("report", tmp_path / "report"), results, settings=small)
+    made = page_of(tmp_path / "report")
+    shapes = [picture(each["src"]).shape for each in made.all("img")]
+    assert shapes[0] == (48, 64, 3)
+    assert [max(shape) for shape in shapes[1:]] == [20]
+
+
+def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_path: Path) -> None:
+    job = VideoJob(red_clip, outputs(report=tmp_path), frames=3)
+    (tmp_path / "notes.txt").write_text("mine")
+    run_red(job)
+    before = (tmp_path / "report.html").read_text()
+    run_red(replace(job, frames=5, overwrite=True))
+    assert (tmp_path / "report.html").read_text() != before
+    assert names(tmp_path) == ["notes.txt", "report.html"]

@@ -1,0 +1,138 @@
+"""The pictures of every stage of one moment."""
+
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
+from run.red_runs import model_for, result_of, video_info, write
+from run.sinks.test_overlay import LANE, LENS, road_seen
+from vdet.boxes import Box
+from vdet.detect.detections import Detections
+from vdet.draw.boxes import color_of
+from vdet.lanes.lane import Lane
+from vdet.lanes.road import Road
+from vdet.media.images import Image, read_image
+from vdet.run.loop import NullDetector
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output
+from vdet.track.track import Track
+
+NAMES = ["1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png"]
+
+
+def detected(*boxes: Box, time: Fraction = Fraction(0), found: Road | None = None) -> FrameResult:
+    """Return a result whose detections are those of the red car."""
+    result = result_of(*boxes, time=time, found=found)
+    detector = model_for(SETTINGS).for_video(WIDTH, HEIGHT, [result.frame.image])
+    detections = detector.detect(detector.search(result.frame.picture, None))
+    return replace(result, detections=detections, detector=detector)
+
+
+def stages(folder: Path, at: Fraction, *results: FrameResult) -> list[str]:
+    """Give results to the sink; return the names of the pictures that it leaves."""
+    folder.mkdir(exist_ok=True)
+    write(Output("stages", folder), results, at=at)
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_pictures_are_made_of_the_first_frame_at_or_after_the_moment(tmp_path: Path) -> None:
+    early, late = (detected(time=Fraction(t)) for t in (1, 3))
+    assert stages(tmp_path / "a", Fraction(2), early) == []
+    assert stages(tmp_path / "b", Fraction(2), early, late) == NAMES
+    assert stages(tmp_path / "c", Fraction(3), early, late) == NAMES
+
+
+def test_the_moment_counts_from_the_first_frame(tmp_path: Path) -> None:
+    late = replace(video_info(), start=Fraction(100))
+    results = (
+        detected(*boxes, time=Fraction(time))
+        for time, boxes in ((100, ()), (101, (CAR,)), (102, ()))
+    )
+    write(Output("stages", tmp_path), results, at=Fraction(1), video=late)
+    picture = read_image(tmp_path / "5-boxes.png")
+    assert (picture[CAR.bottom - 1, CAR.x : CAR.right] == color_of(1)).all()
+
+
+def test_pictures_are_made_once(tmp_path: Path) -> None:
+    first, second = detected(time=Fraction(1)), detected(CAR, time=Fraction(2))
+    stages(tmp_path / "one", Fraction(0), first)
+    stages(tmp_path / "two", Fraction(0), first, second)
+    for name in NAMES:
+        one, two = (tmp_path / folder / name for folder in ("one", "two"))
+        assert one.read_bytes() == two.read_bytes()
+
+
+def test_a_moment_that_never_comes_gives_no_pictures(tmp_path: Path) -> None:
+    assert stages(tmp_path / "stages", Fraction(9), detected()) == []
+
+
+@pytest.mark.parametrize("lane", [None, LANE])
+def test_pictures_show_the_lane_where_it_is_looked_for(tmp_path: Path, lane: Lane | None) -> None:
+    names = stages(tmp_path, Fraction(0), detected(found=replace(road_seen(LENS), lane=lane)))
+    assert names == [*NAMES, "6-road.png", "7-above.png", "8-mask.png", "9-fit.png"]
+
+
+def test_pictures_of_an_earlier_run_are_replaced(tmp_path: Path) -> None:
+    stages(tmp_path, Fraction(0), detected(CAR))
+    before = (tmp_path / "5-boxes.png").read_bytes()
+    assert stages(tmp_path, Fraction(0), detected()) == NAMES
+    assert (tmp_path / "5-boxes.png").read_bytes() != before
+
+
+def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path: Path) -> None:
+    assert stages(tmp_path, Fraction(0), result_of(CAR)) == ["1-boxes.png"]
+    lane = result_of(CAR, found=road_seen(None))
+    names = ["1-boxes.png", "2-road.png", "3-above.png", "4-mask.png", "5-fit.png"]
+    assert stages(tmp_path / "lanes", Fraction(0), lane) == names
+
+
+def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> None:
+    class Pictures(NullDetector):
+        def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+            assert len(detections) == 0
+            return {"z-first": image // 2, "a-second": 255 - image}
+
+    result = replace(result_of(), detector=Pictures())
+    assert stages(tmp_path, Fraction(0), result) == [
+        *("1-z-first.png", "2-a-second.png", "3-boxes.png")
+    ]
+    np.testing.assert_array_equal(read_image(tmp_path / "2-a-second.png"), 255 - road(CAR))
+
+
+class TestBoxes:
+    """The picture of the detections and the shown vehicles."""
+
+    def picture(self, folder: Path, result: FrameResult) -> Image:
+        before = result.frame.image.copy()
+        name = stages(folder, Fraction(0), result)[-1]
+        np.testing.assert_array_equal(result.frame.image, before)
+        return read_image(folder / name)
+
+    def test_where_nothing_is_found_the_frame_is_shown_as_it_is(self, tmp_path: Path) -> None:
+        picture = self.picture(tmp_path, result_of(image=road()))
+        np.testing.assert_array_equal(picture, road())
+
+    def test_vehicles_are_drawn_with_their_ids_and_scores(self, tmp_path: Path) -> None:
+        plain, boxed = (
+            self.picture(tmp_path / name, result_of(*boxes, image=road()))
+            for name, boxes in (("a", ()), ("b", (CAR,)))
+        )
+        side = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
+        assert (boxed[side] != plain[side]).any(axis=1).all()
+        assert (boxed[: CAR.y] != plain[: CAR.y]).any(), "the label stands above the box"
+
+    def test_predicted_vehicles_are_drawn_dashed(self, tmp_path: Path) -> None:
+        track = Track(1, CAR, 0.9, predicted=True)
+        picture = self.picture(tmp_path, result_of(track, image=road()))
+        side = (picture[CAR.bottom - 1, CAR.x : CAR.right] == color_of(1)).all(axis=1)
+        assert 0.2 < side.mean() < 0.8
+
+    def test_detections_are_drawn_even_where_no_vehicle_is_shown(self, tmp_path: Path) -> None:
+        result = detected()
+        (box,) = result.detections.rounded
+        picture = self.picture(tmp_path, result)
+        assert (picture[box.y : box.bottom, box.x] == 255).all()

@@ -1,0 +1,86 @@
+"""The sinks `summary` and `crops` in a run."""
+
+import csv
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from red_cars import CAR, SETTINGS, WIDTH
+from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
+from running import names
+from vdet.boxes import Box
+from vdet.config.schema import CropSettings
+from vdet.files import OutputFiles
+from vdet.media.images import read_image
+from vdet.run.loop import VideoJob
+from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+
+
+def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_path: Path) -> None:
+    wanted = outputs(
+        summary=tmp_path / "a.csv", crops=tmp_path / "crops", tracks=tmp_path / "tracks.csv"
+    )
+    run_red(VideoJob(red_clip, wanted))
+    with (tmp_path / "tracks.csv").open() as file:
+        tracks = list(csv.DictReader(file))
+    with (tmp_path / "a.csv").open() as file:
+        (row,) = csv.DictReader(file)
+    assert (row["id"], row["class"]) == ("1", "")
+    assert float(row["first"]) == float(tracks[0]["time"])
+    assert float(row["last"]) == float(tracks[-1]["time"])
+    assert int(row["seen"]) + int(row["predicted"]) == len(tracks)
+    assert float(row["length_share"]) == pytest.approx(float(row["length"]) / WIDTH, abs=1e-3)
+    assert float(row["length"]) == pytest.approx(COUNT, abs=COUNT / 4), "a pixel a frame"
+    (name,) = names(tmp_path / "crops")
+    assert name.startswith("vehicle-0001-at-")
+    time = float(name.removeprefix("vehicle-0001-at-").removesuffix("s.jpg"))
+    assert time in {round(float(each["time"]), 3) for each in tracks}
+    blue, _, red = read_image(tmp_path / "crops" / name).reshape(-1, 3).mean(axis=0)
+    assert red > blue + 50
+
+
+def test_pictures_have_the_size_and_the_format_that_is_set(tmp_path: Path) -> None:
+    png = SETTINGS.model_copy(update={"crops": CropSettings(format="png", padding=0.25, least=60)})
+    small = Box(10, 150, 59, 70)
+    write(Output("crops", tmp_path), [result_of(CAR, small)], settings=png)
+    assert names(tmp_path) == []
+    png = SETTINGS.model_copy(update={"crops": CropSettings(format="png", padding=0.25, least=48)})
+    write(Output("crops", tmp_path), [result_of(CAR)], settings=png)
+    assert names(tmp_path) == ["vehicle-0001-at-0.000s.png"]
+    picture = read_image(tmp_path / "vehicle-0001-at-0.000s.png")
+    assert picture.shape == (72, 96, 3)
+    assert (picture[12:-12, 16:-16] == (0, 0, 255)).all()
+
+
+def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Path) -> None:
+    large = Box(50, 50, 80, 60)
+    results = [
+        result_of(CAR, time=Fraction(0)),
+        result_of(index=1, time=Fraction(1)),
+        result_of(large, index=2, time=Fraction(2)),
+    ]
+    write(Output("crops", tmp_path), results)
+    assert names(tmp_path) == ["vehicle-0001-at-2.000s.jpg"]
+
+
+def test_pictures_of_an_earlier_run_go(tmp_path: Path) -> None:
+    write(Output("crops", tmp_path), [result_of(CAR, CAR)])
+    (tmp_path / "vehicle-list.txt").write_text("mine")
+    write(Output("crops", tmp_path), [result_of(CAR, time=Fraction(3))])
+    assert names(tmp_path) == ["vehicle-0001-at-3.000s.jpg", "vehicle-list.txt"]
+
+
+def test_thousands_of_vehicles_do_not_need_thousands_of_open_files(tmp_path: Path) -> None:
+    with (
+        OutputFiles() as files,
+        open_sink(
+            Output("crops", tmp_path / "crops"), SinkContext(files, SETTINGS, video_info())
+        ) as sink,
+    ):
+        before = len(list(Path("/proc/self/fd").iterdir()))
+        for number in range(50):
+            sink.write(result_of(*[CAR] * (number + 1), index=number))
+            sink.write(result_of(index=number))
+        assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert len(names(tmp_path / "crops")) == 50

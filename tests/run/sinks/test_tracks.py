@@ -1,0 +1,160 @@
+"""Files of tracks in each format."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from run.red_runs import result_of, write
+from vdet.boxes import Box
+from vdet.config.lanes import LaneSettings
+from vdet.errors import OutputError
+from vdet.labels.predictions import read_predictions
+from vdet.labels.registry import ENDINGS
+from vdet.lanes.lane import Lane, lane_record
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, check_sinks
+from vdet.track.track import Track
+
+RESULTS = (
+    result_of(Track(1, Box(10, 20, 30, 40), 0.98765, False, "car"), index=4, time=Fraction(4, 25)),
+    result_of(index=5, time=Fraction(1, 3)),
+    result_of(
+        Track(1, Box(11, 21, 31, 41), 0.5, True, "car", (27.25, 63.504), 18.249, -1),
+        Track(2, Box(0, -3, 5, 6), 1.0, predicted=False),
+        index=6,
+        time=Fraction(6, 25),
+    ),
+)
+HEADING = "frame,time,id,x,y,width,height,score,predicted,class,foot_x,foot_y,distance,lane\n"
+LANE = Lane(
+    curvature=-0.001,
+    radius=1000.0,
+    offset=0.25,
+    width=3.7,
+    left=np.array([[1.0, 8.0], [3.0, 4.0]]),
+    right=np.array([[9.0, 8.0], [7.0, 4.0]]),
+)
+
+
+def written(path: Path, results: Sequence[FrameResult] = RESULTS) -> str:
+    write(Output("tracks", path), results)
+    return path.read_bytes().decode()
+
+
+def test_motchallenge_text_counts_frames_and_pixels_from_1(tmp_path: Path) -> None:
+    assert written(tmp_path / "tracks.txt") == (
+        "5,1,11,21,30,40,0.9877,-1,-1,-1\n"
+        "7,1,12,22,31,41,0.5000,-1,-1,-1\n"
+        "7,2,1,-2,5,6,1.0000,-1,-1,-1\n"
+    )  # fmt: skip
+
+
+def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
+    assert written(tmp_path / "tracks.csv") == (
+        f"{HEADING}"
+        "4,0.160000,1,10,20,30,40,0.9877,0,car,25.0,60.0,,\n"
+        "6,0.240000,1,11,21,31,41,0.5000,1,car,27.25,63.5,18.25,-1\n"
+        "6,0.240000,2,0,-3,5,6,1.0000,0,,2.5,3.0,,\n"
+    )
+
+
+def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
+    assert written(tmp_path / "tracks.jsonl") == (
+        '{"frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
+        '"height": 40, "score": 0.9877, "predicted": false, "class": "car", "foot": [25.0, 60.0], '
+        '"distance": null, "lane": null}]}\n'
+        '{"frame": 5, "time": 0.333333, "tracks": []}\n'
+        '{"frame": 6, "time": 0.24, "tracks": [{"id": 1, "x": 11, "y": 21, "width": 31, '
+        '"height": 41, "score": 0.5, "predicted": true, "class": "car", "foot": [27.25, 63.5], '
+        '"distance": 18.25, "lane": -1}, {"id": 2, "x": 0, "y": -3, "width": 5, '
+        '"height": 6, "score": 1.0, "predicted": false, "class": null, "foot": [2.5, 3.0], '
+        '"distance": null, "lane": null}]}\n'
+    )
+
+
+def road(lane: Lane | None) -> Road:
+    image = np.zeros((36, 64, 3), np.uint8)
+    finder = RoadFinder(LaneRequest(), LaneSettings(), 64, 36)
+    return replace(finder.update(finder.observe(image)), lane=lane)
+
+
+def written_with_lanes(path: Path) -> str:
+    lanes = (LANE, None, None)
+    found = [replace(one, road=road(lane)) for one, lane in zip(RESULTS, lanes, strict=True)]
+    return written(path, found)
+
+
+def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> None:
+    with_lanes = written_with_lanes(tmp_path / "with.jsonl").splitlines()
+    without = written(tmp_path / "without.jsonl").splitlines()
+    lanes = []
+    for line, other in zip(with_lanes, without, strict=True):
+        record = json.loads(line)
+        lanes.append(record.pop("lane"))
+        assert record == json.loads(other)
+    assert lanes == [lane_record(LANE), None, None]
+
+
+@pytest.mark.parametrize("suffix", [".txt", ".csv"])
+def test_other_formats_have_no_place_for_a_lane(tmp_path: Path, suffix: str) -> None:
+    assert written_with_lanes(tmp_path / f"a{suffix}") == written(tmp_path / f"b{suffix}")
+
+
+def test_without_frames_only_a_heading_is_written(tmp_path: Path) -> None:
+    texts = [written(tmp_path / f"tracks{suffix}", []) for suffix in (".txt", ".csv", ".jsonl")]
+    assert texts == ["", HEADING, ""]
+
+
+def test_the_case_of_the_suffix_does_not_matter(tmp_path: Path) -> None:
+    assert written(tmp_path / "A.CSV") == written(tmp_path / "b.csv")
+
+
+@pytest.mark.parametrize("name", ["tracks.json", "tracks", "tracks.coco", ".csv", ".kitti.txt"])
+def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str) -> None:
+    output = Output("tracks", tmp_path / name)
+    with pytest.raises(OutputError, match=r"tracks are written as \.txt, \.csv, \.jsonl"):
+        check_sinks([output], overwrite=False)
+    with pytest.raises(OutputError, match="tracks are written as"):
+        write(output, RESULTS)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", ENDINGS)
+def test_an_error_leaves_no_half_written_tracks(tmp_path: Path, suffix: str) -> None:
+    def interrupted() -> Iterator[FrameResult]:
+        yield RESULTS[0]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write(Output("tracks", tmp_path / f"tracks{suffix}"), interrupted())
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("suffix", [each for each in ENDINGS if each != ".yolo.zip"])
+def test_written_tracks_are_read_back_by_the_evaluation(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"tracks{suffix}"
+    written(path)
+    video = read_predictions(path)
+    assert video.frames.tolist() == [5, 7, 7]
+    assert video.ids.tolist() == [1, 1, 2]
+    assert video.boxes.tolist() == [[10, 20, 30, 40], [11, 21, 31, 41], [0, -3, 5, 6]]
+    if suffix != ".xml":  # which has no scores
+        assert video.scores.tolist() == [0.9877, 0.5, 1]
+
+
+def test_formats_that_describe_the_video_are_not_for_pictures(tmp_path: Path) -> None:
+    for ending in (".coco.json", ".xml", ".yolo.zip"):
+        with pytest.raises(OutputError, match=r"is for videos; give another format for pictures"):
+            write(Output("tracks", tmp_path / f"a{ending}"), RESULTS, video=None)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_video_is_described_by_its_name_and_size(tmp_path: Path) -> None:
+    text = written(tmp_path / "a.coco.json")
+    assert '{"id": 1, "name": "red.mp4", "width": 320, "height": 240}' in text

@@ -1,0 +1,394 @@
+"""The loop: what is found in a video, what is kept, and what is left when something breaks."""
+
+import gc
+import json
+import threading
+import weakref
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import count, islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conftest import Run
+from quick import QUICK, QUICK_OPTIONS
+from red_cars import (
+    HEIGHT,
+    PERSPECTIVE,
+    SETTINGS,
+    WIDTH,
+    by_perspective,
+    car_at,
+    drive,
+    red_model,
+    road,
+)
+from run.red_runs import (
+    COUNT,
+    follow,
+    outputs,
+    read,
+    run_red,
+    video_info,
+)
+from running import write_drive
+from vdet.config.loading import load_settings
+from vdet.config.schema import DrawSettings, OutputSettings, Settings
+from vdet.detect.factory import load_detector
+from vdet.errors import ImageError, OutputError, VdetError, VideoError
+from vdet.media import Frame, Picture, VideoWriter
+from vdet.media.images import Image, read_image
+from vdet.media.planes import Planes
+from vdet.run.loop import FIRST_FRAMES, VideoJob, follow_frames, peek, run_video
+from vdet.run.threads import map_ordered
+from vdet.synthetic import frames, true_boxes
+from vdet.synthetic.scene import Scene
+from vdet.track.rules.tracker import RulesTracker
+
+QUEUED = 24
+"""Largest number of frames that a run may hold at a time."""
+
+
+class TestFollowFrames:
+    def test_finds_the_vehicle_of_a_drawn_scene(self, scene: Scene, model_path: Path) -> None:
+        settings = load_settings(None, QUICK)
+        images, drawn = peek(islice(frames(scene), 16))
+        detector = load_detector(settings.detector, model_path).for_video(320, 180, images)
+        results = list(follow_frames(drawn, detector, settings, video_info(320, 180)))
+        assert [result.frame.index for result in results] == list(range(16))
+        nearest = 3  # its number in the scene
+        overlaps = []
+        for result in results[8:]:
+            (box,) = (v.box for v in true_boxes(scene, result.frame.index) if v.id == nearest)
+            overlaps.append(max((track.box.iou(box) for track in result.tracks), default=0))
+        assert min(overlaps) > 0.3
+        assert np.mean(overlaps) > 0.5
+
+    @pytest.mark.parametrize(
+        ("settings", "least"), [(SETTINGS, 0.3), (PERSPECTIVE, 0.5)], ids=["original", "default"]
+    )
+    def test_follows_a_car_by_one_id(self, settings: Settings, least: float) -> None:
+        results = list(follow(drive(20), settings))
+        shown = [result for result in results if result.tracks]
+        assert len(shown) > 15
+        for result in shown:
+            (track,) = result.tracks
+            assert track.id == 1
+            assert track.box.iou(car_at(result.frame.index)) > least
+
+    @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
+    @pytest.mark.parametrize("threads", [3, 5])
+    def test_gives_the_same_with_any_number_of_threads(
+        self, settings: Settings, threads: int
+    ) -> None:
+        one, many = (list(follow(drive(20), settings, threads=number)) for number in (1, threads))
+        assert [result.tracks for result in many] == [result.tracks for result in one]
+        assert [result.frame.index for result in many] == list(range(20))
+        for first, second in zip(one, many, strict=True):
+            for name in ("boxes", "scores", "centroids", "strengths"):
+                np.testing.assert_array_equal(
+                    getattr(first.detections, name), getattr(second.detections, name)
+                )
+            heat, same = (each.detections.trace.heat.values for each in (first, second))
+            np.testing.assert_array_equal(heat, same)
+
+    def test_shows_nothing_on_an_empty_road(self) -> None:
+        empty = (replace(frame, picture=Picture(road())) for frame in drive(15))
+        for result in follow(empty):
+            assert result.tracks == ()
+            assert len(result.detections) == 0
+
+    def test_gives_every_frame_untouched(self) -> None:
+        for result in follow(drive(15)):
+            np.testing.assert_array_equal(result.frame.image, road(car_at(result.frame.index)))
+
+    def test_ids_begin_at_1_in_every_video(self) -> None:
+        for _ in range(2):
+            *_, last = follow(drive(15))
+            assert [track.id for track in last.tracks] == [1]
+
+    def test_no_frames_give_no_results(self) -> None:
+        assert list(follow([])) == []
+
+    def test_a_frame_too_small_for_any_window_is_refused(self) -> None:
+        with pytest.raises(ImageError, match="no search window fits into a frame of 20×240"):
+            list(follow(drive(3), width=20))
+
+
+class TestFirstFrames:
+    """The first frames tell the detector where the horizon is; they are searched like all others.
+
+    The horizon is looked for only where it is not set.
+    """
+
+    FREE = by_perspective(0, 0.15, 0.2)
+
+    @pytest.fixture
+    def asked(self, monkeypatch: pytest.MonkeyPatch) -> list[list[Image]]:
+        """The pictures in which the horizon is looked for; it is always found at 0.35."""
+        asked: list[list[Image]] = []
+
+        def find(images: Sequence[Image]) -> float:
+            asked.append(list(images))
+            return 0.35
+
+        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", find)
+        return asked
+
+    def test_the_horizon_is_looked_for_in_the_first_frames_once(
+        self, asked: list[list[Image]]
+    ) -> None:
+        list(follow(drive(12), self.FREE))
+        ((*images,),) = asked
+        assert len(images) == FIRST_FRAMES == 5
+        for index, image in enumerate(images):
+            np.testing.assert_array_equal(image, road(car_at(index)))
+
+    def test_a_horizon_that_is_set_is_not_looked_for(self, asked: list[list[Image]]) -> None:
+        list(follow(drive(6), PERSPECTIVE))
+        assert asked == []
+
+    def test_a_found_horizon_gives_what_the_same_set_horizon_gives(
+        self, asked: list[list[Image]]
+    ) -> None:
+        found, given = (
+            [(each.frame.index, each.tracks) for each in follow(drive(12), settings)]
+            for settings in (self.FREE, PERSPECTIVE)
+        )
+        assert found == given
+        assert [index for index, _ in found] == list(range(12))
+        assert asked
+
+    @pytest.mark.parametrize("frames", [0, 1, 4])
+    def test_a_clip_may_be_shorter(self, asked: list[list[Image]], frames: int) -> None:
+        results = list(follow(drive(frames), self.FREE))
+        assert [result.frame.index for result in results] == list(range(frames))
+        assert [len(images) for images in asked] == [frames]
+
+    def test_no_more_frames_are_read_than_the_detector_needs(self) -> None:
+        source = drive(12)
+        images, same = peek(source)
+        assert len(images) == FIRST_FRAMES
+        assert next(source).index == FIRST_FRAMES
+        assert [frame.index for frame in same] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
+
+
+class TestMemory:
+    def test_following_holds_few_frames_at_a_time(self) -> None:
+        alive: list[weakref.ref[object]] = []
+
+        def watched() -> Iterator[Frame]:
+            for frame in drive(COUNT):
+                alive.append(weakref.ref(frame.image))
+                yield frame
+
+        most = 0
+        for _ in follow(watched()):
+            most = max(most, sum(image() is not None for image in alive))
+        assert len(alive) == COUNT
+        assert 0 < most <= QUEUED
+
+    def test_the_first_frames_are_let_go_when_they_have_been_taken(self) -> None:
+        images, rest = peek(drive(COUNT))
+        first = weakref.ref(images[0])
+        del images
+        assert first() is not None
+        for _ in islice(rest, FIRST_FRAMES + 1):
+            pass
+        assert first() is None
+
+    def test_a_whole_run_holds_few_frames_at_a_time(self, red_clip: Path, tmp_path: Path) -> None:
+        def frames_alive() -> int:
+            return sum(isinstance(item, Frame) for item in gc.get_objects())
+
+        others = frames_alive()  # of tests before this one
+        calls = count()
+        held: list[int] = []
+
+        def advance(_: int) -> None:
+            if next(calls) % 6 == 5:  # looking takes a while
+                held.append(frames_alive() - others)
+
+        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
+        run_red(VideoJob(red_clip, wanted), threads=2, progress=lambda _: advance)
+        assert held
+        assert 0 < max(held) <= QUEUED
+
+
+class TestRun:
+    def test_without_a_number_all_cores_that_the_process_may_use_search(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        pools: list[int] = []
+
+        def note(function: Any, items: Any, threads: int, **options: Any) -> Any:
+            pools.append(threads)
+            return map_ordered(function, items, threads, **options)
+
+        monkeypatch.setattr("joblib.cpu_count", lambda: 3)  # it knows control groups
+        monkeypatch.setattr("vdet.run.loop.map_ordered", note)
+        job = VideoJob(write_drive(tmp_path / "a.mp4", 2))
+        run_video(job, red_model(), SETTINGS)
+        run_video(job, red_model(), SETTINGS, threads=2)
+        assert pools == [3, 2]
+
+    def test_the_summary_counts_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:
+        job = VideoJob(red_clip, outputs(video=tmp_path / "out.mp4"), frames=20)
+        summary = run_red(job)
+        assert (summary.frames, summary.tracks) == (20, 1)
+        assert (summary.width, summary.height) == (WIDTH, HEIGHT)
+        assert summary.seconds > 0
+
+    def test_progress_gets_every_frame(self, red_clip: Path) -> None:
+        calls: list[int | None] = []
+
+        def progress(total: int | None) -> Callable[[int], object]:
+            calls.append(total)
+            return calls.append
+
+        run_red(VideoJob(red_clip, frames=20), progress=progress)
+        assert calls[0] == 20
+        assert sum(advance or 0 for advance in calls[1:]) == 20
+
+    def test_stages_alone_need_only_the_frames_before_their_moment(
+        self, red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("vdet.run.loop.LEAD", Fraction(5, 25))
+        at = Fraction(30, 25)
+        whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
+        for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():
+            (tmp_path / name).mkdir()
+            summary = run_red(VideoJob(red_clip, wanted, at=at))
+            assert summary.frames == (6 if name == "alone" else COUNT)
+        one, other = (read_image(tmp_path / name / "3-hits.png") for name in ("alone", "whole"))
+        np.testing.assert_array_equal(one, other)
+
+    def test_boxes_are_drawn_where_the_tracks_say(self, red_clip: Path, tmp_path: Path) -> None:
+        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
+        exact = {"output": OutputSettings(crf=1), "draw": DrawSettings(smoothing=0)}
+        run_red(VideoJob(red_clip, wanted, frames=20), SETTINGS.model_copy(update=exact))
+        records = [json.loads(line) for line in (tmp_path / "out.jsonl").read_text().splitlines()]
+        before, after = read(red_clip)[:20], read(tmp_path / "out.mp4")
+        for old, new, record in zip(before, after, records, strict=True):
+            change = np.abs(new.image.astype(int) - old.image).max(axis=2) > 20
+            if not record["tracks"]:
+                assert not change.any()
+                continue
+            (box,) = record["tracks"]
+            right, bottom = box["x"] + box["width"], box["y"] + box["height"]
+            assert change[bottom - 1, box["x"] : right].mean() > 0.9
+            assert change[box["y"] : bottom, right - 1].mean() > 0.9
+            assert not change[bottom + 3 :].any()
+            assert not change[:, right + 3 :].any()
+        assert records[-1]["tracks"]
+
+    def test_the_tracks_do_not_depend_on_whether_a_video_is_written(
+        self, red_clip: Path, tmp_path: Path
+    ) -> None:
+        both = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "a.csv")
+        run_red(VideoJob(red_clip, both, frames=20))
+        run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "b.csv"), frames=20))
+        assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
+        assert len((tmp_path / "a.csv").read_text().splitlines()) > 10
+
+    def test_a_run_leaves_no_thread_behind(self, red_clip: Path, tmp_path: Path) -> None:
+        before = threading.active_count()
+        run_red(VideoJob(red_clip, outputs(video=tmp_path / "out.mp4"), frames=10))
+        assert threading.active_count() == before
+
+
+def _breaking(method: Callable[..., object], error: BaseException) -> Callable[..., object]:
+    """Return a method that works ten times and then breaks."""
+    calls = iter(range(10))
+
+    def call(*arguments: object) -> object:
+        if next(calls, None) is None:
+            raise error
+        return method(*arguments)
+
+    return call
+
+
+class TestBreakage:
+    @pytest.fixture
+    def job(self, red_clip: Path, tmp_path: Path) -> Iterator[VideoJob]:
+        """A job of which, after the test, nothing may be left: neither files nor threads."""
+        threads = threading.active_count()
+        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
+        yield VideoJob(red_clip, wanted)
+        assert list(tmp_path.iterdir()) == []
+        assert threading.active_count() == threads
+
+    @pytest.fixture
+    def breaks(self, monkeypatch: pytest.MonkeyPatch) -> Callable[[BaseException], None]:
+        """Let the tracker break with an error."""
+
+        def breaks(error: BaseException) -> None:
+            monkeypatch.setattr(RulesTracker, "update", _breaking(RulesTracker.update, error))
+
+        return breaks
+
+    def test_the_tracker_breaks(
+        self, job: VideoJob, breaks: Callable[[BaseException], None]
+    ) -> None:
+        breaks(RuntimeError("broken"))
+        with pytest.raises(RuntimeError, match="broken"):
+            run_red(job)
+
+    @pytest.mark.parametrize("error", [OutputError("disk full"), OSError(28, "disk full")])
+    def test_the_writer_breaks(
+        self, job: VideoJob, monkeypatch: pytest.MonkeyPatch, error: OSError
+    ) -> None:
+        monkeypatch.setattr(VideoWriter, "write", _breaking(VideoWriter.write, error))
+        with pytest.raises(OutputError, match="disk full"):
+            run_red(job)
+
+    def test_the_reader_breaks(self, job: VideoJob, monkeypatch: pytest.MonkeyPatch) -> None:
+        error = VideoError("its pixels cannot be converted")
+        monkeypatch.setattr("vdet.media.reader.Planes", _breaking(Planes, error))
+        with pytest.raises(VdetError, match="its pixels"):
+            run_red(job)
+
+    def test_the_progress_is_interrupted(self, job: VideoJob) -> None:
+        def interrupt(_: int) -> None:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_red(job, progress=lambda _: interrupt)
+
+    def test_the_work_is_interrupted(
+        self, job: VideoJob, breaks: Callable[[BaseException], None]
+    ) -> None:
+        breaks(KeyboardInterrupt())
+        with pytest.raises(KeyboardInterrupt):
+            run_red(job)
+
+    def test_the_command_is_interrupted(
+        self,
+        run: Run,
+        clip_path: Path,
+        model_path: Path,
+        tmp_path: Path,
+        breaks: Callable[[BaseException], None],
+    ) -> None:
+        breaks(KeyboardInterrupt())
+        wanted = (tmp_path / "out.mp4", "--tracks", tmp_path / "out.csv")
+        result = run("detect-video", clip_path, *wanted, "--model", model_path, *QUICK_OPTIONS)
+        assert result.code == 130
+        assert "interrupted" in result.err
+        assert list(tmp_path.iterdir()) == []
+
+    def test_an_earlier_output_is_kept(
+        self, red_clip: Path, tmp_path: Path, breaks: Callable[[BaseException], None]
+    ) -> None:
+        out = tmp_path / "out.mp4"
+        out.write_bytes(b"precious")
+        breaks(RuntimeError("broken"))
+        with pytest.raises(RuntimeError, match="broken"):
+            run_red(VideoJob(red_clip, outputs(video=out)))
+        assert out.read_bytes() == b"precious"
+        assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]

@@ -1,0 +1,259 @@
+"""Still pictures: which are taken, where their results go, and what is found in them."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import pytest
+
+from red_cars import CAR, PERSPECTIVE, SETTINGS, road
+from run.conftest import Register
+from run.red_runs import model_for
+from vdet.config.schema import Settings
+from vdet.errors import ImageError, OutputError
+from vdet.media import Picture
+from vdet.media.images import read_image, write_image
+from vdet.run.pictures import (
+    PictureJob,
+    find_images,
+    plan_pictures,
+    run_picture,
+    run_pictures,
+)
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import Output, SinkContext, SinkKind
+
+
+def touch(*paths: Path) -> None:
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+
+
+class TestFindingImages:
+    def test_files_stay_in_the_order_given(self, tmp_path: Path) -> None:
+        paths = [tmp_path / name for name in ("b.png", "a.jpg", "c.txt")]
+        touch(*paths)
+        assert find_images(paths) == paths
+
+    def test_a_folder_gives_its_pictures_by_name(self, tmp_path: Path) -> None:
+        touch(*(tmp_path / name for name in ("b.png", "a.JPG", "c.webp", "notes.txt")))
+        assert [path.name for path in find_images([tmp_path])] == ["a.JPG", "b.png", "c.webp"]
+
+    def test_folders_inside_a_folder_are_not_searched(self, tmp_path: Path) -> None:
+        touch(tmp_path / "a.png", tmp_path / "more" / "b.png")
+        assert find_images([tmp_path]) == [tmp_path / "a.png"]
+
+    def test_a_picture_that_is_named_twice_is_taken_once(self, tmp_path: Path) -> None:
+        touch(tmp_path / "a.png", tmp_path / "b.png")
+        found = find_images([tmp_path / "b.png", tmp_path, tmp_path / "a.png"])
+        assert [path.name for path in found] == ["b.png", "a.png"]
+
+    def test_a_folder_without_pictures_is_named(self, tmp_path: Path) -> None:
+        touch(tmp_path / "in" / "notes.txt")
+        with pytest.raises(ImageError, match=r"in: holds no pictures \(.*\.png"):
+            find_images([tmp_path / "in"])
+
+    def test_what_is_not_there_is_named(self, tmp_path: Path) -> None:
+        with pytest.raises(ImageError, match=r"none\.png: no such file or folder"):
+            find_images([tmp_path / "none.png"])
+
+
+class TestPlan:
+    def test_one_picture_goes_to_the_file_named(self, tmp_path: Path) -> None:
+        source, out = tmp_path / "a.png", tmp_path / "found.jpg"
+        expected = PictureJob(source, (Output("picture", out),))
+        assert plan_pictures([source], out, None, overwrite=False) == [expected]
+
+    def test_one_picture_goes_into_a_folder_that_is_named(self, tmp_path: Path) -> None:
+        out = tmp_path / "new" / "out"
+        (job,) = plan_pictures([tmp_path / "a.png"], out, None, overwrite=False)
+        assert job.outputs == (Output("picture", out / "a.png"),)
+        assert out.is_dir()
+
+    def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.jpg"]
+        jobs = plan_pictures(sources, tmp_path / "out", None, overwrite=False)
+        assert [job.outputs for job in jobs] == [
+            (Output("picture", tmp_path / "out" / source.name),) for source in sources
+        ]
+
+    def test_without_an_output_no_picture_is_written(self, tmp_path: Path) -> None:
+        (job,) = plan_pictures([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
+        assert [output.sink for output in job.outputs] == ["stages"]
+        assert [path.name for path in tmp_path.iterdir()] == ["stages"]
+
+    def test_stages_of_two_inputs_of_one_stem_are_refused(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "a.jpg"]
+        with pytest.raises(OutputError, match="is wanted by two inputs"):
+            plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
+
+    def test_earlier_stages_are_kept(self, tmp_path: Path) -> None:
+        (tmp_path / "5-boxes.png").write_text("precious")
+        with pytest.raises(OutputError, match="--overwrite"):
+            plan_pictures([tmp_path / "a.png"], None, tmp_path, overwrite=False)
+
+    def test_stages_of_one_picture_go_into_the_folder_itself(self, tmp_path: Path) -> None:
+        (job,) = plan_pictures([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
+        assert job.outputs == (Output("stages", tmp_path / "stages"),)
+
+    def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        jobs = plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
+        assert [job.outputs for job in jobs] == [
+            (Output("stages", tmp_path / "stages" / name),) for name in "ab"
+        ]
+
+    def test_one_output_that_is_there_already_refuses_all(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        touch(tmp_path / "out" / "b.png")
+        with pytest.raises(OutputError, match=r"b\.png: is there already"):
+            plan_pictures(sources, tmp_path / "out", None, overwrite=False)
+        assert len(plan_pictures(sources, tmp_path / "out", None, overwrite=True)) == 2
+
+    def test_a_file_where_the_folder_should_be_is_refused(self, tmp_path: Path) -> None:
+        touch(tmp_path / "out")
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        with pytest.raises(OutputError, match="out: cannot be made a folder"):
+            plan_pictures(sources, tmp_path / "out", None, overwrite=True)
+
+    def test_the_folder_of_the_inputs_cannot_be_the_output(self, tmp_path: Path) -> None:
+        sources = [tmp_path / "a.png", tmp_path / "b.png"]
+        touch(*sources)
+        with pytest.raises(OutputError, match="is the input itself"):
+            plan_pictures(sources, tmp_path, None, overwrite=True)
+
+
+def run_red(source: Path, settings: Settings = SETTINGS, **paths: Path) -> FrameResult:
+    """Search a picture for red cars, and write outputs by the names of their sinks."""
+    wanted = tuple(Output(sink, path) for sink, path in paths.items())
+    return run_picture(PictureJob(source, wanted), model_for(settings), settings)
+
+
+class TestRun:
+    @pytest.fixture
+    def source(self, tmp_path: Path) -> Path:
+        path = tmp_path / "road.png"
+        write_image(path, road(CAR))
+        return path
+
+    @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["original", "default"])
+    def test_gives_the_boxes_of_the_detection(self, source: Path, settings: Settings) -> None:
+        result = run_red(source, settings)
+        image = road(CAR)
+        detector = model_for(settings).for_video(image.shape[1], image.shape[0], [image])
+        detections = detector.detect(detector.search(Picture(image), None))
+        assert result.source == source
+        assert (result.frame.index, result.frame.time) == (0, Fraction(0))
+        np.testing.assert_array_equal(result.frame.image, image)
+        (track,) = result.tracks
+        assert [track.box] == detections.rounded
+        assert track.score == pytest.approx(detections.scores.tolist()[0])
+        assert (track.id, track.predicted) == (1, False)
+        assert track.box.iou(CAR) > 0.35
+        assert result.detections.strengths[0] > settings.svm.heat.threshold
+
+    def test_writes_nothing_that_is_not_asked_for(self, source: Path) -> None:
+        run_red(source)
+        assert [path.name for path in source.parent.iterdir()] == ["road.png"]
+
+    def test_draws_the_boxes_into_the_picture_only(self, source: Path) -> None:
+        out = source.with_name("out.png")
+        (track,) = run_red(source, picture=out).tracks
+        box = track.box
+        changed = (read_image(out) != road(CAR)).any(axis=2)
+        assert changed[box.y : box.bottom, box.x].all()
+        assert not changed[box.bottom :].any()
+        np.testing.assert_array_equal(read_image(source), road(CAR))
+
+    def test_an_empty_road_is_written_as_it_is(self, tmp_path: Path) -> None:
+        source, out = tmp_path / "empty.png", tmp_path / "out.png"
+        write_image(source, road())
+        assert run_red(source, picture=out).tracks == ()
+        np.testing.assert_array_equal(read_image(out), road())
+
+    def test_stages_show_the_frame_without_the_boxes_of_the_output(self, source: Path) -> None:
+        both, alone = source.with_name("both"), source.with_name("alone")
+        for folder in (both, alone):
+            folder.mkdir()
+        run_red(source, picture=source.with_name("out.png"), stages=both)
+        run_red(source, stages=alone)
+        names = sorted(path.name for path in both.iterdir())
+        assert len(names) == 5
+        for name in names:
+            assert (both / name).read_bytes() == (alone / name).read_bytes()
+
+    def test_a_picture_that_is_too_small_is_named(self, tmp_path: Path) -> None:
+        source = tmp_path / "tiny.png"
+        write_image(source, road(CAR)[:, :20])
+        with pytest.raises(ImageError, match=r"tiny\.png: no search window fits"):
+            run_red(source, picture=tmp_path / "out.png")
+        assert not (tmp_path / "out.png").exists()
+
+
+class Fails:
+    """A sink that stages a file, and fails when its block ends without an error."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self.file = context.files.stage(path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            raise OSError(28, "No space left on device")
+
+    def write(self, result: FrameResult) -> None:
+        self.file.write_text(result.source.name)
+
+
+class TestSeveral:
+    @pytest.fixture
+    def jobs(self, tmp_path: Path) -> list[PictureJob]:
+        """Two pictures of a car, and between them a file that is no picture."""
+        jobs = []
+        for name in ("a.png", "b.png", "c.png"):
+            source = tmp_path / name
+            write_image(source, road(CAR))
+            jobs.append(PictureJob(source, (Output("picture", tmp_path / f"out-{name}"),)))
+        (tmp_path / "b.png").write_text("no picture")
+        return jobs
+
+    def names(self, folder: Path) -> list[str]:
+        return sorted(path.name for path in folder.iterdir() if len(path.stem) > 1)
+
+    def test_a_picture_that_cannot_be_read_does_not_stop_the_others(
+        self, jobs: list[PictureJob], tmp_path: Path
+    ) -> None:
+        shared = [Output("json", tmp_path / "boxes.json")]
+        (failure,) = run_pictures(jobs, shared, model_for(SETTINGS), SETTINGS)
+        assert "b.png: is not a picture" in str(failure)
+        assert self.names(tmp_path) == ["boxes.json", "out-a.png", "out-c.png"]
+        items = json.loads((tmp_path / "boxes.json").read_text())
+        assert [Path(item["image"]).name for item in items] == ["a.png", "c.png"]
+        assert [len(item["boxes"]) for item in items] == [1, 1]
+
+    def test_a_shared_output_that_fails_at_the_end_leaves_those_of_the_pictures(
+        self, jobs: list[PictureJob], tmp_path: Path, register: Register
+    ) -> None:
+        register("fails", SinkKind(Fails))
+        shared = [Output("json", tmp_path / "boxes.json"), Output("fails", tmp_path / "fails.txt")]
+        with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
+            run_pictures(jobs, shared, model_for(SETTINGS), SETTINGS)
+        assert self.names(tmp_path) == ["out-a.png", "out-c.png"]
+
+    def test_the_outputs_of_one_picture_appear_together_or_not_at_all(
+        self, jobs: list[PictureJob], tmp_path: Path, register: Register
+    ) -> None:
+        register("fails", SinkKind(Fails))
+        (first, *_) = jobs
+        fails = Output("fails", tmp_path / "fails.txt")
+        for outputs in ((*first.outputs, fails), (fails, *first.outputs)):
+            job = replace(first, outputs=outputs)
+            with pytest.raises(OutputError, match=r"fails\.txt: cannot be written: No space"):
+                run_pictures([job], (), model_for(SETTINGS), SETTINGS)
+            assert self.names(tmp_path) == []

@@ -1,0 +1,137 @@
+"""The distance and the lane of vehicles, in videos and in pictures."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from run.red_runs import video_info
+from vdet.boxes import Box
+from vdet.config.lanes import LaneSettings
+from vdet.config.schema import MotionTrackerSettings, Settings
+from vdet.detect.detections import Detections
+from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.media import Picture
+from vdet.run.loop import NullDetector, follow_frames
+from vdet.run.pictures import detect_picture
+from vdet.run.positions import with_positions
+from vdet.synthetic import frames, render, true_boxes
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.lane_view import lane_view
+from vdet.synthetic.scene import Carriageway, Light, Line, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.truth import true_places
+from vdet.track.track import Track
+
+WIDTH, HEIGHT = 640, 360
+AHEAD = 18.0
+CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
+SETTINGS = Settings(
+    lanes=LaneSettings(view=lane_view(CAMERA, near=6, far=42)),
+    tracker=MotionTrackerSettings(needed=0.05),
+)
+SCENE = Scene(
+    camera=CAMERA,
+    road=Carriageway(-7, 7, tuple(Line(x) for x in (-5.55, -1.85, 1.85, 5.55))),
+    light=Light(noise=0),
+    vehicles=tuple(
+        SceneVehicle(number, (Waypoint(0, AHEAD, x), Waypoint(9, AHEAD, x)), color=(40, 30, 200))
+        for number, x in ((1, -3.7), (2, 0.2), (3, 3.7))
+    ),
+    frames=8,
+)
+
+
+class TrueDetector(NullDetector):
+    """Finds the vehicles of the scene; for the tests of what follows from boxes."""
+
+    def search(self, picture: Picture, index: int | None) -> None:
+        """Do nothing: the vehicles keep their distances."""
+
+    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
+        """Return the true boxes of the scene."""
+        boxes = [each.box for each in true_boxes(SCENE, 0)]
+        corners = [(box.x, box.y, box.right, box.bottom) for box in boxes]
+        return Detections(corners, np.full(len(corners), 0.95))
+
+    def for_video(self, *_: object) -> "TrueDetector":
+        return self
+
+
+def roads() -> RoadFinder:
+    return RoadFinder(LaneRequest(), SETTINGS.lanes, WIDTH, HEIGHT)
+
+
+def check(tracks: tuple[Track, ...]) -> None:
+    """Compare tracks from left to right with where the vehicles are."""
+    left_to_right = sorted(tracks, key=lambda track: track.box.x)
+    assert len(left_to_right) == 3
+    for track, place in zip(left_to_right, true_places(SCENE, 0), strict=True):
+        assert track.distance == pytest.approx(place.distance, rel=0.1)
+        assert track.lane == place.lane
+
+
+def test_vehicles_of_a_video_have_their_distance_and_lane() -> None:
+    found = list(
+        follow_frames(
+            frames(SCENE), TrueDetector(), SETTINGS, video_info(WIDTH, HEIGHT), roads=roads()
+        )
+    )
+    check(found[-1].tracks)
+    assert found[-1].frame_tracks.tracks == found[-1].tracks, "all outputs get them"
+
+
+def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
+    image = render(SCENE, 0)
+    result = detect_picture(Path("a.png"), image, TrueDetector(), SETTINGS, LaneRequest())
+    check(result.tracks)
+
+
+@pytest.mark.parametrize("with_roads", [False, True])
+def test_without_a_lane_they_have_none(*, with_roads: bool) -> None:
+    grey = [replace(f, picture=Picture(np.full_like(f.image, 90))) for f in frames(SCENE)]
+    finder = roads() if with_roads else None
+    found = list(
+        follow_frames(grey, TrueDetector(), SETTINGS, video_info(WIDTH, HEIGHT), roads=finder)
+    )
+    assert len(found[-1].tracks) == 3
+    assert all((t.distance, t.lane) == (None, None) for t in found[-1].tracks)
+
+
+@pytest.fixture(scope="module")
+def road() -> Road:
+    finder = roads()
+    return finder.update(finder.observe(render(replace(SCENE, vehicles=()), 0)))
+
+
+def track_at(box: Box) -> Track:
+    return Track(1, box, 0.9, predicted=False)
+
+
+def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
+    box = Box(300, 200, 60, 50)
+    [plain] = with_positions([track_at(box)], road, 0)
+    [lower] = with_positions([replace(track_at(box), whole_foot=(330.0, 270.0))], road, 0)
+    assert plain.distance is not None
+    assert lower.distance is not None
+    assert lower.distance < plain.distance
+
+
+def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road) -> None:
+    low, right = track_at(Box(300, 200, 60, 50)), track_at(Box(300, 200, 60, 45))
+    [shortened], [expected] = with_positions([low], road, 0.1), with_positions([right], road, 0)
+    assert expected.distance is not None
+    assert shortened.distance == pytest.approx(expected.distance)
+    assert shortened.box == low.box
+
+
+@pytest.mark.parametrize(
+    "box", [Box(300, 300, 60, 60), Box(0, 230, 60, 60), Box(580, 230, 60, 60), Box(300, 150, 9, 9)]
+)
+def test_a_vehicle_whose_foot_is_not_on_the_road_in_the_frame_has_none(
+    road: Road, box: Box
+) -> None:
+    old = replace(track_at(box), distance=1.0, lane=1)
+    [track] = with_positions([old], road, 0)
+    assert (track.distance, track.lane) == (None, None)
+    assert replace(track, distance=1.0, lane=1) == old, "nothing else changes"

@@ -1,0 +1,88 @@
+"""Regions in videos and pictures: which vehicles are shown, and the picture of the regions."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, drive, road
+from run.red_runs import follow, model_for, outputs, run_red
+from vdet.batch.digest import work_digest
+from vdet.batch.manifest import Origin
+from vdet.boxes import Box
+from vdet.config.regions import RegionsSettings
+from vdet.config.schema import Settings
+from vdet.errors import ImageError, VideoError
+from vdet.media.images import read_image, write_image
+from vdet.run.loop import VideoJob
+from vdet.run.pictures import PictureJob, detect_picture, run_picture
+from vdet.run.sinks.protocol import Output
+
+RIGHT = [[100, 0], [320, 0], [320, 240], [100, 240]]
+
+
+def within(
+    points: Any = RIGHT, settings: Settings = SETTINGS, kind: str = "include", **others: Any
+) -> Settings:
+    polygons = [{"name": "right", "points": points, "kind": kind}] if points else []
+    values = {"size": (WIDTH, HEIGHT), "polygons": polygons} | others
+    return settings.model_copy(update={"regions": RegionsSettings.model_validate(values)})
+
+
+def test_a_vehicle_is_shown_from_where_its_foot_is_in_the_region() -> None:
+    whole = {r.frame.index: r.tracks for r in follow(drive(60))}
+    part = {r.frame.index: r.tracks for r in follow(drive(60), within())}
+    for index, tracks in whole.items():
+        assert [t.box for t in part[index]] == [t.box for t in tracks if t.foot[0] >= 100]
+    assert any(whole.values())
+    assert any(part.values())
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["outlines", "votes"])
+def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> None:
+    image = road(CAR.moved_to(20, 120), CAR.moved_to(220, 120))
+
+    def found(regions: Settings) -> list[Box]:
+        result = detect_picture(Path("a.png"), image, model_for(regions), regions)
+        assert [t.box for t in result.tracks] == result.detections.rounded
+        return [t.box for t in result.tracks]
+
+    assert len(found(settings)) == 2
+    (right,) = found(within(settings=settings))
+    (left,) = found(within(settings=settings, kind="exclude"))
+    assert left.center[0] < WIDTH / 2 < right.center[0]
+
+
+def test_regions_for_another_shape_name_the_file(red_clip: Path, tmp_path: Path) -> None:
+    settings = within([[0, 0], [9, 0], [9, 9]], size=(100, 100))
+    with pytest.raises(VideoError, match=r"red\.mp4: regions\.size: places are given for frames"):
+        run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "t.csv")), settings)
+    with pytest.raises(ImageError, match=r"a\.png: regions\.size"):
+        detect_picture(Path("a.png"), road(CAR), model_for(settings), settings)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_stages_show_the_regions(tmp_path: Path) -> None:
+    write_image(tmp_path / "road.png", road(CAR))
+    for name, settings in (("without", SETTINGS), ("with", within())):
+        folder = tmp_path / name
+        job = PictureJob(tmp_path / "road.png", (Output("stages", folder),))
+        run_picture(job, model_for(settings), settings)
+    assert not list((tmp_path / "without").glob("*regions*"))
+    names = sorted(path.name for path in (tmp_path / "with").iterdir())
+    assert names[-2:] == ["5-regions.png", "6-boxes.png"]
+    picture = read_image(tmp_path / "with" / "5-regions.png")
+    assert picture[220, 40].max() < 60, "it is dark outside"
+    assert np.array_equal(picture[220, 200], road(CAR)[220, 200])
+
+
+def test_a_mask_that_is_drawn_anew_makes_results_out_of_date(tmp_path: Path) -> None:
+    mask = tmp_path / "mask.png"
+    settings = within([], mask=str(mask))
+    job, origin = VideoJob(Path("a.mp4")), Origin("vdet", None, None)
+    write_image(mask, np.zeros((24, 32, 3), np.uint8))
+    before = work_digest(origin, settings, job)
+    assert before == work_digest(origin, settings, job)
+    write_image(mask, np.full((24, 32, 3), 255, np.uint8), overwrite=True)
+    assert before != work_digest(origin, settings, job)

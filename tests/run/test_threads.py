@@ -1,0 +1,545 @@
+"""Threads keep the order of items, and end with their block, also after an error in it."""
+
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import chain, islice
+
+import cv2
+import pytest
+from threadpoolctl import threadpool_info
+
+from running import SOON, until
+from vdet.run.threads import (
+    StalledError,
+    map_ordered,
+    prefetch,
+    run_in_thread,
+    single_threaded_libraries,
+    write_async,
+)
+
+PLACES = ("source", "function", "taker")
+Errors = pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt, SystemExit])
+
+
+@pytest.fixture(autouse=True)
+def no_thread_is_left(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", SOON)
+    yield
+    assert threads_of_vdet() == []
+
+
+@pytest.fixture
+def ctrl_c() -> Iterator[Callable[[], None]]:
+    """A call interrupts the main thread, as the keyboard does, and returns when that is done."""
+    interrupted = threading.Event()
+
+    def interrupt(*_: object) -> None:
+        interrupted.set()
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    main = threading.main_thread().ident
+    assert main is not None
+
+    def press() -> None:
+        signal.pthread_kill(main, signal.SIGINT)
+        assert interrupted.wait(SOON)
+
+    yield press
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.fixture
+def hang(no_thread_is_left: None, monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """An event that lets a thread wait until the end of the test; nobody waits for that thread."""
+    assert no_thread_is_left is None
+    monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", 0.1)
+    event = threading.Event()
+    yield event
+    event.set()
+    until(lambda: threads_of_vdet() == [])
+
+
+def threads_of_vdet() -> list[str]:
+    return [thread.name for thread in threading.enumerate() if "vdet-" in thread.name]
+
+
+def stays(count: Callable[[], int], expected: int) -> bool:
+    """Wait until a count has the expected value; then return whether it still has it later."""
+    until(lambda: count() >= expected)
+    time.sleep(0.05)
+    return count() == expected
+
+
+def failing(error: BaseException, after: int) -> Iterator[int]:
+    yield from range(after)
+    raise error
+
+
+def fail(error: BaseException, after: object) -> None:
+    assert after is not None
+    raise error
+
+
+def hand_all(items: Iterable[int], hand_over: Callable[[int], None]) -> None:
+    for item in items:
+        hand_over(item)
+
+
+def recording(items: Iterable[int], seen: list[int]) -> Iterator[int]:
+    for item in items:
+        seen.append(item)
+        yield item
+
+
+def after(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
+    assert event.wait(SOON)
+    yield from items
+
+
+def setting(event: threading.Event, items: Iterable[int]) -> Iterator[int]:
+    event.set()
+    yield from items
+
+
+class TestPrefetch:
+    @pytest.mark.parametrize("depth", [1, 4, 100])
+    def test_gives_all_items_in_order(self, depth: int) -> None:
+        with prefetch(range(50), depth) as items:
+            assert list(items) == list(range(50))
+
+    def test_without_items_it_gives_nothing(self) -> None:
+        with prefetch(range(0)) as items:
+            assert list(items) == []
+
+    def test_takes_items_before_they_are_asked_for(self) -> None:
+        made: list[int] = []
+        with prefetch(recording(range(3), made)):
+            until(lambda: made == [0, 1, 2])
+
+    @pytest.mark.parametrize("depth", [1, 3])
+    def test_depth_items_wait_and_one_more_is_held(self, depth: int) -> None:
+        made: list[int] = []
+        with prefetch(recording(range(50), made), depth) as items:
+            for taken in range(4):
+                assert stays(lambda: len(made), taken + depth + 1)
+                next(items)
+
+    @Errors
+    def test_an_error_of_the_source_comes_after_what_it_gave(
+        self, kind: type[BaseException]
+    ) -> None:
+        error = kind("source")
+        read: list[int] = []
+        with pytest.raises(kind) as caught, prefetch(failing(error, after=7)) as items:
+            read.extend(items)
+        assert caught.value is error
+        assert read == list(range(7))
+
+    @Errors
+    def test_an_error_of_the_reader_ends_the_source(self, kind: type[BaseException]) -> None:
+        error = kind("reader")
+        made: list[int] = []
+        with pytest.raises(kind) as caught, prefetch(recording(range(10**9), made), 2) as items:
+            fail(error, after=next(items))
+        assert caught.value is error
+        assert len(made) <= 1 + 2 + 1
+
+    def test_the_reader_may_stop_early(self) -> None:
+        with prefetch(iter(int, 1)) as items:
+            assert next(items) == 0
+
+    @pytest.mark.parametrize("take", [1, 3])
+    def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
+        threads: list[threading.Thread] = []
+
+        def items() -> Iterator[int]:
+            threads.append(threading.current_thread())
+            try:
+                yield from range(3)
+            finally:
+                threads.append(threading.current_thread())
+
+        with prefetch(items()) as read:
+            assert list(islice(read, take)) == list(range(take))
+        opened, closed = threads
+        assert opened is closed is not threading.current_thread()
+
+    def test_a_source_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
+        first_waits = threading.Event()
+
+        def items() -> Iterator[int]:
+            yield 1
+            first_waits.set()
+            hang.wait()
+
+        read: list[int] = []
+        with pytest.raises(StalledError), prefetch(items(), timeout=0.2) as given:
+            read.extend(after(first_waits, given))
+        assert read == [1]
+
+    def test_ctrl_c_ends_the_wait_for_a_source_that_hangs(
+        self, hang: threading.Event, ctrl_c: Callable[[], None]
+    ) -> None:
+        asked = threading.Event()
+
+        def items() -> Iterator[int]:
+            asked.wait()
+            ctrl_c()
+            hang.wait()
+            yield 1
+
+        with pytest.raises(KeyboardInterrupt), prefetch(items()) as given:
+            next(setting(asked, given))
+
+
+class TestRunInThread:
+    def test_gives_what_the_call_gives(self) -> None:
+        assert run_in_thread(lambda: threading.current_thread().name) == "vdet-prefetch"
+
+    def test_raises_what_the_call_raises(self) -> None:
+        error = ValueError("call")
+        with pytest.raises(ValueError, match="call") as caught:
+            run_in_thread(lambda: fail(error, after=1))
+        assert caught.value is error
+
+    def test_a_call_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
+        with pytest.raises(StalledError):
+            run_in_thread(hang.wait, timeout=0.1)
+
+
+class TestWriteAsync:
+    @pytest.mark.parametrize("depth", [1, 4, 100])
+    def test_passes_all_items_on_in_order(self, depth: int) -> None:
+        taken: list[int] = []
+        with write_async(taken.append, depth) as hand_over:
+            hand_all(range(50), hand_over)
+        assert taken == list(range(50))
+
+    def test_there_may_be_no_items(self) -> None:
+        taken: list[int] = []
+        with write_async(taken.append):
+            pass
+        assert taken == []
+
+    def test_depth_items_wait_while_another_is_taken(self) -> None:
+        gate = threading.Event()
+        handed: list[int] = []
+
+        def give_all() -> None:
+            for item in range(10):
+                hand_over(item)
+                handed.append(item)
+
+        with write_async(lambda _: gate.wait(), depth=3) as hand_over:
+            giver = threading.Thread(target=give_all)
+            giver.start()
+            try:
+                assert stays(lambda: len(handed), 3 + 1)
+            finally:
+                gate.set()
+                giver.join()
+        assert len(handed) == 10
+
+    @Errors
+    def test_an_error_of_the_taker_is_raised_at_one_of_the_next_items(
+        self, kind: type[BaseException]
+    ) -> None:
+        error = kind("taker")
+        taken: list[int] = []
+
+        def take(item: int) -> None:
+            if item == 3:
+                raise error
+            taken.append(item)
+
+        with pytest.raises(kind) as caught, write_async(take, 2) as hand_over:
+            hand_all(range(10**9), hand_over)
+        assert caught.value is error
+        assert taken == [0, 1, 2]
+
+    def test_an_error_at_the_last_item_is_raised_when_the_block_ends(self) -> None:
+        error = ValueError("taker")
+
+        def take(_: int) -> None:
+            raise error
+
+        with pytest.raises(ValueError, match="taker") as caught, write_async(take) as hand_over:
+            hand_over(0)
+        assert caught.value is error
+
+    def test_the_thread_enters_and_leaves_the_context(self) -> None:
+        seen: list[object] = []
+
+        @contextmanager
+        def within() -> Iterator[None]:
+            seen.append(threading.current_thread().name)
+            yield
+            seen.append("left")
+
+        with write_async(seen.append, within=within()) as hand_over:
+            hand_over(1)
+        assert seen == ["vdet-write", 1, "left"]
+
+    @Errors
+    def test_an_error_of_the_giver_is_an_error_in_the_context_too(
+        self, kind: type[BaseException]
+    ) -> None:
+        error = kind("giver")
+        seen: list[BaseException] = []
+
+        @contextmanager
+        def within() -> Iterator[None]:
+            try:
+                yield
+            except BaseException as inside:
+                seen.append(inside)
+                raise
+
+        taken: list[int] = []
+        with (
+            pytest.raises(kind) as caught,
+            write_async(taken.append, within=within()) as hand_over,
+        ):
+            hand_all(failing(error, after=2), hand_over)
+        assert caught.value is error
+        assert taken == [0, 1]
+        assert len(seen) == 1
+
+    @pytest.mark.parametrize("place", ["enter", "exit"])
+    def test_an_error_of_the_context_is_raised(self, place: str) -> None:
+        @contextmanager
+        def within() -> Iterator[None]:
+            fail(ValueError(place), after=1) if place == "enter" else None
+            yield
+            raise ValueError(place)
+
+        with pytest.raises(ValueError, match=place), write_async(int, within=within()) as hand_over:
+            hand_over(0)
+
+    @pytest.mark.parametrize("place", ["last item", "one before", "end of the context"])
+    def test_a_taker_that_hangs_at_its_end_is_abandoned(
+        self, place: str, hang: threading.Event
+    ) -> None:
+        def take(item: int) -> None:
+            if place == ("last item" if item == 3 else "one before" if item == 2 else ""):
+                hang.wait()
+
+        @contextmanager
+        def context() -> Iterator[None]:
+            yield
+            if place == "end of the context":
+                hang.wait()
+
+        def give() -> None:
+            with write_async(take, within=context(), timeout=0.1) as put:
+                for item in range(4):
+                    put(item)
+
+        with pytest.raises(StalledError):
+            give()
+        assert threads_of_vdet() == ["vdet-write"]
+
+    def test_the_end_has_the_time_that_it_is_given_and_as_long_as_it_gets_on(self) -> None:
+        passed: list[int] = []
+
+        def take(item: int) -> None:
+            time.sleep(0.2)
+            passed.append(item)
+
+        with write_async(take, timeout=0.1, depth=9, end_timeout=lambda: SOON) as put:
+            for item in range(5):
+                put(item)
+        assert passed == list(range(5))
+
+    def test_a_taker_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
+        left: list[str] = []
+        first_is_taken = threading.Event()
+
+        def take(_: int) -> None:
+            first_is_taken.set()
+            hang.wait()
+
+        @contextmanager
+        def within() -> Iterator[None]:
+            try:
+                yield
+            except BaseException as error:
+                left.append(type(error).__name__)
+                raise
+
+        with (
+            pytest.raises(StalledError),
+            write_async(take, 1, within=within(), timeout=0.2) as hand_over,
+        ):
+            hand_all(chain([0], after(first_is_taken, range(10))), hand_over)
+        assert left == [], "the context of a thread that hangs must not be left"
+        hang.set()
+        until(lambda: left == ["_ClosedError"])
+
+    @Errors
+    def test_after_an_error_of_the_giver_earlier_items_are_still_taken(
+        self, kind: type[BaseException]
+    ) -> None:
+        error = kind("giver")
+        taken: list[int] = []
+        with pytest.raises(kind) as caught, write_async(taken.append) as hand_over:
+            hand_all(failing(error, after=2), hand_over)
+        assert caught.value is error
+        assert taken == [0, 1]
+
+
+class TestMapOrdered:
+    @pytest.mark.parametrize("threads", [1, 2, 5])
+    def test_pairs_come_in_order_although_later_ones_end_first(self, threads: int) -> None:
+        ended = [threading.Event() for _ in range(10)]
+
+        def odd_ones_end_first(item: int) -> int:
+            if threads > 1 and item % 2 == 0:
+                assert ended[item + 1].wait(SOON)
+            ended[item].set()
+            return item**2
+
+        with map_ordered(odd_ones_end_first, range(10), threads) as pairs:
+            assert list(pairs) == [(item, item**2) for item in range(10)]
+
+    def test_without_items_there_are_no_pairs(self) -> None:
+        with map_ordered(str, range(0), 2) as pairs:
+            assert list(pairs) == []
+
+    def test_all_threads_work_at_once(self) -> None:
+        together = threading.Barrier(3, timeout=SOON)
+        with map_ordered(lambda _: together.wait(), range(3), threads=3) as pairs:
+            assert sorted(turn for _, turn in pairs) == [0, 1, 2]
+
+    @pytest.mark.parametrize("threads", [1, 3])
+    def test_at_most_one_item_more_than_threads_is_taken(self, threads: int) -> None:
+        taken: list[int] = []
+        with map_ordered(str, recording(range(50), taken), threads) as pairs:
+            for received, _ in enumerate(pairs, start=1):
+                assert len(taken) - received <= threads
+
+    @Errors
+    @pytest.mark.parametrize("threads", [1, 3])
+    def test_an_error_of_the_function_is_raised_instead_of_its_pair(
+        self, kind: type[BaseException], threads: int
+    ) -> None:
+        error = kind("function")
+        received: list[int] = []
+
+        def fail_at_5(item: int) -> int:
+            if item == 5:
+                raise error
+            return item
+
+        with pytest.raises(kind) as caught, map_ordered(fail_at_5, range(50), threads) as pairs:
+            received.extend(item for item, _ in pairs)
+        assert caught.value is error
+        assert received == list(range(5))
+
+    @Errors
+    def test_an_error_of_the_items_is_raised_unchanged(self, kind: type[BaseException]) -> None:
+        error = kind("items")
+        with (
+            pytest.raises(kind) as caught,
+            map_ordered(str, failing(error, after=3), threads=2) as pairs,
+        ):
+            list(pairs)
+        assert caught.value is error
+
+    @Errors
+    def test_after_an_error_of_the_reader_no_item_is_begun(self, kind: type[BaseException]) -> None:
+        error = kind("reader")
+        begun: list[int] = []
+
+        def begin(item: int) -> None:
+            begun.append(item)
+
+        with (
+            pytest.raises(kind) as caught,
+            map_ordered(begin, range(10**9), threads=2) as pairs,
+        ):
+            fail(error, after=next(pairs))
+        assert caught.value is error
+        assert len(begun) <= 3
+
+
+class TestAllTogether:
+    """As in the pipeline: reading, searching and writing overlap."""
+
+    @staticmethod
+    def run(
+        source: Iterable[int], function: Callable[[int], int], take: Callable[[int], object]
+    ) -> None:
+        with ExitStack() as stack:
+            hand_over = stack.enter_context(write_async(take))
+            items = stack.enter_context(prefetch(source))
+            for _, result in stack.enter_context(map_ordered(function, items, threads=2)):
+                hand_over(result)
+
+    def test_everything_arrives_in_order(self) -> None:
+        taken: list[int] = []
+        self.run(range(100), lambda item: -item, taken.append)
+        assert taken == [-item for item in range(100)]
+
+    @Errors
+    @pytest.mark.parametrize("place", PLACES)
+    def test_any_error_ends_all_threads(self, kind: type[BaseException], place: str) -> None:
+        error = kind(place)
+        made: list[int] = []
+
+        def fail_at_20(item: int) -> int:
+            if item == 20:
+                raise error
+            return item
+
+        stages: dict[str, Callable[[int], int]] = dict.fromkeys(
+            ("source", "function", "taker"), int
+        )
+        stages[place] = fail_at_20
+        with pytest.raises(kind) as caught:
+            self.run(
+                map(stages["source"], recording(range(10**9), made)),
+                stages["function"],
+                stages["taker"],
+            )
+        assert caught.value is error
+        assert len(made) < 60
+
+    def test_ctrl_c_in_the_middle_ends_all_threads(self, ctrl_c: Callable[[], None]) -> None:
+        def press_at_20(item: int) -> int:
+            if item == 20:
+                ctrl_c()
+            return item
+
+        made: list[int] = []
+        with pytest.raises(KeyboardInterrupt):
+            self.run(recording(range(10**9), made), press_at_20, int)
+        assert len(made) < 60
+
+
+class TestSingleThreadedLibraries:
+    @pytest.fixture(autouse=True)
+    def two_threads(self) -> Iterator[None]:
+        before = cv2.getNumThreads()
+        cv2.setNumThreads(2)
+        yield
+        cv2.setNumThreads(before)
+
+    def test_inside_they_have_one_thread_and_afterwards_as_many_as_before(self) -> None:
+        before = [pool["num_threads"] for pool in threadpool_info()]
+        with single_threaded_libraries():
+            assert cv2.getNumThreads() == 1
+            assert {pool["num_threads"] for pool in threadpool_info()} == {1}
+        assert cv2.getNumThreads() == 2
+        assert [pool["num_threads"] for pool in threadpool_info()] == before
+
+    @Errors
+    def test_an_error_restores_them_too(self, kind: type[BaseException]) -> None:
+        with pytest.raises(kind), single_threaded_libraries():
+            raise kind
+        assert cv2.getNumThreads() == 2

@@ -1,0 +1,23 @@
+"""Vehicles that pass: their tracks, frame by frame."""
+
+from collections.abc import Iterator
+
+from vdet.boxes import Box
+from vdet.track.track import FrameTracks, Track
+
+WIDTH, HEIGHT = 320, 240
+RATE = 25
+
+
+def track(number: int, box: Box, *, score: float = 0.9, **rest: object) -> Track:
+    return Track(number, box, score, **{"predicted": False, **rest})  # type: ignore[arg-type]
+
+
+def frame(index: int, *tracks: Track, rate: float = RATE) -> FrameTracks:
+    return FrameTracks(index, index / rate, tracks)
+
+
+def passing(count: int, number: int = 1, speed: int = 2) -> Iterator[FrameTracks]:
+    """Give frames of a vehicle of 40 × 30 pixels that goes to the right, `speed` pixels a frame."""
+    for index in range(count):
+        yield frame(index, track(number, Box(10 + speed * index, 100, 40, 30)))

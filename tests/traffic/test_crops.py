@@ -1,0 +1,99 @@
+"""The best picture of each vehicle."""
+
+import numpy as np
+import pytest
+
+from traffic.passing import HEIGHT, WIDTH, frame, track
+from vdet.boxes import Box
+from vdet.config.schema import CropSettings
+from vdet.media import Picture
+from vdet.media.images import Image
+from vdet.track.track import Track
+from vdet.traffic.crops import BestCrops, Crop
+
+BARE = CropSettings(padding=0)
+ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
+PICTURE = Picture(ROAD)
+
+
+def crops(*shown: list[Track], settings: CropSettings = BARE) -> dict[int, Crop]:
+    """Return the picture of each vehicle that was given back last."""
+    best = BestCrops(settings)
+    found = [crop for n, each in enumerate(shown) for crop in best.add(frame(n, *each), PICTURE)]
+    return {crop.id: crop for crop in (*found, *best.end())}
+
+
+def box(size: int, x: int = 50) -> Box:
+    return Box(x, 60, size, size)
+
+
+def cut(place: Box) -> Image:
+    return ROAD[place.y : place.bottom, place.x : place.right]
+
+
+def test_the_largest_is_taken_and_shows_the_box() -> None:
+    found = crops([track(1, box(40))], [track(1, box(50))], [track(1, box(45))])
+    np.testing.assert_array_equal(found[1].image, cut(box(50)))
+    assert found[1].time == 1 / 25
+
+
+def test_size_counts_times_score() -> None:
+    found = crops([track(1, box(50), score=0.5)], [track(1, box(40), score=0.9)])
+    assert found[1].image.shape == (40, 40, 3)
+
+
+def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
+    at_the_edge = Box(WIDTH - 90, 60, 90, 90)
+    found = crops([track(1, box(40))], [track(1, at_the_edge)])
+    assert found[1].image.shape == (40, 40, 3)
+    alone = crops([track(1, at_the_edge)])
+    assert alone[1].image.shape == (90, 90, 3), "it is better than nothing"
+
+
+def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
+    assert crops([track(1, box(40), predicted=True)]) == {}
+
+
+def test_a_vehicle_that_is_too_small_gets_no_picture() -> None:
+    settings = CropSettings(least=30, padding=0)
+    assert crops([track(1, box(29)), track(2, box(30))], settings=settings).keys() == {2}
+
+
+def test_padding_shows_what_is_around_as_far_as_the_frame_goes() -> None:
+    settings = CropSettings(padding=0.5)
+    inside, corner = Box(100, 100, 40, 30), Box(0, 0, 40, 30)
+    found = crops([track(1, inside), track(2, corner)], settings=settings)
+    np.testing.assert_array_equal(found[1].image, cut(Box(80, 85, 80, 60)))
+    np.testing.assert_array_equal(found[2].image, cut(Box(0, 0, 60, 45)))
+
+
+def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:
+    best = BestCrops(BARE)
+    assert best.add(frame(0, track(1, box(40))), PICTURE) == []
+    assert [crop.id for crop in best.add(frame(1), PICTURE)] == [1]
+    assert best.add(frame(2), PICTURE) == []
+    assert best.add(frame(3, track(1, box(30))), PICTURE) == []
+    assert best.add(frame(4), PICTURE) == [], "the first one is better"
+    best.add(frame(5, track(1, box(60))), PICTURE)
+    assert [crop.image.shape[0] for crop in best.end()] == [60]
+
+
+def test_memory_holds_only_vehicles_that_are_shown() -> None:
+    best = BestCrops(BARE)
+    for number in range(1, 200):
+        best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), PICTURE)
+    assert len(best.end()) == 2
+
+
+def test_a_picture_is_a_copy() -> None:
+    image = ROAD.copy()
+    best = BestCrops(BARE)
+    best.add(frame(0, track(1, box(40))), Picture(image))
+    image[:] = 0
+    assert best.end()[0].image.any()
+
+
+@pytest.mark.parametrize("least", [0, -1])
+def test_a_picture_has_a_size(least: int) -> None:
+    with pytest.raises(ValueError, match="greater than or equal to 1"):
+        CropSettings(least=least)

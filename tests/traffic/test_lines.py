@@ -1,0 +1,158 @@
+"""Crossings of a line: each of the ways in which other counters go wrong."""
+
+import random
+
+import pytest
+
+from traffic.scenes import CAR_HEIGHT, HEIGHT, LINE, WIDTH, events, feet, frames, through, ways
+from vdet.config.counts import LineSettings
+
+ABOVE, BELOW = (600.0, 385.0), (600.0, 415.0)  # a quarter of a box from the line
+
+
+def line(start: tuple[float, float], end: tuple[float, float]) -> LineSettings:
+    return LineSettings(name="line", start=start, end=end, left="left", right="right")
+
+
+class TestDirections:
+    def test_right_and_left_are_those_of_someone_who_looks_from_start_to_end(self) -> None:
+        down = frames(through((0, 600, 300), (4, 600, 500)))
+        up = frames(through((0, 600, 500), (4, 600, 300)))
+        assert ways(events(down)) == ["here"]
+        assert ways(events(up)) == ["away"]
+
+    def test_an_event_says_when_where_and_who(self) -> None:
+        (event,) = events(frames(through((0, 600, 300), (4, 600, 501))))
+        assert event.time == pytest.approx(4 * 100 / 201, abs=0.005)
+        assert (event.frame, event.name, event.id) == (50, "line", 1)
+        assert (event.score, event.stitched, event.seconds) == (0.9, False, None)
+
+    @pytest.mark.parametrize("shape", [line((600, 100), (600, 600)), line((600, 600), (600, 100))])
+    def test_a_line_may_be_exactly_vertical(self, shape: LineSettings) -> None:
+        to_the_right = frames(through((0, 400, 400), (4, 800, 400)))
+        found = ways(events(to_the_right, shape))
+        assert found == ["left" if shape.start[1] < shape.end[1] else "right"]
+
+    def test_motion_along_a_line_crosses_nothing(self) -> None:
+        along = frames(through((0, 300, 400), (8, 900, 400)))
+        beside = frames(through((0, 300, 410), (8, 900, 410)))
+        assert events(along) == events(beside) == ()
+
+
+class TestFlicker:
+    def test_one_frame_on_the_other_side_is_nothing(self) -> None:
+        for place in (BELOW, (600.0, 400.0 + 3 * CAR_HEIGHT)):
+            assert events(feet(*[ABOVE] * 20, place, *[ABOVE] * 20)) == ()
+
+    def test_nor_is_it_after_a_crossing(self) -> None:
+        path = [(600.0, 300.0 + 4 * n) for n in range(60)]
+        path[40] = (600.0, 250.0)
+        assert ways(events(feet(*path))) == ["here"]
+
+    def test_trembling_on_the_line_for_a_hundred_frames(self) -> None:
+        rng = random.Random(0)
+        trembling = [(600 + rng.uniform(-1, 1), 400 + rng.uniform(-1, 1)) for _ in range(100)]
+        steps = [(600.0, 340.0 + 3 * n) for n in range(20)]
+        assert events(feet(*steps, *trembling)) == ()
+        goes_on = [(600.0, 401.0 + 3 * n) for n in range(20)]
+        assert ways(events(feet(*steps, *trembling, *goes_on))) == ["here"]
+        assert events(feet(*steps, *trembling, *reversed(steps))) == ()
+
+    def test_stopping_exactly_on_the_line(self) -> None:
+        here = [(600.0, 340.0 + 3 * n) for n in range(21)]
+        stop = [(600.0, 400.0)] * 50
+        there = [(600.0, 400.0 + 3 * n) for n in range(1, 20)]
+        assert ways(events(feet(*here, *stop, *there))) == ["here"]
+        assert events(feet(*here, *stop, *reversed(here))) == ()
+
+    def test_rocking_over_the_line_counts_once(self) -> None:
+        """It moves back and forth over the dead band, as in a queue, and then drives on."""
+        rocking = [ABOVE] * 10 + [BELOW] * 10
+        onward = [(600.0, 415.0 + 3 * n) for n in range(40)]
+        assert ways(events(feet(*rocking * 8, *onward))) == ["here"]
+
+
+class TestWayBack:
+    def test_a_u_turn_counts_both_ways(self) -> None:
+        path = through((0, 600, 300), (4, 600, 500), (8, 600, 300))
+        assert ways(events(frames(path))) == ["here", "away"]
+
+    def test_reversing_out_again_counts_both_ways(self) -> None:
+        path = through((0, 600, 300), (3, 600, 420), (6, 600, 300))
+        assert ways(events(frames(path))) == ["here", "away"]
+
+    def test_a_turn_on_a_wide_road_counts_both_ways_at_once(self) -> None:
+        path = through((0, 400, 380), (3, 400, 430), (6, 700, 430), (8, 700, 375))
+        assert ways(events(frames(path))) == ["here", "away"]
+
+
+class TestEnds:
+    @pytest.mark.parametrize(("x", "count"), [(199, 0), (200, 1), (201, 1), (1000, 1), (1001, 0)])
+    def test_the_ends_belong_to_the_line_and_a_pixel_beyond_does_not(
+        self, x: float, count: int
+    ) -> None:
+        assert len(events(frames(through((0, x, 300), (4, x, 500))))) == count
+
+    def test_the_extension_of_the_line_does_not_count(self) -> None:
+        around = through((0, 600, 300), (2, 1200, 300), (4, 1200, 500), (6, 600, 500))
+        assert events(frames(around)) == ()
+
+    def test_a_way_around_and_back_through_counts_once(self) -> None:
+        path = through((0, 600, 300), (2, 1200, 300), (4, 1200, 500), (6, 600, 500), (9, 600, 300))
+        assert ways(events(frames(path))) == ["away"]
+
+    def test_a_line_that_ends_at_the_edge_goes_on_beyond_it(self) -> None:
+        """The whole box of a vehicle that leaves at the side stands outside the frame."""
+        to_the_edge = line((800, 400), (WIDTH - 1, 400))
+        path = through((0, 1100, 300), (2, WIDTH + 40, 440))
+        assert ways(events(frames(path), to_the_edge)) == ["right"]
+
+    def test_a_line_along_the_edge_counts_what_leaves_there(self) -> None:
+        along = line((WIDTH - 3, 0), (WIDTH - 3, HEIGHT))
+        path = through((0, 1000, 400), (3, WIDTH + 60, 400))
+        assert ways(events(frames(path), along)) == ["left"]
+
+
+class TestJumps:
+    def test_a_jump_over_the_line_in_one_frame(self) -> None:
+        found = events(feet(*[(600.0, 300.0)] * 10, *[(600.0, 500.0)] * 10))
+        assert ways(found) == ["here"]
+        assert found[0].frame == 10
+
+    def test_a_vehicle_that_is_seen_once_beyond_the_line(self) -> None:
+        fast = feet((600, 100), (600, 200), (600, 300), (600, 480), rate=10)
+        assert ways(events(fast)) == ["here"]
+
+    def test_a_jump_beside_the_line_is_no_crossing(self) -> None:
+        assert events(feet(*[(1100.0, 300.0)] * 10, *[(1100.0, 500.0)] * 10)) == ()
+
+
+@pytest.mark.parametrize("rate", [10, 25, 30, 60])
+@pytest.mark.parametrize("stride", [1, 2, 5])
+@pytest.mark.parametrize("scale", [1, 0.5])
+def test_rate_stride_and_scale_do_not_change_the_counts(
+    rate: int, stride: int, scale: float
+) -> None:
+    paths = [
+        through((0, 300, 300), (8, 320, 520)),
+        through((0, 700, 560), (7, 640, 310)),
+        through((1, 500, 330), (4, 500, 470), (5, 500, 470), (9, 520, 300)),
+        through((2, 900, 380), (9, 900, 395)),
+    ]
+    video = list(frames(*paths, rate=rate, scale=scale))[::stride]
+    size = {"width": round(scale * WIDTH), "height": round(scale * HEIGHT)}
+    found = events(video, LINE, **size)
+    assert sorted((event.id, event.direction) for event in found) == [
+        (1, "here"), (2, "away"), (3, "away"), (3, "here"),
+    ]  # fmt: skip
+    expected = {1: 8 * 100 / 220, 2: 7 * 160 / 250}
+    for event in found:
+        if event.id in expected:
+            assert event.time == pytest.approx(expected[event.id], abs=0.05)
+
+
+def test_a_variable_rate_gives_the_same_counts() -> None:
+    rng = random.Random(1)
+    path = through((0, 600, 300), (4, 600, 500), (8, 600, 300))
+    video = [each for each in frames(path, rate=60) if rng.random() < 0.4]
+    assert ways(events(video)) == ["here", "away"]

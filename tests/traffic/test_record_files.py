@@ -1,0 +1,96 @@
+"""Files of records, and the file over those of many videos."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from traffic.passing import WIDTH, frame, passing, track
+from vdet.boxes import Box
+from vdet.config.schema import SummarySettings
+from vdet.errors import OutputError
+from vdet.track.track import FrameTracks
+from vdet.traffic.record_files import join_records, write_records
+from vdet.traffic.records import summarize
+
+HEADING = (
+    "id,class,first,last,seconds,seen,predicted,mean_score,best_score,"
+    "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height\n"
+)
+FIRST = "1,,0.0,1.0,1.04,26,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30\n"
+
+
+def written(path: Path, *frames: FrameTracks) -> str:
+    write_records(summarize(frames, WIDTH, SummarySettings()), path)
+    return path.read_bytes().decode()
+
+
+def test_csv_has_a_heading_and_a_row_a_vehicle(tmp_path: Path) -> None:
+    assert written(tmp_path / "a.csv", *passing(26)) == HEADING + FIRST
+    assert written(tmp_path / "none.csv") == HEADING
+
+
+def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
+    truck = frame(0, track(3, Box(1, 2, 30, 40), class_name="truck", predicted=True, score=1))
+    (item,) = json.loads(written(tmp_path / "a.JSON", truck))
+    assert item == {
+        "id": 3,
+        "class": "truck",
+        "first": 0,
+        "last": 0,
+        "seconds": 0,
+        "seen": 0,
+        "predicted": 1,
+        "mean_score": 1,
+        "best_score": 1,
+        "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_share": 0},
+        "largest": {"x": 1, "y": 2, "width": 30, "height": 40},
+    }
+    assert json.loads(written(tmp_path / "none.json")) == []
+
+
+class TestJoined:
+    NAMES = ("a", "day/b", 'with ", and\nnewline')
+
+    def join(self, folder: Path, suffix: str) -> str:
+        outputs = {name: folder / f"{number}{suffix}" for number, name in enumerate(self.NAMES)}
+        for path in outputs.values():
+            written(path, *passing(26), frame(26, track(2, Box(5, 5, 30, 30), class_name="bus")))
+        join_records(outputs, folder / f"all{suffix}")
+        return (folder / f"all{suffix}").read_text(encoding="utf-8")
+
+    def test_each_row_has_its_video(self, tmp_path: Path) -> None:
+        text = self.join(tmp_path, ".csv")
+        assert text.startswith(f"video,{HEADING}a,{FIRST}a,2,bus,")
+        rows = list(csv.DictReader(text.splitlines(keepends=True)))
+        assert [row["video"] for row in rows] == [name for name in self.NAMES for _ in range(2)]
+
+    def test_each_item_has_its_video(self, tmp_path: Path) -> None:
+        items: list[dict[str, Any]] = json.loads(self.join(tmp_path, ".json"))
+        assert [(item["video"], item["id"]) for item in items] == [
+            (name, number) for name in self.NAMES for number in (1, 2)
+        ]
+
+    @pytest.mark.parametrize("suffix", [".csv", ".json"])
+    def test_of_no_videos_it_is_empty(self, tmp_path: Path, suffix: str) -> None:
+        join_records({}, tmp_path / f"all{suffix}")
+        text = (tmp_path / f"all{suffix}").read_text()
+        assert text == (f"video,{HEADING}" if suffix == ".csv" else "[]\n")
+
+    @pytest.mark.parametrize("suffix", [".csv", ".json"])
+    def test_a_name_that_is_no_text_is_escaped(self, tmp_path: Path, suffix: str) -> None:
+        written(tmp_path / f"a{suffix}", *passing(2))
+        join_records({"clip\udcff": tmp_path / f"a{suffix}"}, tmp_path / f"all{suffix}")
+        assert "\\udcff" in (tmp_path / f"all{suffix}").read_text(encoding="utf-8")
+
+    @pytest.mark.parametrize("suffix", [".csv", ".json"])
+    @pytest.mark.parametrize("text", ["junk", "", "[1]", "id,class\n1,car\n", "\xff"])
+    def test_a_file_that_is_no_summary_is_refused_with_its_name(
+        self, tmp_path: Path, suffix: str, text: str
+    ) -> None:
+        path = tmp_path / f"a{suffix}"
+        path.write_bytes(text.encode("latin-1"))
+        with pytest.raises(OutputError, match=r"a\.\w+: is no summary of vehicles; remove it"):
+            join_records({"a": path}, tmp_path / f"all{suffix}")

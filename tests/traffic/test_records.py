@@ -1,0 +1,143 @@
+"""A record of each vehicle."""
+
+import itertools
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from traffic.passing import RATE, WIDTH, frame, passing, track
+from vdet.boxes import Box
+from vdet.config.schema import SummarySettings
+from vdet.track.track import FrameTracks
+from vdet.traffic.records import VehicleRecord, summarize
+
+SETTINGS = SummarySettings()
+PLACE = Box(100, 100, 40, 30)
+
+
+def records(*frames: FrameTracks, settings: SummarySettings = SETTINGS) -> list[VehicleRecord]:
+    return list(summarize(frames, WIDTH, settings))
+
+
+def record(*frames: FrameTracks, settings: SummarySettings = SETTINGS) -> VehicleRecord:
+    (only,) = records(*frames, settings=settings)
+    return only
+
+
+def test_without_vehicles_there_are_no_records() -> None:
+    assert records() == []
+    assert records(frame(0), frame(1)) == []
+
+
+def test_a_vehicle_has_its_times_frames_and_path() -> None:
+    found = record(*passing(51))
+    assert (found.id, found.first, found.last) == (1, 0.0, 2.0)
+    assert found.seconds == pytest.approx(51 / RATE), "the last frame is shown too"
+    assert (found.seen, found.predicted) == (51, 0)
+    assert found.path[0] == (30, 130)
+    assert found.path[-1] == (130, 130)
+    assert found.length == pytest.approx(100)
+    assert found.share == pytest.approx(100 / WIDTH)
+
+
+def test_records_are_in_the_order_of_ids() -> None:
+    frames = [frame(0, track(2, PLACE)), frame(1, track(1, PLACE), track(2, PLACE))]
+    assert [found.id for found in records(*frames)] == [1, 2]
+
+
+def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
+    boxes = [PLACE, Box(90, 90, 60, 50), Box(95, 95, 50, 40)]
+    tracks = [track(1, box, score=0.5 + 0.2 * n) for n, box in enumerate(boxes)]
+    found = record(*(frame(n, each) for n, each in enumerate(tracks)))
+    assert found.mean_score == pytest.approx(0.7)
+    assert found.best_score == pytest.approx(0.9)
+    assert found.largest == boxes[1]
+
+
+def test_the_class_is_a_vote_weighted_by_score() -> None:
+    def seen(*classes: tuple[str | None, float]) -> VehicleRecord:
+        tracks = [track(1, PLACE, class_name=name, score=score) for name, score in classes]
+        return record(*(frame(n, each) for n, each in enumerate(tracks)))
+
+    assert seen((None, 0.9)).class_name is None
+    assert seen(("car", 0.3), ("car", 0.3), ("truck", 0.9)).class_name == "truck"
+    assert seen(("car", 0.9), ("truck", 0.9), ("car", 0.9), (None, 1.0)).class_name == "car"
+
+
+class TestTime:
+    def test_a_vehicle_that_is_hidden_for_a_while_is_shown_for_less_than_its_span(self) -> None:
+        found = record(frame(0, track(1, PLACE)), *map(frame, range(1, 10)), *(
+            frame(n, track(1, PLACE)) for n in (10, 11)
+        ))  # fmt: skip
+        assert (found.first, found.last) == (0, 11 / RATE)
+        assert found.seconds == pytest.approx(3 / RATE)
+
+    def test_frames_without_vehicles_may_be_left_out(self) -> None:
+        found = record(frame(0, track(1, PLACE)), *(frame(n, track(1, PLACE)) for n in (10, 11)))
+        assert found.seconds == pytest.approx(3 / RATE)
+
+    def test_frames_count_as_long_as_they_are_shown(self) -> None:
+        times = [0.0, 0.1, 0.5, 0.6]
+        frames = [FrameTracks(n, time, (track(1, PLACE),)) for n, time in enumerate(times)]
+        assert record(*frames).seconds == pytest.approx(0.7)
+
+    @pytest.mark.parametrize("rate", [10, 25, 30, 60])
+    def test_seconds_and_length_do_not_depend_on_the_rate(self, rate: int) -> None:
+        frames = [
+            frame(n, track(1, Box(10 + round(40 * n / rate), 100, 40, 30)), rate=rate)
+            for n in range(4 * rate)
+        ]
+        found = record(*frames)
+        assert found.seconds == pytest.approx(4)
+        assert found.length == pytest.approx(160, abs=5)
+
+
+class TestPath:
+    def test_a_vehicle_that_stands_and_trembles_goes_nowhere(self) -> None:
+        frames = [frame(n, track(1, Box(100 + n % 3, 100 - n % 2, 40, 30))) for n in range(500)]
+        assert record(*frames).length <= SETTINGS.path_step * WIDTH
+        every = SummarySettings(path_step=0)
+        assert record(*frames, settings=every).length > 500
+
+    def test_the_way_there_and_back_counts(self) -> None:
+        there = [frame(n, track(1, Box(100 + 2 * n, 100, 40, 30))) for n in range(51)]
+        back = [frame(51 + n, track(1, Box(200 - 2 * n, 100, 40, 30))) for n in range(51)]
+        found = record(*there, *back)
+        assert found.path[0] == found.path[-1]
+        assert found.length == pytest.approx(200, abs=5)
+
+    def test_the_part_of_the_box_outside_the_frame_counts_where_it_is_known(self) -> None:
+        found = record(frame(0, track(1, PLACE, whole_foot=(50.0, 260.0))))
+        assert found.path == ((50.0, 260.0),)
+
+    def test_predicted_frames_add_nothing(self) -> None:
+        frames = [
+            frame(0, track(1, Box(0, 0, 40, 30), predicted=True)),
+            *(frame(n, track(1, Box(100 + 10 * n, 100, 40, 30))) for n in (1, 2, 3)),
+            frame(4, track(1, Box(280, 200, 40, 30), predicted=True)),
+        ]
+        found = record(*frames)
+        assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
+        assert (found.seen, found.predicted) == (3, 2)
+
+    def test_of_a_vehicle_that_was_never_seen_they_are_all_there_is(self) -> None:
+        found = record(
+            *(frame(n, track(1, Box(10 * n, 0, 40, 30), predicted=True)) for n in (0, 1))
+        )
+        assert found.path == ((20, 30), (30, 30))
+
+
+@given(
+    xs=st.lists(st.integers(-50, 300), min_size=1, max_size=30),
+    step=st.floats(0, 0.5),
+)
+def test_a_path_is_never_longer_than_the_way_nor_shorter_than_from_start_to_end(
+    xs: Sequence[int], step: float
+) -> None:
+    frames = [frame(n, track(1, Box(x, 100, 40, 30))) for n, x in enumerate(xs)]
+    found = record(*frames, settings=SummarySettings(path_step=step))
+    way = sum(abs(b - a) for a, b in itertools.pairwise(xs))
+    assert abs(xs[-1] - xs[0]) - 1e-6 <= found.length <= way + 1e-6
+    assert len(found.path) <= len(xs)

@@ -1,0 +1,130 @@
+"""Which vehicles count, with which class, and what becomes of them when their id changes."""
+
+from dataclasses import replace
+
+from traffic.scenes import ZONE, events, feet, frames, joined, numbered, through, track, ways
+from vdet.config.counts import LineSettings
+from vdet.track.track import FrameTracks
+
+DOWN = through((0, 600, 300), (4, 600, 500))
+
+
+def test_predicted_boxes_do_not_count() -> None:
+    """The tracker predicts that it goes on over the line, but it turns off before."""
+    seen = [(600.0, 300.0 + 3 * n) for n in range(30)]
+    video = feet(*seen) + [
+        FrameTracks(30 + n, (30 + n) / 25, (track((600, 390 + 5 * n), predicted=True),))
+        for n in range(20)
+    ]
+    assert events(video) == ()
+
+
+def test_a_crossing_while_it_is_not_seen_is_interpolated() -> None:
+    video = list(frames(DOWN))
+    hidden = [
+        replace(each, tracks=tuple(replace(t, predicted=True) for t in each.tracks))
+        if 1.6 < each.time < 2.4
+        else each
+        for each in video
+    ]
+    (event,), (expected,) = events(hidden), events(video)
+    assert (event.direction, event.time) == (expected.direction, expected.time)
+
+
+def test_a_vehicle_that_is_seen_for_a_moment_does_not_count() -> None:
+    moment = feet((600, 300), (600, 350), (600, 450), (600, 500))
+    assert events(moment) == ()
+    assert ways(events(moment, confirmed=0.1)) == ["here"]
+
+
+def test_once_it_is_confirmed_what_it_did_before_counts() -> None:
+    path = [(600.0, 300.0), (600.0, 350.0), (600.0, 470.0), (600.0, 500.0)]
+    stays = [(600.0, 505.0)] * 10
+    (event,) = events(feet(*path, *stays))
+    assert event.frame == 2
+
+
+class TestNewIds:
+    def test_a_new_id_on_the_line_goes_on_with_the_old_one(self) -> None:
+        old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
+        new = numbered(frames(through((2.1, 600, 405), (4, 600, 500))), 2)
+        (event,) = events(joined(old, new))
+        assert (event.id, event.direction, event.stitched) == (2, "here", True)
+        assert 1.9 < event.time < 2.1
+
+    def test_it_knows_that_the_old_one_was_counted(self) -> None:
+        """The box of the new track begins a little before the line, and goes over it again."""
+        old = frames(through((0, 600, 300), (2.4, 600, 420)), seconds=3)
+        new = numbered(frames(through((2.6, 600, 390), (6, 600, 520))), 2)
+        assert [(event.id, event.direction) for event in events(joined(old, new))] == [(1, "here")]
+
+    def test_a_new_id_elsewhere_or_later_is_another_vehicle(self) -> None:
+        old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
+        for new in (
+            through((2.1, 800, 405), (4, 800, 500)),
+            through((3.5, 600, 405), (6, 600, 500)),
+        ):
+            assert events(joined(old, numbered(frames(new), 2))) == ()
+
+    def test_one_that_comes_in_where_another_has_just_left_is_another_vehicle(self) -> None:
+        out = frames(through((0, 1100, 380), (3, 1260, 440)), seconds=3)
+        in_ = numbered(frames(through((3.6, 1255, 425), (8, 1100, 380)), seconds=8), 2)
+        edge = LineSettings(name="line", start=(900, 400), end=(1280, 400), left="away", right="in")
+        found = events(joined(out, in_), edge)
+        assert [(event.id, event.direction) for event in found] == [(1, "in"), (2, "away")]
+        assert not any(event.stitched for event in found)
+
+    def test_a_flag_stands_only_where_the_count_rests_on_the_old_id(self) -> None:
+        old = frames(through((0, 600, 100), (1, 600, 150)), seconds=1)
+        new = numbered(frames(through((1.2, 600, 160), (6, 600, 500))), 2)
+        (event,) = events(joined(old, new))
+        assert not event.stitched
+
+    def test_an_id_that_comes_back_after_that_counts_for_itself(self) -> None:
+        hides = through((0, 600, 300), (10, 600, 450), gone=((2, 5),))
+        new = numbered(frames(through((2.2, 600, 335), (4, 640, 500)), seconds=4), 2)
+        found = events(joined(frames(hides), new))
+        assert [(event.id, event.direction) for event in found] == [(2, "here"), (1, "here")]
+
+    def test_stop_and_go_with_a_new_id_every_second(self) -> None:
+        """A queue that rocks on the line while the tracker gives it new ids, and then moves on."""
+        video = []
+        for index in range(20 * 25):
+            rocks = 397 + 6 * (index // 30 % 2)
+            y = 320 + 2 * index if index < 38 else rocks if index < 420 else 403 + 3 * (index - 420)
+            video += [FrameTracks(index, index / 25, (track((600, y), 1 + index // 25),))]
+        assert ways(events(video)) == ["here"]
+
+
+class TestClasses:
+    def test_a_class_that_flips_on_the_line_does_not_split_the_history(self) -> None:
+        video = [
+            replace(
+                each,
+                tracks=tuple(
+                    replace(t, class_name="truck" if 1.8 < each.time < 2.2 else "car")
+                    for t in each.tracks
+                ),
+            )
+            for each in frames(DOWN)
+        ]
+        (event,) = events(video)
+        assert event.class_name == "car"
+
+    def test_scores_are_the_weights(self) -> None:
+        video = [
+            FrameTracks(n, n / 25, (track((600, 300 + 2 * n), score=s, name=c),))
+            for n, (c, s) in enumerate([("car", 0.2)] * 60 + [("bus", 0.9)] * 30)
+        ]
+        (event,) = events(video)
+        assert event.class_name == "bus"
+
+    def test_without_classes_there_is_none(self) -> None:
+        (event,) = events(frames(DOWN))
+        assert event.class_name is None
+
+
+def test_a_long_absence_ends_a_vehicle() -> None:
+    path = through((0, 600, 400), (30, 600, 401), gone=((2, 20),))
+    found = events(frames(path, seconds=30), ZONE)
+    assert ways(found) == ["appear", "vanish", "appear", "vanish"]

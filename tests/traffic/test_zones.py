@@ -1,0 +1,85 @@
+"""Zones: entries, exits, presence and time inside."""
+
+import pytest
+
+from traffic.scenes import HEIGHT, WIDTH, ZONE, events, frames, joined, numbered, through, ways
+from vdet.config.counts import ZoneSettings
+from vdet.traffic.totals import stays
+
+ACROSS = through((0, 200, 400), (8, 1000, 400))  # 100 pixels a second; in from 2 s to 6 s
+
+
+def test_a_vehicle_that_drives_through_enters_and_leaves() -> None:
+    found = events(frames(ACROSS), ZONE)
+    assert ways(found) == ["enter", "exit"]
+    assert [event.time for event in found] == pytest.approx([2, 6])
+    assert found[1].seconds == pytest.approx(4)
+
+
+def test_one_that_is_first_seen_inside_appears() -> None:
+    found = events(frames(through((0, 600, 400), (4, 1000, 400))), ZONE)
+    assert ways(found) == ["appear", "exit"]
+    assert found[1].seconds == pytest.approx(2)
+
+
+def test_a_video_that_ends_inside_a_zone() -> None:
+    found = events(frames(ACROSS, seconds=5), ZONE)
+    assert ways(found) == ["enter", "vanish"]
+    assert found[1].time == pytest.approx(5)
+    assert found[1].seconds == pytest.approx(3)
+
+
+def test_trembling_at_the_border_is_one_entry() -> None:
+    path = through(
+        (0, 200, 400), (2, 396, 400), (2.4, 404, 400), (2.8, 396, 400), (3.2, 404, 400),
+        (8, 1000, 400),
+    )  # fmt: skip
+    assert ways(events(frames(path), ZONE)) == ["enter", "exit"]
+
+
+def test_a_new_id_inside_goes_on_with_the_stay() -> None:
+    old = frames(through((0, 200, 400), (3.9, 590, 400)), seconds=4)
+    new = numbered(frames(through((4.1, 610, 400), (8, 1000, 400))), 2)
+    found = events(joined(old, new), ZONE)
+    assert [(event.id, event.direction) for event in found] == [(1, "enter"), (2, "exit")]
+    assert found[1].seconds == pytest.approx(4, abs=0.02)
+
+
+def test_overlapping_zones_count_each_for_itself() -> None:
+    other = ZoneSettings(name="other", points=((600, 300), (900, 300), (900, 500), (600, 500)))
+    found = events(frames(ACROSS), ZONE, other)
+    assert [(event.name, event.direction) for event in found] == [
+        ("zone", "enter"), ("other", "enter"), ("zone", "exit"), ("other", "exit"),
+    ]  # fmt: skip
+
+
+def test_a_vehicle_is_in_one_of_two_zones_side_by_side() -> None:
+    left = ZoneSettings(name="left", points=((0, 0), (640, 0), (640, 720), (0, 720)))
+    right = ZoneSettings(name="right", points=((640, 0), (1280, 0), (1280, 720), (640, 720)))
+    found = events(frames(ACROSS), left, right)
+    assert [(event.name, event.direction) for event in found if event.time < 8] == [
+        ("left", "appear"), ("left", "exit"), ("right", "enter"),
+    ]  # fmt: skip
+    assert found[1].time == found[2].time
+
+
+def test_a_zone_goes_on_beyond_the_edge_of_the_frame() -> None:
+    """The foot of a vehicle that the frame cuts off lies below the frame."""
+    corner = ZoneSettings(name="zone", points=((800, 500), (1279, 500), (1279, 719), (800, 719)))
+    path = through((0, 900, 300), (4, 1100, HEIGHT + 80), (6, WIDTH + 90, HEIGHT + 200))
+    assert ways(events(frames(path), corner)) == ["enter", "vanish"]
+
+
+def test_the_whole_frame_is_a_zone_without_a_border() -> None:
+    whole = ZoneSettings(name="zone", points=((0, 0), (1280, 0), (1280, 720), (0, 720)))
+    assert ways(events(frames(ACROSS, seconds=8), whole)) == ["appear", "vanish"]
+
+
+def test_stays_follow_from_the_events() -> None:
+    later = through((1, 200, 420), (9, 1000, 420))
+    last = through((5.5, 900, 380), (9, 450, 380))
+    found = events(frames(ACROSS, later, last, seconds=9), ZONE)
+    (stay,) = stays(found, ["zone"])
+    assert stay.most == 2
+    assert stay.longest == pytest.approx(4, abs=0.01)
+    assert stay.mean == pytest.approx((4 + 4 + 9 - (5.5 + 3.5 * 100 / 450)) / 3, abs=0.01)
