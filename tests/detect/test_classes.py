@@ -1,6 +1,7 @@
 """The classes of networks, and which of them are wanted."""
 
-from vdet.detect.onnx.classes import COCO, our_classes
+from vdet.detect.onnx.detector import our_classes
+from vdet.detect.onnx.recognition import COCO
 
 WANTED = ("car", "truck", "bus", "vehicle")
 

@@ -19,9 +19,8 @@ from detect.onnx.graphs import (
 )
 from vdet.config.schema import NetworkSettings
 from vdet.detect.detections import Detections
-from vdet.detect.onnx.classes import COCO
 from vdet.detect.onnx.detector import NetworkModel
-from vdet.detect.onnx.recognition import recognize
+from vdet.detect.onnx.recognition import COCO, recognize
 from vdet.detect.onnx.session import Session
 from vdet.errors import ModelError
 from vdet.media import Picture

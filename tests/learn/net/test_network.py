@@ -15,8 +15,8 @@ from learn.net.blocks import block_picture, block_source  # noqa: E402
 from vdet.config.network import NetworkTrainingSettings  # noqa: E402
 from vdet.config.schema import NetworkSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
-from vdet.detect.onnx.header import Header  # noqa: E402
 from vdet.detect.onnx.layouts import cell_centers as runtime_cells  # noqa: E402
+from vdet.detect.onnx.recognition import Header  # noqa: E402
 from vdet.errors import DataError  # noqa: E402
 from vdet.learn.net.architecture import (  # noqa: E402
     Network,

@@ -4,17 +4,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
-from vdet.boxes import Box, Int32Array
+from vdet.boxes import Box, Float32Array, Int32Array, Int64Array, to_sides
 from vdet.config.schema import NetworkSettings
+from vdet.detect.classes import our_name
 from vdet.detect.detections import Detections
-from vdet.detect.onnx.classes import our_classes
 from vdet.detect.onnx.layouts import RawBoxes
 from vdet.detect.onnx.preparation import Placement
 from vdet.detect.onnx.recognition import Recognized, recognize
 from vdet.detect.onnx.session import Session
-from vdet.detect.onnx.suppression import suppress
 from vdet.draw.boxes import GREEN, draw_box
 from vdet.errors import ModelError
 from vdet.media import Picture
@@ -125,3 +125,25 @@ class NetworkDetector:
         return RawBoxes(
             boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep].astype(np.int32)
         )
+
+
+def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
+    """Return for each class of a network its number in `wanted`, -1 where it is not wanted."""
+    numbers = {name: number for number, name in enumerate(wanted)}
+    return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]
+
+
+def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64Array:
+    """Return the rows of the boxes that stay, the best first.
+
+    Parameters
+    ----------
+    boxes
+        float32 `(n, 4)`: x1, y1, x2, y2.
+    scores
+        float32 `(n,)`.
+    overlap
+        A box with more intersection over union with a better one is removed.
+    """
+    kept = cv2.dnn.NMSBoxes(to_sides(boxes).tolist(), scores.tolist(), 0.0, overlap)
+    return np.asarray(kept, np.int64).reshape(-1)

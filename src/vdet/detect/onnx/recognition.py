@@ -1,15 +1,16 @@
 """What kind of network an ONNX file holds: by its metadata, then its names, then its shapes."""
 
 import ast
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
-from vdet.detect.onnx.classes import COCO
-from vdet.detect.onnx.header import HEADER_KEY, Header
+from vdet.config.network import NetworkScoreSettings
+from vdet.config.section import Section
 from vdet.detect.onnx.layouts import (
     CenterRows,
     FinalRows,
@@ -28,6 +29,38 @@ _MULTIPLE = 32
 _MOST_FINAL_ROWS = 1000
 _DEFAULT_SIDE = 640  # of the usual exports with an input of any size
 _SIZES = "orig_target_sizes"
+
+
+# fmt: off
+COCO = (
+    "person", "bicycle", "car", "motorcycle", "airplane", "bus", "train", "truck", "boat",
+    "traffic light", "fire hydrant", "stop sign", "parking meter", "bench", "bird", "cat", "dog",
+    "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe", "backpack", "umbrella",
+    "handbag", "tie", "suitcase", "frisbee", "skis", "snowboard", "sports ball", "kite",
+    "baseball bat", "baseball glove", "skateboard", "surfboard", "tennis racket", "bottle",
+    "wine glass", "cup", "fork", "knife", "spoon", "bowl", "banana", "apple", "sandwich",
+    "orange", "broccoli", "carrot", "hot dog", "pizza", "donut", "cake", "chair", "couch",
+    "potted plant", "bed", "dining table", "toilet", "tv", "laptop", "mouse", "remote",
+    "keyboard", "cell phone", "microwave", "oven", "toaster", "sink", "refrigerator", "book",
+    "clock", "vase", "scissors", "teddy bear", "hair drier", "toothbrush",
+)
+# fmt: on
+"""The 80 classes of the COCO data set in the order that detectors number them."""
+
+HEADER_KEY = "vdet"
+"""Key of the metadata that holds the header."""
+
+
+class Header(Section):
+    """What an ONNX file says of a network of ours."""
+
+    format: Literal[1] = 1
+    classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
+    pixels: int = Field(147_456, ge=1024, le=16_000_000, description="of the scaled frame")
+    calibration: NetworkScoreSettings = NetworkScoreSettings()
+    provenance: dict[str, Any] = Field(
+        default={}, description="what it was trained on and how, and what it reached"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,28 +176,99 @@ def _rt_detr(session: Session, path: Path, names: Sequence[str]) -> Recognized:
 
 def _by_shape(session: Session, path: Path, names: Sequence[str]) -> Recognized:
     metadata = _ultralytics_metadata(session.metadata, path)
-    known = tuple(names) or metadata.names
     width, height = _size_of(session, metadata.size)
     slot = _picture_slot(session)
     if len(slot.shape) != 4 or slot.shape[1] not in (3, None):
         raise _unknown(path, f"its input is {_listed([slot.shape])}, not (1, 3, height, width)")
     form = InputForm(width, height, "center", is_rgb=True, factor=1 / 255, dtype=slot.dtype)
-    guess = Recognized("", (), known, form, FinalRows())
+    guess = Recognized("", (), tuple(names) or metadata.names, form, FinalRows())
     shapes = [output.shape for output in _outputs_for_grey(session, path, guess)]
-    shape = shapes[0]
-    if len(shape) != 3 or shape[0] != 1:
+    if len(shapes[0]) != 3 or shapes[0][0] != 1:
         raise _unknown(path, f"its output is {_listed(shapes)}")
-    for rule in (_final_rows, _ultralytics, _ultralytics_v5, _yolox):
-        found = rule(guess, shape, metadata)
-        if found is not None:
+    _, rows, columns = shapes[0]
+    for rule in _rules(rows, columns, cell_count(width, height), metadata):
+        if rule.fits:
             break
     else:
         raise _unknown(path, f"for an input of {width}×{height} it gives {_listed(shapes)}")
-    if found.name == "YOLOX" and _is_raw(_outputs_for_grey(session, path, found)[0][0], width):
-        layout = CenterRows(has_objectness=True, grid=cell_centers(width, height))
-        reasons = (*found.reasons, "its middles are offsets from cells")
-        found = replace(found, layout=layout, reasons=reasons)
-    return _with_names(found, shape, path)
+    seen = ("its metadata has the keys of Ultralytics",) if metadata else ()
+    reasons = (*seen, f"its output is {shapes[0]}: {rule.reason}")
+    found = replace(guess, name=rule.name, reasons=reasons, layout=rule.layout)
+    if rule.name == "YOLOX":
+        found = _as_yolox(found, session, path)
+    return replace(found, names=_names_of(found, rows if rule.is_turned else columns, path))
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """A form of output: whether it fits what was seen, its name, and the reason in words."""
+
+    fits: bool
+    name: str
+    reason: str
+    layout: FinalRows | CenterRows
+
+    @property
+    def is_turned(self) -> bool:
+        return isinstance(self.layout, CenterRows) and self.layout.is_turned
+
+
+def _rules(rows: int, columns: int, cells: int, metadata: "_Metadata") -> Sequence[_Rule]:
+    """Return all forms, for an output of `rows` and `columns`; the first that fits counts."""
+    bare, classes = not metadata, len(metadata.names)
+    return (
+        _Rule(
+            columns == 6 and (metadata.is_final or rows <= _MOST_FINAL_ROWS),
+            "boxes after suppression",
+            "rows of box, score and class",
+            FinalRows(),
+        ),
+        _Rule(
+            columns == cells and (bare or rows == 4 + classes),
+            "Ultralytics v8 or later",
+            "columns of box and class scores",
+            CenterRows(has_objectness=False, is_turned=True),
+        ),
+        _Rule(
+            rows == 3 * cells and (bare or columns == 5 + classes),
+            "Ultralytics v5",
+            "three boxes a cell",
+            CenterRows(has_objectness=True),
+        ),
+        _Rule(
+            rows == cells and columns >= 6 and bare,
+            "YOLOX",
+            "one box a cell, and no metadata",
+            CenterRows(has_objectness=True),
+        ),
+    )
+
+
+def _as_yolox(found: Recognized, session: Session, path: Path) -> Recognized:
+    """Return YOLOX with its own form of input, and decoded where the export left that out."""
+    found = replace(found, form=replace(found.form, fit="corner", is_rgb=False, factor=1.0))
+    middles = _outputs_for_grey(session, path, found)[0][0][:, 0]
+    if np.ptp(middles) >= found.form.width / 2:  # they spread over the input
+        return found
+    grid = cell_centers(found.form.width, found.form.height)
+    reasons = (*found.reasons, "its middles are offsets from cells")
+    return replace(found, layout=CenterRows(has_objectness=True, grid=grid), reasons=reasons)
+
+
+def _names_of(found: Recognized, length: int, path: Path) -> tuple[str, ...]:
+    """Return the names of the classes; `length` is that of a row or column of the output."""
+    if isinstance(found.layout, FinalRows):
+        return found.names or COCO
+    assert isinstance(found.layout, CenterRows)
+    count = length - (5 if found.layout.has_objectness else 4)
+    if len(found.names) == count:
+        return found.names
+    if found.names:
+        raise ModelError(f"{path}: has {count} classes, not {len(found.names)}; name them all")
+    usual = {len(COCO): COCO, 1: ("vehicle",)}
+    if count not in usual:
+        raise ModelError(f"{path}: does not name its {count} classes; give detector.names")
+    return usual[count]
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,89 +301,6 @@ def _ultralytics_metadata(metadata: Mapping[str, str], path: Path) -> _Metadata:
         raise _unknown(path, f"its task is {task}, not detect")
     is_final = bool(args.get("nms")) or metadata.get("end2end", "False") == "True"
     return _Metadata(tuple(str(each) for each in listed), size, is_final)
-
-
-_Rule = Callable[[Recognized, tuple[int, ...], _Metadata], Recognized | None]
-
-
-def _final_rows(
-    guess: Recognized, shape: tuple[int, ...], metadata: _Metadata
-) -> Recognized | None:
-    if shape[2] != 6 or not (metadata.is_final or shape[1] <= _MOST_FINAL_ROWS):
-        return None
-    return replace(
-        guess,
-        name="boxes after suppression",
-        reasons=(f"its output is {shape}: rows of box, score and class",),
-        layout=FinalRows(),
-    )
-
-
-def _ultralytics(
-    guess: Recognized, shape: tuple[int, ...], metadata: _Metadata
-) -> Recognized | None:
-    count = cell_count(guess.form.width, guess.form.height)
-    if shape[2] != count or (metadata and shape[1] != 4 + len(metadata.names)):
-        return None
-    return replace(
-        guess,
-        name="Ultralytics v8 or later",
-        reasons=(*_seen(metadata), f"its output is {shape}: columns of box and class scores"),
-        layout=CenterRows(has_objectness=False, is_turned=True),
-    )
-
-
-def _ultralytics_v5(
-    guess: Recognized, shape: tuple[int, ...], metadata: _Metadata
-) -> Recognized | None:
-    count = 3 * cell_count(guess.form.width, guess.form.height)
-    if shape[1] != count or (metadata and shape[2] != 5 + len(metadata.names)):
-        return None
-    return replace(
-        guess,
-        name="Ultralytics v5",
-        reasons=(*_seen(metadata), f"its output is {shape}: three boxes a cell"),
-        layout=CenterRows(has_objectness=True),
-    )
-
-
-def _yolox(guess: Recognized, shape: tuple[int, ...], metadata: _Metadata) -> Recognized | None:
-    count = cell_count(guess.form.width, guess.form.height)
-    if shape[1] != count or shape[2] < 6 or metadata:
-        return None
-    return replace(
-        guess,
-        name="YOLOX",
-        reasons=(f"its output is {shape}: one box a cell, and no metadata",),
-        form=replace(guess.form, fit="corner", is_rgb=False, factor=1.0),
-        layout=CenterRows(has_objectness=True),
-    )
-
-
-def _is_raw(table: Array, width: int) -> bool:
-    """Tell whether middles are offsets from cells: then they do not spread over the input."""
-    return bool(np.ptp(table[:, 0]) < width / 2)
-
-
-def _with_names(found: Recognized, shape: tuple[int, ...], path: Path) -> Recognized:
-    if isinstance(found.layout, FinalRows):
-        return replace(found, names=found.names or COCO)
-    assert isinstance(found.layout, CenterRows)
-    rest = shape[1] if found.layout.is_turned else shape[2]
-    count = rest - (5 if found.layout.has_objectness else 4)
-    if len(found.names) == count:
-        return found
-    if found.names:
-        raise ModelError(f"{path}: has {count} classes, not {len(found.names)}; name them all")
-    if count == len(COCO):
-        return replace(found, names=COCO)
-    if count == 1:
-        return replace(found, names=("vehicle",))
-    raise ModelError(f"{path}: does not name its {count} classes; give detector.names")
-
-
-def _seen(metadata: _Metadata) -> tuple[str, ...]:
-    return ("its metadata has the keys of Ultralytics",) if metadata else ()
 
 
 def _picture_slot(session: Session) -> InputSlot:

@@ -16,7 +16,7 @@ import torch
 from onnx import TensorProto, helper, numpy_helper
 from torch import Tensor, nn
 
-from vdet.detect.onnx.header import HEADER_KEY, Header
+from vdet.detect.onnx.recognition import HEADER_KEY, Header
 from vdet.files import staged
 from vdet.learn.net.architecture import Block, Network
 

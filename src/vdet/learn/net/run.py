@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.config.network import NetworkTrainingSettings
-from vdet.detect.onnx.header import Header
-from vdet.detect.onnx.recognition import read_header
+from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.files import write_json
 from vdet.labels.pictures.reading import read_labelled_images
