@@ -1,7 +1,7 @@
-"""Detectors, trackers and sinks by name: those of vdet, and those of other installed packages.
+"""What other packages can add, by name: detectors, trackers, steps, sinks, formats and commands.
 
-Another package registers its own as entry points of these groups. It is imported when one of its
-names is used, not before.
+A package registers its own as entry points of these groups. It is imported when one of its names is
+used, not before.
 """
 
 from importlib.metadata import entry_points
@@ -13,10 +13,20 @@ from vdet.files import printable
 
 DETECTORS = "vdet.detectors"
 TRACKERS = "vdet.trackers"
+STEPS = "vdet.steps"
 SINKS = "vdet.sinks"
+FORMATS = "vdet.formats"
+COMMANDS = "vdet.commands"
 
-_NOUNS = {DETECTORS: "detector", TRACKERS: "tracker", SINKS: "sink"}
-_BUILT_IN = {
+_NOUNS = {
+    DETECTORS: "detector",
+    TRACKERS: "tracker",
+    STEPS: "step",
+    SINKS: "sink",
+    FORMATS: "format",
+    COMMANDS: "command",
+}
+_BUILT_IN: dict[str, dict[str, str]] = {
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.kind:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {
@@ -30,7 +40,11 @@ _BUILT_IN = {
         "report": "vdet.run.sinks.report:REPORT",
         "counts": "vdet.run.sinks.counts:COUNTS",
     },
+    STEPS: {},
+    FORMATS: {},
+    COMMANDS: {},
 }
+"""The names of vdet itself: where each is defined."""
 
 
 def plugin_names(group: str) -> list[str]:
