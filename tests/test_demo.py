@@ -43,7 +43,7 @@ def test_draws_finds_counts_trains_and_compares(
     assert float(network.split()[3]) > 0.8, "F1 of the network"
     assert network.endswith("1 of 1")
     assert linear.startswith("linear model model.npz")
-    for name in ("found.mp4", "page/report.html", "found.csv", "truth.txt", "stages", "model.json"):
+    for name in ("found.mp4", "page/page.html", "found.csv", "truth.txt", "stages", "model.json"):
         assert str(folder / name) in result.out
         assert (folder / name).exists()
 

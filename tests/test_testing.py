@@ -49,7 +49,7 @@ def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettin
         ("summary", "out.csv"),
         ("summary", "out.json"),
         ("crops", "crops"),
-        ("report", "report"),
+        ("page", "page"),
     ],
 )
 def test_every_sink_passes(name: str, file: str, tmp_path: Path) -> None:

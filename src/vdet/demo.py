@@ -15,7 +15,7 @@ from vdet.labels.predictions import read_predictions
 from vdet.labels.registry import read_tracks
 from vdet.labels.truth import read_truth
 from vdet.learn.svm.dataset import find_patches
-from vdet.learn.svm.report import TrainingReport
+from vdet.learn.svm.metrics import TrainingMetrics
 from vdet.learn.svm.training import train
 from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
@@ -65,7 +65,7 @@ class DemoFiles:
     def found(self) -> VideoJob:
         """The run of the network: the road with the vehicles, their tracks, counts and page."""
         outputs = {"video": "found.mp4", "tracks": "found.csv", "counts": "counts.csv"}
-        return self._job(outputs | {"report": "page"})
+        return self._job(outputs | {"page": "page"})
 
     @property
     def patches(self) -> Path:
@@ -79,7 +79,7 @@ class DemoFiles:
 
     @property
     def training(self) -> Path:
-        """The report of the training."""
+        """The metrics of the training."""
         return self.folder / "model.json"
 
     @property
@@ -108,7 +108,7 @@ class DemoResult:
 
     rows: tuple[DemoRow, ...]
     crossings: int
-    training: TrainingReport
+    training: TrainingMetrics
 
     def lines(self) -> Iterator[str]:
         """Yield the result as lines of text."""
@@ -138,7 +138,7 @@ def run_demo(
     *,
     seed: int = SEED,
     overwrite: bool = False,
-    report_step: Callable[[str], object] = lambda _: None,
+    announce: Callable[[str], object] = lambda _: None,
     steps: Steps = no_steps,
 ) -> DemoResult:
     """Draw a road, find its vehicles with both detectors, and compare them with the truth.
@@ -151,13 +151,13 @@ def run_demo(
         Of everything that is drawn; the same seed gives the same data.
     overwrite
         Replace the files of an earlier demo.
-    report_step
+    announce
         Called with a line before each step.
     steps
         Called at the start of each longer step.
     """
     scene = demo_scene(seed)
-    report_step("1/4 drawing a road with vehicles …")
+    announce("1/4 drawing a road with vehicles …")
     steps("drawing", None)
     write_clip(files.clip, scene, overwrite=overwrite)
     write_truth(files.truth, scene, overwrite=overwrite)
@@ -170,9 +170,9 @@ def run_demo(
         job = replace(job, at=scene.frames / scene.rate / 2, overwrite=overwrite)
         run_video(job, detector, settings, progress=partial(steps, "frames"))
 
-    report_step("2/4 finding the vehicles with the network …")
+    announce("2/4 finding the vehicles with the network …")
     find(files.found, settings)
-    report_step(f"3/4 drawing {2 * PATCHES:,} patches, and training a linear model on them …")
+    announce(f"3/4 drawing {2 * PATCHES:,} patches, and training a linear model on them …")
     steps("drawing", None)
     write_patches(
         files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES, overwrite=overwrite
@@ -181,7 +181,7 @@ def run_demo(
     model, training = train(find_patches([files.patches]), linear, steps=steps)
     save_model(model, files.model, overwrite=overwrite)
     training.write(files.training, overwrite=overwrite)
-    report_step("4/4 finding the vehicles with the linear model …")
+    announce("4/4 finding the vehicles with the linear model …")
     find(files.found_by_model, linear, files.model)
     runs = {"network": files.found, f"linear model {files.model.name}": files.found_by_model}
     rows = (

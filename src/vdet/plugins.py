@@ -37,7 +37,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "json": "vdet.run.sinks.json_list:JSON",
         "summary": "vdet.run.sinks.summary:SUMMARY",
         "crops": "vdet.run.sinks.crops:CROPS",
-        "report": "vdet.run.sinks.report:REPORT",
+        "page": "vdet.run.sinks.page:PAGE",
         "counts": "vdet.run.sinks.counts:COUNTS",
     },
     STEPS: {},

@@ -72,12 +72,12 @@ def test_the_boxes_that_count_are_those_that_detect_image_shows(
     assert json.loads(run("eval", "images", folder, *options).out)["mean"]["matches"] == 0
 
 
-def test_several_sets_a_table_and_a_report(
+def test_several_sets_a_table_and_a_page(
     run: Run, tmp_path: Path, red: tuple[str | Path, ...]
 ) -> None:
     sets = [write_set(tmp_path / "one"), write_set(tmp_path / "two", "YOLO")]
-    folder = tmp_path / "report"
-    options = ("--report", folder, "--set", "detector.search.probability=0.6")
+    folder = tmp_path / "page"
+    options = ("--page", folder, "--set", "detector.search.probability=0.6")
     result = run("eval", "images", *sets, *red, *options)
     assert result.code == 0, result.err
     first, second, *_ = result.out.splitlines()
@@ -86,7 +86,7 @@ def test_several_sets_a_table_and_a_report(
     assert second == f"boxes from score {PERSPECTIVE.svm.shown_score:.2f}"
     for words in (str(sets[0]), str(sets[1]), "mean of 2", "recall / F1 by width", "person (2)"):
         assert words in result.out
-    assert "data:image/jpeg" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "data:image/jpeg" in (folder / "page.html").read_text(encoding="utf-8")
 
 
 def test_narrow_vehicles_are_left_out(
@@ -107,7 +107,7 @@ def test_narrow_vehicles_are_left_out(
         ((), 2, "Missing argument 'DATA...'"),
         (("none",), 1, "none: is no folder and no .json file"),
         (("set", "--score", "2"), 2, "2.0 is not in the range"),
-        (("set", "--report", "set/a.png"), 1, "cannot be made a folder"),
+        (("set", "--page", "set/a.png"), 1, "cannot be made a folder"),
         (("set", "--set", "detector.kind=sonar"), 1, "sonar: is no detector"),
     ],
 )

@@ -24,8 +24,8 @@ def _few_draws(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_trains_a_model_for_a_split(run: Run, patches_path: Path, tmp_path: Path) -> None:
-    target, folder = tmp_path / "p.json", tmp_path / "report"
-    options = ("--split", "tail", "--json", target, "--report", folder)
+    target, folder = tmp_path / "p.json", tmp_path / "page"
+    options = ("--split", "tail", "--json", target, "--page", folder)
     result = run("eval", "patches", patches_path, *options, *QUICK)
     assert result.code == 0, result.err
     for words in ("160 vehicles, 160 non-vehicles", "leak-free", "calibration error", "["):
@@ -33,7 +33,7 @@ def test_trains_a_model_for_a_split(run: Run, patches_path: Path, tmp_path: Path
     (trial,) = json.loads(target.read_text())["trials"]
     assert (trial["name"], trial["scores"]["patches"]) == ("tail", 65)
     assert trial["scores"]["accuracy"] > 0.9
-    html = (folder / "report.html").read_text()
+    html = (folder / "page.html").read_text()
     for words in ("Curves", "Accuracy by group", "Worst mistakes: tail", "data:image/svg+xml"):
         assert words in html
 

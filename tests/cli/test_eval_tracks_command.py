@@ -48,10 +48,10 @@ def test_boxes_after_the_last_true_frame_are_left_out(run: Run, found: Path, tru
     assert "frames 1–10 compared; left out: 2 boxes found in later ones" in result.out
 
 
-def test_writes_a_report(run: Run, found: Path, truth: Path, tmp_path: Path) -> None:
-    result = run("eval", "tracks", found, truth, "--report", tmp_path / "report")
+def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> None:
+    result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert result.code == 0, result.err
-    html = (tmp_path / "report" / "report.html").read_text()
+    html = (tmp_path / "page" / "page.html").read_text()
     for words in ("Vehicle by vehicle", "Largest losses", "vehicle 1 missed", "data:image/svg+xml"):
         assert words in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
@@ -61,9 +61,9 @@ def test_without_matplotlib_a_report_is_an_error_of_one_line(
     run: Run, found: Path, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    result = run("eval", "tracks", found, truth, "--report", tmp_path / "report")
+    result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert (result.code, result.out) == (1, "")
-    assert result.err == "vdet: --report needs matplotlib; pip install matplotlib\n"
+    assert result.err == "vdet: --page needs matplotlib; pip install matplotlib\n"
 
 
 def test_bad_truth_is_an_error_of_one_line(run: Run, found: Path, tmp_path: Path) -> None:

@@ -18,13 +18,13 @@ TWO_SHIPPED = (
 def test_scores_agree_with_those_of_the_tracks_written(
     run: Run, clip_path: Path, truth_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
-    tracks, folder = tmp_path / "found.jsonl", tmp_path / "report"
+    tracks, folder = tmp_path / "found.jsonl", tmp_path / "page"
     common = ("--model", model_path, *QUICK_OPTIONS)
     made = run(
         "detect-video", clip_path, "--no-video", "--tracks", tracks, "--frames", "8", *common
     )
     assert made.code == 0, made.err
-    options = ("--truth", truth_path, "--json", "-", "--report", folder)
+    options = ("--truth", truth_path, "--json", "-", "--page", folder)
     from_video = run("eval", "video", clip_path, *options, *common)
     assert from_video.code == 0, from_video.err
     total = json.loads(from_video.out)["total"]
@@ -32,7 +32,7 @@ def test_scores_agree_with_those_of_the_tracks_written(
     from_tracks = json.loads(again.out)
     assert total["track_boxes"] > 0, "nothing was found: the test would say nothing"
     assert {key: from_tracks[key] for key in total} == total
-    assert "data:image/jpeg" in (folder / "report.html").read_text()
+    assert "data:image/jpeg" in (folder / "page.html").read_text()
 
 
 def test_several_videos_and_a_sweep(
@@ -40,8 +40,8 @@ def test_several_videos_and_a_sweep(
 ) -> None:
     videos = (clip_path, clip_path, "--truth", truth_path, "--truth", truth_path, "--until", "4")
     sweeps = ("--sweep", "detector.heat.threshold=0.1,5000", "--sweep", "tracker.history=5,10")
-    target, folder = tmp_path / "s.json", tmp_path / "report"
-    results = ("--json", target, "--report", folder)
+    target, folder = tmp_path / "s.json", tmp_path / "page"
+    results = ("--json", target, "--page", folder)
     result = run("eval", "video", *videos, *sweeps, *results, "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err
     runs = json.loads(target.read_text())["sweep"]
@@ -55,7 +55,7 @@ def test_several_videos_and_a_sweep(
     assert runs[2]["total"]["track_boxes"] == 0, "nothing is as hot as that"
     assert "detector.heat.threshold=5000 tracker.history=10" in result.out
     assert "best F1: " in result.out
-    html = (folder / "report.html").read_text()
+    html = (folder / "page.html").read_text()
     assert "Settings compared" in html
     for text in (result.out, html):
         assert f"vdet {vdet.__version__}, detector svm, model {model_path.name}, settings " in text

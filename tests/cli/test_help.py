@@ -139,7 +139,7 @@ def test_one_option_means_the_same_in_every_command() -> None:
     """Options of one name have one help, but for examples and for what is the command's own."""
     own = {
         *("--output", "--until", "--model", "--stages", "--json", "--jobs", "--truth"),
-        *("--rate", "--counts", "--report"),
+        *("--rate", "--counts", "--page"),
     }
     texts: dict[str, set[str]] = {}
     for _, option, text in OPTIONS:

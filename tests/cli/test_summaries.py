@@ -1,4 +1,4 @@
-"""`--summary`, `--crops` and `--report` of `vdet detect-video`, for one video and for many."""
+"""`--summary`, `--crops` and `--page` of `vdet detect-video`, for one video and for many."""
 
 import csv
 import json
@@ -10,7 +10,7 @@ from conftest import Run
 from running import names, write_drive
 
 NASTY = "<img src=x onerror=alert(1)>"
-ENDS = ("--summary", ".cars.csv", "--crops", ".crops", "--report", ".report")
+ENDS = ("--summary", ".cars.csv", "--crops", ".crops", "--page", ".page")
 
 
 @pytest.fixture
@@ -24,13 +24,13 @@ def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_one_video(run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]) -> None:
-    options = ("--summary", "a.json", "--crops", "crops", "--report", "report", *red)
+    options = ("--summary", "a.json", "--crops", "crops", "--page", "page", *red)
     result = run("detect-video", clips / "day" / "a.mp4", "--no-video", *options)
     assert result.code == 0, result.err
     (vehicle,) = json.loads(Path("a.json").read_text())
     assert vehicle["id"] == 1
     assert len(names(tmp_path / "crops")) == 1
-    assert names(tmp_path / "report") == ["report.html"]
+    assert names(tmp_path / "page") == ["page.html"]
     again = run("detect-video", clips / "day" / "a.mp4", "--no-video", "--crops", "crops", *red)
     assert again.code == 1
     assert "is there already; give --overwrite to replace it" in again.err
@@ -50,12 +50,12 @@ def test_many_videos_have_their_own_and_a_table_and_a_page_over_all(
     assert [name.partition(".crops/")[0] for name in crops] == [NASTY, "day/a"]
     assert set(found) - set(crops) == {
         *("all.cars.csv", "index.html", "manifest.jsonl"),
-        *(f"{NASTY}{end}" for end in (".cars.csv", ".mp4", ".report/report.html")),
-        *(f"day/a{end}" for end in (".cars.csv", ".mp4", ".report/report.html")),
+        *(f"{NASTY}{end}" for end in (".cars.csv", ".mp4", ".page/page.html")),
+        *(f"day/a{end}" for end in (".cars.csv", ".mp4", ".page/page.html")),
     }
     with Path("found/all.cars.csv").open() as file:
         assert [row["video"] for row in csv.DictReader(file)] == [NASTY, "day/a"]
-    assert "day/a.report/report.html" in Path("found/index.html").read_text()
+    assert "day/a.page/page.html" in Path("found/index.html").read_text()
 
     before = {name: (tmp_path / "found" / name).stat().st_mtime_ns for name in found}
     Path("found/index.html").unlink()  # as if the batch had been interrupted before it
@@ -79,7 +79,7 @@ def test_a_video_that_fails_leaves_no_folder(
     )
     assert result.code == 3
     assert {path.name for path in (tmp_path / "found").iterdir()} == {
-        *("a.cars.csv", "a.crops", "a.report", "all.cars.csv", "index.html", "manifest.jsonl")
+        *("a.cars.csv", "a.crops", "a.page", "all.cars.csv", "index.html", "manifest.jsonl")
     }
 
 
@@ -87,7 +87,7 @@ def test_a_video_that_fails_leaves_no_folder(
     ("options", "words"),
     [
         (("--crops", "crops"), "with -d give --crops a suffix: as in .crops"),
-        (("--report", "report"), "with -d give --report a suffix: as in .report"),
+        (("--page", "page"), "with -d give --page a suffix: as in .page"),
         (("--summary", ".xml"), "with -d give --summary a suffix: .csv, .json"),
     ],
 )

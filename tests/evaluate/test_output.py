@@ -37,9 +37,9 @@ def test_the_folder_of_a_report_is_created(tmp_path: Path) -> None:
     assert write_page("<p>", tmp_path / "a" / "b").read_text() == "<p>"
 
 
-def test_an_earlier_report_is_kept(tmp_path: Path) -> None:
+def test_an_earlier_page_is_kept(tmp_path: Path) -> None:
     write_page("precious", tmp_path)
-    with pytest.raises(OutputError, match=r"report\.html: is there already; give --overwrite"):
+    with pytest.raises(OutputError, match=r"page\.html: is there already; give --overwrite"):
         check_outputs(None, tmp_path, overwrite=False, inputs=[])
     check_outputs(None, tmp_path, overwrite=True, inputs=[])
 
@@ -52,7 +52,7 @@ def test_earlier_numbers_are_kept(tmp_path: Path) -> None:
         check_outputs(target, None, overwrite=False, inputs=[])
 
 
-def test_a_file_cannot_be_the_folder_of_a_report(tmp_path: Path) -> None:
+def test_a_file_cannot_be_the_folder_of_a_page(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot be made a folder"):
         check_outputs(None, tmp_path / "file", overwrite=True, inputs=[])
@@ -63,8 +63,8 @@ def test_without_matplotlib_the_error_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(OutputError, match="needs matplotlib; pip install matplotlib"):
-        check_outputs(None, tmp_path / "report", overwrite=False, inputs=[])
-    assert not (tmp_path / "report").exists()
+        check_outputs(None, tmp_path / "page", overwrite=False, inputs=[])
+    assert not (tmp_path / "page").exists()
     check_outputs("-", None, overwrite=False, inputs=[])
 
 

@@ -45,7 +45,7 @@ def report(
         levels.add(each)
     return VideoReport(
         source=source,
-        folder=Path("found/a.report"),
+        folder=Path("found/a.page"),
         width=WIDTH,
         height=HEIGHT,
         frames=52,
@@ -180,7 +180,7 @@ class TestFacts:
     FACTS = Facts(seconds=2, frames=50, vehicles=3, most=2, still=jpeg_uri(STILL), counts={"a": 1})
 
     def test_they_are_read_back(self, tmp_path: Path) -> None:
-        path = tmp_path / "report.html"
+        path = tmp_path / "page.html"
         path.write_text(f"<html>{facts_html(self.FACTS)}</html>")
         assert read_facts(path) == self.FACTS
 
@@ -203,25 +203,25 @@ class TestFacts:
     )
     def test_another_page_is_refused(self, tmp_path: Path, text: str) -> None:
         (tmp_path / "a.html").write_text(text)
-        with pytest.raises(OutputError, match=r"a\.html: is no report of vdet on a video; remove"):
+        with pytest.raises(OutputError, match=r"a\.html: is no page of vdet on a video; remove"):
             read_facts(tmp_path / "a.html")
 
 
 class TestIndex:
     def index(self, folder: Path, *names: str) -> Elements:
         """Write the page of each video, and the page over all."""
-        outputs = {name: folder / f"{name}.report" for name in names}
+        outputs = {name: folder / f"{name}.page" for name in names}
         for place in outputs.values():
             place.mkdir(parents=True)
-            (place / "report.html").write_text(video_page(report()), encoding="utf-8")
-        outputs["failed"] = folder / "failed.report"
+            (place / "page.html").write_text(video_page(report()), encoding="utf-8")
+        outputs["failed"] = folder / "failed.page"
         write_index(outputs, folder / "index.html")
         return Elements((folder / "index.html").read_text(encoding="utf-8"))
 
     def test_it_links_each_page_and_adds_up(self, tmp_path: Path) -> None:
         made = self.index(tmp_path, "a", "day/b")
         links = {link["href"] for link in made.all("a")}
-        assert links == {"a.report/report.html", "day/b.report/report.html"}
+        assert links == {"a.page/page.html", "day/b.page/page.html"}
         for words in ("4vehicles", "2videos", "0:04time searched", "104frames"):
             assert words in made.text
         assert all(
@@ -234,7 +234,7 @@ class TestIndex:
             place.mkdir()
             counts = [Series("north", {0: number})]
             html = video_page(replace(report(), counts=counts))
-            (place / "report.html").write_text(html, encoding="utf-8")
+            (place / "page.html").write_text(html, encoding="utf-8")
         write_index(outputs, tmp_path / "index.html")
         assert "3north" in Elements((tmp_path / "index.html").read_text(encoding="utf-8")).text
 

@@ -13,7 +13,7 @@ from vdet.cli.messages import set_up_logs
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--summary", "--crops", "--json"),
-        *("--report", "--preview", "--stages", "--at", "--sink", "--overwrite"),
+        *("--page", "--preview", "--stages", "--at", "--sink", "--overwrite"),
     ),
     "What is processed": (
         *("--truth", "--video", "--start", "--end", "--frames", "--stride", "--every", "--from"),

@@ -43,7 +43,7 @@ def demo(quiet: bool, *, folder: Path, seed: int, overwrite: bool) -> None:
             files,
             seed=seed,
             overwrite=overwrite,
-            report_step=(lambda _: None) if quiet else print_message,
+            announce=(lambda _: None) if quiet else print_message,
             steps=steps,
         )
     print_lines(
@@ -51,9 +51,9 @@ def demo(quiet: bool, *, folder: Path, seed: int, overwrite: bool) -> None:
         "",
         "Look at",
         f"  {folder / 'found.mp4'}  the road with the vehicles that the network found",
-        f"  {folder / 'page' / 'report.html'}  the page of this run",
+        f"  {folder / 'page' / 'page.html'}  the page of this run",
         f"  {folder / 'found.csv'}  the tracks; {files.truth} has the true ones",
         f"  {folder / 'stages'}/  every stage of the linear model in one frame",
-        f"  {files.training}  the report of the training",
+        f"  {files.training}  the metrics of the training",
         "Then try your own:  vdet detect-video in.mp4 out.mp4",
     )

@@ -69,10 +69,10 @@ from vdet.run.sinks.protocol import Output
     "Write the best picture of each vehicle into DIR. With -d, give an end such as .crops.",
 )
 @output_option(
-    "report",
+    "page",
     "DIR",
-    "Write report.html into DIR: a page on the vehicles of the video. With -d, give an end such as "
-    ".report. A page that links all videos is then written too.",
+    "Write page.html into DIR: a page on the vehicles of the video. With -d, give an ending as in "
+    ".page. A page that links all videos is then written too.",
 )
 @output_option(
     "counts",

@@ -58,7 +58,7 @@ def images(
     config_name: str | None,
     assignments: tuple[str, ...],
     json_target: str | None,
-    report: Path | None,
+    page: Path | None,
     overwrite: bool,
 ) -> None:
     """Measure detection in labelled pictures.
@@ -75,9 +75,7 @@ def images(
     detector = read_whole_frame_settings(config_name, assignments, model_path).detector
     model = load_detector(detector.showing_all(), model_path)
     file = model_file(detector, model_path)
-    check_outputs(
-        json_target, report, overwrite=overwrite, inputs=[*data, *([file] if file else [])]
-    )
+    check_outputs(json_target, page, overwrite=overwrite, inputs=[*data, *([file] if file else [])])
     sets = [read_labelled_images(path) for path in data]
     counting = Counting(
         score=detector.shown_score if score is None else score,
@@ -93,6 +91,6 @@ def images(
         plain(result, run),
         lambda: images_page(result, run),
         json_target=json_target,
-        report=report,
+        page=page,
         overwrite=overwrite,
     )

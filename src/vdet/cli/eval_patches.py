@@ -23,7 +23,7 @@ from vdet.learn.svm.dataset import find_patches
 @click.command(
     cls=Command,
     examples=(
-        "vdet eval patches vehicles.zip non-vehicles.zip --report report",
+        "vdet eval patches vehicles.zip non-vehicles.zip --page page",
         "vdet eval patches patches/ --model model.npz",
     ),
 )
@@ -65,7 +65,7 @@ def patches(
     assignments: tuple[str, ...],
     jobs: int | None,
     json_target: str | None,
-    report: Path | None,
+    page: Path | None,
     overwrite: bool,
 ) -> None:
     """Measure the classifier on labelled patches.
@@ -81,7 +81,7 @@ def patches(
     settings = read_settings(config_name, assignments, detector="svm")
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     inputs = [*data, *([model_path] if model_path else [])]
-    check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
+    check_outputs(json_target, page, overwrite=overwrite, inputs=inputs)
     files = find_patches(data)
     with progress_steps("", quiet=quiet) as steps:
         if model is None:
@@ -96,6 +96,6 @@ def patches(
         plain_run(name) | plain(result),
         lambda: patch_page(result, name),
         json_target=json_target,
-        report=report,
+        page=page,
         overwrite=overwrite,
     )

@@ -13,7 +13,7 @@ from vdet.version import __version__
 
 @click.command(
     cls=Command,
-    examples=("vdet eval tracks out.txt gt.txt --report report",),
+    examples=("vdet eval tracks out.txt gt.txt --page page",),
 )
 @click.argument("prediction", type=PATH, metavar="PRED")
 @click.argument("truth", type=PATH, metavar="TRUTH")
@@ -41,7 +41,7 @@ def tracks(
     until: int | None,
     rate: float | None,
     json_target: str | None,
-    report: Path | None,
+    page: Path | None,
     overwrite: bool,
 ) -> None:
     """Compare a file of tracks with the truth.
@@ -53,7 +53,7 @@ def tracks(
     from vdet.evaluate.clips.text import plain_clip, result_lines
     from vdet.evaluate.report.video_page import video_page
 
-    check_outputs(json_target, report, overwrite=overwrite, inputs=[prediction, truth])
+    check_outputs(json_target, page, overwrite=overwrite, inputs=[prediction, truth])
     with progress_steps("", quiet=quiet) as steps:
         steps("comparing", None)
         run = score_files(prediction, truth, until=until, rate=rate)
@@ -62,6 +62,6 @@ def tracks(
         plain_clip(run.clips[0]),
         lambda: video_page([run], f"compared with {truth} by vdet {__version__}"),
         json_target=json_target,
-        report=report,
+        page=page,
         overwrite=overwrite,
     )

@@ -25,7 +25,7 @@ from vdet.run.sinks.protocol import check_sinks
 @click.command(
     cls=Command,
     examples=(
-        "vdet eval video in.mp4 --truth gt.txt --report report",
+        "vdet eval video in.mp4 --truth gt.txt --page page",
         "vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3",
     ),
 )
@@ -72,7 +72,7 @@ def video(
     config_name: str | None,
     assignments: tuple[str, ...],
     json_target: str | None,
-    report: Path | None,
+    page: Path | None,
     overwrite: bool,
 ) -> None:
     """Measure detection and tracking in labelled video.
@@ -99,7 +99,7 @@ def video(
     detectors = [variant.settings.detector for variant in variants]
     files = [path for each in detectors if (path := model_file(each, model_path))]
     inputs = [*videos, *truths, *files]
-    check_outputs(json_target, report, overwrite=overwrite, inputs=inputs)
+    check_outputs(json_target, page, overwrite=overwrite, inputs=inputs)
     check_sinks(outputs, overwrite=overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
     with progress_bar(" frames", quiet=quiet) as progress:
@@ -112,6 +112,6 @@ def video(
         plain(runs, name),
         lambda: video_page(runs, "; ".join(run_lines(name))),
         json_target=json_target,
-        report=report,
+        page=page,
         overwrite=overwrite,
     )

@@ -258,10 +258,10 @@ scheduler_option = click.option(
 
 
 def results_options(command: F) -> F:
-    """Add `--json FILE`, `--report DIR` and `--overwrite`; read them with `print_results`."""
+    """Add `--json FILE`, `--page DIR` and `--overwrite`; read them with `print_results`."""
     command = overwrite_option(command)
     command = click.option(
-        "--report", type=PATH, metavar="DIR", help="Write report.html, with figures, into DIR."
+        "--page", type=PATH, metavar="DIR", help="Write page.html, with charts, into DIR."
     )(command)
     return click.option(
         "--json",
@@ -308,7 +308,7 @@ def print_results(
     make_page: Callable[[], str],
     *,
     json_target: str | None,
-    report: Path | None,
+    page: Path | None,
     overwrite: bool,
 ) -> None:
     """Print the table, and write the files that `results_options` ask for."""
@@ -316,8 +316,8 @@ def print_results(
     print_lines(*lines, err=to_stderr)
     if json_target is not None:
         write_json(values, json_target, overwrite=overwrite)
-    if report is not None:
+    if page is not None:
         with progress_steps("", quiet=click.get_current_context().obj) as steps:
-            steps("writing the report", None)
-            page = write_page(make_page(), report, overwrite=overwrite)
-        print_lines("", f"{page}: the report", err=to_stderr)
+            steps("writing the page", None)
+            file = write_page(make_page(), page, overwrite=overwrite)
+        print_lines("", f"{file}: the page", err=to_stderr)

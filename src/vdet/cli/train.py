@@ -60,7 +60,7 @@ def train(
     Pascal VOC), out of which patches of vehicles and of other things are cut. Patches lie in
     vehicles/<group>/ and non-vehicles/<group>/. A file boxes.csv beside these folders says where in
     a patch the vehicle is; vdet mine writes it. With it the model learns where the sides of
-    vehicles are. A report is printed, and written beside the model as JSON.
+    vehicles are. The metrics are printed, and written beside the model as JSON.
     """
     from vdet.labels.pictures.reading import holds_labelled_images
     from vdet.learn.svm.mining import MiningJob, PictureSource, mine
@@ -71,8 +71,8 @@ def train(
     settings = read_settings(config_name, assignments, detector="svm")
     if output.suffix.lower() != ".npz":
         raise OutputError(f"{output}: models are written as .npz; name it so")
-    report_path = output.with_suffix(".json")
-    for path in (output, report_path):
+    metrics_path = output.with_suffix(".json")
+    for path in (output, metrics_path):
         check_output(path, overwrite=overwrite, inputs=data)
     if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
@@ -88,7 +88,7 @@ def train(
             mine(MiningJob(sources, archive), settings, None, steps=steps)
             patches.append(archive)
         files, boxed = find_patches(patches), find_boxed(patches)
-        model, report = fit_model(
+        model, metrics = fit_model(
             files,
             settings,
             boxed=boxed,
@@ -97,5 +97,5 @@ def train(
             steps=steps,
         )
     save_model(model, output, overwrite=overwrite)
-    report.write(report_path, overwrite=overwrite)
-    print_lines(*report.lines(), "", f"{output}: the model; {report_path}: the report")
+    metrics.write(metrics_path, overwrite=overwrite)
+    print_lines(*metrics.lines(), "", f"{output}: the model; {metrics_path}: the metrics")

@@ -56,7 +56,7 @@ def train_net(
 
     Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The state of the
     training is kept beside the network, as .ckpt; a training that was stopped goes on from there
-    when the same command is given again. A report is written beside the network as JSON.
+    when the same command is given again. The metrics are written beside the network as JSON.
     Needs torch and onnx: pip install torch onnx
     """
     if not data and not clips:
@@ -75,8 +75,8 @@ def train_net(
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
     job = NetworkJob(data, labelled, output, base, overwrite)
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
-    for path in (job.output, job.report):
+    for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
     with steps_bar(settings.steps, quiet=quiet) as advance:
-        report = train_to_file(job, settings, progress=advance)
-    print_lines(*report.lines(), "", f"{output}: the network; {job.report}: the report")
+        metrics = train_to_file(job, settings, progress=advance)
+    print_lines(*metrics.lines(), "", f"{output}: the network; {job.metrics}: the metrics")

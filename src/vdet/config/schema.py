@@ -27,8 +27,8 @@ from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
 from vdet.config.network import NetworkTrainingSettings
 from vdet.config.output import OutputSettings
+from vdet.config.page import PageSettings
 from vdet.config.regions import RegionSettings, RegionsSettings
-from vdet.config.report import ReportSettings
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
 from vdet.config.summary import CropSettings, SummarySettings
@@ -62,10 +62,10 @@ __all__ = [
     "NetworkSettings",
     "NetworkTrainingSettings",
     "OutputSettings",
+    "PageSettings",
     "PerspectiveSettings",
     "RegionSettings",
     "RegionsSettings",
-    "ReportSettings",
     "RulesTrackerSettings",
     "ScoreSettings",
     "SearchSettings",
@@ -98,7 +98,7 @@ class Settings(Section):
     output: OutputSettings = OutputSettings()
     summary: SummarySettings = SummarySettings()
     crops: CropSettings = CropSettings()
-    report: ReportSettings = ReportSettings()
+    page: PageSettings = PageSettings()
     draw: DrawSettings = DrawSettings()
 
     @property

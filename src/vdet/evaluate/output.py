@@ -1,4 +1,4 @@
-"""Results on their way out: tables as text, the checks of the output files, the report's file."""
+"""Results on their way out: tables as text, the checks of the output files, the file of a page."""
 
 import contextlib
 import importlib
@@ -10,7 +10,7 @@ from typing import Any
 
 from vdet.errors import OutputError
 from vdet.files import check_output, make_folder, staged
-from vdet.pages.frame import PAGE
+from vdet.pages.frame import PAGE_NAME
 from vdet.version import __version__
 
 ABSENT = "–"
@@ -79,16 +79,16 @@ def share(value: float | None, digits: int = 3) -> str:
 
 
 def check_outputs(
-    json_target: str | None, report: Path | None, *, overwrite: bool, inputs: Iterable[Path]
+    json_target: str | None, page: Path | None, *, overwrite: bool, inputs: Iterable[Path]
 ) -> None:
-    """Refuse outputs that could not be written, before any work; make the report's folder.
+    """Refuse outputs that could not be written, before any work; make the page's folder.
 
     Parameters
     ----------
     json_target
         File for the numbers, `-` for standard output, None for neither.
-    report
-        Folder for the report, None for no report.
+    page
+        Folder for the page, None for no page.
     inputs
         Files that the work reads.
 
@@ -96,22 +96,22 @@ def check_outputs(
     ------
     OutputError
         A file exists already (and not `overwrite`) or cannot be written, or matplotlib, which
-        draws the report, is not installed.
+        draws the charts, is not installed.
     """
     if json_target not in (None, "-"):
         check_output(Path(json_target), overwrite=overwrite, inputs=inputs)
-    if report is not None:
+    if page is not None:
         load_matplotlib()
-        make_folder(report)
-        check_output(report / PAGE, overwrite=overwrite)
+        make_folder(page)
+        check_output(page / PAGE_NAME, overwrite=overwrite)
 
 
 def write_page(html: str, folder: Path, *, overwrite: bool = False) -> Path:
-    """Write a report into its folder and return the file. Raises `OutputError`."""
-    with staged(folder / PAGE, overwrite=overwrite) as temporary:
+    """Write a page into its folder and return the file. Raises `OutputError`."""
+    with staged(folder / PAGE_NAME, overwrite=overwrite) as temporary:
         # The name of a file may be no valid text.
         temporary.write_text(html, encoding="utf-8", errors="backslashreplace")
-    return folder / PAGE
+    return folder / PAGE_NAME
 
 
 def load_matplotlib() -> None:
@@ -128,4 +128,4 @@ def load_matplotlib() -> None:
         with contextlib.chdir(Path(__file__).parent):  # there is no other way to keep it from that
             importlib.import_module("matplotlib")
     except ImportError as error:
-        raise OutputError("--report needs matplotlib; pip install matplotlib") from error
+        raise OutputError("--page needs matplotlib; pip install matplotlib") from error

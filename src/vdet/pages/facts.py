@@ -45,4 +45,4 @@ def read_facts(page: Path) -> Facts:
 
 
 def _refused(page: Path) -> OutputError:
-    return OutputError(f"{page}: is no report of vdet on a video; remove it, and run again")
+    return OutputError(f"{page}: is no page of vdet on a video; remove it, and run again")

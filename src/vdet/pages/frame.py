@@ -10,8 +10,8 @@ import cv2
 from vdet.media.images import Image
 from vdet.version import __version__
 
-PAGE = "report.html"
-"""Name of the file in the folder of a report."""
+PAGE_NAME = "page.html"
+"""Name of the file of a page in its folder."""
 
 _STYLE = """
 :root { color-scheme: light dark;

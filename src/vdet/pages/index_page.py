@@ -9,7 +9,7 @@ from pathlib import Path
 from vdet.files import escaped
 from vdet.pages.charts import clock
 from vdet.pages.facts import Facts, read_facts
-from vdet.pages.frame import PAGE, cards, page, paragraph, section
+from vdet.pages.frame import PAGE_NAME, cards, page, paragraph, section
 from vdet.pages.player import link_to
 
 _STYLE = """
@@ -43,9 +43,13 @@ def write_index(outputs: Mapping[str, Path], target: Path) -> None:
         A page is none of this program.
     """
     videos = [
-        _Video(escaped(name), link_to(folder / PAGE, target.parent), read_facts(folder / PAGE))
+        _Video(
+            escaped(name),
+            link_to(folder / PAGE_NAME, target.parent),
+            read_facts(folder / PAGE_NAME),
+        )
         for name, folder in outputs.items()
-        if (folder / PAGE).is_file()
+        if (folder / PAGE_NAME).is_file()
     ]
     target.write_text(index_page(videos), encoding="utf-8")
 

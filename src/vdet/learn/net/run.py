@@ -1,4 +1,4 @@
-"""A training from files to files: labelled pictures and videos → network and report."""
+"""A training from files to files: labelled pictures and videos → network and metrics."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -37,11 +37,11 @@ class NetworkJob:
     clips
         Labelled videos.
     output
-        The file of the network; report and checkpoint, the training's state, lie beside it.
+        The file of the network; metrics and checkpoint, the training's state, lie beside it.
     base
         An exported network from whose weights the training starts.
     overwrite
-        Replace an earlier network and its report.
+        Replace an earlier network and its metrics.
     """
 
     pictures: tuple[Path, ...]
@@ -51,8 +51,8 @@ class NetworkJob:
     overwrite: bool = False
 
     @property
-    def report(self) -> Path:
-        """The file of the report."""
+    def metrics(self) -> Path:
+        """The file of the metrics."""
         return self.output.with_suffix(".json")
 
     @property
@@ -62,8 +62,8 @@ class NetworkJob:
 
 
 @dataclass(frozen=True, slots=True)
-class NetworkReport:
-    """The report of a training: its sources, how long it took, and the mean loss of its last steps.
+class NetworkMetrics:
+    """The metrics of a training: its sources, its duration, and the mean loss of its last steps.
 
     `seconds` are those since the training was started or went on.
     """
@@ -75,7 +75,7 @@ class NetworkReport:
     loss: float | None
 
     def lines(self) -> Iterator[str]:
-        """Yield the report as lines of text."""
+        """Yield the metrics as lines of text."""
         for source in self.sources:
             yield f"{source.name:<28}{source.pictures:6d} pictures {source.vehicles:8d} vehicles"
         loss = "" if self.loss is None else f"; loss at the end {self.loss:.3f}"
@@ -90,8 +90,8 @@ def train_to_file(
     settings: NetworkTrainingSettings,
     *,
     progress: Callable[[TrainingState], object] = lambda _: None,
-) -> NetworkReport:
-    """Train a network, write it with its report, and remove the checkpoint.
+) -> NetworkMetrics:
+    """Train a network, write it with its metrics, and remove the checkpoint.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def train_to_file(
     network = train_network(
         sources, len(CLASSES), settings, job.checkpoint, base=job.base, progress=note
     )
-    report = NetworkReport(
+    report = NetworkMetrics(
         sources=reports,
         steps=settings.steps,
         parameters=sum(each.numel() for each in network.parameters()),
@@ -137,7 +137,7 @@ def train_to_file(
         },
     )
     export_network(network, header, job.output, overwrite=job.overwrite)
-    write_json(asdict(report), str(job.report), overwrite=job.overwrite)
+    write_json(asdict(report), str(job.metrics), overwrite=job.overwrite)
     job.checkpoint.unlink(missing_ok=True)
     return report
 

@@ -13,7 +13,7 @@ from vdet.detect.svm.model import BoxRegression
 from vdet.learn.svm.augmentation import Augmenter, augment, zoom_in
 from vdet.learn.svm.dataset import PatchFile, Sides
 from vdet.learn.svm.extraction import LabelledVectors, SampleVectors, extract
-from vdet.learn.svm.report import BoxError
+from vdet.learn.svm.metrics import BoxError
 from vdet.learn.svm.training_set import SplitName, hold_out, training_set
 from vdet.progress import Steps, no_steps
 from vdet.workers import Workers

@@ -1,4 +1,4 @@
-"""A training run: from patch files to a model with its report."""
+"""A training run: from patch files to a model with its metrics."""
 
 import time
 from collections import Counter
@@ -19,7 +19,7 @@ from vdet.learn.svm.box_regression import BoxPatches, extract_box_patches, fit_s
 from vdet.learn.svm.dataset import PatchFile, read_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit_patches
-from vdet.learn.svm.report import Confusion, GroupAccuracy, SplitReport, TrainingReport
+from vdet.learn.svm.metrics import Confusion, GroupAccuracy, SplitMetrics, TrainingMetrics
 from vdet.learn.svm.training_set import SplitName, hold_out
 from vdet.progress import Steps, no_steps
 from vdet.version import __version__
@@ -36,7 +36,7 @@ def train(
     jobs: int | None = None,
     scheduler: str | None = None,
     steps: Steps = no_steps,
-) -> tuple[LinearModel, TrainingReport]:
+) -> tuple[LinearModel, TrainingMetrics]:
     """Describe the patches, fit on the configured split, and on the other one for comparison.
 
     Parameters
@@ -53,7 +53,7 @@ def train(
 
     Returns
     -------
-    The model fitted on the training part of `training.split`, with its provenance, and the report
+    The model fitted on the training part of `training.split`, with its provenance, and the metrics
     on both splits, this one first.
 
     Raises
@@ -82,7 +82,7 @@ def train(
     fitted = [_fit_split(data, boxes, settings, name, steps) for name in names]
     model = fitted[0][0]
     steps("timing the classifier", None)
-    report = TrainingReport(
+    report = TrainingMetrics(
         vehicles=int(np.count_nonzero(data.vehicle)),
         non_vehicles=int(np.count_nonzero(~data.vehicle)),
         boxed=sum(file.sides is not None for file in (*files, *boxed)),
@@ -110,7 +110,7 @@ def _fit_split(
     settings: Settings,
     name: SplitName,
     steps: Steps,
-) -> tuple[LinearModel, SplitReport]:
+) -> tuple[LinearModel, SplitMetrics]:
     training = settings.training
     held = hold_out(data.groups, name, training.test_fraction, training.seed)
     if not held.any():
@@ -128,7 +128,7 @@ def _fit_split(
     augmented = 0
     if data.augmented is not None:
         augmented = int(np.count_nonzero(~held[data.augmented.origins]))
-    return replace(model, box_regression=regression), SplitReport(
+    return replace(model, box_regression=regression), SplitMetrics(
         split=name,
         train_patches=int(np.count_nonzero(~held)),
         train_augmented=augmented,

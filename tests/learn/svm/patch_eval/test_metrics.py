@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import BoolArray, Float64Array
+from vdet.learn.svm.metrics import Confusion
 from vdet.learn.svm.patch_eval.metrics import (
     METRICS,
     intervals,
@@ -12,7 +13,6 @@ from vdet.learn.svm.patch_eval.metrics import (
     ranking_curves,
     reliability,
 )
-from vdet.learn.svm.report import Confusion
 
 
 def test_the_metrics_of_four_patches() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array, Int64Array
-from vdet.learn.svm.report import Confusion
+from vdet.learn.svm.metrics import Confusion
 
 METRICS = (
     *("accuracy", "precision", "recall", "f1"),

@@ -1,4 +1,4 @@
-"""The sink `report`: a folder with the page of a video."""
+"""The sink `page`: a folder with the page of a video."""
 
 import platform
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from vdet.config.rendering import render
 from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
 from vdet.pages.charts import Series
-from vdet.pages.frame import PAGE, jpeg_uri
+from vdet.pages.frame import PAGE_NAME, jpeg_uri
 from vdet.pages.index_page import write_index
 from vdet.pages.player import Player
 from vdet.pages.video_page import Thumbnail, VideoReport, video_page
@@ -33,7 +33,7 @@ _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one tha
 _QUALITY = 80  # of the pictures of vehicles, JPEG
 
 
-class ReportSink:
+class PageSink:
     """Collects what the page shows, and writes it at the end."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -61,7 +61,7 @@ class ReportSink:
     def __exit__(self, kind: Any, *_: object) -> None:
         if kind is None:
             self._keep(self._crops.end())
-            target = self._context.files.stage(self._folder / PAGE)
+            target = self._context.files.stage(self._folder / PAGE_NAME)
             # The name of a file may be no valid text.
             html = video_page(self._report())
             target.write_text(html, encoding="utf-8", errors="backslashreplace")
@@ -74,7 +74,7 @@ class ReportSink:
         self._frames += 1
         self._last = frame.time
         if self._still is None or self._is_even:
-            self._still = _at_most(picture.image, self._settings.report.still, picture.width)
+            self._still = _at_most(picture.image, self._settings.page.still, picture.width)
             self._is_even = float(self._still.std()) < _EVEN
         self._records.add(frame)
         self._levels.add(frame)
@@ -85,7 +85,7 @@ class ReportSink:
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:
-            small = _at_most(crop.image, self._settings.report.picture, max(crop.image.shape[:2]))
+            small = _at_most(crop.image, self._settings.page.picture, max(crop.image.shape[:2]))
             self._thumbnails[crop.id] = Thumbnail(crop.time, jpeg_uri(small, _QUALITY))
 
     def _report(self) -> VideoReport:
@@ -102,7 +102,7 @@ class ReportSink:
             levels=self._levels,
             still=None if self._still is None else self._heat.over(self._still),
             player=self._player(),
-            most_vehicles=self._settings.report.vehicles,
+            most_vehicles=self._settings.page.vehicles,
             settings=render(self._settings),
             versions=_versions(),
             counts=_series(self._counter.finish()) if self._counter else (),
@@ -145,10 +145,10 @@ def _versions() -> dict[str, str]:
     }
 
 
-REPORT = SinkKind(
-    ReportSink,
-    what="reports",
-    marker=PAGE,
+PAGE = SinkKind(
+    PageSink,
+    what="pages",
+    marker=PAGE_NAME,
     takes="videos",
     total=BatchTotal("index", write_index, suffix=".html"),
 )

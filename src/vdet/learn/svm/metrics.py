@@ -1,4 +1,4 @@
-"""The report of `vdet train` on a model: numbers, printed and written as JSON."""
+"""The metrics of a model that `vdet train` trains: numbers, printed and written as JSON."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -51,7 +51,7 @@ class BoxError:
 
 
 @dataclass(frozen=True, slots=True)
-class SplitReport:
+class SplitMetrics:
     """A model fitted on one part of the patches and tested on the other.
 
     `train_augmented` is the number of samples made of the training patches. `boxes` is None if no
@@ -71,8 +71,8 @@ class SplitReport:
 
 
 @dataclass(frozen=True, slots=True)
-class TrainingReport:
-    """The report of a training run; the saved model is that of the first split.
+class TrainingMetrics:
+    """The metrics of a training run; the saved model is that of the first split.
 
     `boxed` is the number of patches with a known box, including those of neither class; `groups`
     has the number of patches of each group.
@@ -86,10 +86,10 @@ class TrainingReport:
     features: int
     extract_seconds: float
     milliseconds_per_prediction: float
-    splits: tuple[SplitReport, ...]
+    splits: tuple[SplitMetrics, ...]
 
     def lines(self) -> Iterator[str]:
-        """Yield the report as lines of text."""
+        """Yield the metrics as lines of text."""
         broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
         yield (
             f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}; "
@@ -111,7 +111,7 @@ class TrainingReport:
             )
 
     def write(self, path: Path, *, overwrite: bool = False) -> None:
-        """Write the report as JSON. Raises `OutputError`."""
+        """Write the metrics as JSON. Raises `OutputError`."""
         write_json(asdict(self), str(path), overwrite=overwrite)
 
 
@@ -121,7 +121,7 @@ _SPLITS = {
 }
 
 
-def _split_lines(report: SplitReport) -> Iterator[str]:
+def _split_lines(report: SplitMetrics) -> Iterator[str]:
     confusion = report.confusion
     yield ""
     yield _SPLITS[report.split]

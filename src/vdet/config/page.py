@@ -1,11 +1,11 @@
-"""The section `report`: the page of a video."""
+"""The section `page`: the page of a video."""
 
 from pydantic import Field
 
 from vdet.config.section import Section
 
 
-class ReportSettings(Section):
+class PageSettings(Section):
     """The page of a video."""
 
     vehicles: int = Field(

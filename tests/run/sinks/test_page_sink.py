@@ -1,4 +1,4 @@
-"""The sink `report` in a run."""
+"""The sink `page` in a run."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -12,7 +12,7 @@ from pages.html import Elements
 from red_cars import CAR, SETTINGS, car_at, road
 from run.red_runs import COUNT, outputs, read, result_of, run_red, video_info, write
 from running import names
-from vdet.config.schema import ReportSettings
+from vdet.config.schema import PageSettings
 from vdet.media.images import Image, decode_image
 from vdet.pages.facts import read_facts
 from vdet.run.loop import VideoJob
@@ -20,8 +20,8 @@ from vdet.run.sinks.protocol import Output
 
 
 def page_of(folder: Path) -> Elements:
-    assert names(folder) == ["report.html"]
-    return Elements((folder / "report.html").read_text(encoding="utf-8"))
+    assert names(folder) == ["page.html"]
+    return Elements((folder / "page.html").read_text(encoding="utf-8"))
 
 
 def picture(uri: str | None) -> Image:
@@ -35,12 +35,12 @@ def picture(uri: str | None) -> Image:
 def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     red_clip: Path, tmp_path: Path
 ) -> None:
-    wanted = outputs(video=tmp_path / "out.mp4", report=tmp_path / "report")
+    wanted = outputs(video=tmp_path / "out.mp4", page=tmp_path / "page")
     run_red(VideoJob(red_clip, wanted))
-    made = page_of(tmp_path / "report")
+    made = page_of(tmp_path / "page")
     (video,) = made.all("video")
     assert video["src"] == "../out.mp4"
-    facts = read_facts(tmp_path / "report" / "report.html")
+    facts = read_facts(tmp_path / "page" / "page.html")
     assert (facts.frames, facts.vehicles, facts.most) == (COUNT, 1, 1)
     assert facts.seconds == pytest.approx(COUNT / 25)
     (thumbnail,) = (each for each in made.all("img") if each.get("alt") == "vehicle 1")
@@ -49,19 +49,19 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
 
 
 def test_its_moments_are_those_of_the_part_that_was_written(red_clip: Path, tmp_path: Path) -> None:
-    wanted = outputs(video=tmp_path / "out.mp4", report=tmp_path / "report")
+    wanted = outputs(video=tmp_path / "out.mp4", page=tmp_path / "page")
     run_red(VideoJob(red_clip, wanted, start=Fraction(1), end=Fraction(2)))
     length = len(read(tmp_path / "out.mp4")) / 25
-    times = [float(link["data-time"] or "") for link in page_of(tmp_path / "report").all("a")]
+    times = [float(link["data-time"] or "") for link in page_of(tmp_path / "page").all("a")]
     assert times
     assert all(0 <= time < length for time in times)
 
 
 def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path: Path) -> None:
-    run_red(VideoJob(red_clip, outputs(report=tmp_path / "report"), start=Fraction(1)))
-    made = page_of(tmp_path / "report")
+    run_red(VideoJob(red_clip, outputs(page=tmp_path / "page"), start=Fraction(1)))
+    made = page_of(tmp_path / "page")
     (video,) = made.all("video")
-    target = (tmp_path / "report" / (video["src"] or "")).resolve()
+    target = (tmp_path / "page" / (video["src"] or "")).resolve()
     assert target == red_clip.resolve()
     times = [float(link["data-time"] or "") for link in made.all("a")]
     assert min(times) >= 1, "the source is there from its beginning"
@@ -69,8 +69,8 @@ def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path
 
 def test_numbered_pictures_are_no_video_to_show(tmp_path: Path) -> None:
     numbered = replace(video_info(), path=tmp_path / "img_%04d.png")
-    write(Output("report", tmp_path / "report"), [result_of(CAR)], video=numbered)
-    assert page_of(tmp_path / "report").all("video") == []
+    write(Output("page", tmp_path / "page"), [result_of(CAR)], video=numbered)
+    assert page_of(tmp_path / "page").all("video") == []
 
 
 def test_the_still_is_the_first_frame_that_shows_something(tmp_path: Path) -> None:
@@ -81,29 +81,29 @@ def test_the_still_is_the_first_frame_that_shows_something(tmp_path: Path) -> No
     results = [
         result_of(image=image, index=n, time=Fraction(n, 25)) for n, image in enumerate(frames)
     ]
-    write(Output("report", tmp_path / "report"), results)
-    (still,) = page_of(tmp_path / "report").all("img", **{"class": "still"})
+    write(Output("page", tmp_path / "page"), results)
+    (still,) = page_of(tmp_path / "page").all("img", **{"class": "still"})
     assert abs(picture(still["src"]).astype(int) - scene).mean() < 10
 
 
 def test_pictures_have_the_sizes_that_are_set(tmp_path: Path) -> None:
-    small = SETTINGS.model_copy(update={"report": ReportSettings(picture=20, still=64, vehicles=1)})
+    small = SETTINGS.model_copy(update={"page": PageSettings(picture=20, still=64, vehicles=1)})
     results = [
         result_of(*[car_at(n)] * (1 + n % 2), image=road(car_at(n)), index=n, time=Fraction(n, 25))
         for n in range(9)
     ]
-    write(Output("report", tmp_path / "report"), results, settings=small)
-    made = page_of(tmp_path / "report")
+    write(Output("page", tmp_path / "page"), results, settings=small)
+    made = page_of(tmp_path / "page")
     shapes = [picture(each["src"]).shape for each in made.all("img")]
     assert shapes[0] == (48, 64, 3)
     assert [max(shape) for shape in shapes[1:]] == [20]
 
 
 def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_path: Path) -> None:
-    job = VideoJob(red_clip, outputs(report=tmp_path), frames=3)
+    job = VideoJob(red_clip, outputs(page=tmp_path), frames=3)
     (tmp_path / "notes.txt").write_text("mine")
     run_red(job)
-    before = (tmp_path / "report.html").read_text()
+    before = (tmp_path / "page.html").read_text()
     run_red(replace(job, frames=5, overwrite=True))
-    assert (tmp_path / "report.html").read_text() != before
-    assert names(tmp_path) == ["notes.txt", "report.html"]
+    assert (tmp_path / "page.html").read_text() != before
+    assert names(tmp_path) == ["notes.txt", "page.html"]

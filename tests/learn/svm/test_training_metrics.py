@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from vdet.errors import OutputError
-from vdet.learn.svm.report import BoxError, Confusion, GroupAccuracy, SplitReport, TrainingReport
+from vdet.learn.svm.metrics import BoxError, Confusion, GroupAccuracy, SplitMetrics, TrainingMetrics
 
 
-def split_report(name: str) -> SplitReport:
-    return SplitReport(
+def split_report(name: str) -> SplitMetrics:
+    return SplitMetrics(
         split=name,
         train_patches=80,
         train_augmented=90,
@@ -27,10 +27,10 @@ def split_report(name: str) -> SplitReport:
     )
 
 
-def report(broken: int = 0) -> TrainingReport:
+def report(broken: int = 0) -> TrainingMetrics:
     splits = (split_report("random"), split_report("tail"))
     groups = {"vehicles/far": 60, "non-vehicles": 40, "boxes/mined": 7}
-    return TrainingReport(60, 40, 9, broken, groups, 4800, 2.5, 0.7214, splits)
+    return TrainingMetrics(60, 40, 9, broken, groups, 4800, 2.5, 0.7214, splits)
 
 
 def test_a_confusion_counts_patches_by_truth_and_prediction() -> None:
