@@ -42,8 +42,8 @@ BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
 SETTINGS = (
     f"detector.search.probability={LEAST}",
-    "training.calibration.folds=2",
-    "training.augmentation.mirror=false",  # half the memory, a third of the time
+    "train.svm.calibration.folds=2",
+    "train.svm.augmentation.mirror=false",  # half the memory, a third of the time
 )
 SWEEPS = {
     "detector.search.probability": (0.2, 0.3, 0.4, 0.5),
@@ -96,7 +96,7 @@ def _frames_of(files: Sequence[PatchFile]) -> Numbers:
 
 def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
     files, boxed = find_patches(sources), find_boxed(sources)
-    training = settings.training
+    training = settings.train.svm
     workers = make_workers()
     data = extract(
         files,

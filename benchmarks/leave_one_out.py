@@ -59,7 +59,7 @@ _SAME_CAMERA = {
 """Clips of `traffic_cams` from one camera."""
 
 _LEAST_SCORE = 0.02
-_UNCALIBRATED = ("network.score.slope=1", "network.score.offset=0")
+_UNCALIBRATED = ("train.net.score.slope=1", "train.net.score.offset=0")
 
 
 def _fifth(picture: str) -> str:
@@ -110,7 +110,7 @@ def _split(path: Path, part_of: Callable[[str], str], folder: Path) -> list[Path
 def train(job: NetworkJob, settings: Settings) -> Path:
     """Train a network, if there is none yet, and return its file."""
     if not job.output.exists():
-        train_to_file(job, settings.network, progress=lambda state: _print_step(job, state.step))
+        train_to_file(job, settings.train.net, progress=lambda state: _print_step(job, state.step))
     return job.output
 
 
@@ -151,8 +151,8 @@ def main() -> None:
     parser.add_argument("--base", type=Path, help="network that has seen no group: the start")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    settings = load_settings(None, [f"network.steps={arguments.steps}", *_UNCALIBRATED])
-    clip = LabelledClip(arguments.video, arguments.truth, settings.network.every)
+    settings = load_settings(None, [f"train.net.steps={arguments.steps}", *_UNCALIBRATED])
+    clip = LabelledClip(arguments.video, arguments.truth, settings.train.net.every)
     sets = split_sets(arguments.roads, arguments.work / "sets")
     results = []
     for group in GROUPS:
@@ -167,7 +167,7 @@ def main() -> None:
     path = arguments.work / "results.json"
     path.write_text(json.dumps(asdict(summary), indent=2) + "\n", encoding="utf-8")
     job = NetworkJob(tuple(sets), (), arguments.work / "without_the_video.onnx", arguments.base)
-    network = train(job, load_settings(None, [f"network.steps={arguments.steps}"]))
+    network = train(job, load_settings(None, [f"train.net.steps={arguments.steps}"]))
     print("\n".join(video_lines(clip, network, settings)))
 
 
@@ -208,7 +208,7 @@ class Summary:
             f"mean F1 of the groups {self.mean_f1:.3f} at score {self.score:.2f}; "
             f"each at its best score {self.mean_best_f1:.3f}"
         )
-        yield f"network.score.slope={self.slope:.3f} network.score.offset={self.offset:.3f}"
+        yield f"train.net.score.slope={self.slope:.3f} train.net.score.offset={self.offset:.3f}"
 
 
 def summarize(results: Sequence[ImagesResult]) -> Summary:

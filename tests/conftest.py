@@ -14,7 +14,13 @@ import pytest
 from hypothesis import settings
 
 from vdet.cli import main
-from vdet.config.schema import AugmentationSettings, Settings, SvmSettings, TrainingSettings
+from vdet.config.schema import (
+    AugmentationSettings,
+    Settings,
+    SvmSettings,
+    SvmTrainingSettings,
+    TrainSettings,
+)
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import train
@@ -66,10 +72,9 @@ def patches_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def model_path(patches_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model with the default features, trained on generated patches and nothing made of them."""
     path = tmp_path_factory.mktemp("model") / "model.npz"
-    plain = TrainingSettings(augmentation=AugmentationSettings(mirror=False, cut=0, parts=0))
-    model, _ = train(
-        find_patches([patches_path]), Settings(detector=SvmSettings(), training=plain), jobs=1
-    )
+    plain = SvmTrainingSettings(augmentation=AugmentationSettings(mirror=False, cut=0, parts=0))
+    settings = Settings(detector=SvmSettings(), train=TrainSettings(svm=plain))
+    model, _ = train(find_patches([patches_path]), settings, jobs=1)
     save_model(model, path)
     return path
 

@@ -14,7 +14,7 @@ QUICK = (
     "detector.heat={frames: 4, threshold: 0.1, regions: outline}",
     "detector.score.middle=0.1",
     "detector.stills={strength: 0, width: 0.04, height: 0.07}",
-    "tracker.method=rules",
+    "tracker.kind=rules",
     "tracker.confident_peak=0.35",
     "tracker.confident_detections_needed=2",
 )

@@ -119,7 +119,7 @@ def test_follow_can_be_left_early(clip_path: Path) -> None:
 
 
 def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
-    settings = vdet.load_settings(None, ["tracker.method=rules"])
+    settings = vdet.load_settings(None, ["tracker.kind=rules"])
     tracker = vdet.Tracker(320, 240, settings)
     found = vdet.Detections([[96, 120, 160, 168]], [0.9])
     with pytest.raises(ValueError, match="image"):

@@ -20,7 +20,7 @@ from vdet.media.images import write_image
 from vdet.testing import check_detector, check_sink, check_tracker
 
 FRAMES = 30
-CHOSEN = ("--set", "detector.kind=red", "--set", "tracker.method=nearest")
+CHOSEN = ("--set", "detector.kind=red", "--set", "tracker.kind=nearest")
 
 
 @pytest.fixture(scope="session")
@@ -156,7 +156,7 @@ def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path
 def test_mine_takes_the_detector(package: Path, clip: Path, tmp_path: Path) -> None:
     truth = tmp_path / "gt.txt"
     truth.write_text(f"1,1,1,1,20,20,1,3,1\n{FRAMES},1,1,1,20,20,1,3,1\n")
-    wide = ("--set", "mining.probability=0.5", "--set", "detector.kind=red", "--every", "10")
+    wide = ("--set", "train.mine.probability=0.5", "--set", "detector.kind=red", "--every", "10")
     done = vdet(
         package, "mine", clip, "--truth", truth, "-o", tmp_path / "mined.zip", "--from", "1", *wide
     )
@@ -173,7 +173,7 @@ def test_its_settings_are_printed_and_checked(package: Path) -> None:
     assert (wrong.returncode, "detector.level" in wrong.stderr) == (1, True)
     other = vdet(package, "config", "--set", "detector.level=7")
     assert "detector.level: belongs to detector.kind: red" in other.stderr
-    unknown = vdet(package, "config", "--set", "tracker.method=none")
+    unknown = vdet(package, "config", "--set", "tracker.kind=none")
     assert "known are motion, rules, nearest" in unknown.stderr
 
 

@@ -70,7 +70,7 @@ def load_settings(config: PathName | None = None, assignments: Sequence[str] = (
     config
         A YAML file, or the name of a shipped config such as "seed"; None for the default settings.
     assignments
-        Single values on top, as the command line takes them: `["tracker.method=rules"]`.
+        Single values on top, as the command line takes them: `["tracker.kind=rules"]`.
 
     Raises
     ------

@@ -28,7 +28,7 @@ def test_a_file_and_then_assignments_change_them(run: Run, tmp_path: Path) -> No
 
 def test_what_is_printed_can_be_given_back(run: Run, tmp_path: Path) -> None:
     file = tmp_path / "printed.yaml"
-    file.write_text(run("config", "--set", "training.C=1e-3").out, encoding="utf-8")
+    file.write_text(run("config", "--set", "train.svm.C=1e-3").out, encoding="utf-8")
     assert run("config", "-c", file).out == file.read_text(encoding="utf-8")
 
 

@@ -158,7 +158,7 @@ def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
 
 class TestRegions:
     def test_roi_takes_polygons_or_a_mask(self, run: Run, folder: Path, tmp_path: Path) -> None:
-        (tmp_path / "roi.yaml").write_text(
+        (tmp_path / "regions.yaml").write_text(
             "size: [320, 240]\n"
             "polygons: [{name: right, points: [[100, 0], [320, 0], [320, 240], [100, 240]]}]\n"
         )
@@ -166,17 +166,17 @@ class TestRegions:
         mask[:, 100:] = 255
         write_image(tmp_path / "mask.png", mask)
         found = {}
-        for name in ("", "roi.yaml", "mask.png"):
+        for name in ("", "regions.yaml", "mask.png"):
             out = tmp_path / f"found-{name}.csv"
-            roi = ("--roi", tmp_path / name) if name else ()
+            roi = ("--regions", tmp_path / name) if name else ()
             wanted = ("--no-video", "--tracks", out, *roi)
             result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
             assert result.code == 0, result.err
             rows = list(csv.DictReader(out.read_text().splitlines()))
             found[name] = [int(row["x"]) + int(row["width"]) / 2 for row in rows]
         assert min(found[""]) < 95
-        assert 100 <= min(found["roi.yaml"]) < 110
-        assert found["roi.yaml"] == found["mask.png"]
+        assert 100 <= min(found["regions.yaml"]) < 110
+        assert found["regions.yaml"] == found["mask.png"]
 
     @pytest.mark.parametrize(
         "command",
@@ -197,7 +197,10 @@ class TestRegions:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("{name: a, points: [[0, 0], [1, 1]]}", "roi.yaml:1:22: regions.polygons[0].points: h"),
+            (
+                "{name: a, points: [[0, 0], [1, 1]]}",
+                "regions.yaml:1:22: regions.polygons[0].points: h",
+            ),
             ("{name: a, points: [[0, 0], [1, 1], [1, 0], [0, 1]]}", "crosses or touches itself"),
             ("{name: a, points: [[0, 0], [1, 0], [2, 2]]}", "[2, 2] lies outside the frame"),
         ],
@@ -205,15 +208,21 @@ class TestRegions:
     def test_mistakes_are_named_with_their_place(
         self, run: Run, folder: Path, tmp_path: Path, text: str, message: str
     ) -> None:
-        (tmp_path / "roi.yaml").write_text(f"polygons: [{text}]")
-        wanted = ("--no-video", "--tracks", tmp_path / "t.csv", "--roi", tmp_path / "roi.yaml")
+        (tmp_path / "regions.yaml").write_text(f"polygons: [{text}]")
+        wanted = (
+            "--no-video",
+            "--tracks",
+            tmp_path / "t.csv",
+            "--regions",
+            tmp_path / "regions.yaml",
+        )
         result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
         assert result.code == 1
         assert message in result.err
         assert len(result.err.splitlines()) == 1
 
     def test_a_mask_that_is_none_is_refused(self, run: Run, folder: Path, tmp_path: Path) -> None:
-        wanted = ("--json", "-", "--roi", tmp_path / "none.png")
+        wanted = ("--json", "-", "--regions", tmp_path / "none.png")
         result = run("detect-image", folder / "red.mp4", *wanted, *options(folder))
         assert result.code == 1
         assert "none.png: cannot be read" in result.err

@@ -10,9 +10,9 @@ from conftest import Run
 QUICK = (
     *(
         "--set",
-        "training.C=0.001",
+        "train.svm.C=0.001",
         "--set",
-        "training.augmentation={mirror: false, cut: 0, parts: 0}",
+        "train.svm.augmentation={mirror: false, cut: 0, parts: 0}",
     ),
     *("--jobs", "1"),
 )

@@ -49,7 +49,7 @@ def truth_path(scene: Scene, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def options(model_path: Path) -> tuple[str | Path, ...]:
     # Of a model this small, whatever it finds likely is worth a look.
-    lenient = ("--set", "mining.probability=0.05")
+    lenient = ("--set", "train.mine.probability=0.05")
     return ("--model", model_path, *WINDOWS, *lenient)
 
 
@@ -192,9 +192,9 @@ def _patches(path: Path) -> dict[str, bytes]:
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--truth", "a.txt", "--truth", "b.txt"), 2, "1 videos, 2 --truth; give one for each"),
-        (("--set", "mining.parts=-1"), 1, "mining.parts"),
+        (("--set", "train.mine.parts=-1"), 1, "train.mine.parts"),
         (
-            ("--set", "mining={false_alarms: 0, parts: 0, per_vehicle: 0}"),
+            ("--set", "train.mine={false_alarms: 0, parts: 0, per_vehicle: 0}"),
             1,
             "no window fits a vehicle",
         ),

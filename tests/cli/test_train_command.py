@@ -86,7 +86,7 @@ def test_too_many_broken_patches_are_an_error(run: Run, patches_path: Path, tmp_
     data = _small_set(tmp_path / "data", patches_path, broken=3)
     result = run("train", data, "-o", tmp_path / "m.npz", *QUICK)
     assert result.code == 1
-    assert "3 of 160 patches are broken, more than the 1.0% of training.max_broken" in result.err
+    assert "3 of 160 patches are broken, more than the 1.0% of train.svm.max_broken" in result.err
     assert not (tmp_path / "m.npz").exists()
 
 

@@ -241,7 +241,7 @@ def test_a_huge_file_is_refused_before_it_is_parsed(tmp_path: Path) -> None:
         (" heat.blur = 3 # px", {"heat": {"blur": 3}}),
         ("search.windows.1.overlap=0.5", {"search": {"windows": {1: {"overlap": 0.5}}}}),
         ("detector.heat.frames=3", {"detector": {"heat": {"frames": 3}}}),
-        ("training.C=1e-3", {"training": {"C": 0.001}}),
+        ("train.svm.C=1e-3", {"train": {"svm": {"C": 0.001}}}),
         ("a=b=c", {"a": "b=c"}),
         ("heat={frames: 3, blur: 0}", {"heat": {"frames": 3, "blur": 0}}),
         ("features.hog.channels=[0, 2]", {"features": {"hog": {"channels": [0, 2]}}}),

@@ -16,7 +16,7 @@ from vdet.config.schema import (
 )
 from vdet.errors import ConfigError
 
-RULES = "--set: tracker.history: belongs to tracker.method: rules, and has no effect with motion"
+RULES = "--set: tracker.history: belongs to tracker.kind: rules, and has no effect with motion"
 
 
 @pytest.fixture
@@ -43,20 +43,20 @@ class TestLayers:
         assert settings.tracker == MotionTrackerSettings()
 
     def test_a_file_chooses_a_kind_and_changes_its_keys(self, path: Path) -> None:
-        tracker = load(path, "tracker:\n  history: 12\n  method: rules\n").tracker
+        tracker = load(path, "tracker:\n  history: 12\n  kind: rules\n").tracker
         assert tracker == RulesTrackerSettings(history=12)
 
     def test_assignments_change_the_kind_that_the_file_chose(self, path: Path) -> None:
-        tracker = load(path, "tracker: {method: rules, history: 12}", "tracker.young=3").tracker
+        tracker = load(path, "tracker: {kind: rules, history: 12}", "tracker.young=3").tracker
         assert tracker == RulesTrackerSettings(history=12, young=3)
 
     def test_to_choose_the_same_kind_again_changes_nothing(self, path: Path) -> None:
-        text = "tracker: {method: rules, history: 12}"
-        assert load(path, text, "tracker.method=rules") == load(path, text)
+        text = "tracker: {kind: rules, history: 12}"
+        assert load(path, text, "tracker.kind=rules") == load(path, text)
 
     def test_another_kind_starts_from_its_own_defaults(self, path: Path) -> None:
-        text = "tracker: {method: rules, history: 12}\noutput: {crf: 30}"
-        settings = load(path, text, "tracker.method=motion", "tracker.needed=0.5")
+        text = "tracker: {kind: rules, history: 12}\noutput: {crf: 30}"
+        settings = load(path, text, "tracker.kind=motion", "tracker.needed=0.5")
         assert settings.tracker == MotionTrackerSettings(needed=0.5)
         assert settings.output.crf == 30
 
@@ -65,29 +65,29 @@ class TestLayers:
     def test_a_kind_may_be_chosen_over_printed_settings(
         self, path: Path, printed: str, chosen: str
     ) -> None:
-        text = render(load_settings(None, [f"tracker.method={printed}"]))
-        assert load(path, text, f"tracker.method={chosen}") == load_settings(
-            None, [f"tracker.method={chosen}"]
+        text = render(load_settings(None, [f"tracker.kind={printed}"]))
+        assert load(path, text, f"tracker.kind={chosen}") == load_settings(
+            None, [f"tracker.kind={chosen}"]
         )
 
     @pytest.mark.parametrize(
         "assignments",
         [
-            ("tracker.method=rules", "tracker.history=5"),
-            ("tracker.history=5", "tracker.method=rules"),
-            ("tracker={history: 5, method: rules}",),
-            ("tracker={method: motion, history: 5}", "tracker.method=rules"),
+            ("tracker.kind=rules", "tracker.history=5"),
+            ("tracker.history=5", "tracker.kind=rules"),
+            ("tracker={history: 5, kind: rules}",),
+            ("tracker={kind: motion, history: 5}", "tracker.kind=rules"),
         ],
     )
     def test_assignments_are_one_layer_in_any_order(self, assignments: tuple[str, ...]) -> None:
         assert load_settings(None, assignments).tracker == RulesTrackerSettings(history=5)
 
     def test_of_two_kinds_in_assignments_the_last_one_counts(self) -> None:
-        both = ["tracker.method=rules", "tracker.method=motion"]
+        both = ["tracker.kind=rules", "tracker.kind=motion"]
         assert load_settings(None, both) == Settings()
 
     def test_settings_can_be_sent_to_another_process(self) -> None:
-        settings = load_settings(None, ["tracker.method=rules", "tracker.history=5"])
+        settings = load_settings(None, ["tracker.kind=rules", "tracker.history=5"])
         assert pickle.loads(pickle.dumps(settings)) == settings
         assert hash(settings.tracker) == hash(RulesTrackerSettings(history=5))
 
@@ -95,33 +95,33 @@ class TestLayers:
 class TestRefused:
     def test_a_key_of_another_kind_is_refused_with_what_it_belongs_to(self, path: Path) -> None:
         (line,) = refusal(path, "tracker:\n  near: 3\n")
-        words = "belongs to tracker.method: rules, and has no effect with motion"
+        words = "belongs to tracker.kind: rules, and has no effect with motion"
         assert line == f"my.yaml:2:3: tracker.near: {words}"
-        (line,) = refusal(path, "tracker: {method: rules, needed: 0.3, history: 3}")
-        words = "belongs to tracker.method: motion, and has no effect with rules"
-        assert line == f"my.yaml:1:26: tracker.needed: {words}"
+        (line,) = refusal(path, "tracker: {kind: rules, needed: 0.3, history: 3}")
+        words = "belongs to tracker.kind: motion, and has no effect with rules"
+        assert line == f"my.yaml:1:24: tracker.needed: {words}"
 
     def test_a_key_of_another_kind_in_an_assignment_is_refused(self, path: Path) -> None:
-        assert refusal(path, "tracker: {method: motion}", "tracker.history=3") == [RULES]
-        assert refusal(path, "tracker: {method: rules}", "tracker.method=motion",
+        assert refusal(path, "tracker: {kind: motion}", "tracker.history=3") == [RULES]
+        assert refusal(path, "tracker: {kind: rules}", "tracker.kind=motion",
                        "tracker.history=3") == [RULES]  # fmt: skip
 
     def test_a_key_of_no_kind_is_no_setting(self, path: Path) -> None:
-        (line,) = refusal(path, "tracker: {method: rules, histroy: 3}")
-        assert line == "my.yaml:1:26: tracker.histroy: is no setting; did you mean history?"
+        (line,) = refusal(path, "tracker: {kind: rules, histroy: 3}")
+        assert line == "my.yaml:1:24: tracker.histroy: is no setting; did you mean history?"
 
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("tracker: {method: best}", "my.yaml:1:11: tracker.method: best: is no tracker; "),
+            ("tracker: {kind: best}", "my.yaml:1:11: tracker.kind: best: is no tracker; "),
             ("detector:\n  kind: yolo", "my.yaml:2:3: detector.kind: yolo: is no detector; "),
             (
-                "tracker: {method: [1]}",
-                "my.yaml:1:11: tracker.method: should be motion or rules (got [1])",
+                "tracker: {kind: [1]}",
+                "my.yaml:1:11: tracker.kind: should be motion or rules (got [1])",
             ),
             (
-                "tracker: {method: }",
-                "my.yaml:1:11: tracker.method: should be motion or rules (got None)",
+                "tracker: {kind: }",
+                "my.yaml:1:11: tracker.kind: should be motion or rules (got None)",
             ),
             ("tracker: rules", "my.yaml:1:1: tracker: should be a section, key: value (got 'rule"),
         ],
@@ -132,15 +132,15 @@ class TestRefused:
 
     def test_an_unknown_kind_is_answered_with_the_known_ones(self) -> None:
         with pytest.raises(ConfigError, match=r"is no tracker; known are motion, rules$"):
-            load_settings(None, ["tracker.method=best"])
+            load_settings(None, ["tracker.kind=best"])
         with pytest.raises(ConfigError, match=r"is no detector; known are svm"):
             load_settings(None, ["detector.kind=best"])
 
     def test_all_mistakes_are_given_beside_an_unknown_kind(self, path: Path) -> None:
-        text = "tracker: {method: best, level: 3}\ndetector: {kind: none}\noutput: {crf: 99}"
+        text = "tracker: {kind: best, level: 3}\ndetector: {kind: none}\noutput: {crf: 99}"
         assert [line.split(": ")[1] for line in refusal(path, text, "input.x=1")] == [
             "detector.kind",
-            "tracker.method",
+            "tracker.kind",
             "input.x",
             "output.crf",
         ]

@@ -11,7 +11,8 @@ from vdet.config.schema import (
     SearchSettings,
     Settings,
     SvmSettings,
-    TrainingSettings,
+    SvmTrainingSettings,
+    TrainSettings,
     WindowSettings,
 )
 from vdet.errors import ConfigError
@@ -54,9 +55,11 @@ def test_an_empty_file_changes_nothing(path: Path) -> None:
 
 
 def test_a_file_changes_what_it_names_and_nothing_else(path: Path) -> None:
-    loaded = load(path, "detector:\n  heat:\n    frames: 5\ntraining: {C: 1e-3}\n")
+    loaded = load(path, "detector:\n  heat:\n    frames: 5\ntrain: {svm: {C: 1e-3}}\n")
     heat = HeatSettings(frames=5)
-    expected = Settings(detector=SvmSettings(heat=heat), training=TrainingSettings(C=0.001))
+    expected = Settings(
+        detector=SvmSettings(heat=heat), train=TrainSettings(svm=SvmTrainingSettings(C=0.001))
+    )
     assert loaded == expected
     assert loaded.svm.heat.threshold == SVM.svm.heat.threshold
 
@@ -113,13 +116,13 @@ def test_an_error_names_file_line_column_key_and_what_was_expected(path: Path) -
 
 
 def test_all_errors_are_given_at_once(path: Path) -> None:
-    text = "detector: {heat: {frames: 0, blur: -1}}\ntraining:\n  C: -1\ntrakcer: {}\n"
+    text = "detector: {heat: {frames: 0, blur: -1}}\ntrain:\n  svm: {C: -1}\ntrakcer: {}\n"
     assert sorted(refusal(path, text, "output.crf=99", "nonsense")) == [
         "--set nonsense: expected KEY=VALUE, as in output.crf=18",
         "--set: output.crf: should be less than or equal to 51 (got 99)",
         "my.yaml:1:19: detector.heat.frames: should be greater than or equal to 1 (got 0)",
         "my.yaml:1:30: detector.heat.blur: should be greater than or equal to 0 (got -1)",
-        "my.yaml:3:3: training.C: should be greater than 0 (got -1)",
+        "my.yaml:3:9: train.svm.C: should be greater than 0 (got -1)",
         "my.yaml:4:1: trakcer: is no setting; did you mean tracker?",
     ]
 
@@ -193,8 +196,8 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
     [
         ("tracker: {neded: 3}", "1:11: tracker.neded: is no setting; did you mean needed?"),
         (
-            "tracker: {method: rules, histroy: 3}",
-            "1:26: tracker.histroy: is no setting; did you mean history?",
+            "tracker: {kind: rules, histroy: 3}",
+            "1:24: tracker.histroy: is no setting; did you mean history?",
         ),
         ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, regions, "),
         ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
@@ -257,7 +260,7 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("tracker.0=3", "tracker[0]: is no setting; known here: method, smallest, "),
+        ("tracker.0=3", "tracker[0]: is no setting; known here: kind, smallest, "),
         ("0=3", "[0]: is no setting; known here: detector, tracker, "),
         ("9" * 5000 + "=3", "9999"),
     ],
@@ -305,7 +308,7 @@ def test_keys_are_written_as_a_user_would() -> None:
 _NAMES = st.sampled_from(
     [
         *("detector", "kind", "features", "hog", "channels", "search", "windows", "size", "heat"),
-        *("frames", "tracker", "method", "x"),
+        *("frames", "tracker", "kind", "x"),
     ]
 )
 _SCALARS = st.one_of(

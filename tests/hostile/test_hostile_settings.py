@@ -34,7 +34,7 @@ detector:
   heat: {frames: 3, weight: "coverage", shrink: 4, blur: 15, threshold: 5e-1}
   score: {middle: 0.3, slope: 2}
 tracker:
-  method: rules
+  kind: rules
   history: 10
   min_region: 50
   match_method: ccoeff_normed
@@ -47,7 +47,7 @@ output:
 """
 MOTION = """\
 tracker:
-  method: motion
+  kind: motion
   smallest: 0.03
   needed: 0.25
   hidden: 5e-1

@@ -12,7 +12,7 @@ from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 
 
-def test_the_method_decides_which_tracker_it_is() -> None:
+def test_the_kind_decides_which_tracker_it_is() -> None:
     assert isinstance(make_tracker(Settings(), 1280, 720), MotionTracker)
     rules = make_tracker(SEED, 1280, 720)
     assert isinstance(rules, HoldingTracker)

@@ -8,7 +8,7 @@ from vdet.batch.manifest import Origin
 from vdet.config.schema import Settings
 from vdet.run.loop import VideoJob
 
-_NO_EFFECT = {"training", "mining"}  # sections that detection does not read
+_NO_EFFECT = {"train"}  # sections that detection does not read
 
 
 def work_digest(origin: Origin, settings: Settings, job: VideoJob) -> str:

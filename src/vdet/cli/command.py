@@ -17,7 +17,7 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     ),
     "What is processed": (
         *("--truth", "--video", "--start", "--end", "--frames", "--stride", "--every", "--from"),
-        *("--until", "--roi", "--lines", "--size", "--rate", "--seed", "--split", "--sweep"),
+        *("--until", "--regions", "--lines", "--size", "--rate", "--seed", "--split", "--sweep"),
         *("--pattern", "--score", "--least-width"),
     ),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),

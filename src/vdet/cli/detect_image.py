@@ -16,7 +16,7 @@ from vdet.cli.options import (
     read_lanes,
     read_settings,
     read_sinks,
-    roi_option,
+    regions_option,
     settings_options,
     sink_option,
 )
@@ -55,7 +55,7 @@ log = logging.getLogger("vdet")
     help="Write the boxes to FILE, or with - to standard output.",
 )
 @click.option("--stages", type=PATH, metavar="DIR", help="Write a picture of every stage into DIR.")
-@roi_option
+@regions_option
 @sink_option
 @lane_options
 @model_option
@@ -72,7 +72,7 @@ def detect_image(
     sinks: tuple[str, ...],
     lanes: bool,
     camera_path: Path | None,
-    roi: Path | None,
+    regions: Path | None,
     model_path: Path | None,
     config_name: str | None,
     assignments: tuple[str, ...],
@@ -88,7 +88,7 @@ def detect_image(
         shared = (Output("json", json_target), *shared)
     is_printed = not (output or stages or shared)
     request = read_lanes(lanes, camera_path)
-    settings = read_settings(config_name, assignments, model_path, roi=roi)
+    settings = read_settings(config_name, assignments, model_path, regions=regions)
     check_mask(settings.regions)
     model = load_detector(settings.detector, model_path)
     sources = find_images(images)

@@ -26,7 +26,7 @@ from vdet.cli.options import (
     read_lanes,
     read_settings,
     read_sinks,
-    roi_option,
+    regions_option,
     settings_options,
     sink_option,
 )
@@ -80,7 +80,7 @@ from vdet.run.sinks.protocol import Output
     "Write which vehicles cross the lines and visit the zones of --lines: .csv has the events, "
     ".json also all totals. With -d, give only the end, as in .counts.csv. Can be repeated.",
 )
-@roi_option
+@regions_option
 @lines_option
 @click.option(
     "--start",
@@ -135,7 +135,7 @@ def detect_video(
     sinks: tuple[str, ...],
     lanes: bool,
     camera_path: Path | None,
-    roi: Path | None,
+    regions: Path | None,
     lines: Path | None,
     model_path: Path | None,
     config_name: str | None,
@@ -172,7 +172,7 @@ def detect_video(
     request = read_lanes(lanes, camera_path)
     if stride is not None:
         assignments = (*assignments, f"detector.stride={stride}")
-    settings = read_settings(config_name, assignments, model_path, roi=roi, lines=lines)
+    settings = read_settings(config_name, assignments, model_path, regions=regions, lines=lines)
     check_mask(settings.regions)
     check_counts(others, settings)
     job = VideoJob(source, outputs, start, end, frames, at or Fraction(0), request, overwrite)

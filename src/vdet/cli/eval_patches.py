@@ -45,7 +45,7 @@ from vdet.learn.svm.dataset import find_patches
     help="Train without the patches of this split, and test on them: random patches, the tail of "
     "each group, or each of the groups in turn. Can be repeated.",
 )
-@settings_options("training.C=1e-4")
+@settings_options("train.svm.C=1e-4")
 @click.option(
     "--jobs",
     type=PROCESSES,

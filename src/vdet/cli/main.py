@@ -55,7 +55,7 @@ def evaluate() -> None:
         "vdet config -c seed --set output.crf=18",
     ),
 )
-@settings_options("tracker.method=rules")
+@settings_options("tracker.kind=rules")
 def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
     """Print the effective settings as commented YAML.
 

@@ -62,7 +62,7 @@ from vdet.files import check_output
     help="End with this frame, counted from 1.",
 )
 @model_option
-@settings_options("mining.parts=0")
+@settings_options("train.mine.parts=0")
 @overwrite_option
 @click.pass_obj
 def mine(

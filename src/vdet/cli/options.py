@@ -113,11 +113,11 @@ def read_settings(
     assignments: tuple[str, ...],
     model_path: Path | None = None,
     *,
-    roi: Path | None = None,
+    regions: Path | None = None,
     lines: Path | None = None,
     detector: str | None = None,
 ) -> Settings:
-    """Read the settings that `settings_options`, `roi_option` and `lines_option` ask for.
+    """Read the settings that `settings_options`, `regions_option` and `lines_option` ask for.
 
     The model file decides which detector runs; without one, `detector` is the kind, or the default
     where it is None.
@@ -125,7 +125,7 @@ def read_settings(
     if model_path is not None:
         detector = kind_of_model(model_path) or detector
     path = find_config(config_name) if config_name else None
-    named = {"regions": roi, "counts": lines}
+    named = {"regions": regions, "counts": lines}
     places = {name: file for name, file in named.items() if file}
     return load_settings(path, assignments, places, detector=detector)
 
@@ -150,8 +150,8 @@ def read_whole_frame_settings(
     return settings
 
 
-roi_option = click.option(
-    "--roi",
+regions_option = click.option(
+    "--regions",
     type=PATH,
     metavar="FILE",
     help="Search only these regions of the frame: polygons (.yaml), or a mask, which is a picture "

@@ -25,14 +25,14 @@ from vdet.learn.svm.dataset import find_boxed, find_patches
     cls=Command,
     examples=(
         "vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz",
-        "vdet train patches/ -o model.npz --set training.C=1e-3",
+        "vdet train patches/ -o model.npz --set train.svm.C=1e-3",
     ),
 )
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
 @click.option(
     "-o", "--output", required=True, type=PATH, metavar="FILE", help="Model file to write, .npz."
 )
-@settings_options("training.C=1e-4")
+@settings_options("train.svm.C=1e-4")
 @click.option(
     "--jobs",
     type=PROCESSES,

@@ -30,7 +30,7 @@ from vdet.files import check_output
     multiple=True,
     type=PATH,
     metavar="CLIP TRUTH",
-    help="Learn from every n-th frame of a labelled video too (network.every). Can be repeated.",
+    help="Learn from every n-th frame of a labelled video too (train.net.every). Can be repeated.",
 )
 @click.option(
     "--base",
@@ -38,7 +38,7 @@ from vdet.files import check_output
     metavar="FILE",
     help="Start from the weights of this network, which vdet train-net has written.",
 )
-@settings_options("network.steps=4000")
+@settings_options("train.net.steps=4000")
 @overwrite_option
 @click.pass_obj
 def train_net(
@@ -63,7 +63,7 @@ def train_net(
         raise click.UsageError("nothing to learn from; give DATA or --video")
     if output.suffix.lower() != ".onnx":
         raise OutputError(f"{output}: networks are written as .onnx; name it so")
-    settings = read_settings(config_name, assignments).network
+    settings = read_settings(config_name, assignments).train.net
     try:
         import onnx  # noqa: F401
         import torch  # noqa: F401

@@ -2,7 +2,7 @@
 
 from pydantic import Field, model_validator
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 from vdet.config.shapes import MOST_SHAPES, Name, Place, PlacedSection, PolygonSection, check_names
 
 
@@ -49,7 +49,7 @@ class CountSettings(PlacedSection):
         le=1,
         description="a vehicle this near a line or a border is on neither side, heights of its box",
     )
-    least_band: Fraction = Field(
+    least_band: Share = Field(
         0.003, description="but at least this near, share of the frame's height"
     )
     settled: float = Field(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Hashable
-from fractions import Fraction as Rational
+from fractions import Fraction
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
@@ -10,7 +10,7 @@ from pydantic import Field
 from vdet.config.features import FeatureSettings
 from vdet.config.heat import HeatSettings
 from vdet.config.search import SearchSettings
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 Searches = Annotated[
     float,
@@ -54,7 +54,7 @@ class DetectorSettings(Section):
     )
     foot: Foot = 0.0
 
-    def stride_at(self, rate: float | Rational) -> int:
+    def stride_at(self, rate: float | Fraction) -> int:
         """Return that one of so many frames is searched in a video of `rate` frames a second."""
         return self.stride or max(1, int(rate / (self.searches or rate)))
 
@@ -90,10 +90,8 @@ class StillSettings(Section):
         ge=0,
         description="least evidence: heat, or with votes the weight of the hits that agree",
     )
-    width: Fraction = Field(0.028, description="least width of a box, share of the picture's width")
-    height: Fraction = Field(
-        0.0, description="least height of a box, share of the picture's height"
-    )
+    width: Share = Field(0.028, description="least width of a box, share of the picture's width")
+    height: Share = Field(0.0, description="least height of a box, share of the picture's height")
 
 
 class ScoreSettings(Section):
@@ -166,11 +164,11 @@ class NetworkSettings(DetectorSettings):
     kind: Literal["net"] = Field("net", description="kind of detector; net: a network")
     searches: Searches = 12.0
     least: float = Field(0.1, gt=0, lt=1, description="boxes with a lower score are not looked at")
-    overlap: Fraction = Field(
+    overlap: Share = Field(
         0.55,
         description="a box with more intersection over union with a better one is removed",
     )
-    still_score: Fraction = Field(
+    still_score: Share = Field(
         0.4,
         description="least score of a vehicle in a still picture; in video, the tracker decides",
     )

@@ -4,16 +4,16 @@ from typing import Literal
 
 from pydantic import Field
 
-from vdet.config.section import Fraction, Pixels, Section
+from vdet.config.section import Pixels, Section, Share
 
 
 class VoteSettings(Section):
     """How the boxes of hits that agree on a vehicle are averaged."""
 
-    agreement: Fraction = Field(
+    agreement: Share = Field(
         0.35, description="least intersection over union of two boxes that agree"
     )
-    inside: Fraction = Field(
+    inside: Share = Field(
         0.7, description="a box with more than this share inside a larger vehicle is a part of it"
     )
     least: float = Field(0.12, ge=0, description="least weight of the hits that agree on a vehicle")

@@ -2,13 +2,13 @@
 
 from pydantic import Field
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 
 class InputSettings(Section):
     """The video that is read."""
 
-    max_damaged: Fraction = Field(
+    max_damaged: Share = Field(
         0.05,
         description="tolerated share of damaged or lost frames; a video with more of them fails",
     )

@@ -68,7 +68,7 @@ _DETECTORS: dict[str, type[DetectorSettings]] = {"svm": SvmSettings, "net": Netw
 SECTIONS_WITH_KINDS = {
     "detector": SectionKinds("kind", DETECTORS, _DETECTORS),
     "tracker": SectionKinds(
-        "method", TRACKERS, {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings}
+        "kind", TRACKERS, {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings}
     ),
 }
 """By the name of the section."""

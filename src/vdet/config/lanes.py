@@ -2,7 +2,7 @@
 
 from pydantic import Field, model_validator
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 _MAX_PIXELS = 4_000_000  # of the top view
 
@@ -15,10 +15,10 @@ class TopViewSettings(Section):
     at which the lines of the vehicle's lane cross them.
     """
 
-    top: Fraction = Field(
+    top: Share = Field(
         0.63, description="farther row of the trapezoid, share of the frame's height"
     )
-    bottom: Fraction = Field(
+    bottom: Share = Field(
         0.93, description="nearer row of the trapezoid, share of the frame's height"
     )
     top_left: float = Field(
@@ -71,7 +71,7 @@ class MaskSettings(Section):
         0.35, gt=0, le=3, description="distance at which a pixel is compared with the road on its "
         "left and right, metres"
     )  # fmt: skip
-    lightness: Fraction = Field(
+    lightness: Share = Field(
         0.10, description="smallest rise in lightness from the road to paint, share of the road's "
         "lightness"
     )  # fmt: skip
@@ -156,7 +156,7 @@ class PlaceSettings(Section):
         0.1, gt=0, le=1, description="largest error of the distance, share of it, that one row of "
         "pixels makes; beyond it, near the horizon, the distance is not told"
     )  # fmt: skip
-    edge: Fraction = Field(
+    edge: Share = Field(
         0.005, description="a box that ends this near to the left, right or lower edge of the "
         "frame, as a share of the frame, is cut off: its distance is not told"
     )  # fmt: skip

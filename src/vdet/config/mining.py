@@ -2,13 +2,13 @@
 
 from pydantic import Field
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 
 class MiningSettings(Section):
     """What `vdet mine` takes from each frame of labelled video."""
 
-    probability: Fraction = Field(
+    probability: Share = Field(
         0.2, description="least probability of a false alarm: a window that shows no vehicle"
     )
     per_vehicle: int = Field(

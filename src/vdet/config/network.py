@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 
 class NetworkScoreSettings(Section):
@@ -25,25 +25,25 @@ class NetworkTrainingSettings(Section):
     batch: int = Field(16, ge=1, le=1024, description="pictures in a step")
     width: int = Field(512, ge=64, le=4096, multiple_of=64, description="width of the pictures")
     height: int = Field(288, ge=64, le=4096, multiple_of=32, description="height of the pictures")
-    small: Fraction = Field(
+    small: Share = Field(
         0.7, description="share of the steps, from the first on, with pictures of half the size"
     )
     rate: float = Field(2e-3, gt=0, le=1, description="highest learning rate of AdamW")
-    last_rate: Fraction = Field(0.02, description="the last learning rate, share of the highest")
+    last_rate: Share = Field(0.02, description="the last learning rate, share of the highest")
     warm_up: int = Field(300, ge=0, description="steps in which the learning rate rises")
     weight_decay: float = Field(0.02, ge=0, le=1, description="weight decay of AdamW")
     gradient: float = Field(10.0, gt=0, description="longest gradient; longer ones are shortened")
-    average: Fraction = Field(
+    average: Share = Field(
         0.998, description="the moving average of the weights keeps this share at each step"
     )
     scales: tuple[float, float] = Field(
         (0.6, 2.2), description="least and most scale of a picture; at 1 its width fits"
     )
-    mosaics: Fraction = Field(0.35, description="share of pictures put together of four")
+    mosaics: Share = Field(0.35, description="share of pictures put together of four")
     mosaic_scales: tuple[float, float] = Field(
         (0.5, 1.5), description="least and most scale of the four pictures of a mosaic"
     )
-    plain: Fraction = Field(0.12, description="share of the steps, the last ones, without mosaics")
+    plain: Share = Field(0.12, description="share of the steps, the last ones, without mosaics")
     weights: dict[str, Annotated[float, Field(gt=0, le=1000)]] = Field(
         {}, description="pictures of the set of this name are drawn so many times as often"
     )

@@ -33,11 +33,12 @@ from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettin
 from vdet.config.section import Section
 from vdet.config.summary import CropSettings, SummarySettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
+from vdet.config.train import TrainSettings
 from vdet.config.training import (
     AugmentationSettings,
     BoxSettings,
     CalibrationSettings,
-    TrainingSettings,
+    SvmTrainingSettings,
 )
 from vdet.errors import ConfigError
 
@@ -75,8 +76,9 @@ __all__ = [
     "StillSettings",
     "SummarySettings",
     "SvmSettings",
+    "SvmTrainingSettings",
     "TrackerSettings",
-    "TrainingSettings",
+    "TrainSettings",
     "VoteSettings",
     "WindowSettings",
     "ZoneSettings",
@@ -91,9 +93,7 @@ class Settings(Section):
     regions: RegionsSettings = RegionsSettings()
     counts: CountSettings = CountSettings()
     lanes: LaneSettings = LaneSettings()
-    training: TrainingSettings = TrainingSettings()
-    mining: MiningSettings = MiningSettings()
-    network: NetworkTrainingSettings = NetworkTrainingSettings()
+    train: TrainSettings = TrainSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
     summary: SummarySettings = SummarySettings()

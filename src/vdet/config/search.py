@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from vdet.config.section import FRAME_LENGTH, Fraction, Pixels, Section
+from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
 
 WindowShare = Annotated[float, Field(gt=0, le=1)]
 
@@ -53,7 +53,7 @@ class PerspectiveSettings(Section):
     zoom: float = Field(
         1.0, ge=0.1, le=10, description="factor of all sizes; above 1 for a longer lens"
     )
-    horizon: Fraction = Field(
+    horizon: Share = Field(
         0.0,
         description="row of the horizon, share of the frame's height; 0: found in the first "
         "frames, where the lines of the road meet",
@@ -72,7 +72,7 @@ class PerspectiveSettings(Section):
         description="distance from the horizon down to the bottom of a set's lowest windows, "
         "sides of a window",
     )
-    beyond: Fraction = Field(
+    beyond: Share = Field(
         0.7, description="share of a window that may lie beyond the left or right of the frame"
     )
     step: int = Field(1, ge=1, le=64, description="distance to the next window, cells of the patch")
@@ -93,7 +93,7 @@ class SearchSettings(Section):
         "features of a strip are computed once for all windows in it, which is many times faster; "
         "auto: dense if it can compute the features, else patch",
     )
-    probability: Fraction = Field(
+    probability: Share = Field(
         0.3, description="least probability of a hit, a window that counts as evidence"
     )
     windows: tuple[WindowSettings, ...] = Field(

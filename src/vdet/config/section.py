@@ -11,7 +11,7 @@ class _FrameLength:
 
 FRAME_LENGTH = _FrameLength()
 Pixels = Annotated[int, Field(ge=0, le=100_000), FRAME_LENGTH]
-Fraction = Annotated[float, Field(ge=0, le=1)]
+Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Section(BaseModel):

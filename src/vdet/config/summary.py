@@ -4,13 +4,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 
 class SummarySettings(Section):
     """The record of each vehicle."""
 
-    path_step: Fraction = Field(
+    path_step: Share = Field(
         0.01,
         description="the path of a vehicle gets a point when it has gone so far, share of the "
         "frame's width; shorter ways are the trembling of the boxes",

@@ -1,39 +1,39 @@
-"""How the detections of consecutive frames become tracks: one section a method."""
+"""How the detections of consecutive frames become tracks: one class a kind."""
 
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vdet.config.section import Fraction, Pixels, Section
+from vdet.config.section import Pixels, Section, Share
 
 Seconds = Annotated[float, Field(ge=0, le=1000)]
 Positive = Annotated[float, Field(gt=0, le=1000)]
 
 
 class TrackerSettings(Section):
-    """How detections become tracks. Each method has a class of its own."""
+    """How detections become tracks. Each kind has a class of its own."""
 
-    method: str
+    kind: str
 
 
 class MotionTrackerSettings(TrackerSettings):
     """The motion tracker (`vdet.track.motion` explains it); times are seconds."""
 
-    method: Literal["motion"] = Field(
+    kind: Literal["motion"] = Field(
         "motion",
         description="motion: vehicles move steadily, also while they are hidden or not detected; "
         "rules: the rules of the original system, which count frames",
     )
-    smallest: Fraction = Field(
+    smallest: Share = Field(
         0.028, description="narrower vehicles are not shown, share of the frame's width"
     )
-    least_score: Fraction = Field(
+    least_score: Share = Field(
         0.4, description="vehicles whose latest detections have a lower mean score are not shown"
     )
     needed: Seconds = Field(
         0.1, description="evidence before a vehicle is shown: seconds of detections with score 1"
     )
-    leak: Fraction = Field(
+    leak: Share = Field(
         0.2,
         description="evidence that a vehicle loses in a second; detections with lower scores never "
         "add up",
@@ -51,16 +51,16 @@ class MotionTrackerSettings(TrackerSettings):
     velocity: Positive = Field(
         2.5, description="standard deviation of a new vehicle's velocity, sizes a second"
     )
-    overlap: Fraction = Field(
+    overlap: Share = Field(
         0.3,
         description="least intersection over union of a detection with the box where its vehicle "
         "is expected",
     )
-    part: Fraction = Field(
+    part: Share = Field(
         0.6,
         description="a detection with more than this share inside a shown vehicle is a part of it",
     )
-    hidden: Fraction = Field(
+    hidden: Share = Field(
         0.5, description="a vehicle is hidden where a nearer one covers more than this share of it"
     )
     carried: Seconds = Field(
@@ -75,7 +75,7 @@ class MotionTrackerSettings(TrackerSettings):
 class RulesTrackerSettings(TrackerSettings):
     """The rules of the original system (`vdet.track.rules` lists them); times are frames."""
 
-    method: Literal["rules"] = Field("rules", description="motion or rules")
+    kind: Literal["rules"] = Field("rules", description="motion or rules")
     reference_height: int = Field(
         720,
         ge=16,
@@ -98,11 +98,11 @@ class RulesTrackerSettings(TrackerSettings):
     wide: Pixels = Field(
         200, description="a region wider than this is always good enough for its car"
     )
-    good_fraction: Fraction = Field(2 / 3, description="so is one wider than this share of its car")
+    good_fraction: Share = Field(2 / 3, description="so is one wider than this share of its car")
     max_combined: Pixels = Field(
         250, description="two regions of one car, combined, must be narrower"
     )
-    combined_tolerance: Fraction = Field(
+    combined_tolerance: Share = Field(
         1 / 3, description="and differ in width from the car by no more than this share of it"
     )
     merge_overlap: Pixels = Field(
@@ -114,7 +114,7 @@ class RulesTrackerSettings(TrackerSettings):
     match_method: Literal["ccoeff_normed", "ccorr_normed", "sqdiff_normed"] = Field(
         "ccoeff_normed", description="score of the template match, as cv2.matchTemplate names it"
     )
-    match_score: Fraction = Field(
+    match_score: Share = Field(
         0.5, description="least score of a match; 1 is perfect (sqdiff_normed is inverted)"
     )
     young: int = Field(

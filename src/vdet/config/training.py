@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from vdet.config.section import Fraction, Section
+from vdet.config.section import Section, Share
 
 
 class CalibrationSettings(Section):
@@ -24,12 +24,12 @@ class AugmentationSettings(Section):
     mirror: bool = Field(
         True, description="add the mirror image; the samples below are made of both"
     )
-    cut: Fraction = Field(
+    cut: Share = Field(
         0.15,
         description="share of patches of which a copy is added that the frame's left or right side "
         "cuts off by 15 to 50 %",
     )
-    parts: Fraction = Field(
+    parts: Share = Field(
         0.05,
         description="share of vehicle patches of which a crop, 40 to 60 % of the width and height, "
         "is added as a non-vehicle",
@@ -51,7 +51,7 @@ class BoxSettings(Section):
     )
 
 
-class TrainingSettings(Section):
+class SvmTrainingSettings(Section):
     """How `vdet train` fits the classifier."""
 
     C: float = Field(
@@ -72,7 +72,7 @@ class TrainingSettings(Section):
         le=2**32 - 1,
         description="seed of the split, the folds and the augmentation",
     )
-    max_broken: Fraction = Field(0.01, description="tolerated share of unreadable patches")
+    max_broken: Share = Field(0.01, description="tolerated share of unreadable patches")
     calibration: CalibrationSettings = CalibrationSettings()
     augmentation: AugmentationSettings = AugmentationSettings()
     boxes: BoxSettings = BoxSettings()

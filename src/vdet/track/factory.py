@@ -1,4 +1,4 @@
-"""A tracker from its settings, whatever its method."""
+"""A tracker from its settings, of any kind."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from vdet.track.rules.tracker import RulesTracker
 
 @dataclass(frozen=True, slots=True)
 class TrackerKind:
-    """A method of tracking, as it is registered under its name.
+    """A kind of tracker, as it is registered under its name.
 
     Attributes
     ----------
     settings
-        Class of the section `tracker` for this method; its `method` has the name as default.
+        Class of the section `tracker` for this kind; its `kind` has the name as default.
     make
         Takes these settings and the width and height of the frames, pixels.
     """
@@ -42,9 +42,9 @@ def make_tracker(settings: Settings, width: int, height: int) -> CarryingTracker
     Raises
     ------
     ConfigError
-        There is no method of that name.
+        There is no such kind.
     """
-    kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.method)
+    kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.kind)
     tracker = kind.make(settings.tracker, width, height)
     return tracker if isinstance(tracker, CarryingTracker) else HoldingTracker(tracker)
 

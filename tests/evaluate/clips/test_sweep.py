@@ -54,7 +54,7 @@ def test_a_key_swept_twice_is_refused() -> None:
         ("tracker.needed=0.2, 1e-1", "tracker.needed=0.2, 1e-1"),
         ("detector.heat.regions=outline", "detector.heat.regions=votes,outline"),
         ("output.crf=1", "output.crf=30,1"),
-        ("training.augmentation.mirror=no", "training.augmentation.mirror=true,no"),
+        ("train.svm.augmentation.mirror=no", "train.svm.augmentation.mirror=true,no"),
         ("detector.search.perspective.sizes.0=0.2", "detector.search.perspective.sizes.0=0.1,0.2"),
         ("detector.features={patch: 64}", "detector.features={patch: 64}"),
         ("no.such=1", "no.such=1"),

@@ -19,7 +19,7 @@ torch = pytest.importorskip(
 QUICK = tuple(
     argument
     for value in ("steps=2", "batch=2", "width=128", "height=64", "checkpoint=1")
-    for argument in ("--set", f"network.{value}")
+    for argument in ("--set", f"train.net.{value}")
 )
 CAR = Boxed("car", (20, 30, 60, 40))
 IGNORED = Boxed("ignore", (90, 0, 70, 96))
@@ -79,7 +79,7 @@ def test_a_stopped_training_goes_on_and_other_scores_need_no_step(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["net.ckpt", "set"]
     with monkeypatch.context() as trained:
         trained.setattr("vdet.learn.net.training._Run.learn", stop)
-        result = run(*command, "--set", "network.score.slope=2")
+        result = run(*command, "--set", "train.net.score.slope=2")
     assert result.code == 0, result.err
     header = recognize(Session(tmp_path / "net.onnx"), tmp_path / "net.onnx").header
     assert header is not None

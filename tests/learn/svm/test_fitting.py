@@ -19,7 +19,8 @@ from vdet.config.schema import (
     HogSettings,
     Settings,
     SvmSettings,
-    TrainingSettings,
+    SvmTrainingSettings,
+    TrainSettings,
 )
 from vdet.errors import DataError
 from vdet.learn.svm.extraction import LabelledVectors, SampleVectors
@@ -39,9 +40,9 @@ def clouds(count: int = 300) -> tuple[Float32Array, npt.NDArray[np.bool_]]:
     return vectors.astype(np.float32), vehicle
 
 
-def training(*, ensemble: bool = True, **changes: object) -> TrainingSettings:
+def training(*, ensemble: bool = True, **changes: object) -> SvmTrainingSettings:
     calibration = CalibrationSettings(ensemble=ensemble)
-    return TrainingSettings(C=0.01, calibration=calibration).model_copy(update=changes)
+    return SvmTrainingSettings(C=0.01, calibration=calibration).model_copy(update=changes)
 
 
 @pytest.mark.parametrize("ensemble", [True, False])
@@ -200,7 +201,8 @@ def test_a_fit_has_the_training_part_in_memory_once() -> None:
     data = LabelledVectors(vectors, vehicle, np.full(3000, "a"), "", 0, augmented=samples)
     features = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=256))
     settings = Settings(
-        detector=SvmSettings(features=features), training=training(ensemble=False, max_iterations=5)
+        detector=SvmSettings(features=features),
+        train=TrainSettings(svm=training(ensemble=False, max_iterations=5)),
     )
     peak = peak_memory(lambda: fit_patches(data, np.ones(3000, bool), settings))
     assert peak < 1.5 * (vectors.nbytes + more.nbytes)

@@ -20,7 +20,8 @@ from vdet.config.schema import (
     HogSettings,
     Settings,
     SvmSettings,
-    TrainingSettings,
+    SvmTrainingSettings,
+    TrainSettings,
 )
 from vdet.detect.svm.features import FeatureExtractor, Layout
 from vdet.detect.svm.model import load_model, save_model
@@ -50,8 +51,10 @@ SETTINGS = Settings(
             histogram=HistogramSettings(bins=8),
         )
     ),
-    training=TrainingSettings(
-        C=0.1, augmentation=AugmentationSettings(mirror=True, cut=0.5, parts=0.5)
+    train=TrainSettings(
+        svm=SvmTrainingSettings(
+            C=0.1, augmentation=AugmentationSettings(mirror=True, cut=0.5, parts=0.5)
+        )
     ),
 )
 
@@ -111,12 +114,12 @@ def with_broken(files: list[PatchFile], folder: Path, count: int) -> list[PatchF
 
 def but(**changes: object) -> Settings:
     """Return the settings with some of `training` replaced."""
-    training = SETTINGS.training.model_copy(update=changes)
-    return SETTINGS.model_copy(update={"training": training})
+    training = SETTINGS.train.svm.model_copy(update=changes)
+    return SETTINGS.model_copy(update={"train": TrainSettings(svm=training)})
 
 
 NO_AUGMENTATION = AugmentationSettings(mirror=False, cut=0, parts=0)
-AUGMENTER = partial(augment, settings=SETTINGS.training.augmentation)
+AUGMENTER = partial(augment, settings=SETTINGS.train.svm.augmentation)
 
 
 def tolerant(share: float) -> Settings:
@@ -334,8 +337,10 @@ def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_he
     settings = but(split=name, augmentation=NO_AUGMENTATION)
     model, report = train(files, settings, jobs=1)
     data = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
-    kept = ~hold_out(data.groups, name, settings.training.test_fraction, settings.training.seed)
-    expected = fit(data.vectors[kept], data.vehicle[kept], SETTINGS.svm.features, settings.training)
+    kept = ~hold_out(data.groups, name, settings.train.svm.test_fraction, settings.train.svm.seed)
+    expected = fit(
+        data.vectors[kept], data.vehicle[kept], SETTINGS.svm.features, settings.train.svm
+    )
     np.testing.assert_array_equal(model.weights, expected.weights)
     assert [split.train_augmented for split in report.splits] == [0, 0]
 
@@ -351,7 +356,7 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
     shutil.copytree(mined, spoilt)
     for files in lists:
         groups = np.array([file.group for file in files])
-        held = hold_out(groups, name, settings.training.test_fraction, settings.training.seed)
+        held = hold_out(groups, name, settings.train.svm.test_fraction, settings.train.svm.seed)
         for row in np.flatnonzero(held):
             flat = np.full((SIZE, SIZE, 3), row, np.uint8)
             write_image(spoilt / files[row].name, flat, overwrite=True)
@@ -399,7 +404,7 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
     loaded = load_model(tmp_path / "model.npz", SETTINGS.svm.features)
     provenance = loaded.provenance
     assert provenance["program"] == f"vdet {vdet.__version__}"
-    assert provenance["training"] == SETTINGS.training.model_dump(mode="json")
+    assert provenance["training"] == SETTINGS.train.svm.model_dump(mode="json")
     assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
     digest = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
     assert provenance["data_sha256"] == digest

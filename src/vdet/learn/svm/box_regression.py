@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
-from vdet.config.schema import Settings, TrainingSettings
+from vdet.config.schema import Settings, SvmTrainingSettings
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
 from vdet.learn.svm.augmentation import Augmenter, augment, zoom_in
@@ -64,7 +64,7 @@ def extract_box_patches(
     with_boxes = {file.source for file in (*files, *boxed) if file.sides}
     if not with_boxes or not settings.svm.features.hog.channels:
         return None
-    training = settings.training
+    training = settings.train.svm
 
     def describe(some: Sequence[PatchFile], augmenter: Augmenter, step: str) -> LabelledVectors:
         return extract(
@@ -110,10 +110,10 @@ def fit_split_boxes(
     """
     parts = [(data, held)]
     if patches.boxed is not None:
-        parts.append((patches.boxed, _hold_out(patches.boxed, name, settings.training)))
+        parts.append((patches.boxed, _hold_out(patches.boxed, name, settings.train.svm)))
     assumed = None
     if patches.assumed is not None:
-        assumed_held = _hold_out(patches.assumed, name, settings.training)
+        assumed_held = _hold_out(patches.assumed, name, settings.train.svm)
         assumed = training_set(patches.assumed, ~assumed_held)
     regression = fit_boxes([_with_sides(each, ~out) for each, out in parts], assumed, settings)
     if regression is None:
@@ -129,7 +129,7 @@ def fit_boxes(
 
     Returns None if no side is known.
     """
-    boxes = settings.training.boxes
+    boxes = settings.train.svm.boxes
     length = Layout.of(settings.svm.features).hog_length
     rows = [BoxRows(each.vectors[:, :length], each.sides) for each in sets]
     count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in sets)
@@ -148,7 +148,7 @@ def _with_sides(data: LabelledVectors, kept: BoolArray) -> SampleVectors:
     return training_set(data, kept)
 
 
-def _hold_out(data: LabelledVectors, name: SplitName, training: TrainingSettings) -> BoolArray:
+def _hold_out(data: LabelledVectors, name: SplitName, training: SvmTrainingSettings) -> BoolArray:
     return hold_out(data.groups, name, training.test_fraction, training.seed)
 
 

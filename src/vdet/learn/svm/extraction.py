@@ -226,7 +226,7 @@ def _check_broken(
     if len(broken) > max_broken * len(files):
         raise DataError(
             f"{broken[0]}: {len(broken)} of {len(files)} patches are broken, more than the "
-            f"{max_broken:.1%} of training.max_broken; get the data set again"
+            f"{max_broken:.1%} of train.svm.max_broken; get the data set again"
         )
 
 

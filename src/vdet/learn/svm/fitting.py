@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
-from vdet.config.schema import FeatureSettings, Settings, TrainingSettings
+from vdet.config.schema import FeatureSettings, Settings, SvmTrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
@@ -27,7 +27,7 @@ def fit_patches(data: LabelledVectors, kept: BoolArray, settings: Settings) -> L
         samples.vectors,
         samples.vehicle,
         settings.svm.features,
-        settings.training,
+        settings.train.svm,
         samples.origins,
         copy=False,
     )
@@ -37,7 +37,7 @@ def fit(
     vectors: Float32Array,
     vehicle: BoolArray,
     features: FeatureSettings,
-    settings: TrainingSettings,
+    settings: SvmTrainingSettings,
     origins: RowNumbers | None = None,
     *,
     copy: bool = True,
@@ -74,7 +74,7 @@ def fit(
     fewest = min(np.count_nonzero(vehicle[patches]), np.count_nonzero(~vehicle[patches]))
     if fewest < folds:
         raise DataError(
-            f"a class has {fewest} training patches, training.calibration.folds needs {folds}; "
+            f"a class has {fewest} training patches, train.svm.calibration.folds needs {folds}; "
             "give more patches"
         )
     scaler = StandardScaler(copy=copy)
@@ -92,7 +92,9 @@ def fit(
         warnings.simplefilter("always", ConvergenceWarning)
         calibrated.fit(np.arange(len(vehicle)), vehicle, _weights(patches, len(vehicle)))
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
-        log.warning("the SVM has not converged; raise training.max_iterations or lower training.C")
+        log.warning(
+            "the SVM has not converged; raise train.svm.max_iterations or lower train.svm.C"
+        )
     return _to_model(calibrated.calibrated_classifiers_, scaler, features)
 
 
@@ -104,7 +106,7 @@ def _weights(patches: RowNumbers, count: int) -> Float64Array:
 
 
 def _folds(
-    vehicle: BoolArray, patches: RowNumbers, origins: RowNumbers, settings: TrainingSettings
+    vehicle: BoolArray, patches: RowNumbers, origins: RowNumbers, settings: SvmTrainingSettings
 ) -> Iterator[tuple[RowNumbers, RowNumbers]]:
     """Yield the rows to fit on and to calibrate on; `vehicle` holds the labels of `patches`."""
     from sklearn.model_selection import StratifiedKFold

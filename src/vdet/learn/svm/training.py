@@ -64,7 +64,7 @@ def train(
         The cluster of `scheduler` cannot be used.
     """
     began = time.perf_counter()
-    training = settings.training
+    training = settings.train.svm
     workers = make_workers(jobs, scheduler)
     data = extract(
         files,
@@ -111,7 +111,7 @@ def _fit_split(
     name: SplitName,
     steps: Steps,
 ) -> tuple[LinearModel, SplitMetrics]:
-    training = settings.training
+    training = settings.train.svm
     held = hold_out(data.groups, name, training.test_fraction, training.seed)
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")

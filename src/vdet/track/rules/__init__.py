@@ -1,7 +1,7 @@
 """The tracker of the original system: regions of the heatmap become cars, by these rules.
 
 The code and the tests number the rules so; the constants are the original's (the settings have
-them all, under `tracker` with `method: rules`). A region is a detection, its peak the detection's
+them all, under `tracker` with `kind: rules`). A region is a detection, its peak the detection's
 strength. Source: seed section 3, "Video pipeline".
 
 1.  Regions narrower or lower than 50 px are ignored.

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box
-from vdet.config.schema import MiningSettings, OutputSettings, Settings
+from vdet.config.schema import MiningSettings, OutputSettings, Settings, TrainSettings
 from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
@@ -90,7 +90,7 @@ def mined(clip: Path, tmp_path: Path) -> Mine:
     ) -> MiningResult:
         model = detector(found(*boxes, score=score))
         job = MiningJob((VideoSource(clip, truth, every=2),), tmp_path / "mined.zip")
-        return mine(job, Settings(mining=MiningSettings(**settings)), model)
+        return mine(job, Settings(train=TrainSettings(mine=MiningSettings(**settings))), model)
 
     return run
 
@@ -233,7 +233,7 @@ class TestPictures:
         job = MiningJob((PictureSource(folder),), tmp_path / "mined.zip")
         result = mine(job, Settings(), None)
         assert result.vehicles > 0
-        assert result.false_alarms == Settings().mining.false_alarms
+        assert result.false_alarms == Settings().train.mine.false_alarms
         for box in boxes_of(job.output, "non-vehicles/mined_city"):
             assert box.iou(CAR) < 0.5
 

@@ -11,7 +11,8 @@ from vdet.config.schema import (
     HogSettings,
     Settings,
     SvmSettings,
-    TrainingSettings,
+    SvmTrainingSettings,
+    TrainSettings,
 )
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.patch_eval import evaluate_model, evaluate_splits
@@ -21,7 +22,9 @@ from vdet.media.images import write_image
 FEATURES = FeatureSettings(
     patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
 )
-SETTINGS = Settings(detector=SvmSettings(features=FEATURES), training=TrainingSettings(C=1))
+SETTINGS = Settings(
+    detector=SvmSettings(features=FEATURES), train=TrainSettings(svm=SvmTrainingSettings(C=1))
+)
 
 
 @pytest.fixture
@@ -60,7 +63,9 @@ def test_mistakes_have_the_right_names_beside_a_broken_patch(bright_and_dark: Pa
     light = np.full((16, 16, 3), 180, np.uint8)
     write_image(bright_and_dark / "non-vehicles" / "b" / "7.png", light, overwrite=True)
     tolerant = SETTINGS.model_copy(
-        update={"training": SETTINGS.training.model_copy(update={"max_broken": 0.1})}
+        update={
+            "train": TrainSettings(svm=SETTINGS.train.svm.model_copy(update={"max_broken": 0.1}))
+        }
     )
     report = evaluate_splits(find_patches([bright_and_dark]), tolerant, ("groups",), jobs=1)
     (mistake,) = report.trials[0].mistakes

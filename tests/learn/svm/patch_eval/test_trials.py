@@ -9,7 +9,8 @@ from vdet.config.schema import (
     HogSettings,
     Settings,
     SvmSettings,
-    TrainingSettings,
+    SvmTrainingSettings,
+    TrainSettings,
 )
 from vdet.errors import DataError
 from vdet.learn.svm.extraction import LabelledVectors
@@ -19,7 +20,9 @@ from vdet.learn.svm.patch_eval.trials import holdouts, model_trial, run_trial
 FEATURES = FeatureSettings(
     patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
 )
-SETTINGS = Settings(detector=SvmSettings(features=FEATURES), training=TrainingSettings(C=1))
+SETTINGS = Settings(
+    detector=SvmSettings(features=FEATURES), train=TrainSettings(svm=SvmTrainingSettings(C=1))
+)
 
 
 def data(groups: dict[str, int]) -> LabelledVectors:
@@ -70,7 +73,7 @@ def test_each_patch_is_predicted_once_by_a_model_fitted_without_its_group() -> N
     assert (trial.fits, steps) == (4, [1, 1, 1, 1])
     held = parts[0]
     model = fit(
-        patches.vectors[~held], patches.vehicle[~held], SETTINGS.svm.features, SETTINGS.training
+        patches.vectors[~held], patches.vehicle[~held], SETTINGS.svm.features, SETTINGS.train.svm
     )
     expected = model.probabilities(patches.vectors[held])
     assert trial.probabilities[:20] == pytest.approx(expected.astype(float))
@@ -79,7 +82,7 @@ def test_each_patch_is_predicted_once_by_a_model_fitted_without_its_group() -> N
 
 def test_a_ready_model_predicts_every_patch() -> None:
     patches = data(FOUR)
-    model = fit(patches.vectors, patches.vehicle, FEATURES, SETTINGS.training)
+    model = fit(patches.vectors, patches.vehicle, FEATURES, SETTINGS.train.svm)
     trial = model_trial(patches, model)
     assert trial.rows.tolist() == list(range(65))
     assert trial.probabilities == pytest.approx(model.probabilities(patches.vectors).astype(float))

@@ -99,9 +99,9 @@ def mine(
 
 def _choose(frame: LabelledFrame, settings: Settings) -> list[ChosenWindow]:
     """Choose at random, with a seed that depends on the frame alone."""
-    rng = np.random.default_rng((settings.training.seed, frame.number))
+    rng = np.random.default_rng((settings.train.svm.seed, frame.number))
     width = frame.image.shape[1]
-    return list(choose_windows(frame.windows, frame.labels, width, settings.mining, rng))
+    return list(choose_windows(frame.windows, frame.labels, width, settings.train.mine, rng))
 
 
 def _add(

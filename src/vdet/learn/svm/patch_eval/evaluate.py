@@ -100,7 +100,7 @@ def evaluate_splits(
     DataError
         Too many patches are unreadable, or there are too few for a split.
     """
-    augmenter = partial(augment, settings=settings.training.augmentation)
+    augmenter = partial(augment, settings=settings.train.svm.augmentation)
     advance = steps("describing patches", len(files))
     data = _extract(files, settings, settings.svm.features, jobs, advance, augmenter=augmenter)
     plans = [(split, holdouts(data, settings, split)) for split in splits]
@@ -137,9 +137,9 @@ def _extract(
     return extract(
         files,
         features,
-        max_broken=settings.training.max_broken,
+        max_broken=settings.train.svm.max_broken,
         augmenter=augmenter,
-        seed=settings.training.seed,
+        seed=settings.train.svm.seed,
         workers=make_workers(jobs),
         progress=advance,
     )

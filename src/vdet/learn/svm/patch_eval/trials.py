@@ -49,7 +49,7 @@ def holdouts(data: LabelledVectors, settings: Settings, split: TrialSplit) -> li
     if split == "groups":
         parts = _group_holdouts(data)
     else:
-        training = settings.training
+        training = settings.train.svm
         parts = [hold_out(data.groups, split, training.test_fraction, training.seed)]
     if not any(part.any() for part in parts):
         raise DataError(f"split {split}: nothing can be held out; give more patches, more groups")
