@@ -97,7 +97,7 @@ def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, ot
     vehicle = np.array([True] * vehicles + [False] * others, bool)
     vectors = np.ones((len(vehicle), 24), np.float32)
     message = (
-        rf"a class has {min(vehicles, others)} training patches, training\.calibration\.folds "
+        rf"a class has {min(vehicles, others)} training patches, train\.svm\.calibration\.folds "
         "needs 3; give more patches"
     )
     with pytest.raises(DataError, match=message):
@@ -109,7 +109,7 @@ def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
 ) -> None:
     with caplog.at_level(logging.WARNING, "vdet"):
         fit(*clouds(), COLOUR, training(max_iterations=1, C=1e6))
-    assert "the SVM has not converged; raise training.max_iterations" in caplog.text
+    assert "the SVM has not converged; raise train.svm.max_iterations" in caplog.text
 
 
 def test_an_svm_that_has_converged_gives_no_warning(caplog: pytest.LogCaptureFixture) -> None:
