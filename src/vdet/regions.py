@@ -8,7 +8,7 @@ import numpy as np
 from vdet.boxes import BoolArray, Int32Array
 from vdet.config.regions import RegionsSettings
 from vdet.errors import ConfigError
-from vdet.media.images import Image, read_image, read_size
+from vdet.media.images import Image, read_header, read_image
 from vdet.polygons import Outline, Point
 
 _WHITE = 128
@@ -114,7 +114,7 @@ def lay_regions(settings: RegionsSettings, width: int, height: int) -> Regions |
 def check_mask(settings: RegionsSettings) -> None:
     """Refuse a mask that cannot be read, before any work. Raises `ImageError`."""
     if settings.mask:
-        read_size(Path(settings.mask))
+        read_header(Path(settings.mask))
 
 
 def _read_mask(path: str, width: int, height: int) -> BoolArray:

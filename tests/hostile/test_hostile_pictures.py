@@ -127,13 +127,3 @@ def test_a_panorama_with_a_million_windows_is_refused(tmp_path: Path) -> None:
     for trial in trials:
         assert "search windows would be laid over a frame of 32000×24 pixels" in trial.err
     assert broken_promises(trials) == []
-
-
-def test_a_damaged_jpeg_that_can_be_read_gives_a_warning(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    path = tmp_path / "damaged.jpg"
-    whole = encoded(".jpg", PICTURE)
-    path.write_bytes(whole[:-400] + b"\xff\xd9")
-    assert read_image(path).shape == PICTURE.shape
-    assert "damaged.jpg: is damaged, and read as far as possible (Corrupt JPEG data" in caplog.text

@@ -159,17 +159,6 @@ def test_all_eight_orientations_are_upright(
     np.testing.assert_array_equal(image, expected)
 
 
-@pytest.mark.parametrize("degrees", [45, 20])
-def test_a_matrix_that_is_no_quarter_turn_is_told(
-    degrees: int, tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
-) -> None:
-    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    path = set_matrix(write_clip(tmp_path / "clip.mp4"), cosine, -sine, sine, cosine)
-    with VideoReader(path) as reader:
-        assert [read_number(frame.image) for frame in reader] == list(range(12))
-    assert warnings() == [f"{path}: its display matrix is no quarter turn; frames stay as stored"]
-
-
 def test_other_video_streams_are_told(
     tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
 ) -> None:
@@ -491,7 +480,7 @@ def test_pixels_that_cannot_be_converted_are_one_error(
         raise av.error.InvalidDataError(1, "no such conversion")
 
     path = write_clip(tmp_path / "fine.mp4", pix_fmt="yuv444p")
-    monkeypatch.setattr("vdet.media.reader.to_bgr", refuse)
+    monkeypatch.setattr("vdet.media.reader.bgr_of", refuse)
     with (
         VideoReader(path) as reader,
         pytest.raises(VideoError, match=r"fine\.mp4: its pixels \(yuv444p\) cannot be converted"),

@@ -1,8 +1,7 @@
 """Video and pictures: frames with exact times, sound carried over, sizes limited."""
 
 from vdet.media.frame import ColorTags, Frame, VideoInfo
-from vdet.media.picture import Picture
-from vdet.media.planes import Planes
+from vdet.media.planes import Picture, Planes
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 

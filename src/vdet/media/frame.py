@@ -7,7 +7,7 @@ from pathlib import Path
 from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.orientation import Orientation
-from vdet.media.picture import Picture
+from vdet.media.planes import Picture
 
 UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 

@@ -1,23 +1,21 @@
 """Pictures: read to BGR uint8 from any common format, written whole or not at all."""
 
-import contextlib
+import io
 import logging
 import math
-import os
-import re
-import tempfile
-import threading
-from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.errors import ImageError, OutputError
+from vdet.errors import ImageError
 from vdet.files import read_whole, staged
-from vdet.media.picture_size import picture_size
+from vdet.media.orientation import Orientation, upright
+
+if TYPE_CHECKING:
+    from PIL.Image import Image as PillowImage
 
 Image = npt.NDArray[np.uint8]
 
@@ -28,18 +26,25 @@ MAX_BYTES = 256_000_000
 """Of a picture's file: enough for `MAX_PICTURE_PIXELS` of 16 bits without compression."""
 PICTURE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 
+_FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP")
 _NO_PICTURE = "is not a picture, or is damaged (PNG, JPEG, BMP, TIFF, WebP)"
-_HARMLESS = ("[ WARN", "Warning", "libpng warning")
-_PLACE = re.compile(r"^\[ERROR:\S+ global \S+ \w+ ")  # in OpenCV's source
-_MAX_COMMENTS = 10_000  # bytes
-_STDERR = 2
-_stderr_lock = threading.Lock()  # the file descriptor belongs to the whole process
+_TOO_LARGE = (
+    f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than {MAX_PICTURE_SIDE:,}; "
+    "make it smaller"
+)
+_WHITE = {"I;16": 65_535, "I;16B": 65_535, "F": 1}
+"""The value of white in Pillow's modes of grey with more than 8 bits."""
+_JPEG_SCAN, _JPEG_END = b"\xff\xda", b"\xff\xd9"  # markers, ITU-T T.81, annex B
+_TURNED_BY_PILLOW = "TIFF"
+_ORIENTATION = 274  # EXIF tag
 
 log = logging.getLogger("vdet")
 
 
 def read_image(path: Path) -> Image:
     """Read a picture, turned upright as its EXIF data say.
+
+    A JPEG file that was cut off is read as far as it goes, with a warning.
 
     Returns
     -------
@@ -55,11 +60,11 @@ def read_image(path: Path) -> Image:
     """
     data = read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
     try:
-        image, complaint = _decode(data)
+        image = _decode(data)
     except ImageError as error:
         raise ImageError(f"{path}: {error}") from error
-    if complaint:
-        log.warning("%s: is damaged, and read as far as possible (%s)", path, complaint)
+    if _is_cut_off(data):
+        log.warning("%s: was cut off, and is read as far as it goes", path)
     return image
 
 
@@ -68,24 +73,32 @@ def is_picture_name(path: Path) -> bool:
     return path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".")
 
 
-def read_size(path: Path) -> tuple[int, int]:
-    """Return the width and height of a picture upright, in pixels, from its header alone.
+def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
+    """Return width and height of a picture upright, in pixels, and how it becomes so.
+
+    Only the header is decoded.
 
     Raises
     ------
     ImageError
-        The file cannot be read, or is no picture.
+        As `read_image`.
     """
-    size = picture_size(read_whole(path, most=MAX_BYTES, what="picture", error=ImageError))
-    if size is None:
-        raise ImageError(f"{path}: {_NO_PICTURE}")
-    return size
+    data = read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
+    try:
+        picture = _open(data)
+    except ImageError as error:
+        raise ImageError(f"{path}: {error}") from error
+    width, height = picture.size
+    turn = _orientation(picture)
+    if turn.is_sideways and picture.format != _TURNED_BY_PILLOW:
+        width, height = height, width
+    return (width, height), turn
 
 
 def decode_image(data: bytes) -> Image | None:
     """Decode an encoded picture as `read_image` does; None where that is impossible."""
     try:
-        return _decode(data)[0]
+        return _decode(data)
     except ImageError:
         return None
 
@@ -108,77 +121,59 @@ def write_image(path: Path, image: Image, *, overwrite: bool = False) -> None:
         temporary.write_bytes(data)
 
 
-def _decode(data: bytes) -> tuple[Image, str]:
-    """Return a picture, and the decoder's first complaint; an empty one where there is none."""
-    size = picture_size(data)  # also keeps out formats for which OpenCV writes files of its own
-    if size is None:
-        raise ImageError(_NO_PICTURE)
-    _check_size(*size)
-    flags = cv2.IMREAD_COLOR_BGR | cv2.IMREAD_ANYDEPTH
-    image = None
+def _is_cut_off(data: bytes) -> bool:
+    """Return whether a JPEG file ends within its picture. It may hold others, as thumbnails."""
+    return data.startswith(b"\xff\xd8") and data.rfind(_JPEG_END) < data.rfind(_JPEG_SCAN)
+
+
+def _open(data: bytes) -> "PillowImage":
+    """Read the header of a picture. Raises `ImageError`."""
+    from PIL import Image as pillow  # noqa: N813
+
     try:
-        with capture_stderr() as comments:
-            image = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
-    except cv2.error as error:
-        if error.code == cv2.Error.StsNoMem:
-            raise MemoryError from error
-    if image is None:
-        raise ImageError(_NO_PICTURE)
-    _check_size(*image.shape[:2])  # should a decoder find another size than its header claims
-    complaints = [_PLACE.sub("", line) for line in comments if not line.startswith(_HARMLESS)]
-    return _to_uint8(image), complaints[0] if complaints else ""
+        picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
+    except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
+        raise ImageError(_TOO_LARGE) from error
+    except MemoryError:
+        raise
+    except Exception as error:  # Pillow raises a dozen kinds on damaged data
+        raise ImageError(_NO_PICTURE) from error
+    if max(picture.size) > MAX_PICTURE_SIDE or math.prod(picture.size) > MAX_PICTURE_PIXELS:
+        raise ImageError(_TOO_LARGE)
+    return picture
 
 
-def _check_size(*sides: int) -> None:
-    if max(sides) > MAX_PICTURE_SIDE or math.prod(sides) > MAX_PICTURE_PIXELS:
-        raise ImageError(
-            f"has more than {MAX_PICTURE_PIXELS:,} pixels, or a side of more than "
-            f"{MAX_PICTURE_SIDE:,}; make it smaller"
-        )
+def _orientation(picture: "PillowImage") -> Orientation:
+    from PIL.Image import Image as PillowImage
 
-
-@contextlib.contextmanager
-def capture_stderr() -> Iterator[list[str]]:
-    """Keep standard error silent in the block; the list then holds the lines written to it.
-
-    The C libraries that decode pictures comment there on damaged files.
-
-    Raises
-    ------
-    OutputError
-        There is no folder for temporary files.
-    """
-    lines: list[str] = []
-    with _stderr_lock, _temporary_file() as file, contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # a process may have no standard error
-            outside = os.dup(_STDERR)
-            stack.callback(os.close, outside)
-            stack.callback(os.dup2, outside, _STDERR)
-            os.dup2(file.fileno(), _STDERR)
-        yield lines
-        file.seek(0)
-        lines += file.read(_MAX_COMMENTS).decode("utf-8", "replace").splitlines()
-
-
-def _temporary_file() -> IO[bytes]:
     try:
-        return tempfile.TemporaryFile()
-    except OSError as error:
-        raise OutputError(
-            f"there is no folder for temporary files ({error.strerror}); name one as TMPDIR"
-        ) from error
+        # The method of a PNG picture would decode it, in search of EXIF data behind it.
+        number = PillowImage.getexif(picture).get(_ORIENTATION, 1)
+    except Exception:  # of many kinds, where the EXIF data are damaged
+        return Orientation()
+    return Orientation.of_exif(number) if number in range(1, 9) else Orientation()
 
 
-def _to_uint8(image: cv2.typing.MatLike) -> Image:
-    if image.dtype == np.uint8:
-        return image.astype(np.uint8, copy=False)
-    if image.dtype == np.uint16:
-        return np.asarray(cv2.convertScaleAbs(image, alpha=1 / 257), np.uint8)
-    scaled = np.empty(image.shape, np.uint8)
-    for number, values in enumerate(image):  # row by row: all at once would take gigabytes
-        shares = np.nan_to_num(values.astype(np.float32)).clip(0, 1)  # such pictures hold 0 to 1
-        scaled[number] = shares * 255 + 0.5
-    return scaled
+def _decode(data: bytes) -> Image:
+    picture = _open(data + _JPEG_END if _is_cut_off(data) else data)
+    turn = Orientation() if picture.format == _TURNED_BY_PILLOW else _orientation(picture)
+    try:
+        picture.load()
+        return upright(_to_bgr(picture), turn)
+    except MemoryError:
+        raise
+    except Exception as error:  # as in `_open`
+        raise ImageError(_NO_PICTURE) from error
+
+
+def _to_bgr(picture: "PillowImage") -> Image:
+    if white := _WHITE.get(picture.mode):
+        values = np.nan_to_num(np.asarray(picture, np.float32)) * (255 / white)
+        grey = np.rint(values.clip(0, 255)).astype(np.uint8)
+        return np.asarray(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), np.uint8)
+    picture.info.pop("transparency", None)  # it is dropped; Pillow would warn of some kinds
+    rgb = picture if picture.mode == "RGB" else picture.convert("RGB")
+    return np.asarray(cv2.cvtColor(np.asarray(rgb), cv2.COLOR_RGB2BGR), np.uint8)
 
 
 def split_channels(image: Image) -> tuple[Image, Image, Image]:

@@ -1,5 +1,6 @@
-"""Pictures as planes of luma and chroma, 4:2:0, as decoders give and encoders take them."""
+"""Pictures in the form in which they came: BGR, or the planes of luma and chroma of a decoder."""
 
+from functools import cached_property
 from typing import cast
 
 import av
@@ -94,3 +95,47 @@ def _plane(picture: av.VideoFrame, number: int) -> Image:
     values = np.frombuffer(cast(bytes, plane), np.uint8)  # it is not typed as such
     rows = values[: plane.line_size * plane.height].reshape(plane.height, plane.line_size)
     return rows[:, : plane.width]
+
+
+class Picture:
+    """An upright picture. What it was made from is shared, so nobody may change it.
+
+    Parameters
+    ----------
+    pixels
+        An image, BGR uint8 `(H, W, 3)`, or planes.
+    """
+
+    def __init__(self, pixels: Image | Planes) -> None:
+        self.pixels = pixels
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return int(self.pixels.shape[0])
+
+    @property
+    def width(self) -> int:
+        """Pixels."""
+        return int(self.pixels.shape[1])
+
+    @property
+    def planes(self) -> Planes | None:
+        """The planes, if it came so."""
+        return self.pixels if isinstance(self.pixels, Planes) else None
+
+    @cached_property
+    def image(self) -> Image:
+        """BGR uint8 `(H, W, 3)`; of planes, it is made when it is first asked for."""
+        return self.pixels.to_image() if isinstance(self.pixels, Planes) else self.pixels
+
+
+def bgr_of(picture: av.VideoFrame) -> Image:
+    """Return a decoded picture as BGR uint8 `(H, W, 3)`.
+
+    Colour matrix and range are those that the picture names; else BT.601 and limited.
+    """
+    if coding := Coding.of(picture):
+        return Planes(picture, coding).to_image()
+    image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), np.uint8)
+    return image.copy() if picture.format.name == "bgr24" else np.ascontiguousarray(image)

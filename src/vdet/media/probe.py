@@ -1,5 +1,6 @@
 """What a video file declares: its size, rate, length, colours."""
 
+from contextlib import suppress
 from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
@@ -9,14 +10,14 @@ from av.container import InputContainer
 from av.stream import Disposition, Stream
 from av.video.stream import VideoStream
 
-from vdet.errors import VideoError
+from vdet.errors import ImageError, VideoError
 from vdet.media.coding import Coding
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
 from vdet.media.frame import ColorTags, Tags, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS
+from vdet.media.images import read_header
 from vdet.media.numbered import find_sequence
-from vdet.media.orientation import Orientation, orientation
-from vdet.media.picture_size import jpeg_orientation
+from vdet.media.orientation import Orientation
 
 _DEFAULT_RATE = Fraction(25)
 _BT709 = ColorTags(1, 1, 1)
@@ -55,11 +56,10 @@ def check_size(path: Path, width: int, height: int) -> None:
 
 
 def _orientation(path: Path, first: av.VideoFrame) -> Orientation:
-    if sequence := find_sequence(path):  # where there are EXIF data, PyAV gives only the rotation
-        number = jpeg_orientation(sequence.first_picture.read_bytes())
-        if number is not None:
-            return Orientation.of_exif(number)
-    return orientation(first) or Orientation()
+    if sequence := find_sequence(path):
+        with suppress(ImageError):  # of a format that only FFmpeg reads
+            return read_header(sequence.first_picture)[1]
+    return Orientation.of_frame(first)
 
 
 def describe(
@@ -72,7 +72,7 @@ def describe(
     duration = stated_duration(stream, start) or _longest(container)
     turn = _orientation(path, first)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
-    if turn.rotation in (90, 270):
+    if turn.is_sideways:
         width, height, aspect = height, width, 1 / aspect
     return VideoInfo(
         path=path,

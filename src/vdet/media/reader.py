@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Self
 
 import av
+import cv2
+import numpy as np
 
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
@@ -20,10 +22,8 @@ from vdet.media.frame import Frame, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS, StandardRange
 from vdet.media.images import Image
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
-from vdet.media.orientation import Orientation, orientation, upright
-from vdet.media.picture import Picture
-from vdet.media.pixels import resized, to_bgr
-from vdet.media.planes import Planes
+from vdet.media.orientation import Orientation, upright
+from vdet.media.planes import Picture, Planes, bgr_of
 from vdet.media.probe import check_size, describe, moving_streams, stated_duration
 from vdet.media.restarts import restarts_clock
 
@@ -162,8 +162,6 @@ class VideoReader:
             )
 
     def _note_what_is_left_out(self, first: av.VideoFrame) -> None:
-        if orientation(first) is None:
-            self._faults.append("its display matrix is no quarter turn; frames stay as stored")
         if self._standard_range:
             name = HDR_TRANSFERS[first.color_trc]
             self._faults.append(f"is HDR ({name}) and is read as standard range (BT.709)")
@@ -217,8 +215,7 @@ class VideoReader:
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info
         try:
-            coding = Coding.of(picture)
-            image = Planes(picture, coding).to_image() if coding else to_bgr(picture)
+            image = bgr_of(picture)
         except (av.FFmpegError, ValueError) as error:
             pixels = picture.format.name
             raise VideoError(
@@ -228,9 +225,11 @@ class VideoReader:
             image = self._standard_range.convert(image)
         image = upright(image, info.orientation)
         height, width = image.shape[:2]
-        if (width, height) != (info.width, info.height):
-            self._scaled.add((width, height))
-        return resized(image, info.width, info.height)
+        if (width, height) == (info.width, info.height):
+            return image
+        self._scaled.add((width, height))
+        size = info.width, info.height
+        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def _timed(
         self, first: av.VideoFrame, before: int

@@ -17,8 +17,7 @@ from vdet.media.coding import Coding
 from vdet.media.demux import is_pipe, open_input
 from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
 from vdet.media.mp4_index import begins_like_mp4
-from vdet.media.picture import Picture
-from vdet.media.planes import Planes
+from vdet.media.planes import Picture, Planes
 from vdet.media.sound import SoundCopy
 from vdet.version import __version__
 

@@ -10,7 +10,7 @@ from vdet.labels.pictures.folders import pictures_below
 from vdet.labels.pictures.labelled import ImageLabels, Label
 from vdet.labels.rows import line_error
 from vdet.labels.yolo import DATA, class_names, yolo_box
-from vdet.media.images import read_size
+from vdet.media.images import read_header
 
 _NO_LABELS = "classes.txt"
 """A file that label tools write beside the labels."""
@@ -56,7 +56,7 @@ def _class_names(folder: Path) -> list[str]:
 
 def _labelled(picture: Path, file: Path, names: list[str]) -> ImageLabels:
     try:
-        size = read_size(picture)
+        size, _ = read_header(picture)
     except ImageError as error:
         raise TruthError(str(error)) from error
     lines = numbered_lines(read_text(file))
