@@ -36,7 +36,7 @@ EXTRAS = {
 """The packages of each extra, as `pyproject.toml` has them."""
 
 NEEDED = (
-    *("onnxruntime", "scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib"),
+    *("onnxruntime", "scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib", "pillow"),
     *("threadpoolctl", "tqdm"),
 )
 DECODERS = ("h264", "hevc", "av1", "vp9", "mpeg4", "mjpeg")
