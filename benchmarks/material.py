@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.config.loading import find_config, load_settings
-from vdet.config.schema import Settings, SvmSettings
+from vdet.config.schema import Settings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
@@ -25,12 +25,6 @@ class ShippedConfig:
     @property
     def detector(self) -> SvmModel:
         return SvmModel(self.model, self.settings.svm)
-
-    def with_engine(self, engine: str) -> SvmSettings:
-        """Return the detector's settings with another search engine."""
-        settings = self.settings.svm
-        search = settings.search.model_copy(update={"engine": engine})
-        return settings.model_copy(update={"search": search})
 
 
 def shipped_config(name: str) -> ShippedConfig:

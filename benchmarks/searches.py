@@ -9,10 +9,12 @@ import cv2
 import numpy as np
 
 from benchmarks.material import ShippedConfig
+from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.search import FrameSearch
+from vdet.detect.svm.dense_search import dense_search
+from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 
@@ -39,9 +41,9 @@ def search_times(
     Where not every frame of the video is searched, the searched ones count for the others too.
     """
     searches = {
-        "svm dense": _search(svm, "dense", pictures),
-        "seed patch": _search(seed, "patch", pictures),
-        "seed dense": _search(seed, "dense", pictures),
+        "svm dense": _search(svm, pictures),
+        "seed patch": _search(seed, pictures, PatchSearch),
+        "seed dense": _search(seed, pictures),
         "detectMultiScale": _detect_multi_scale(pictures),
         "svm detection": _detection(SvmSettings(), pictures),
         "network detection": _detection(NetworkSettings(), pictures),
@@ -53,10 +55,12 @@ def search_times(
     return per_frame | _decoding(path, svm, pictures, rounds)
 
 
-def _search(config: ShippedConfig, engine: str, pictures: Sequence[Picture]) -> Task:
+def _search(
+    config: ShippedConfig, pictures: Sequence[Picture], engine: Engine = dense_search
+) -> Task:
     """Search the pictures."""
     width, height = pictures[0].width, pictures[0].height
-    search = FrameSearch(config.model, config.with_engine(engine), width, height)
+    search = FrameSearch(config.model, config.settings.svm, width, height, engine=engine)
 
     def run() -> None:
         for picture in pictures:
@@ -105,7 +109,7 @@ def _decoding(
 
     tasks = {
         "decoding": decode,
-        "svm": _search(svm, "dense", pictures),
+        "svm": _search(svm, pictures),
         "network": _detection(NetworkSettings(), pictures),
     }
     times = measure(tasks, rounds)
@@ -126,6 +130,6 @@ def times_by_height(
         width = images[0].shape[1] * height // images[0].shape[0]
         scaled = [np.asarray(cv2.resize(image, (width, height)), np.uint8) for image in images]
         planes = [Picture(Planes.of_image(image, Coding())) for image in scaled]
-        tasks[str(height)] = _search(svm, "dense", planes)
+        tasks[str(height)] = _search(svm, planes)
     times = measure(tasks, rounds)
     return {int(name): seconds / len(images) for name, seconds in times.items()}

@@ -22,7 +22,6 @@ detector:
   kind: svm
   reference_height: 720
   search:
-    engine: auto
     probability: 0.5
     windows:
     - {size: 160, overlap: 0.5, top: 380, bottom: 600}

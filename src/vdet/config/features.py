@@ -41,14 +41,6 @@ class HistogramSettings(Section):
     )
 
 
-class SpatialSettings(Section):
-    """The pixels of the shrunk patch."""
-
-    size: int = Field(
-        0, ge=0, le=64, description="side of the shrunk patch, pixels; 0 for no such features"
-    )
-
-
 class FeatureSettings(Section):
     """Features of a patch; they must be those that the model was trained with."""
 
@@ -63,21 +55,17 @@ class FeatureSettings(Section):
     )
     hog: HogSettings = HogSettings()
     histogram: HistogramSettings = HistogramSettings()
-    spatial: SpatialSettings = SpatialSettings()
 
     @model_validator(mode="after")
     def _cells_fill_the_patch(self) -> "FeatureSettings":
-        if not (self.hog.channels or self.histogram.bins or self.spatial.size):
-            raise ValueError("at least one of hog, histogram and spatial must be on")
-        if self.hog.channels:
-            if self.patch % self.hog.cell:
-                raise ValueError(f"patch must be a multiple of hog.cell ({self.hog.cell})")
-            if self.hog.block * self.hog.cell > self.patch:
-                raise ValueError("hog.block × hog.cell must not exceed patch")
-            if self.halved and (self.hog.cell % 2 or self.hog.cell < 4):
-                raise ValueError("hog.cell must be even, and 4 or more, or halved must be []")
-        if self.halved and self.patch % 2:
-            raise ValueError("patch must be even, or halved must be []")
+        if not (self.hog.channels or self.histogram.bins):
+            raise ValueError("at least one of hog and histogram must be on")
+        if self.patch % self.hog.cell:
+            raise ValueError(f"patch must be a multiple of hog.cell ({self.hog.cell})")
+        if self.hog.block * self.hog.cell > self.patch:
+            raise ValueError("hog.block × hog.cell must not exceed patch")
+        if self.halved and (self.hog.cell % 2 or self.hog.cell < 4):
+            raise ValueError("hog.cell must be even, and 4 or more, or halved must be []")
         return self
 
     def shrink(self, channel: int) -> int:

@@ -19,7 +19,6 @@ from vdet.config.features import (
     FeatureSettings,
     HistogramSettings,
     HogSettings,
-    SpatialSettings,
 )
 from vdet.config.heat import HeatSettings, VoteSettings
 from vdet.config.input import InputSettings
@@ -72,7 +71,6 @@ __all__ = [
     "SearchSettings",
     "Section",
     "Settings",
-    "SpatialSettings",
     "StillSettings",
     "SummarySettings",
     "SvmSettings",

@@ -1,6 +1,6 @@
 """The section `detector.search`: which windows of a frame are searched, and how."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, model_validator
 
@@ -24,8 +24,8 @@ class WindowSettings(Section):
     step: int | None = Field(
         None,
         ge=1,
-        description="distance to the next window, cells of the patch; the dense engine is faster "
-        "with step than with overlap",
+        description="distance to the next window, cells of the patch; the search is faster with "
+        "step than with overlap",
     )
     top: Pixels = Field(description="first row of the band")
     bottom: Pixels = Field(description="first row below the band")
@@ -87,12 +87,6 @@ class PerspectiveSettings(Section):
 class SearchSettings(Section):
     """Which windows of a frame are searched, and how."""
 
-    engine: Literal["auto", "dense", "patch"] = Field(
-        "auto",
-        description="patch: each window is cropped, resized and classified on its own; dense: the "
-        "features of a strip are computed once for all windows in it, which is many times faster; "
-        "auto: dense if it can compute the features, else patch",
-    )
     probability: Share = Field(
         0.3, description="least probability of a hit, a window that counts as evidence"
     )

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from benchmarks.patch_search import PatchSearch
 
 from seed import SEED
 from vdet.boxes import Float32Array
@@ -12,7 +13,6 @@ from vdet.config.schema import FeatureSettings, WindowSettings
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes

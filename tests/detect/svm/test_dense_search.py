@@ -3,36 +3,28 @@
 A texture that is drawn into one window must be found in that window.
 """
 
-import logging
 from fractions import Fraction
 
 import cv2
 import numpy as np
 import pytest
+from benchmarks.patch_search import PatchSearch
 
 from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
     HogSettings,
-    SearchSettings,
-    SpatialSettings,
-    SvmSettings,
-    WindowSettings,
 )
 from vdet.detect.svm.dense_search import (
     AlignedSearch,
     LocatedSearch,
     PhasedSearch,
     dense_search,
-    why_not_dense,
 )
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.search import FrameSearch, lay_grids
 from vdet.detect.svm.windows import WindowGrid
-from vdet.errors import ConfigError
 from vdet.media import Picture
 from vdet.media.images import Image
 
@@ -136,90 +128,3 @@ def test_a_search_does_not_change_later_searches() -> None:
         for found in (first, again):
             np.testing.assert_array_equal(found.probabilities, kept)
             np.testing.assert_array_equal(found.hogs(np.arange(len(grid))), hogs)
-
-
-SPATIAL = FeatureSettings(spatial=SpatialSettings(size=4))
-NO_HOG = FeatureSettings(hog=HogSettings(channels=()))
-NOISE = np.random.default_rng(0).integers(0, 256, (90, 160, 3), dtype=np.uint8)
-REASONS = {"detector.features.spatial": SPATIAL, "features without HOG": NO_HOG}
-
-
-def model_of(features: FeatureSettings) -> LinearModel:
-    length = FeatureExtractor(features).layout.length
-    weights = np.random.default_rng(1).normal(scale=0.01, size=(1, length)).astype(np.float32)
-    zero, one = np.zeros(1, np.float32), np.ones(1, np.float32)
-    return LinearModel(features, weights, zero, -one, zero)
-
-
-def settings(engine: str) -> SvmSettings:
-    search = SearchSettings.model_validate(
-        {
-            "engine": engine,
-            "windows": [WindowSettings(size=32, step=1, top=20, bottom=80)],
-            "perspective": {"sizes": []},
-        }
-    )
-    return SvmSettings(reference_height=90, search=search)
-
-
-def searched(features: FeatureSettings, engine: str) -> np.ndarray:
-    windows = FrameSearch(model_of(features), settings(engine), 160, 90).search(Picture(NOISE))
-    return windows.probabilities
-
-
-def by_patch(features: FeatureSettings) -> np.ndarray:
-    model = model_of(features)
-    (grid,) = lay_grids(settings("patch"), features, 160, 90)
-    frame = FramePyramid(Picture(NOISE), features)
-    return PatchSearch(model, grid).search(frame).probabilities
-
-
-@pytest.fixture(autouse=True)
-def log(caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(logging.getLogger("vdet"), "propagate", True)  # the program turns this off
-    caplog.set_level(logging.INFO, logger="vdet")
-
-
-@pytest.mark.parametrize("reason", REASONS)
-def test_features_that_cannot_be_dense_are_searched_by_patch_and_logged(
-    reason: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    features = REASONS[reason]
-    np.testing.assert_array_equal(searched(features, "auto"), by_patch(features))
-    (record,) = caplog.records
-    assert record.levelno == logging.INFO
-    assert record.getMessage() == (
-        f"the patch engine searches, because the dense one cannot compute {reason}"
-    )
-
-
-@pytest.mark.parametrize("reason", REASONS)
-def test_the_dense_engine_refuses_features_that_cannot_be_dense(reason: str) -> None:
-    message = rf"^detector\.search\.engine: dense cannot compute {reason}; take auto or patch$"
-    with pytest.raises(ConfigError, match=message):
-        searched(REASONS[reason], "dense")
-
-
-@pytest.mark.parametrize("features", [FeatureSettings(), SPATIAL, NO_HOG])
-def test_the_patch_engine_takes_any_features_and_logs_nothing(
-    features: FeatureSettings, caplog: pytest.LogCaptureFixture
-) -> None:
-    np.testing.assert_array_equal(searched(features, "patch"), by_patch(features))
-    assert caplog.records == []
-
-
-@pytest.mark.parametrize("engine", ["auto", "dense"])
-def test_other_features_are_searched_densely_and_nothing_is_logged(
-    engine: str, caplog: pytest.LogCaptureFixture
-) -> None:
-    dense = searched(FeatureSettings(), engine)
-    assert np.corrcoef(dense, by_patch(FeatureSettings()))[0, 1] > 0.5
-    assert (dense != by_patch(FeatureSettings())).any()  # at the edges of patches
-    assert caplog.records == []
-
-
-def test_the_reason_against_the_dense_engine_is_named() -> None:
-    assert why_not_dense(FeatureSettings()) is None
-    assert why_not_dense(FeatureSettings(histogram=HistogramSettings(bins=0))) is None
-    assert why_not_dense(SPATIAL) == "detector.features.spatial"
-    assert why_not_dense(NO_HOG) == "features without HOG"

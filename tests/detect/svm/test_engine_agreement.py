@@ -7,6 +7,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
+from benchmarks.patch_search import PatchSearch
 
 from detect.svm.engine_comparison import (
     SEED_FEATURES,
@@ -39,7 +40,7 @@ from vdet.detect.svm.horizon import find_horizon
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import BoxRegression, LinearModel, load_model
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.detect.svm.search import Engine, FrameSearch, lay_grids
 from vdet.detect.svm.strips import Strip, describe_blocks
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.media import Picture, Planes
@@ -185,14 +186,14 @@ def test_the_engines_agree_on_the_real_road(name: str, real_frames: list[Image])
     assert_agree(EngineResults(dense, patch))
 
 
-def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: str) -> Windows:
+def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: Engine) -> Windows:
     """Search a frame with the windows of one grid."""
-    search = SearchSettings.model_validate({"engine": engine, "probability": PROBABILITY})
-    settings = SvmSettings(search=search)
+    settings = SvmSettings(search=SearchSettings(probability=PROBABILITY))
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("vdet.detect.svm.search.lay_grids", lambda *_, **__: [grid])
         height, width = image.shape[:2]
-        return FrameSearch(model, settings, width, height).search(Picture(image))
+        search = FrameSearch(model, settings, width, height, engine=engine)
+        return search.search(Picture(image))
 
 
 def _without_edges(model: LinearModel) -> LinearModel:
@@ -212,7 +213,9 @@ def _vehicles_by_both(model: LinearModel, kind: type) -> tuple[Windows, Windows]
     left, columns = Fraction(-2 * step), (440 + 4 * step - 96) // step + 1
     grid = WindowGrid(96, Fraction(step), left, Fraction(8), columns, rows=5)
     assert type(dense_search(model, grid)) is kind
-    dense, patch = (_vehicles(model, grid, cars(), engine) for engine in ("dense", "patch"))
+    dense, patch = (
+        _vehicles(model, grid, cars(), engine) for engine in (dense_search, PatchSearch)
+    )
     hits = [found.probabilities >= PROBABILITY for found in (dense, patch)]
     assert (hits[0] & hits[1]).sum() > 5
     same = hits[0] == hits[1]

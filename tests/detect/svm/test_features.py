@@ -12,7 +12,6 @@ from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
     HogSettings,
-    SpatialSettings,
 )
 from vdet.detect.svm.features import (
     FeatureExtractor,
@@ -28,7 +27,6 @@ from vdet.detect.svm.features import (
 PATCH = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 FEATURES = SEED.svm.features
 NO_HOG = HogSettings(channels=())
-NO_HISTOGRAM = HistogramSettings(bins=0)
 
 
 def seed_but(**changes: object) -> FeatureSettings:
@@ -45,11 +43,10 @@ def test_a_vector_of_the_seed_settings_has_4800_features() -> None:
 
 
 def test_the_layout_names_the_parts_of_a_vector() -> None:
-    layout = Layout.of(seed_but(spatial=SpatialSettings(size=8)))
+    layout = Layout.of(FEATURES)
     assert layout.hog == (slice(0, 1568), slice(1568, 3136), slice(3136, 4704))
     assert layout.histogram == slice(4704, 4800)
-    assert layout.spatial == slice(4800, 4992)
-    assert layout.length == 4992
+    assert layout.length == 4800
 
 
 @pytest.mark.parametrize(
@@ -58,9 +55,8 @@ def test_the_layout_names_the_parts_of_a_vector() -> None:
         FeatureSettings(),
         FEATURES,
         seed_but(patch=48, hog=HogSettings(cell=6, block=3, orientations=9, channels=(1,))),
-        seed_but(hog=NO_HOG, histogram=NO_HISTOGRAM, spatial=SpatialSettings(size=4)),
     ],
-    ids=["default", "seed", "other HOG", "spatial only"],
+    ids=["default", "seed", "other HOG"],
 )
 def test_a_vector_is_as_long_as_its_layout(settings: FeatureSettings) -> None:
     extractor = FeatureExtractor(settings)
@@ -93,11 +89,9 @@ def test_a_histogram_of_one_colour_has_all_its_bins() -> None:
 
 @pytest.mark.parametrize("space", get_args(ColorSpace))
 def test_every_colour_space_is_that_of_opencv(space: ColorSpace) -> None:
-    settings = seed_but(color_space=space, hog=NO_HOG, spatial=SpatialSettings(size=64))
+    settings = seed_but(color_space=space)
     converted = cv2.cvtColor(PATCH, getattr(cv2, f"COLOR_BGR2{space}"))
     np.testing.assert_array_equal(split(PATCH, settings), converted.transpose(2, 0, 1))
-    spatial = FeatureExtractor(settings).describe(PATCH)[96:]
-    np.testing.assert_array_equal(spatial.reshape(3, 64, 64), converted.transpose(2, 0, 1))
 
 
 def test_a_red_patch_is_red_in_rgb() -> None:
@@ -111,7 +105,7 @@ def test_a_red_patch_is_red_in_rgb() -> None:
 @pytest.mark.parametrize("channels", [(0,), (2, 0), (1, 2)])
 def test_hog_may_be_of_some_channels_in_any_order(channels: tuple[int, ...]) -> None:
     some = FEATURES.hog.model_copy(update={"channels": channels})
-    extractor = FeatureExtractor(seed_but(hog=some, histogram=NO_HISTOGRAM))
+    extractor = FeatureExtractor(seed_but(hog=some, histogram=HistogramSettings(bins=0)))
     everything = FeatureExtractor(FEATURES).describe(PATCH)[:4704].reshape(3, 1568)
     assert extractor.layout.length == 1568 * len(channels)
     np.testing.assert_array_equal(
@@ -140,32 +134,9 @@ def test_without_hog_only_the_histogram_is_left() -> None:
     assert extractor.describe(PATCH).sum() == 3 * 64 * 64
 
 
-@pytest.mark.parametrize("patch", [17, 20, 100])
-def test_without_hog_a_patch_need_not_be_a_multiple_of_the_cell(patch: int) -> None:
-    settings = seed_but(patch=patch, hog=NO_HOG)
-    assert FeatureExtractor(settings).describe(to_patch(PATCH, patch)).sum() == 3 * patch**2
-
-
-def test_spatial_features_are_the_shrunk_channels() -> None:
-    settings = seed_but(
-        hog=NO_HOG, histogram=NO_HISTOGRAM, spatial=SpatialSettings(size=16), color_space="RGB"
-    )
-    extractor = FeatureExtractor(settings)
-    assert extractor.layout.length == 768
-    means = PATCH[..., ::-1].reshape(16, 4, 16, 4, 3).mean(axis=(1, 3)).transpose(2, 0, 1)
-    np.testing.assert_allclose(extractor.describe(PATCH).reshape(3, 16, 16), means, atol=0.5)
-
-
-def test_spatial_features_come_last() -> None:
-    settings = seed_but(spatial=SpatialSettings(size=8))
-    vector = FeatureExtractor(settings).describe(PATCH)
-    np.testing.assert_array_equal(vector[:4800], FeatureExtractor(FEATURES).describe(PATCH))
-    assert len(vector) == 4800 + 192
-
-
 @pytest.mark.parametrize(
     "settings",
-    [FEATURES, seed_but(color_space="HLS", spatial=SpatialSettings(size=8))],
+    [FEATURES, seed_but(color_space="HLS")],
     ids=["seed", "other space"],
 )
 def test_channels_are_described_as_the_patch_that_they_are_of(settings: FeatureSettings) -> None:

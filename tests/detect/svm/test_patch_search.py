@@ -4,15 +4,16 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from benchmarks import patch_search
+from benchmarks.patch_search import PatchSearch
 
 from detect.svm.engine_comparison import cars, fitted, grid_of, log_odds
 from seed import SEED
 from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
-from vdet.detect.svm import dense_search, patch_search
+from vdet.detect.svm import dense_search
 from vdet.detect.svm.dense_search import LocatedSearch
 from vdet.detect.svm.features import FeatureExtractor, Layout, resize, to_patch
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid
 from vdet.media import Picture, Planes

@@ -1,9 +1,8 @@
-import logging
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
+from benchmarks.patch_search import PatchSearch
 
 import seed
 from vdet.boxes import Int32Array
@@ -13,16 +12,16 @@ from vdet.config.schema import (
     HogSettings,
     PerspectiveSettings,
     SearchSettings,
-    SpatialSettings,
     SvmSettings,
     WindowSettings,
 )
+from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.perspective import lay_perspective
-from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.detect.svm.search import Engine, FrameSearch, lay_grids
 from vdet.detect.svm.windows import Windows
-from vdet.errors import ConfigError, FrameSizeError, ImageError
+from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 from vdet.media.images import Image
 
@@ -51,21 +50,14 @@ def laid(
     return np.concatenate([grid.boxes for grid in grids])
 
 
-def search_of(
-    features: FeatureSettings, engine: Literal["auto", "dense", "patch"] = "auto"
-) -> FrameSearch:
-    settings = SvmSettings(
-        reference_height=120, features=features, search=fixed(*SETS, engine=engine)
-    )
-    return FrameSearch(model_of(features), settings, 160, 120)
+def search_of(features: FeatureSettings, engine: Engine = dense_search) -> FrameSearch:
+    settings = SvmSettings(reference_height=120, features=features, search=fixed(*SETS))
+    return FrameSearch(model_of(features), settings, 160, 120, engine=engine)
 
 
-def fixed(
-    *sets: WindowSettings, engine: Literal["auto", "dense", "patch"] = "auto"
-) -> SearchSettings:
+def fixed(*sets: WindowSettings) -> SearchSettings:
     """Return settings with these sets and no others."""
-    none = PerspectiveSettings(sizes=())
-    return SearchSettings(engine=engine, windows=sets, perspective=none)
+    return SearchSettings(windows=sets, perspective=PerspectiveSettings(sizes=()))
 
 
 PERSPECTIVE = SvmSettings(
@@ -81,15 +73,11 @@ def by_perspective() -> FrameSearch:
     return FrameSearch(model_of(SMALL), PERSPECTIVE, 160, 120, horizon=0.3)
 
 
-def with_sides(
-    sides: Sides,
-    engine: Literal["auto", "dense", "patch"] = "auto",
-    probability: float | None = None,
-) -> FrameSearch:
+def with_sides(sides: Sides, probability: float | None = None) -> FrameSearch:
     """Return a search whose regression gives equal sides for all hits, half of the windows."""
     length = Layout.of(SMALL).hog_length
     boxes = BoxRegression(np.zeros((4, length), np.float32), np.array(sides, np.float32))
-    search = fixed(*SETS, engine=engine).model_copy(
+    search = fixed(*SETS).model_copy(
         update={"probability": MEDIAN if probability is None else probability}
     )
     settings = SvmSettings(reference_height=120, features=SMALL, search=search)
@@ -186,11 +174,8 @@ class TestLayingGrids:
 
 
 class TestSearching:
-    @pytest.mark.parametrize("engine", ["dense", "patch"])
-    def test_every_window_of_every_set_has_a_probability_and_its_share(
-        self, engine: Literal["dense", "patch"]
-    ) -> None:
-        found = search_all(search_of(SMALL, engine))
+    def test_every_window_of_every_set_has_a_probability_and_its_share(self) -> None:
+        found = search_all(search_of(SMALL))
         # 4 cells across: the first set's step is 8 pixels of 32, the second's 24 of 48
         assert len(found) == 17 * 5 + 5 * 3
         assert found.boxes[0].tolist() == [0, 24, 32, 32]
@@ -201,8 +186,8 @@ class TestSearching:
         assert len(np.unique(found.probabilities)) > len(found) / 2
 
     def test_the_engines_agree(self) -> None:
-        dense = search_all(search_of(SMALL, "dense"))
-        patch = search_all(search_of(SMALL, "patch"))
+        dense = search_all(search_of(SMALL))
+        patch = search_all(search_of(SMALL, PatchSearch))
         np.testing.assert_array_equal(dense.boxes, patch.boxes)
         assert np.corrcoef(dense.probabilities, patch.probabilities)[0, 1] > 0.9
 
@@ -248,12 +233,9 @@ class TestVehicles:
         np.testing.assert_array_equal(found.vehicles, found.boxes)
         assert found.vehicles.dtype == np.float32
 
-    @pytest.mark.parametrize("engine", ["dense", "patch"])
-    def test_the_vehicles_of_hits_are_where_the_regression_puts_them(
-        self, engine: Literal["dense", "patch"]
-    ) -> None:
+    def test_the_vehicles_of_hits_are_where_the_regression_puts_them(self) -> None:
         # left, top, right, bottom from the middle, in sides of the window
-        found = search_all(with_sides((-0.25, 0, 0.5, 0.375), engine))
+        found = search_all(with_sides((-0.25, 0, 0.5, 0.375)))
         hits = found.probabilities >= MEDIAN
         assert 10 < hits.sum() < len(found) - 10
         expected = [
@@ -283,40 +265,6 @@ class TestVehicles:
     def test_without_hits_vehicles_are_the_windows(self) -> None:
         found = search_all(with_sides((-1, -1, 1, 1), probability=1))
         np.testing.assert_array_equal(found.vehicles, found.boxes)
-
-
-class TestEngines:
-    def test_auto_takes_the_dense_engine_if_it_can_compute_the_features(self) -> None:
-        auto, dense = (search_all(search_of(SMALL, engine)) for engine in ("auto", "dense"))
-        np.testing.assert_array_equal(auto.probabilities, dense.probabilities)
-
-    @pytest.mark.parametrize(
-        ("features", "missing"),
-        [
-            (COLOUR, "features without HOG"),
-            (
-                SMALL.model_copy(update={"spatial": SpatialSettings(size=4)}),
-                "detector.features.spatial",
-            ),
-        ],
-        ids=["colour only", "spatial"],
-    )
-    def test_auto_takes_the_patch_engine_for_other_features(
-        self, features: FeatureSettings, missing: str, caplog: pytest.LogCaptureFixture
-    ) -> None:
-        with caplog.at_level(logging.INFO, "vdet"):
-            auto = search_all(search_of(features))
-        assert (
-            f"the patch engine searches, because the dense one cannot compute {missing}"
-            in caplog.text
-        )
-        patch = search_all(search_of(features, "patch"))
-        np.testing.assert_array_equal(auto.probabilities, patch.probabilities)
-        with pytest.raises(
-            ConfigError,
-            match=rf"^detector\.search\.engine: dense cannot compute {missing}; take auto or",
-        ):
-            search_of(features, "dense")
 
 
 @pytest.mark.parametrize(("width", "height"), [(63, 720), (1, 1), (2, 2), (40, 2000)])

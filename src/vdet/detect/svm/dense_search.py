@@ -12,7 +12,6 @@ from fractions import Fraction
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.features import Channels, Layout, patch_descriptors
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
@@ -30,15 +29,6 @@ MAX_PHASES = 2
 """Of `PhasedSearch`, across and down. With more, `LocatedSearch` is faster."""
 BATCH = 8192
 """Number of windows that are described before they are classified; it bounds the memory."""
-
-
-def why_not_dense(features: FeatureSettings) -> str | None:
-    """Return what the dense engine cannot compute of these features; None where it can."""
-    if features.spatial.size:
-        return "detector.features.spatial"
-    if not features.hog.channels:
-        return "features without HOG"
-    return None
 
 
 def dense_search(
@@ -175,7 +165,7 @@ class LocatedSearch:
 
     def _describe(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
         """Return the HOG features of each window, float32 `(n, h)`, channel by channel."""
-        described = []
+        described = [np.zeros((len(x), 0), np.float32)]  # all there is without HOG
         for number, hog in self._descriptors.items():
             shrink = self._model.features.shrink(number)
             places = zip((x // shrink).tolist(), (y // shrink).tolist(), strict=True)

@@ -86,8 +86,6 @@ class SvmDetector:
         No search window fits into such a frame.
     ImageError
         Too many windows fit into such a frame.
-    ConfigError
-        The dense engine is asked for, and cannot compute the model's features.
     """
 
     def __init__(

@@ -1,7 +1,6 @@
-"""A patch → its feature vector: HOG and colour histogram of each channel, and the shrunk patch.
+"""A patch → its feature vector: HOG and colour histogram of each channel.
 
-Sources: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 2005; seed
-section 1.
+Source: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 2005.
 """
 
 import itertools
@@ -36,7 +35,6 @@ class Layout:
 
     hog: tuple[slice, ...]
     histogram: slice
-    spatial: slice
 
     @staticmethod
     def of(settings: FeatureSettings) -> "Layout":
@@ -46,10 +44,7 @@ class Layout:
         length = blocks**2 * hog.block**2 * hog.orientations
         starts = [i * length for i in range(len(hog.channels) + 1)]
         histogram = slice(starts[-1], starts[-1] + 3 * settings.histogram.bins)
-        spatial = slice(histogram.stop, histogram.stop + 3 * settings.spatial.size**2)
-        return Layout(
-            tuple(itertools.starmap(slice, itertools.pairwise(starts))), histogram, spatial
-        )
+        return Layout(tuple(itertools.starmap(slice, itertools.pairwise(starts))), histogram)
 
     @property
     def hog_length(self) -> int:
@@ -59,7 +54,7 @@ class Layout:
     @property
     def length(self) -> int:
         """Number of all features; 4,800 for the seed's settings."""
-        return int(self.spatial.stop)
+        return int(self.histogram.stop)
 
 
 class FeatureExtractor:
@@ -67,7 +62,7 @@ class FeatureExtractor:
 
     The parts of a vector, in order: HOG channel by channel (each as `cv2.HOGDescriptor.compute`
     gives it: blocks column by column from the top, then cells, then orientations), colour histogram
-    channel by channel, shrunk patch channel by channel.
+    channel by channel.
     """
 
     def __init__(self, settings: FeatureSettings) -> None:
@@ -85,7 +80,7 @@ class FeatureExtractor:
 
         Returns
         -------
-        float32 `(layout.length,)`: HOG 0 to 1, histogram in pixels, shrunk patch 0 to 255.
+        float32 `(layout.length,)`: HOG 0 to 1, histogram in pixels.
         """
         return self.describe_channels(split(patch, self.settings))
 
@@ -95,8 +90,6 @@ class FeatureExtractor:
         parts += [hog.compute(channels[i]) for i, hog in self._descriptors.items()]
         if self.settings.histogram.bins:
             parts += [histogram(channel, self.settings.histogram.bins) for channel in channels]
-        if side := self.settings.spatial.size:
-            parts += [cv2.resize(c, (side, side), interpolation=cv2.INTER_AREA) for c in channels]
         return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
 
     def describe_all(self, patches: Iterable[Image]) -> Float32Array:

@@ -205,8 +205,10 @@ def _parse_header(array: npt.NDArray[Any], path: Path) -> dict[str, Any]:
 
 def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
     try:
-        # Older files do not say which channels are halved: none is.
-        return FeatureSettings.model_validate({"halved": ()} | header["features"])
+        # Older files do not say which channels are halved: none is. They name shrunk patches too.
+        known = {"halved": ()} | header["features"]
+        known.pop("spatial", None)
+        return FeatureSettings.model_validate(known)
     except (KeyError, TypeError, ValidationError) as error:
         raise ModelError(
             f"{path}: its feature settings are not understood; train it again"

@@ -1,22 +1,21 @@
 """The search of one frame size: window sets laid over the frame, each searched by an engine."""
 
-import logging
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.config.schema import FeatureSettings, SearchSettings, SvmSettings
+from vdet.config.schema import FeatureSettings, SvmSettings
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.dense_search import dense_search, why_not_dense
+from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.limits import ALIGNMENT, limited_grid
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.patch_search import PatchSearch
 from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, join_windows, lay_grid
-from vdet.errors import ConfigError, FrameSizeError, ImageError
+from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 from vdet.regions import SearchArea
 
@@ -25,14 +24,16 @@ MAX_WINDOWS = 100_000
 
 _MIN_SIDE = 0.2  # of the smallest vehicle that a window can show, sides of the window
 
-log = logging.getLogger("vdet")
-
 
 class GridSearch(Protocol):
     """An engine for the windows of one grid."""
 
     def search(self, frame: FramePyramid) -> GridResult:
         """Return the probability of each window."""
+
+
+Engine = Callable[[LinearModel, WindowGrid], GridSearch]
+"""Makes the search of a grid."""
 
 
 class FrameSearch:
@@ -56,8 +57,6 @@ class FrameSearch:
         No window fits into such a frame.
     ImageError
         More than `MAX_WINDOWS` windows fit, or none reaches `area`.
-    ConfigError
-        The dense engine is asked for, and cannot compute the model's features.
     """
 
     def __init__(
@@ -69,6 +68,7 @@ class FrameSearch:
         *,
         horizon: float = DEFAULT_HORIZON,
         area: SearchArea | None = None,
+        engine: Engine = dense_search,
     ) -> None:
         grids = tuple(lay_grids(settings, model.features, width, height, horizon=horizon))
         if not grids:
@@ -83,7 +83,6 @@ class FrameSearch:
                 f"more than {MAX_WINDOWS:,}; give larger steps or fewer rows in "
                 "detector.search.windows and detector.search.perspective"
             )
-        engine = dense_search if _use_dense(settings.search, model.features) else PatchSearch
         parts = [limited_grid(grid, area, model.features) if area else grid for grid in grids]
         self.grids = tuple(part for part in parts if part is not None)
         if not self.grids:
@@ -159,16 +158,3 @@ def lay_grids(
     grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
     grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
     return [grid for grid in grids if len(grid)]
-
-
-def _use_dense(search: SearchSettings, features: FeatureSettings) -> bool:
-    if search.engine == "patch":
-        return False
-    reason = why_not_dense(features)
-    if reason and search.engine == "dense":
-        raise ConfigError(
-            f"detector.search.engine: dense cannot compute {reason}; take auto or patch"
-        )
-    if reason:
-        log.info("the patch engine searches, because the dense one cannot compute %s", reason)
-    return not reason

@@ -62,14 +62,12 @@ class StripWeights:
     def of(model: LinearModel) -> "StripWeights":
         """Sort the weights of a model."""
         layout, features = Layout.of(model.features), model.features
-        hog = [_by_block(model.weights[:, part], features) for part in layout.hog]
+        blocks = features.patch // features.hog.cell - features.hog.block + 1
+        shape = len(model.weights), blocks, blocks
+        hog = [np.zeros((*shape, 0), np.float32)]  # all there is without HOG
+        hog += [model.weights[:, part].reshape(*shape, -1) for part in layout.hog]
         tables = _tables(model.weights[:, layout.histogram], features.histogram.bins)
         return StripWeights(np.concatenate(hog, axis=-1), tables)
-
-
-def _by_block(weights: Float32Array, features: FeatureSettings) -> Float32Array:
-    blocks = features.patch // features.hog.cell - features.hog.block + 1
-    return weights.reshape(len(weights), blocks, blocks, -1)
 
 
 def _tables(weights: Float32Array, bins: int) -> Float32Array:
@@ -94,7 +92,8 @@ def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
     hog = features.hog
     columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
     # A descriptor whose window is the strip gives each block once, column by column.
-    blocks = [
+    blocks = [np.zeros((columns, rows, 0), np.float32)]  # all there is without HOG
+    blocks += [
         np.reshape(
             hog_descriptor(features, (width, height), number).compute(strip[number]),
             (columns, rows, -1),
@@ -120,13 +119,16 @@ def window_blocks(
     -------
     float32 `(m, h)`, channel by channel.
     """
-    channels = len(features.hog.channels)
+    channels = max(1, len(features.hog.channels))
     side = features.patch // features.hog.cell - features.hog.block + 1
     steps = np.arange(side)
     across = columns[:, np.newaxis, np.newaxis] + steps[:, np.newaxis]
     down = rows[:, np.newaxis, np.newaxis] + steps
-    chosen = blocks[across, down].reshape(len(columns), side * side, channels, -1)
-    return np.reshape(chosen.transpose(0, 2, 1, 3), (len(columns), -1))
+    chosen = blocks[across, down].reshape(
+        len(columns), side * side, channels, blocks.shape[2] // channels
+    )
+    length = side * side * blocks.shape[2]
+    return np.reshape(chosen.transpose(0, 2, 1, 3), (len(columns), length))
 
 
 def block_sums(blocks: Float32Array, weights: Float32Array) -> Float32Array:
@@ -149,7 +151,8 @@ def block_sums(blocks: Float32Array, weights: Float32Array) -> Float32Array:
     """
     columns, rows, length = blocks.shape
     members, side = weights.shape[:2]
-    planes = weights.reshape(-1, length) @ blocks.reshape(-1, length).T
+    flat_weights = weights.reshape(members * side * side, length)
+    planes = flat_weights @ blocks.reshape(columns * rows, length).T
     plane, item = columns * rows, planes.itemsize
     wide, high = columns - side + 1, rows - side + 1
     flat = (wide - 1) * rows + high

@@ -1,6 +1,6 @@
-"""The patch engine: each window is cropped, resized, described and classified on its own.
+"""The original's search: each window is cropped, resized, described and classified on its own.
 
-It is slow and simple, and the reference for the dense engine. Source: seed section 2.
+It is slow and simple. The tests and benchmarks compare the dense search with it.
 """
 
 import numpy as np
