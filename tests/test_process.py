@@ -14,7 +14,7 @@ from red_cars import car_at, road
 from running import Running, names, start, write_drive
 from vdet.__main__ import leave_out_current_folder
 from vdet.evaluate.report.page import draw
-from vdet.process import LossyFile, check_memory
+from vdet.process import LossyFile
 
 MODULES = ("queue", "typing", "selectors", "socket", "numpy", "joblib", "multiprocessing")
 KB = 1024
@@ -112,10 +112,8 @@ def test_a_pipe_that_nobody_empties_takes_no_more() -> None:
     os.close(reader)
 
 
-def test_too_little_memory_is_told_before_the_libraries_are_loaded(
-    running: list[Running], tmp_path: Path
-) -> None:
-    limit = 700_000 * KB
+def test_too_little_memory_is_reported_in_one_line(running: list[Running], tmp_path: Path) -> None:
+    limit = 300_000 * KB
 
     def limit_memory() -> None:
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
@@ -124,27 +122,8 @@ def test_too_little_memory_is_told_before_the_libraries_are_loaded(
     running.append(start(arguments, before=limit_memory))
     result = running[0].finish()
     assert result.code == 1
-    assert result.err.startswith("vdet: the limit on memory is 0.7 GB, and vdet needs ")
-    assert result.err.endswith("raise it: ulimit -v unlimited\n")
-
-
-@pytest.mark.parametrize("kind", [resource.RLIMIT_AS, resource.RLIMIT_DATA])
-@pytest.mark.parametrize("gigabytes", [0.7, 1e6, None])
-def test_each_limit_on_memory_is_compared(
-    kind: int, gigabytes: float | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    limit = resource.RLIM_INFINITY if gigabytes is None else int(gigabytes * 1e9)
-
-    def get(asked: int) -> tuple[int, int]:
-        return (limit if asked == kind else resource.RLIM_INFINITY, resource.RLIM_INFINITY)
-
-    monkeypatch.setattr("resource.getrlimit", get)
-    if gigabytes == 0.7:
-        with pytest.raises(SystemExit) as ended:
-            check_memory()
-        assert ended.value.code == 1
-    else:
-        check_memory()
+    assert result.err.count("\n") == 1
+    assert "emory" in result.err  # the line may be that of OpenBLAS
 
 
 def test_a_report_does_not_depend_on_settings_in_the_current_folder(tmp_path: Path) -> None:

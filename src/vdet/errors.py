@@ -66,13 +66,16 @@ class ClusterError(VdetError, OSError):
     """A cluster cannot be used."""
 
 
+_NO_ROOM = "failed to map segment"  # says the system, of a library for which memory is missing
+
+
 def in_one_line(error: Exception) -> str:
     """Describe any error in one line; one that is no `VdetError` or `OSError` is called a bug."""
     if isinstance(error, VdetError):
         return str(error)
     if isinstance(error, OSError):
         return f"{error.filename or 'reading or writing'}: {error.strerror or error}"
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or _NO_ROOM in str(error):
         return "there is too little memory; end other programs, or raise the limit (ulimit -v)"
     text = " ".join(f"{type(error).__name__}: {error}".split())
     return f"internal error, please report it ({text}); VDET_DEBUG=1 shows more"

@@ -1,4 +1,4 @@
-"""The process of the program: its signals, its standard streams and its memory."""
+"""The process of the program: its signals, its standard streams, the threads of its libraries."""
 
 import contextlib
 import io
@@ -8,19 +8,19 @@ import sys
 import threading
 from typing import Any, NoReturn
 
-from vdet.errors import INTERRUPTED
+from vdet.errors import INTERRUPTED, VdetError, in_one_line
+from vdet.workers import SINGLE_THREADED
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
-LOADED_BYTES = 1_000_000_000  # of addresses: the libraries, and room for a small video
-THREAD_BYTES = 100_000_000  # of addresses: stack and buffers of a thread of OpenBLAS
 _STDOUT, _STDERR = 1, 2
 
 
 def run() -> NoReturn:
     """Run the program and exit: see `vdet.cli.main`. SIGTERM and SIGHUP act like Ctrl-C."""
     prepare_streams()
-    check_memory()
+    for name, value in SINGLE_THREADED.items():
+        os.environ.setdefault(name, value)
     for number in _signals():
         signal.signal(number, _interrupt)
     try:
@@ -30,6 +30,9 @@ def run() -> NoReturn:
     except KeyboardInterrupt:
         sys.stderr.write("vdet: interrupted\n")
         sys.exit(INTERRUPTED)
+    except (ImportError, MemoryError) as error:  # as the libraries are loaded
+        sys.stderr.write(f"vdet: {in_one_line(error)}\n")
+        sys.exit(VdetError.exit_code)
     except SystemExit as end:
         _exit_if_a_thread_hangs(end.code)
         raise
@@ -64,25 +67,6 @@ def prepare_streams() -> None:
     # Without a buffer below it, which would write a line twice if a signal comes as it is written.
     file: Any = LossyFile(_STDERR, "w", closefd=False)
     sys.stderr = io.TextIOWrapper(file, encoding, "backslashreplace", write_through=True)
-
-
-def check_memory() -> None:
-    """Exit if the process may use too little memory: OpenBLAS would hang or crash as it loads."""
-    try:
-        import resource
-
-        cores = len(os.sched_getaffinity(0))
-    except (ImportError, AttributeError):  # not Linux
-        return
-    needed = LOADED_BYTES + cores * THREAD_BYTES  # OpenBLAS starts a thread for each core
-    for option, kind in (("-v", resource.RLIMIT_AS), ("-d", resource.RLIMIT_DATA)):
-        limit, _ = resource.getrlimit(kind)
-        if limit != resource.RLIM_INFINITY and limit < needed:
-            sys.stderr.write(
-                f"vdet: the limit on memory is {limit / 1e9:.1f} GB, and vdet needs "
-                f"{needed / 1e9:.1f} GB on {cores} cores; raise it: ulimit {option} unlimited\n"
-            )
-            sys.exit(1)
 
 
 def _signals() -> list[signal.Signals]:

@@ -35,12 +35,13 @@ R = TypeVar("R")
 
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 CLEANUP_TIMEOUT = 10.0  # seconds between SIGTERM and a forced exit
+SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
+"""Variables that keep calls of libraries to one thread: frames and files are done in parallel."""
 ENVIRONMENT = {
-    "PYTHONSAFEPATH": "1",  # no module is imported from the current folder
-    # A process for each core is enough: no further threads for linear algebra.
+    **SINGLE_THREADED,
     "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
+    "PYTHONSAFEPATH": "1",  # no module is imported from the current folder
 }
 
 TASKS_PER_MESSAGE = 1000  # to the scheduler; it begins while the next ones are on their way
@@ -107,7 +108,7 @@ class LocalProcesses:
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
         """Yield each item's number and result; see `Workers`."""
-        from joblib.externals.loky import ProcessPoolExecutor
+        from loky import ProcessPoolExecutor
 
         _start_quiet_tracker()
         executor = ProcessPoolExecutor(
@@ -157,7 +158,7 @@ def _start_quiet_tracker() -> None:
 
     A worker that is killed leaves semaphores. They are removed; the user need not know of them.
     """
-    from joblib.externals.loky.backend import resource_tracker
+    from loky.backend import resource_tracker
 
     # The process takes its filters from here as it starts; it runs none of our code.
     options = list(sys.warnoptions)

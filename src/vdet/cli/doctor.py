@@ -36,8 +36,8 @@ EXTRAS = {
 """The packages of each extra, as `pyproject.toml` has them."""
 
 NEEDED = (
-    *("onnxruntime", "scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib", "pillow"),
-    *("threadpoolctl", "tqdm"),
+    *("onnxruntime", "scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib", "loky"),
+    *("pillow", "threadpoolctl", "tqdm"),
 )
 DECODERS = ("h264", "hevc", "av1", "vp9", "mpeg4", "mjpeg")
 DATA = ("vehicles.zip", "non-vehicles.zip", "project_video.mp4")

@@ -77,7 +77,7 @@ def inspect_video(path: Path, frames: int) -> VideoReport:
 def _sound(stream: AudioStream) -> str:
     context = stream.codec_context
     form = f"{context.name}, {context.sample_rate} Hz" if context else "unknown"
-    return f"{form}, {stream.language}" if stream.language else form
+    return form if stream.language in (None, "und") else f"{form}, {stream.language}"
 
 
 def _lost(container: InputContainer, path: Path) -> Iterator[str]:
