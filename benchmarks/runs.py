@@ -11,11 +11,16 @@ import av
 from av.video.frame import PictureType
 
 from benchmarks.rounds import Task, measure
-from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
-from vdet.config.draw import DrawSettings
-from vdet.config.regions import RegionSettings, RegionsSettings
+from vdet.config.places import (
+    CountSettings,
+    LineSettings,
+    RegionSettings,
+    RegionsSettings,
+    ZoneSettings,
+)
 from vdet.config.schema import OutputSettings, Settings, SvmSettings
 from vdet.config.section import Section
+from vdet.config.video import DrawSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
@@ -89,7 +94,7 @@ def _transcode(path: Path, out: Path, settings: OutputSettings) -> None:
     with av.open(str(path)) as source, av.open(str(out), "w") as target:
         stream = source.streams.video[0]
         stream.thread_type = "AUTO"
-        encoder = target.add_stream(settings.codec, rate=stream.average_rate, options=options)
+        encoder = target.add_stream("libx264", rate=stream.average_rate, options=options)
         encoder.width, encoder.height = stream.width, stream.height
         for frame in itertools.islice(source.decode(stream), FRAMES):
             frame.pict_type = PictureType.NONE  # the encoder chooses its own

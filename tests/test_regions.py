@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.config.regions import RegionsSettings
+from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError, ImageError
 from vdet.media.images import write_image
 from vdet.regions import Regions, SearchArea, check_mask, lay_regions
@@ -17,7 +17,9 @@ ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
 BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8]]}
 
 
-def laid(*polygons: dict[str, Any], mask: str = "", size: tuple[int, int] = (320, 180)) -> Regions:
+def laid(
+    *polygons: dict[str, Any], mask: str | None = None, size: tuple[int, int] = (320, 180)
+) -> Regions:
     return Regions(RegionsSettings.model_validate({"polygons": polygons, "mask": mask}), *size)
 
 

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Int32Array
-from vdet.config.regions import RegionsSettings
+from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError
 from vdet.media.images import Image, read_header, read_image
 from vdet.polygons import Outline, Point

@@ -202,9 +202,8 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
         ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
         ("output: {scores: true}", "1:10: output.scores: is now draw.label, as in draw.label: ["),
         ("draw: {label: score}", "1:8: draw.label: should be a list, "),
-        ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'auto', 'id', 'class', "),
-        ("draw: {label: [auto, id]}", "1:1: draw: label: auto stands alone; name the parts"),
-        ("draw: {trails: -1}", "1:8: draw.trails: should be greater than or equal to 0 "),
+        ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'id', 'class', 'score' or "),
+        ("draw: {trails: 0}", "1:8: draw.trails: should be greater than 0 (got 0)"),
     ],
 )
 def test_a_mistake_is_explained_in_one_line(path: Path, text: str, message: str) -> None:

@@ -12,7 +12,6 @@ import pytest
 from pages.html import Elements
 from traffic.passing import HEIGHT, WIDTH, frame, passing, track
 from vdet.boxes import Box
-from vdet.config.schema import SummarySettings
 from vdet.errors import OutputError
 from vdet.pages.charts import Series
 from vdet.pages.facts import Facts, facts_html, read_facts
@@ -31,7 +30,7 @@ TRUCK = replace(track(2, Box(5, 5, 30, 30)), class_name="truck")
 
 
 def records(*frames: FrameTracks) -> Sequence[VehicleRecord]:
-    return summarize(frames, WIDTH, SummarySettings())
+    return summarize(frames, WIDTH)
 
 
 TWO = records(*passing(50), frame(50, TRUCK), frame(51, TRUCK))

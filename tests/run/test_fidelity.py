@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, road
 from run.red_runs import outputs, read, run_red, video_info, with_search
-from vdet.config.draw import DrawSettings
 from vdet.config.schema import OutputSettings, Settings, WindowSettings
+from vdet.config.video import DrawSettings
 from vdet.media import ColorTags, Picture, VideoReader, VideoWriter
 from vdet.media.coding import Coding
 from vdet.media.frame import UNSPECIFIED
@@ -125,7 +125,7 @@ def transcoded(source: Path, target: Path, settings: OutputSettings) -> Path:
     """Give the decoder's pictures to the same encoder, without vdet."""
     with av.open(str(source)) as original, av.open(str(target), "w") as copy:
         options = {"preset": settings.preset, "crf": str(settings.crf)}
-        stream = copy.add_stream(settings.codec, rate=25, options=options)
+        stream = copy.add_stream("libx264", rate=25, options=options)
         context = stream.codec_context
         context.width, context.height, context.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         context.thread_count = 1
@@ -166,7 +166,7 @@ class TestPixels:
     ) -> None:
         """Far from boxes and labels, and inside boxes: luma and chroma are equal, bit for bit."""
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        settings = written_with(OutputSettings(preset="ultrafast", crf=0), smoothing=0)
+        settings = written_with(OutputSettings(preset="ultrafast", crf=0), smoothing=None)
         run_red(VideoJob(filmed, wanted), settings)
         masks = untouched(tmp_path / "out.jsonl")
         drawn = 0

@@ -269,7 +269,7 @@ class TestRun:
 
     def test_boxes_are_drawn_where_the_tracks_say(self, red_clip: Path, tmp_path: Path) -> None:
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        exact = {"output": OutputSettings(crf=1), "draw": DrawSettings(smoothing=0)}
+        exact = {"output": OutputSettings(crf=1), "draw": DrawSettings(smoothing=None)}
         run_red(VideoJob(red_clip, wanted, frames=20), SETTINGS.model_copy(update=exact))
         records = [json.loads(line) for line in (tmp_path / "out.jsonl").read_text().splitlines()]
         before, after = read(red_clip)[:20], read(tmp_path / "out.mp4")

@@ -11,7 +11,7 @@ from run.red_runs import follow, model_for, outputs, run_red
 from vdet.batch.digest import work_digest
 from vdet.batch.manifest import Origin
 from vdet.boxes import Box
-from vdet.config.regions import RegionsSettings
+from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image, write_image

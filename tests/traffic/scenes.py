@@ -6,7 +6,7 @@ from itertools import groupby, pairwise
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
+from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counter import count_events

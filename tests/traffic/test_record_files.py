@@ -9,7 +9,6 @@ import pytest
 
 from traffic.passing import WIDTH, frame, passing, track
 from vdet.boxes import Box
-from vdet.config.schema import SummarySettings
 from vdet.errors import OutputError
 from vdet.track.track import FrameTracks
 from vdet.traffic.record_files import join_records, write_records
@@ -23,7 +22,7 @@ FIRST = "1,,0.0,1.0,1.04,26,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,4
 
 
 def written(path: Path, *frames: FrameTracks) -> str:
-    write_records(summarize(frames, WIDTH, SummarySettings()), path)
+    write_records(summarize(frames, WIDTH), path)
     return path.read_bytes().decode()
 
 

@@ -9,20 +9,18 @@ from hypothesis import strategies as st
 
 from traffic.passing import RATE, WIDTH, frame, passing, track
 from vdet.boxes import Box
-from vdet.config.schema import SummarySettings
 from vdet.track.track import FrameTracks
-from vdet.traffic.records import VehicleRecord, summarize
+from vdet.traffic.records import PATH_STEP, VehicleRecord, summarize
 
-SETTINGS = SummarySettings()
 PLACE = Box(100, 100, 40, 30)
 
 
-def records(*frames: FrameTracks, settings: SummarySettings = SETTINGS) -> list[VehicleRecord]:
-    return list(summarize(frames, WIDTH, settings))
+def records(*frames: FrameTracks) -> list[VehicleRecord]:
+    return list(summarize(frames, WIDTH))
 
 
-def record(*frames: FrameTracks, settings: SummarySettings = SETTINGS) -> VehicleRecord:
-    (only,) = records(*frames, settings=settings)
+def record(*frames: FrameTracks) -> VehicleRecord:
+    (only,) = records(*frames)
     return only
 
 
@@ -97,9 +95,7 @@ class TestTime:
 class TestPath:
     def test_a_vehicle_that_stands_and_trembles_goes_nowhere(self) -> None:
         frames = [frame(n, track(1, Box(100 + n % 3, 100 - n % 2, 40, 30))) for n in range(500)]
-        assert record(*frames).length <= SETTINGS.path_step * WIDTH
-        every = SummarySettings(path_step=0)
-        assert record(*frames, settings=every).length > 500
+        assert record(*frames).length <= PATH_STEP * WIDTH
 
     def test_the_way_there_and_back_counts(self) -> None:
         there = [frame(n, track(1, Box(100 + 2 * n, 100, 40, 30))) for n in range(51)]
@@ -129,15 +125,12 @@ class TestPath:
         assert found.path == ((20, 30), (30, 30))
 
 
-@given(
-    xs=st.lists(st.integers(-50, 300), min_size=1, max_size=30),
-    step=st.floats(0, 0.5),
-)
+@given(xs=st.lists(st.integers(-50, 300), min_size=1, max_size=30))
 def test_a_path_is_never_longer_than_the_way_nor_shorter_than_from_start_to_end(
-    xs: Sequence[int], step: float
+    xs: Sequence[int],
 ) -> None:
     frames = [frame(n, track(1, Box(x, 100, 40, 30))) for n, x in enumerate(xs)]
-    found = record(*frames, settings=SummarySettings(path_step=step))
+    found = record(*frames)
     way = sum(abs(b - a) for a, b in itertools.pairwise(xs))
     assert abs(xs[-1] - xs[0]) - 1e-6 <= found.length <= way + 1e-6
     assert len(found.path) <= len(xs)

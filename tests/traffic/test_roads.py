@@ -15,7 +15,7 @@ from track.motion.traffic import (
     truth_at,
 )
 from vdet.boxes import Box
-from vdet.config.counts import CountSettings, LineSettings
+from vdet.config.places import CountSettings, LineSettings
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
 from vdet.synthetic import demo_scene, must_be_found, true_boxes

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from traffic.scenes import ZONE, events, feet, frames, joined, numbered, through, track, ways
-from vdet.config.counts import LineSettings
+from vdet.config.places import LineSettings
 from vdet.track.track import FrameTracks
 
 DOWN = through((0, 600, 300), (4, 600, 500))

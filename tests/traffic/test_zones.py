@@ -3,7 +3,7 @@
 import pytest
 
 from traffic.scenes import HEIGHT, WIDTH, ZONE, events, frames, joined, numbered, through, ways
-from vdet.config.counts import ZoneSettings
+from vdet.config.places import ZoneSettings
 from vdet.traffic.totals import stays
 
 ACROSS = through((0, 200, 400), (8, 1000, 400))  # 100 pixels a second; in from 2 s to 6 s

@@ -20,7 +20,7 @@ def work_digest(origin: Origin, settings: Settings, job: VideoJob) -> str:
     return _digest(repr(wanted), settings.model_dump_json(exclude=_NO_EFFECT))
 
 
-def _content_digest(path: str) -> str:
+def _content_digest(path: str | None) -> str:
     """Return a digest of a file; nothing where there is none."""
     with contextlib.suppress(OSError):
         return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""

@@ -16,7 +16,7 @@ from vdet.cli.options import (
     read_settings,
     settings_options,
 )
-from vdet.config.counts import CountSettings
+from vdet.config.places import CountSettings
 from vdet.errors import TruthError
 from vdet.files import check_output, printable, staged
 from vdet.labels.registry import read_tracks
@@ -133,10 +133,9 @@ def _count(
 
 def _own_size(settings: CountSettings) -> tuple[int, int]:
     """Return the size of frames that the lines are given for."""
-    if not settings.size:
+    if settings.size is None:
         raise click.UsageError("the lines are shares of the frame; give --size, as in 1280x720")
-    width, height = settings.size
-    return width, height
+    return settings.size
 
 
 def _table(videos: Mapping[str, Counts]) -> list[str]:

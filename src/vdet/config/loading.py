@@ -103,7 +103,7 @@ def load_settings(
 def _read_places(section: str, path: Path) -> Document:
     """Read a file of a section with places in the frame as a layer of settings."""
     defaults: Mapping[str, Any] = getattr(Settings(), section).model_dump(mode="json")
-    no_places = {name: value for name, value in defaults.items() if value in ([], "")}
+    no_places = {name: value for name, value in defaults.items() if value in ([], None)}
     if "mask" in no_places and path.suffix.lower() not in _YAML_SUFFIXES:
         return Document(str(path), {section: no_places | {"mask": str(path)}})
     document = read_document(path)

@@ -5,7 +5,6 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from pydantic import SerializeAsAny
 
-from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
 from vdet.config.detector import (
     DetectorSettings,
     NetworkSettings,
@@ -13,7 +12,6 @@ from vdet.config.detector import (
     StillSettings,
     SvmSettings,
 )
-from vdet.config.draw import DrawSettings
 from vdet.config.features import (
     ColorSpace,
     FeatureSettings,
@@ -21,16 +19,18 @@ from vdet.config.features import (
     HogSettings,
 )
 from vdet.config.heat import HeatSettings, VoteSettings
-from vdet.config.input import InputSettings
 from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
 from vdet.config.network import NetworkTrainingSettings
-from vdet.config.output import OutputSettings
-from vdet.config.page import PageSettings
-from vdet.config.regions import RegionSettings, RegionsSettings
+from vdet.config.places import (
+    CountSettings,
+    LineSettings,
+    RegionSettings,
+    RegionsSettings,
+    ZoneSettings,
+)
 from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
-from vdet.config.summary import CropSettings, SummarySettings
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
 from vdet.config.train import TrainSettings
 from vdet.config.training import (
@@ -39,6 +39,7 @@ from vdet.config.training import (
     CalibrationSettings,
     SvmTrainingSettings,
 )
+from vdet.config.video import CropSettings, DrawSettings, InputSettings, OutputSettings
 from vdet.errors import ConfigError
 
 __all__ = [
@@ -62,7 +63,6 @@ __all__ = [
     "NetworkSettings",
     "NetworkTrainingSettings",
     "OutputSettings",
-    "PageSettings",
     "PerspectiveSettings",
     "RegionSettings",
     "RegionsSettings",
@@ -72,7 +72,6 @@ __all__ = [
     "Section",
     "Settings",
     "StillSettings",
-    "SummarySettings",
     "SvmSettings",
     "SvmTrainingSettings",
     "TrackerSettings",
@@ -94,9 +93,7 @@ class Settings(Section):
     train: TrainSettings = TrainSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
-    summary: SummarySettings = SummarySettings()
     crops: CropSettings = CropSettings()
-    page: PageSettings = PageSettings()
     draw: DrawSettings = DrawSettings()
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from fractions import Fraction
 from pathlib import Path
-from typing import Self
+from typing import Final, Self
 
 import av
 from av.video.reformatter import ColorRange
@@ -25,6 +25,7 @@ _log = logging.getLogger("vdet")
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
+_CODEC: Final = "libx264"
 _MARK = "made by vdet"
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
 _MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
@@ -208,7 +209,7 @@ class _Encoder:
         self, info: VideoInfo, settings: OutputSettings, threads: int | None
     ) -> av.VideoStream:
         options = {"preset": settings.preset, "crf": str(settings.crf)}
-        stream = self._container.add_stream(settings.codec, rate=info.rate, options=options)
+        stream = self._container.add_stream(_CODEC, rate=info.rate, options=options)
         context = stream.codec_context
         context.width = info.width + info.width % 2
         context.height = info.height + info.height % 2

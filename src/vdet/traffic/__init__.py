@@ -4,9 +4,9 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
 
 1. A vehicle is where its foot is, the middle of the lower edge of its whole box. Only frames in
    which the detector saw it count; predicted boxes do not.
-2. Near a line or the border of a zone it is on neither side (`counts.band`). Beyond, its side is
-   settled after `counts.settled` seconds, or one height of its box away in two frames, or in the
-   last one in which it is seen.
+2. Near a line or the border of a zone it is on neither side. Beyond, its side is settled
+   after 0.1 seconds, or one height of its box away in two frames, or in the last one in which it
+   is seen.
 3. A crossing is a change of the settled side whose path meets the line between its ends. Its time
    is interpolated between the two frames before and after it.
 4. Directions are the left and the right of someone who looks from the start to the end of a line.

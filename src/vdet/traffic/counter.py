@@ -16,6 +16,8 @@ from vdet.traffic.layout import APPEAR, VANISH, Layout, Zone
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
 
+_SETTLED = 0.1
+"""Seconds after which a vehicle off a border's band has changed the side."""
 _LEAVES = 0.1
 """Heights of its box a second that a vehicle moves at least to leave the frame."""
 _MOST_GROWTH = 2.0
@@ -189,10 +191,10 @@ class VehicleCounter:
         return self._vehicles[min(near)[1]] if near else None
 
     def _see(self, vehicle: _Vehicle, sighting: Sighting) -> None:
-        band, settled = self._layout.band(sighting.height), self._layout.settings.settled
+        band = self._layout.band(sighting.height)
         for number, (border, state) in enumerate(zip(self._borders, vehicle.states, strict=True)):
             before = state.side
-            change = state.see(sighting, border, band, settled)
+            change = state.see(sighting, border, band, _SETTLED)
             if change is not None:
                 self._note(vehicle, number, change)
             elif before == 0 and state.side > 0 and isinstance(border, Zone):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from vdet.boxes import Box
-from vdet.config.summary import CropSettings
+from vdet.config.video import CropSettings
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.track import FrameTracks, Track

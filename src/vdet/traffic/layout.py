@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from vdet.config.counts import CountSettings, LineSettings
+from vdet.config.places import CountSettings, LineSettings
 from vdet.polygons import (
     Outline,
     Point,
@@ -17,6 +17,11 @@ from vdet.polygons import (
 
 ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
 """Directions of a zone: over its border, or first and last seen inside."""
+
+_BAND = 0.05
+"""Distance from a border within which a vehicle is on neither side, in heights of its box."""
+_LEAST_BAND = 0.003
+"""Smallest such distance, as a share of the frame's height."""
 
 
 class Border(Protocol):
@@ -117,7 +122,7 @@ class Layout:
 
     def band(self, height: float) -> float:
         """Return the pixels from a border within which a box of this height is on neither side."""
-        return max(self.settings.band * height, self.settings.least_band * self.size[1])
+        return max(_BAND * height, _LEAST_BAND * self.size[1])
 
 
 def lay_out(settings: CountSettings, width: int, height: int) -> Layout:

@@ -5,12 +5,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from vdet.boxes import Box
-from vdet.config.summary import SummarySettings
 from vdet.detect.classes import ClassScores
 from vdet.track.track import FrameTracks, Track
 
 Point = tuple[float, float]
 """x and y in pixels of the frame."""
+
+PATH_STEP = 0.01
+"""Distance after which a path gets its next point, as a share of the frame's width.
+
+Shorter moves are jitter of the boxes.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +70,9 @@ class VehicleRecords:
         Of the frames, pixels.
     """
 
-    def __init__(self, width: int, settings: SummarySettings) -> None:
+    def __init__(self, width: int) -> None:
         self._width = width
-        self._step = settings.path_step * width
+        self._step = PATH_STEP * width
         self._vehicles: dict[int, _Vehicle] = {}
         self._latest: FrameTracks | None = None
         self._period = 0.0
@@ -95,11 +100,9 @@ class VehicleRecords:
         return tuple(vehicle.record(self._width) for _, vehicle in sorted(self._vehicles.items()))
 
 
-def summarize(
-    frames: Iterable[FrameTracks], width: int, settings: SummarySettings
-) -> tuple[VehicleRecord, ...]:
+def summarize(frames: Iterable[FrameTracks], width: int) -> tuple[VehicleRecord, ...]:
     """Return a record of each vehicle, by id; `width` is that of the frames in pixels."""
-    records = VehicleRecords(width, settings)
+    records = VehicleRecords(width)
     for frame in frames:
         records.add(frame)
     return records.end()

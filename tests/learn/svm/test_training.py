@@ -279,7 +279,7 @@ def test_more_broken_patches_than_are_tolerated_are_an_error(
     files: list[PatchFile], tmp_path: Path
 ) -> None:
     mixed = with_broken(files, tmp_path, 3)
-    message = r"vehicles/0\.png: 3 of 60 patches are broken, more than the 4\.0% of train\.svm\.max_b"
+    message = r"vehicles/0\.png: 3 of 60 patches are broken, more than the 4\.0% of train\.svm\.max"
     with pytest.raises(DataError, match=message):
         train(mixed, tolerant(0.04), jobs=1)
     _, report = train(mixed, tolerant(0.05), jobs=1)

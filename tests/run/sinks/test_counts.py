@@ -10,7 +10,7 @@ import pytest
 from red_cars import SETTINGS
 from run.red_runs import outputs, read, result_of, run_red, video_info, write
 from vdet.boxes import Box
-from vdet.config.counts import CountSettings, LineSettings, ZoneSettings
+from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
 from vdet.pages.facts import read_facts

@@ -11,10 +11,10 @@ import pytest
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box
-from vdet.config.draw import DrawSettings
 from vdet.config.lanes import LaneSettings
-from vdet.config.regions import RegionSettings, RegionsSettings
+from vdet.config.places import RegionSettings, RegionsSettings
 from vdet.config.schema import Settings
+from vdet.config.video import DrawSettings
 from vdet.draw.boxes import BLACK, GREEN, WHITE, color_of, draw_box, draw_label
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
@@ -177,7 +177,7 @@ def test_each_id_has_its_own_color() -> None:
 
 def test_no_tracks_leave_the_picture_as_it_was() -> None:
     result = result_of(image=white(320, 240))
-    for trails in (0.0, 1.0):
+    for trails in (None, 1.0):
         drawn = drawn_on(result, trails=trails)
         assert drawn.min() == 255
         assert not np.shares_memory(drawn, result.frame.image), "a copy may be drawn into"
@@ -311,9 +311,9 @@ def passing(count: int, rate: int = 25) -> Iterator[FrameResult]:
         yield result_of(box, image=white(320, 240), index=number, time=time)
 
 
-def trail_columns(seconds: float, count: int = 50, **settings: Any) -> list[int]:
+def trail_columns(seconds: float | None, count: int = 50, **settings: Any) -> list[int]:
     """Return the columns in which the trail of `passing` is drawn in the last frame."""
-    quiet: dict[str, Any] = {"boxes": False, "label": (), "smoothing": 0.0, **settings}
+    quiet: dict[str, Any] = {"boxes": False, "label": (), "smoothing": None, **settings}
     overlay = overlay_with(trails=seconds, **quiet)
     *_, last = (shown(overlay, result) for result in passing(count))
     rows, columns = np.nonzero((last != 255).any(axis=2))
@@ -332,11 +332,11 @@ def test_a_trail_is_the_path_of_the_feet_in_the_last_seconds() -> None:
 
 def test_a_vehicle_that_was_just_found_has_no_trail() -> None:
     assert trail_columns(1.0, count=1) == []
-    assert trail_columns(0.0) == []
+    assert trail_columns(None) == []
 
 
 def test_trails_lie_under_the_boxes() -> None:
-    overlay = overlay_with(trails=1.0, smoothing=0.0, label=())
+    overlay = overlay_with(trails=1.0, smoothing=None, label=())
     *_, last = (shown(overlay, result) for result in passing(50))
     box = Box(10 + 4 * 49, 100, 40, 30)
     assert (last[box.bottom - 1, box.x : box.right] == color_of(1)).all()
@@ -347,7 +347,7 @@ def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
     foot = np.array([[CAR.x + CAR.width / 2, float(CAR.bottom)]])
     ((x, y),) = seen.place_points(foot).tolist()
     assert abs(y - CAR.bottom) > 1, "the lens moves the foot"
-    overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=0.0)
+    overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=None)
     for number in range(10):
         start = CAR.moved_to(CAR.x - 4 * (9 - number), CAR.y)
         drawn = shown(overlay, result_of(start, found=seen, time=Fraction(number, 25)))
@@ -393,7 +393,7 @@ def test_a_time_is_written_as_hours_minutes_and_seconds(seconds: float, text: st
 
 def test_boxes_that_tremble_are_drawn_steadily() -> None:
     lefts = []
-    for smoothing in (0.0, 0.4):
+    for smoothing in (None, 0.4):
         overlay = overlay_with(smoothing=smoothing, label=(), thickness=0.1)
         images = []
         for number in range(40):

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from red_cars import CAR, SETTINGS, car_at, road
+from red_cars import CAR, road
 from run.red_runs import COUNT, outputs, read, result_of, run_red, video_info, write
 from running import names
-from vdet.config.schema import PageSettings
 from vdet.media.images import Image, decode_image
 from vdet.pages.facts import read_facts
 from vdet.run.loop import VideoJob
@@ -84,19 +83,6 @@ def test_the_still_is_the_first_frame_that_shows_something(tmp_path: Path) -> No
     write(Output("page", tmp_path / "page"), results)
     (still,) = page_of(tmp_path / "page").all("img", **{"class": "still"})
     assert abs(picture(still["src"]).astype(int) - scene).mean() < 10
-
-
-def test_pictures_have_the_sizes_that_are_set(tmp_path: Path) -> None:
-    small = SETTINGS.model_copy(update={"page": PageSettings(picture=20, still=64, vehicles=1)})
-    results = [
-        result_of(*[car_at(n)] * (1 + n % 2), image=road(car_at(n)), index=n, time=Fraction(n, 25))
-        for n in range(9)
-    ]
-    write(Output("page", tmp_path / "page"), results, settings=small)
-    made = page_of(tmp_path / "page")
-    shapes = [picture(each["src"]).shape for each in made.all("img")]
-    assert shapes[0] == (48, 64, 3)
-    assert [max(shape) for shape in shapes[1:]] == [20]
 
 
 def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_path: Path) -> None:

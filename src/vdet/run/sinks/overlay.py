@@ -8,7 +8,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from vdet.config.draw import AUTO
 from vdet.config.schema import Settings
 from vdet.detect.classes import OUR_NAMES
 from vdet.draw.boxes import (
@@ -54,7 +53,7 @@ class Overlay:
         self._regions: Regions | None = None
         self._start = video.start if video else None
         automatic = VIDEO_LABEL if video else PICTURE_LABEL
-        self._label = automatic if AUTO in settings.draw.label else settings.draw.label
+        self._label = automatic if settings.draw.label is None else settings.draw.label
         self._steady = (
             SteadyBoxes(settings.draw.smoothing) if video and settings.draw.smoothing else None
         )

@@ -30,6 +30,12 @@ from vdet.traffic.totals import by_minute
 from vdet.version import __version__
 
 _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one that is faded in
+_STILL = 960
+"""Largest width of the still under the heat, pixels."""
+_THUMBNAIL = 200
+"""Longer side of the picture of a vehicle, pixels."""
+_MOST_VEHICLES = 300
+"""Most vehicles that are shown one by one: those that are in view longest."""
 _QUALITY = 80  # of the pictures of vehicles, JPEG
 
 
@@ -42,8 +48,8 @@ class PageSink:
         self._folder = path
         self._context = context
         self._video = video = context.video
-        self._settings = settings = context.settings
-        self._records = VehicleRecords(video.width, settings.summary)
+        settings = context.settings
+        self._records = VehicleRecords(video.width)
         self._crops = BestCrops(settings.crops)
         self._heat = HeatMap(video.width, video.height)
         self._levels = Levels()
@@ -74,7 +80,7 @@ class PageSink:
         self._frames += 1
         self._last = frame.time
         if self._still is None or self._is_even:
-            self._still = _at_most(picture.image, self._settings.page.still, picture.width)
+            self._still = _at_most(picture.image, _STILL, picture.width)
             self._is_even = float(self._still.std()) < _EVEN
         self._records.add(frame)
         self._levels.add(frame)
@@ -85,7 +91,7 @@ class PageSink:
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:
-            small = _at_most(crop.image, self._settings.page.picture, max(crop.image.shape[:2]))
+            small = _at_most(crop.image, _THUMBNAIL, max(crop.image.shape[:2]))
             self._thumbnails[crop.id] = Thumbnail(crop.time, jpeg_uri(small, _QUALITY))
 
     def _report(self) -> VideoReport:
@@ -102,8 +108,8 @@ class PageSink:
             levels=self._levels,
             still=None if self._still is None else self._heat.over(self._still),
             player=self._player(),
-            most_vehicles=self._settings.page.vehicles,
-            settings=render(self._settings),
+            most_vehicles=_MOST_VEHICLES,
+            settings=render(self._context.settings),
             versions=_versions(),
             counts=_series(self._counter.finish()) if self._counter else (),
         )

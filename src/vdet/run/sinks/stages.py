@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Self
 
-from vdet.config.regions import RegionsSettings
+from vdet.config.places import RegionsSettings
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
 from vdet.draw.regions import draw_regions
 from vdet.files import make_folder

@@ -19,7 +19,7 @@ class SummarySink:
         assert context.video is not None  # `takes` says so
         self._path = path
         self._context = context
-        self._records = VehicleRecords(context.video.width, context.settings.summary)
+        self._records = VehicleRecords(context.video.width)
 
     def __enter__(self) -> Self:
         return self

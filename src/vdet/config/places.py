@@ -1,0 +1,193 @@
+"""The sections `regions` and `counts`: places in the frame.
+
+Points are pixels of a frame of `size`, or shares of the frame where no size is given.
+"""
+
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from vdet.config.section import Section
+from vdet.errors import ConfigError
+from vdet.polygons import Point, area_of, crosses_itself, unclosed
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Place = tuple[Coordinate, Coordinate]
+Side = Annotated[int, Field(ge=1, le=100_000)]
+Name = Annotated[
+    str, Field(min_length=1, max_length=80, description="Name, different from all others.")
+]
+
+MOST_CORNERS = 100
+MOST_SHAPES = 100
+_SAME_ASPECT = 0.01
+"""Largest relative difference of the aspect ratios of a frame and of the reference size."""
+
+
+class PlacedSection(Section):
+    """A section with places in the frame."""
+
+    size: tuple[Side, Side] | None = Field(
+        None,
+        description="Width and height in pixels of the frames that the points are for. Frames of "
+        "another size are fine if they have the same shape. null: points are shares of the frame, "
+        "0 to 1.",
+    )
+
+    def scales(self, width: int, height: int) -> tuple[float, float]:
+        """Return the factors that turn x and y into pixels of a frame of `width` × `height`.
+
+        Raises
+        ------
+        ConfigError
+            The frame has another aspect ratio than `size`.
+        """
+        if self.size is None:
+            return float(width), float(height)
+        given_width, given_height = self.size
+        aspect = (width / height) / (given_width / given_height)
+        if abs(aspect - 1) > _SAME_ASPECT:
+            raise ConfigError(
+                f"size: places are given for frames of {given_width}×{given_height}, which have "
+                f"another shape than {width}×{height}; give places for such frames"
+            )
+        return width / given_width, height / given_height
+
+    def check_inside(self, what: str, points: Iterable[Point]) -> None:
+        """Raise a `ValueError` that names `what` if one of its points lies outside the frame."""
+        width, height = self.size or (1, 1)
+        for x, y in points:
+            if not (0 <= x <= width and 0 <= y <= height):
+                unit = "" if self.size else "; shares are 0 to 1, and for pixels give size"
+                raise ValueError(
+                    f"{what}: the point [{x:g}, {y:g}] lies outside the frame of "
+                    f"{width}×{height}{unit}"
+                )
+
+
+def _check_names(names: Iterable[str]) -> None:
+    """Raise a `ValueError` if a name is given twice."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise ValueError(f"{name}: this name is given twice; give each its own")
+        seen.add(name)
+
+
+class PolygonSection(Section):
+    """A named polygon."""
+
+    name: Name
+    points: tuple[Place, ...] = Field(
+        max_length=MOST_CORNERS,
+        description="Corners in order, x and y. The last one is joined to the first.",
+    )
+
+    @field_validator("points")
+    @classmethod
+    def _is_a_polygon(cls, points: tuple[Point, ...]) -> tuple[Point, ...]:
+        corners = unclosed(points)
+        if len(corners) < 3:
+            raise ValueError(f"has {len(corners)} corners; give three or more")
+        if crosses_itself(corners):
+            raise ValueError("crosses or touches itself; give the corners in order around it")
+        if area_of(corners) == 0:
+            raise ValueError("has no area; give corners that do not lie on one line")
+        return corners
+
+
+class RegionSettings(PolygonSection):
+    """A polygon in which vehicles are shown, or not."""
+
+    kind: Literal["include", "exclude"] = Field(
+        "include",
+        description="include: vehicles in it are shown. exclude: they are not, even inside an "
+        "included polygon.",
+    )
+
+
+class RegionsSettings(PlacedSection):
+    """Regions of the frame in which vehicles are shown.
+
+    A vehicle is where the middle of its lower edge is. Without an included polygon and without a
+    mask, the whole frame counts, except for excluded polygons.
+    """
+
+    polygons: tuple[RegionSettings, ...] = Field(
+        (), max_length=MOST_SHAPES, description="Polygons."
+    )
+    mask: str | None = Field(
+        None,
+        min_length=1,
+        max_length=4096,
+        description="Picture of the frame's shape: vehicles are shown where it is white, and not "
+        "where it is black.",
+    )
+
+    def __bool__(self) -> bool:
+        return bool(self.polygons or self.mask)
+
+    @model_validator(mode="after")
+    def _lie_in_the_frame(self) -> "RegionsSettings":
+        _check_names(each.name for each in self.polygons)
+        for each in self.polygons:
+            self.check_inside(each.name, each.points)
+        return self
+
+
+class LineSettings(Section):
+    """A line; crossings are counted by direction."""
+
+    name: Name
+    start: Place = Field(description="Start, x and y.")
+    end: Place = Field(description="End, x and y.")
+    left: Name = Field("left", description="Name of the direction to the left, from the start.")
+    right: Name = Field("right", description="Name of the direction to the right.")
+
+    @model_validator(mode="after")
+    def _has_a_length_and_two_directions(self) -> "LineSettings":
+        if self.start == self.end:
+            raise ValueError("start and end are one point; give two")
+        if self.left == self.right:
+            raise ValueError("left and right have one name; give each its own")
+        return self
+
+
+class ZoneSettings(PolygonSection):
+    """A zone; vehicles that enter, leave and stay are counted."""
+
+
+class CountSettings(PlacedSection):
+    """Lines and zones at which vehicles are counted (`vdet.traffic` explains the rule)."""
+
+    lines: tuple[LineSettings, ...] = Field((), max_length=MOST_SHAPES, description="Lines.")
+    zones: tuple[ZoneSettings, ...] = Field((), max_length=MOST_SHAPES, description="Zones.")
+    drawn: bool = Field(
+        False, description="Draw the lines and zones with their running counts into the video."
+    )
+    confirmed: float = Field(
+        0.2,
+        ge=0,
+        le=10,
+        description="Ignore vehicles that are detected over a shorter time, in seconds.",
+    )
+    gap: float = Field(
+        1.0,
+        ge=0,
+        le=10,
+        description="Join a track to one that ended near its start at most this long before, in "
+        "seconds.",
+    )
+
+    def __bool__(self) -> bool:
+        return bool(self.lines or self.zones)
+
+    @model_validator(mode="after")
+    def _lie_in_the_frame(self) -> "CountSettings":
+        _check_names([line.name for line in self.lines] + [zone.name for zone in self.zones])
+        for line in self.lines:
+            self.check_inside(line.name, (line.start, line.end))
+        for zone in self.zones:
+            self.check_inside(zone.name, zone.points)
+        return self
