@@ -29,8 +29,7 @@ from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.box_regression import extract_box_patches, fit_boxes
 from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
 from vdet.learn.svm.extraction import extract
-from vdet.learn.svm.fitting import fit_patches
-from vdet.learn.svm.training_set import training_set
+from vdet.learn.svm.fitting import fit
 from vdet.media import VideoReader
 from vdet.run.loop import peek
 from vdet.run.stride import search_frame
@@ -101,23 +100,22 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
     data = extract(
         files,
         settings.svm.features,
-        max_broken=0,
+        training,
         workers=workers,
         augmenter=partial(augment, settings=training.augmentation),
-        seed=training.seed,
     )
     boxes = extract_box_patches(files, boxed, settings, workers=workers)
     assert boxes is not None
     boxed_data = boxes.boxed
     assert boxed_data is not None
     assert boxes.assumed is not None
-    assumed = training_set(boxes.assumed, np.ones(len(boxes.assumed.vectors), bool))
+    assumed = boxes.assumed.rows
     blocks = _block_of(_frames_of(files), last), _block_of(_frames_of(boxed), last)
 
     def without(block: int) -> LinearModel:
         kept, kept_boxed = (each != block for each in blocks)
-        model = fit_patches(data, kept, settings)
-        sets = [training_set(data, kept), training_set(boxed_data, kept_boxed)]
+        model = fit(data.rows.of(kept), settings)
+        sets = [data.rows.of(kept), boxed_data.rows.of(kept_boxed)]
         return replace(model, box_regression=fit_boxes(sets, assumed, settings))
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)

@@ -10,6 +10,8 @@ from typing import Literal
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import vdet
 from vdet.config.schema import (
@@ -26,14 +28,13 @@ from vdet.config.schema import (
 from vdet.detect.svm.features import FeatureExtractor, Layout
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
-from vdet.learn.svm.augmentation import augment
+from vdet.learn.svm.augmentation import Augmenter, augment
 from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
-from vdet.learn.svm.extraction import MAX_NAMED, extract
+from vdet.learn.svm.extraction import MAX_NAMED, LabelledVectors, Rows, extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.training import train
-from vdet.learn.svm.training_set import hold_out
 from vdet.media.images import Image, read_image, write_image
-from vdet.workers import LocalProcesses, ThisProcess
+from vdet.workers import LocalProcesses, ThisProcess, Workers
 
 SIZE = 16
 GROUPS = {
@@ -118,31 +119,41 @@ def but(**changes: object) -> Settings:
     return SETTINGS.model_copy(update={"train": TrainSettings(svm=training)})
 
 
+SERIAL = ThisProcess()
 NO_AUGMENTATION = AugmentationSettings(mirror=False, cut=0, parts=0)
 AUGMENTER = partial(augment, settings=SETTINGS.train.svm.augmentation)
 
 
-def tolerant(share: float) -> Settings:
-    return but(max_broken=share)
+def describe(
+    files: list[PatchFile],
+    *,
+    features: FeatureSettings = SETTINGS.svm.features,
+    augmenter: Augmenter | None = None,
+    workers: Workers = SERIAL,
+    max_broken: float = 0,
+    seed: int = 0,
+) -> LabelledVectors:
+    training = SvmTrainingSettings(max_broken=max_broken, seed=seed)
+    return extract(files, features, training, workers=workers, augmenter=augmenter)
 
 
 def test_patches_are_described_in_order_with_their_class_and_group(files: list[PatchFile]) -> None:
-    vectors = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
-    assert vectors.groups.tolist() == [file.group for file in files]
-    assert vectors.vehicle.tolist() == [file.vehicle for file in files]
-    assert vectors.vehicle.sum() == 32
-    assert vectors.broken == 0
+    data = describe(files)
+    assert data.groups.tolist() == [file.group for file in files]
+    assert data.vehicle.tolist() == [file.vehicle for file in files]
+    assert data.vehicle.sum() == 32
+    assert data.broken == 0
     last = cv2.imread(str(files[-1].source / files[-1].name))
     assert last is not None
     extractor = FeatureExtractor(SETTINGS.svm.features)
-    assert vectors.vectors.shape == (57, extractor.layout.length)
+    assert data.vectors.shape == (57, extractor.layout.length)
     expected = extractor.describe(np.asarray(last, np.uint8))
-    np.testing.assert_array_equal(vectors.vectors[-1], expected)
+    np.testing.assert_array_equal(data.vectors[-1], expected)
 
 
 def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
     larger = SETTINGS.svm.features.model_copy(update={"patch": 32})
-    vectors = extract(files, larger, max_broken=0, workers=ThisProcess()).vectors
+    vectors = describe(files, features=larger).vectors
     np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
 
 
@@ -150,53 +161,48 @@ def test_several_processes_give_the_same_as_one(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
-    one = extract(
-        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=ThisProcess()
+    one, two = (
+        describe(files, augmenter=AUGMENTER, workers=workers)
+        for workers in (ThisProcess(), LocalProcesses(2))
     )
-    two = extract(
-        files, SETTINGS.svm.features, max_broken=0, augmenter=AUGMENTER, workers=LocalProcesses(2)
-    )
-    np.testing.assert_array_equal(one.vectors, two.vectors)
+    for name in ("vectors", "vehicle", "sides", "origins"):
+        np.testing.assert_array_equal(getattr(one.rows, name), getattr(two.rows, name))
     np.testing.assert_array_equal(one.groups, two.groups)
     assert one.digest == two.digest
-    assert one.augmented is not None
-    assert two.augmented is not None
-    for name in ("vectors", "vehicle", "origins"):
-        np.testing.assert_array_equal(getattr(one.augmented, name), getattr(two.augmented, name))
 
 
-def test_augmented_samples_have_the_row_of_their_patch(
+def test_augmented_samples_follow_and_have_the_row_of_their_patch(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
     mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
-    augmented = extract(
-        files, SETTINGS.svm.features, max_broken=0, augmenter=mirror, workers=ThisProcess()
-    ).augmented
-    assert augmented is not None
-    assert augmented.origins.tolist() == list(range(57))
-    assert augmented.vehicle.tolist() == [file.vehicle for file in files]
+    rows = describe(files, augmenter=mirror).rows
+    assert rows.patches == 57
+    assert rows.origins.tolist() == [*range(57), *range(57)]
+    assert rows.vehicle.tolist() == [file.vehicle for file in files] * 2
     last = read_image(files[-1].source / files[-1].name)
     expected = FeatureExtractor(SETTINGS.svm.features).describe(np.ascontiguousarray(last[:, ::-1]))
-    np.testing.assert_array_equal(augmented.vectors[-1], expected)
+    np.testing.assert_array_equal(rows.vectors[-1], expected)
 
 
 def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile]) -> None:
-    whole, one = (
-        extract(
-            some,
-            SETTINGS.svm.features,
-            max_broken=0,
-            augmenter=AUGMENTER,
-            seed=7,
-            workers=ThisProcess(),
-        ).augmented
-        for some in (files, files[40:41])
-    )
-    assert whole is not None
-    assert one is not None
-    assert len(one.origins) >= 1
+    whole = describe(files, augmenter=AUGMENTER, seed=7).rows
+    one = describe(files[40:41], augmenter=AUGMENTER, seed=7).rows
+    assert len(one.origins) > 1
     np.testing.assert_array_equal(whole.vectors[whole.origins == 40], one.vectors)
+
+
+def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
+    vectors = np.array([0, 10, 20, 30, 40, 1, 11, 12, 21, 41], np.float32)[:, np.newaxis]
+    vehicle = np.array([True, False] * 5)
+    sides = np.arange(40, dtype=np.float32).reshape(10, 4)
+    rows = Rows(vectors, vehicle, sides, np.array([0, 1, 2, 3, 4, 0, 1, 1, 2, 4]))
+    kept = rows.of(np.array([False, True, True, False, True]))
+    assert kept.vectors[:, 0].tolist() == [10, 20, 40, 11, 12, 21, 41]
+    assert kept.sides[:, 0].tolist() == [4, 8, 16, 24, 28, 32, 36]
+    assert kept.vehicle.tolist() == [False, True, True, True, False, True, False]
+    assert kept.origins.tolist() == [0, 1, 2, 0, 0, 1, 2]
+    assert kept.patches == 3
 
 
 def test_a_process_that_is_killed_is_an_error(
@@ -205,34 +211,18 @@ def test_a_process_that_is_killed_is_an_error(
     def be_killed(*_: object, **__: object) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
-    monkeypatch.setattr("vdet.learn.svm.extraction._describe_chunk", be_killed)
+    monkeypatch.setattr("vdet.learn.svm.extraction._describe", be_killed)
     with pytest.raises(DataError, match="a process that described patches was killed"):
-        extract(files, SETTINGS.svm.features, max_broken=0, workers=LocalProcesses(2))
-
-
-def test_progress_adds_up_to_the_number_of_patches(
-    files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
-    steps: list[int] = []
-    extract(
-        files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess(), progress=steps.append
-    )
-    assert steps == [10, 10, 10, 10, 10, 7]
+        describe(files, workers=LocalProcesses(2))
 
 
 def test_different_data_sets_have_different_digests(files: list[PatchFile]) -> None:
-    whole, same, fewer, renamed = (
-        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
-        for some in (
-            files,
-            files,
-            files[1:],
-            [replace(files[0], group="non-vehicles/x"), *files[1:]],
-        )
-    )
+    renamed = [replace(files[0], group="non-vehicles/x"), *files[1:]]
+    boxed = [replace(files[0], sides=(None, 0.0, None, 0.1)), *files[1:]]
+    sets = (files, files, files[1:], renamed, boxed)
+    whole, same, *others = (describe(some).digest for some in sets)
     assert whole == same
-    assert len({whole, fewer, renamed}) == 3
+    assert len({whole, *others}) == 4
     assert len(whole) == 64
 
 
@@ -244,35 +234,24 @@ def test_a_file_name_that_is_no_text_is_part_of_the_digest(tmp_path: Path) -> No
         path.parent.mkdir(parents=True)
         write_image(path, picture)
         odd = PatchFile(path.parent, path.name, "vehicles", vehicle=True)
-        digests.add(
-            extract([odd], SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
-        )
+        digests.add(describe([odd]).digest)
     assert len(digests) == 2
 
 
-def test_broken_patches_are_named_skipped_and_counted(
+def test_broken_patches_are_skipped_and_counted_and_the_first_ones_named(
     files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    mixed = with_broken(files, tmp_path, 2)
+    count = MAX_NAMED + 3
+    mixed = with_broken(files, tmp_path, count)
     with caplog.at_level(logging.WARNING, "vdet"):
-        vectors = extract(mixed, SETTINGS.svm.features, max_broken=0.1, workers=ThisProcess())
-    assert vectors.broken == 2
-    assert vectors.groups.tolist() == [file.group for file in files]
-    whole = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
-    np.testing.assert_array_equal(vectors.vectors, whole.vectors)
+        data = describe(mixed, max_broken=0.5)
+    assert data.broken == count
+    assert data.groups.tolist() == [file.group for file in files]
+    np.testing.assert_array_equal(data.vectors, describe(files).vectors)
     assert [record.message for record in caplog.records] == [
-        f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(2)
+        *(f"{tmp_path}: vehicles/{i}.png: is no readable picture; skipped" for i in range(10)),
+        "… and 3 more",
     ]
-
-
-def test_only_the_first_broken_patches_are_named(
-    files: list[PatchFile], tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    mixed = with_broken(files, tmp_path, MAX_NAMED + 3)
-    with caplog.at_level(logging.WARNING, "vdet"):
-        extract(mixed, SETTINGS.svm.features, max_broken=0.5, workers=ThisProcess())
-    assert len(caplog.records) == MAX_NAMED + 1
-    assert caplog.records[-1].message == "… and 3 more"
 
 
 def test_more_broken_patches_than_are_tolerated_are_an_error(
@@ -281,8 +260,8 @@ def test_more_broken_patches_than_are_tolerated_are_an_error(
     mixed = with_broken(files, tmp_path, 3)
     message = r"vehicles/0\.png: 3 of 60 patches are broken, more than the 4\.0% of train\.svm\.max"
     with pytest.raises(DataError, match=message):
-        train(mixed, tolerant(0.04), jobs=1)
-    _, report = train(mixed, tolerant(0.05), jobs=1)
+        train(mixed, but(max_broken=0.04), jobs=1)
+    _, report = train(mixed, but(max_broken=0.05), jobs=1)
     assert report.broken == 3
 
 
@@ -290,39 +269,65 @@ def test_only_broken_patches_are_an_error_at_any_tolerance(
     tmp_path: Path,
 ) -> None:
     with pytest.raises(DataError, match="patches"):
-        train(with_broken([], tmp_path, 5), tolerant(1), jobs=1)
+        train(with_broken([], tmp_path, 5), but(max_broken=1), jobs=1)
 
 
-def test_the_report_counts_patches_and_features(files: list[PatchFile]) -> None:
+TAILS = np.array(["a"] * 10 + ["b"] * 5 + ["c"] * 3 + ["d"])
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_tail_split_holds_out_the_last_of_each_group(seed: int) -> None:
+    assert np.flatnonzero(hold_out(TAILS, "tail", 0.2, seed)).tolist() == [8, 9, 14, 17]
+    scattered = hold_out(np.array(["a", "b"] * 5), "tail", 0.4, seed)
+    assert np.flatnonzero(scattered).tolist() == [6, 7, 8, 9]
+
+
+def test_the_only_patch_of_a_group_is_not_held_out() -> None:
+    assert not hold_out(np.array(["a", "b", "c"]), "tail", 0.2, seed=0).any()
+
+
+def test_the_random_split_depends_on_the_seed_alone() -> None:
+    one, same, other = (hold_out(TAILS, "random", 0.3, seed) for seed in (0, 0, 1))
+    np.testing.assert_array_equal(one, same)
+    np.testing.assert_array_equal(one, hold_out(TAILS[::-1], "random", 0.3, seed=0))
+    assert (one != other).any()
+    assert one[:-6].any(), "it is not the tail"
+
+
+@given(st.integers(2, 500), st.floats(0.01, 0.99), st.integers(0, 10))
+def test_the_random_split_holds_out_the_fraction_but_never_nothing_or_all(
+    count: int, fraction: float, seed: int
+) -> None:
+    held = hold_out(np.array(["a"] * count), "random", fraction, seed)
+    assert 1 <= held.sum() <= count - 1
+    assert abs(held.sum() - count * fraction) <= 1
+
+
+@pytest.mark.parametrize("fraction", [0.01, 0.5, 0.99])
+def test_the_tail_split_holds_out_some_of_each_group_of_two_or_more(fraction: float) -> None:
+    held = hold_out(TAILS, "tail", fraction, seed=0)
+    for group in "abc":
+        of_group = held[np.isin(TAILS, group)]
+        assert 1 <= of_group.sum() < len(of_group)
+
+
+def test_the_report_has_the_numbers_of_patches_features_and_results(
+    files: list[PatchFile],
+) -> None:
     _, report = train(files, SETTINGS, jobs=1)
     assert (report.vehicles, report.non_vehicles, report.broken) == (32, 25, 0)
     assert report.features == FeatureExtractor(SETTINGS.svm.features).layout.length
     assert report.milliseconds_per_prediction > 0
-
-
-def test_a_separable_set_is_learned(files: list[PatchFile]) -> None:
-    _, report = train(files, SETTINGS, jobs=1)
     for split in report.splits:
         assert split.train_accuracy == 1
         assert split.test_accuracy >= 0.9
-
-
-def test_the_parts_of_each_split_add_up(files: list[PatchFile]) -> None:
-    _, report = train(files, SETTINGS, jobs=1)
-    for split in report.splits:
         assert split.train_patches + split.test_patches == 57
         assert sum(asdict(split.confusion).values()) == split.test_patches
-        assert sum(group.patches for group in split.groups) == split.test_patches
         right = split.confusion.true_positives + split.confusion.true_negatives
         assert split.test_accuracy == pytest.approx(right / split.test_patches)
         by_group = sum(group.patches * group.accuracy for group in split.groups)
         assert by_group == pytest.approx(right)
-
-
-def test_the_tail_split_is_reported_by_group(files: list[PatchFile]) -> None:
-    _, report = train(files, SETTINGS, jobs=1)
-    tail = report.splits[1]
-    assert {group.group: group.patches for group in tail.groups} == {
+    assert {group.group: group.patches for group in report.splits[1].groups} == {
         "non-vehicles/road": 3,
         "non-vehicles/sky": 2,
         "vehicles/far": 2,
@@ -336,11 +341,9 @@ def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_he
 ) -> None:
     settings = but(split=name, augmentation=NO_AUGMENTATION)
     model, report = train(files, settings, jobs=1)
-    data = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess())
-    kept = ~hold_out(data.groups, name, settings.train.svm.test_fraction, settings.train.svm.seed)
-    expected = fit(
-        data.vectors[kept], data.vehicle[kept], SETTINGS.svm.features, settings.train.svm
-    )
+    data = describe(files)
+    held = hold_out(data.groups, name, settings.train.svm.test_fraction, settings.train.svm.seed)
+    expected = fit(data.rows.of(~held), settings)
     np.testing.assert_array_equal(model.weights, expected.weights)
     assert [split.train_augmented for split in report.splits] == [0, 0]
 
@@ -378,8 +381,8 @@ def test_the_model_is_that_of_the_configured_split_which_comes_first(
     settings = but(split=split)
     model, report = train(files, settings, jobs=1)
     assert [part.split for part in report.splits] == order.split()
-    vectors = extract(files, settings.svm.features, max_broken=0, workers=ThisProcess())
-    right = (model.probabilities(vectors.vectors) >= 0.5) == vectors.vehicle
+    data = describe(files)
+    right = (model.probabilities(data.vectors) >= 0.5) == data.vehicle
     first = report.splits[0]
     accuracy = first.train_patches * first.train_accuracy + first.test_patches * first.test_accuracy
     assert right.sum() == pytest.approx(accuracy)
@@ -406,8 +409,7 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
     assert provenance["program"] == f"vdet {vdet.__version__}"
     assert provenance["training"] == SETTINGS.train.svm.model_dump(mode="json")
     assert provenance["report"]["splits"][0]["test_accuracy"] == report.splits[0].test_accuracy
-    digest = extract(files, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
-    assert provenance["data_sha256"] == digest
+    assert provenance["data_sha256"] == describe(files).digest
     np.testing.assert_array_equal(loaded.weights, model.weights)
 
 
@@ -475,10 +477,7 @@ def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     model, _ = train(files, settings, jobs=1)
     assert model.box_regression is not None
     vehicles = [file for file in files if file.vehicle]
-    described = extract(
-        vehicles, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()
-    ).vectors
-    hogs = described[:, : Layout.of(SETTINGS.svm.features).hog_length]
+    hogs = describe(vehicles).vectors[:, : Layout.of(SETTINGS.svm.features).hog_length]
     left, top, right, bottom = model.box_regression.sides(hogs).mean(axis=0).tolist()
     if assumed:
         assert max(left, -right) < -0.25
@@ -493,13 +492,3 @@ def test_without_hog_no_sides_are_found(mined: Path) -> None:
     settings = SETTINGS.model_copy(update={"detector": SvmSettings(features=colour)})
     files, boxed = find_patches([mined]), find_boxed([mined])
     assert train(files, settings, boxed=boxed, jobs=1)[0].box_regression is None
-
-
-def test_different_boxes_have_different_digests(mined: Path) -> None:
-    boxed = find_boxed([mined])
-    moved = [replace(boxed[0], sides=(None, 0.0, None, 0.1)), *boxed[1:]]
-    one, other = (
-        extract(some, SETTINGS.svm.features, max_broken=0, workers=ThisProcess()).digest
-        for some in (boxed, moved)
-    )
-    assert one != other

@@ -1,20 +1,19 @@
 """Where a vehicle's sides are, from the HOG of a window around it: linear ridge regression."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
-from vdet.config.schema import Settings, SvmTrainingSettings
+from vdet.config.schema import Settings
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
 from vdet.learn.svm.augmentation import Augmenter, augment, zoom_in
 from vdet.learn.svm.dataset import PatchFile, Sides
-from vdet.learn.svm.extraction import LabelledVectors, SampleVectors, extract
+from vdet.learn.svm.extraction import LabelledVectors, Rows, extract
 from vdet.learn.svm.metrics import BoxError
-from vdet.learn.svm.training_set import SplitName, hold_out, training_set
 from vdet.progress import Steps, no_steps
 from vdet.workers import Workers
 
@@ -66,13 +65,16 @@ def extract_box_patches(
         return None
     training = settings.train.svm
 
-    def describe(some: Sequence[PatchFile], augmenter: Augmenter, step: str) -> LabelledVectors:
+    def describe(
+        some: Sequence[PatchFile], augmenter: Augmenter, step: str
+    ) -> LabelledVectors | None:
+        if not some:
+            return None
         return extract(
             some,
             settings.svm.features,
-            max_broken=training.max_broken,
+            training,
             augmenter=augmenter,
-            seed=training.seed,
             workers=workers,
             progress=steps(step, len(some)),
         )
@@ -85,45 +87,58 @@ def extract_box_patches(
         if file.vehicle and file.source not in with_boxes and training.boxes.assumed
     ]
     return BoxPatches(
-        describe(boxed, augmenter, "describing patches with boxes") if boxed else None,
-        describe(assumed, zoom_in, "describing vehicles again") if assumed else None,
+        describe(boxed, augmenter, "describing patches with boxes"),
+        describe(assumed, zoom_in, "describing vehicles again"),
     )
 
 
 def fit_split_boxes(
     data: LabelledVectors,
-    held: BoolArray,
     patches: BoxPatches,
-    name: SplitName,
+    hold_out: Callable[[LabelledVectors], BoolArray],
     settings: Settings,
 ) -> tuple[BoxRegression | None, BoxError | None]:
     """Fit on the patches that are not held out and measure the error on the others.
 
     Parameters
     ----------
-    held
-        bool `(n,)`: the held-out patches of `data`. Of `patches` the same split is made.
+    hold_out
+        Returns which patches of a set are held out, bool `(patches,)`.
 
     Returns
     -------
     Either is None if it has no patches.
     """
-    parts = [(data, held)]
-    if patches.boxed is not None:
-        parts.append((patches.boxed, _hold_out(patches.boxed, name, settings.train.svm)))
+    sets = [data] if patches.boxed is None else [data, patches.boxed]
+    held = [hold_out(each) for each in sets]
     assumed = None
     if patches.assumed is not None:
-        assumed_held = _hold_out(patches.assumed, name, settings.train.svm)
-        assumed = training_set(patches.assumed, ~assumed_held)
-    regression = fit_boxes([_with_sides(each, ~out) for each, out in parts], assumed, settings)
+        assumed = patches.assumed.rows.of(~hold_out(patches.assumed))
+    learnt = [_with_sides(each, ~out) for each, out in zip(sets, held, strict=True)]
+    regression = fit_boxes(learnt, assumed, settings)
     if regression is None:
         return None, None
-    tested = [_with_sides(replace(each, augmented=None), out) for each, out in parts]
-    return regression, _error(regression, tested, settings)
+    length = Layout.of(settings.svm.features).hog_length
+    errors = []
+    for each, out in zip(sets, held, strict=True):
+        rows = _with_sides(each, out)
+        tested = slice(rows.patches)
+        found = regression.sides(rows.vectors[tested, :length])
+        errors.append(abs(found - rows.sides[tested]))
+    together = np.concatenate(errors)
+    if not len(together):
+        return regression, None
+    return regression, BoxError(len(together), round(float(np.nanmean(together)), 4))
+
+
+def _with_sides(data: LabelledVectors, kept: BoolArray) -> Rows:
+    """Return the rows of the kept patches of which at least one side is known."""
+    known = np.isfinite(data.rows.sides[: len(data.groups)]).any(axis=1)
+    return data.rows.of(kept & known)
 
 
 def fit_boxes(
-    sets: Sequence[SampleVectors], assumed: SampleVectors | None, settings: Settings
+    sets: Sequence[Rows], assumed: Rows | None, settings: Settings
 ) -> BoxRegression | None:
     """Fit on samples with known sides and, with less weight, on samples with assumed sides.
 
@@ -141,30 +156,9 @@ def fit_boxes(
     return fit_sides(rows, boxes.penalty)
 
 
-def _with_sides(data: LabelledVectors, kept: BoolArray) -> SampleVectors:
-    """Return the training set of the kept patches of which at least one side is known."""
-    if data.sides is not None:
-        kept = kept & np.isfinite(data.sides).any(axis=1)
-    return training_set(data, kept)
-
-
-def _hold_out(data: LabelledVectors, name: SplitName, training: SvmTrainingSettings) -> BoolArray:
-    return hold_out(data.groups, name, training.test_fraction, training.seed)
-
-
-def _error(
-    regression: BoxRegression, tested: Sequence[SampleVectors], settings: Settings
-) -> BoxError | None:
-    length = Layout.of(settings.svm.features).hog_length
-    errors = np.concatenate(
-        [abs(regression.sides(each.vectors[:, :length]) - each.sides) for each in tested]
-    )
-    return BoxError(len(errors), round(float(np.nanmean(errors)), 4)) if len(errors) else None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxRows:
-    """Rows to fit the sides of boxes to, all of the same weight.
+    """Rows to fit the sides of boxes to.
 
     Attributes
     ----------
@@ -181,6 +175,13 @@ class BoxRows:
     sides: Float32Array
     weight: float = 1.0
 
+    def blocks(self, columns: Sequence[int]) -> Iterator["BoxRows"]:
+        """Yield the rows in which a side is known, block by block, with these sides only."""
+        rows = np.flatnonzero(~np.isnan(self.sides[:, columns[0]]))
+        for start in range(0, len(rows), _BLOCK):
+            some = rows[start : start + _BLOCK]
+            yield BoxRows(self.hogs[some], self.sides[some][:, columns], self.weight)
+
 
 def fit_sides(parts: Sequence[BoxRows], penalty: float) -> BoxRegression:
     """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
@@ -194,80 +195,58 @@ def fit_sides(parts: Sequence[BoxRows], penalty: float) -> BoxRegression:
     """
     slopes = np.zeros((4, parts[0].hogs.shape[1]), np.float32)
     biases = np.zeros(4, np.float32)
-    for columns, rows in _patterns([~np.isnan(part.sides) for part in parts]):
-        slopes[columns], biases[columns] = _Ridge(parts, columns, rows).solve(penalty)
+    known = ~np.isnan(np.concatenate([part.sides for part in parts]))
+    for pattern in np.unique(known[:, known.any(axis=0)], axis=1).T:
+        columns = np.flatnonzero((known == pattern[:, np.newaxis]).all(axis=0)).tolist()
+        slopes[columns], biases[columns] = _fit_columns(parts, columns, penalty)
     return BoxRegression(slopes, biases)
 
 
-_Pattern = tuple[list[int], list[BoolArray]]
+def _fit_columns(
+    parts: Sequence[BoxRows], columns: Sequence[int], penalty: float
+) -> tuple[Float64Array, Float64Array]:
+    """Fit sides that are known in the same rows, by the normal equations of scaled features.
 
+    Returns
+    -------
+    Weights `(columns, h)` and biases `(columns,)` for features as they are.
+    """
+    from scipy.linalg import solve  # type: ignore[import-untyped]
+    from sklearn.preprocessing import StandardScaler
 
-def _patterns(known: Sequence[BoolArray]) -> Iterator[_Pattern]:
-    """Yield the columns known in the same rows, and these rows of each part."""
-    together = np.concatenate(known)
-    left = [column for column in range(together.shape[1]) if together[:, column].any()]
-    while left:
-        first = left[0]
-        columns = [column for column in left if (together[:, column] == together[:, first]).all()]
-        yield columns, [part[:, first] for part in known]
-        left = [column for column in left if column not in columns]
+    features, weighted = StandardScaler(), StandardScaler()
+    for block in _blocks(parts, columns):
+        features.partial_fit(block.hogs)
+        weights = np.full(len(block.hogs), block.weight)
+        weighted.partial_fit(np.hstack([block.hogs, block.sides]), sample_weight=weights)
+    width = parts[0].hogs.shape[1]
+    mean, target = np.split(weighted.mean_, [width])
+    spread = np.sqrt(features.var_)
+    spread += _LEAST_SPREAD * spread.mean() + np.finfo(np.float32).tiny
 
-
-class _Ridge:
-    """Ridge regression by the normal equations of scaled features."""
-
-    def __init__(
-        self, parts: Sequence[BoxRows], columns: Sequence[int], rows: Sequence[BoolArray]
-    ) -> None:
-        self._parts, self._columns, self._rows = parts, list(columns), rows
-        self._count, self._weight = 0, 0.0
-        width = parts[0].hogs.shape[1]
-        sums, squares, weighted = np.zeros((3, width))
-        targets = np.zeros(len(self._columns))
-        for hogs, sides, weight in self._blocks():
-            self._count += len(hogs)
-            self._weight += weight * len(hogs)
-            total = hogs.sum(axis=0, dtype=np.float64)
-            sums += total
-            weighted += weight * total
-            squares += np.square(hogs, dtype=np.float64).sum(axis=0)
-            targets += weight * sides.sum(axis=0, dtype=np.float64)
-        mean = sums / self._count
-        spread = np.sqrt(np.maximum(squares / self._count - np.square(mean), 0))
-        self._spread = spread + _LEAST_SPREAD * spread.mean() + np.finfo(np.float32).tiny
-        self._mean = weighted / self._weight
-        self._target = targets / self._weight
-
-    def _blocks(self) -> Iterator[tuple[Float32Array, Float32Array, float]]:
-        """Yield HOG and targets of the rows, block by block, with their weight."""
-        for part, known in zip(self._parts, self._rows, strict=True):
-            (rows,) = np.nonzero(known)
-            for start in range(0, len(rows), _BLOCK):
-                some = rows[start : start + _BLOCK]
-                yield part.hogs[some], part.sides[some][:, self._columns], part.weight
-
-    def solve(self, penalty: float) -> tuple[Float64Array, Float64Array]:
-        """Return weights `(columns, h)` and biases `(columns,)` for features as they are."""
-        from scipy.linalg import solve  # type: ignore[import-untyped]
-
-        ridge = penalty * self._weight
-        if self._count < len(self._mean):  # the products of the rows are fewer
-            blocks = list(self._scaled())
-            hogs, sides = (np.concatenate(each) for each in zip(*blocks, strict=True))
-            products = (hogs @ hogs.T).astype(np.float64) + ridge * np.identity(self._count)
-            scaled = hogs.T @ solve(products, sides, assume_a="pos", overwrite_a=True)
-        else:
-            gram = np.diag(np.full(len(self._mean), ridge))
-            product = np.zeros((len(self._mean), len(self._columns)))
-            for hogs, sides in self._scaled():
-                gram += hogs.T @ hogs
-                product += hogs.T @ sides
-            scaled = solve(gram, product, assume_a="pos", overwrite_a=True)
-        weights = scaled.T / self._spread
-        return weights, self._target - weights @ self._mean
-
-    def _scaled(self) -> Iterator[tuple[Float32Array, Float64Array]]:
+    def scaled() -> Iterator[tuple[Float32Array, Float64Array]]:
         """Yield the rows block by block, both centred, the HOG scaled too."""
-        for hogs, sides, weight in self._blocks():
-            scaled = (hogs - self._mean) / self._spread * weight**0.5
-            yield scaled.astype(np.float32), (sides - self._target) * weight**0.5
+        for block in _blocks(parts, columns):
+            root = block.weight**0.5
+            hogs = (block.hogs - mean) / spread * root
+            yield hogs.astype(np.float32), (block.sides - target) * root
+
+    ridge = penalty * float(np.max(weighted.n_samples_seen_))
+    count = int(np.max(features.n_samples_seen_))
+    if count < width:  # the products of the rows are fewer
+        hogs, sides = (np.concatenate(each) for each in zip(*scaled(), strict=True))
+        products = (hogs @ hogs.T).astype(np.float64) + ridge * np.identity(count)
+        found = hogs.T @ solve(products, sides, assume_a="pos", overwrite_a=True)
+    else:
+        gram = ridge * np.identity(width)
+        product = np.zeros((width, len(columns)))
+        for hogs, sides in scaled():
+            gram += hogs.T @ hogs
+            product += hogs.T @ sides
+        found = solve(gram, product, assume_a="pos", overwrite_a=True)
+    slopes = found.T / spread
+    return slopes, target - slopes @ mean
+
+
+def _blocks(parts: Sequence[BoxRows], columns: Sequence[int]) -> Iterator[BoxRows]:
+    return (block for part in parts for block in part.blocks(columns))

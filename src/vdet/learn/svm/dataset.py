@@ -76,7 +76,7 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
         boxes is damaged, or a zip file has a member whose name occurs twice or leads out of the
         archive, or which is a symbolic link.
     """
-    files = [file for file in _find(sources) if file.group.split("/")[0] != BOXED]
+    files = _find(sources, boxed=False)
     for name, vehicle in CLASSES.items():
         if not any(file.vehicle is vehicle for file in files):
             where = ", ".join(map(str, sources))
@@ -95,24 +95,27 @@ def find_boxed(sources: Sequence[Path]) -> list[PatchFile]:
     DataError
         As for `find_patches`, but a class may be without patches.
     """
-    return [file for file in _find(sources) if file.group.split("/")[0] == BOXED]
+    return _find(sources, boxed=True)
 
 
-def _find(sources: Sequence[Path]) -> list[PatchFile]:
+def _find(sources: Sequence[Path], *, boxed: bool) -> list[PatchFile]:
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
+    files = [file for file in files if (file.group.split("/")[0] == BOXED) is boxed]
     return sorted(files, key=lambda file: (file.group, _numeric(file.name), file.source))
 
 
 def _find_in(source: Path) -> list[PatchFile]:
-    if source.is_dir():
-        names = [path.relative_to(source).as_posix() for path in _files(source)]
+    if source.is_dir():  # only files: devices and pipes may be endless
+        names = [p.relative_to(source).as_posix() for p in source.rglob("*") if p.is_file()]
     elif source.exists():
-        names = _zip_names(source)
+        try:
+            names = list_members(source)
+        except ArchiveError as error:
+            raise DataError(f"{source}: {error}") from error
     else:
         raise DataError(f"{source}: no such folder or zip file")
     boxes = _read_table(source) if TABLE in names else {}
-    top = source.resolve().name
-    files = [file for name in names if (file := _patch_file(source, top, name, boxes))]
+    files = [file for name in names if (file := _patch_file(source, name, boxes))]
     if not files:
         raise DataError(
             f"{source}: no pictures in vehicles/<group>/ or non-vehicles/<group>/; "
@@ -121,47 +124,15 @@ def _find_in(source: Path) -> list[PatchFile]:
     return files
 
 
-def _files(folder: Path) -> Iterator[Path]:
-    """Yield the files below a folder, without devices and pipes, which may be endless."""
-    return (path for path in folder.rglob("*") if path.is_file())
-
-
-def _zip_names(source: Path) -> list[str]:
-    try:
-        return list_members(source)
-    except ArchiveError as error:
-        raise DataError(f"{source}: {error}") from error
-
-
-def _read_table(source: Path) -> dict[str, Sides]:
-    """Return the sides of each patch in the source's table."""
-    with ExitStack() as stack:
-        table = _read_bytes(source, TABLE, {}, stack)
-    try:
-        rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline="")))
-        if not rows or tuple(rows[0]) != COLUMNS:
-            raise ValueError(f"its first line is not {','.join(COLUMNS)}")
-        return {name: _sides(values) for name, *values in rows[1:]}
-    except (ValueError, csv.Error) as error:
-        raise DataError(f"{source}: {TABLE} is damaged ({error}); mine it again") from error
-
-
-def _sides(values: Sequence[str]) -> Sides:
-    left, top, right, bottom = (float(value) if value else None for value in values)
-    if not all(side is None or math.isfinite(side) for side in (left, top, right, bottom)):
-        raise ValueError("a side is not a number")
-    return left, top, right, bottom
-
-
-def _patch_file(source: Path, top: str, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
-    """Return the patch of a file name in a source named `top`; None if it is no patch."""
+def _patch_file(source: Path, name: str, boxes: Mapping[str, Sides]) -> PatchFile | None:
+    """Return the patch of a file name in a source; None if it is no patch."""
     path = PurePosixPath(name)
     hidden = any(part.startswith((".", "__MACOSX")) for part in path.parts)
     if hidden or path.suffix.lower() not in PICTURE_SUFFIXES:
         return None
     sides = boxes.get(name)
     known = CLASSES | ({BOXED: True} if sides else {})
-    folders = [top, *path.parts[:-1]]
+    folders = [source.resolve().name, *path.parts[:-1]]
     for depth in range(len(folders) - 1, -1, -1):
         if folders[depth] in known:
             group = escaped("/".join(folders[depth:]))
@@ -198,27 +169,43 @@ def _read_bytes(
         return b""
 
 
+def _read_table(source: Path) -> dict[str, Sides]:
+    """Return the sides of each patch in the source's table."""
+    with ExitStack() as stack:
+        table = _read_bytes(source, TABLE, {}, stack)
+    try:
+        rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline="")))
+        if not rows or tuple(rows[0]) != COLUMNS:
+            raise ValueError(f"its first line is not {','.join(COLUMNS)}")
+        return {name: _sides(values) for name, *values in rows[1:]}
+    except (ValueError, csv.Error) as error:
+        raise DataError(f"{source}: {TABLE} is damaged ({error}); mine it again") from error
+
+
+def _sides(values: Sequence[str]) -> Sides:
+    left, top, right, bottom = (float(value) if value else None for value in values)
+    if not all(side is None or math.isfinite(side) for side in (left, top, right, bottom)):
+        raise ValueError("a side is not a number")
+    return left, top, right, bottom
+
+
 class PatchArchive:
     """A zip file of patches, in the order in which they are added."""
 
     def __init__(self, file: zipfile.ZipFile) -> None:
         self._file = file
-        self._rows: list[tuple[str, Sides]] = []
+        self._rows: list[list[str]] = [list(COLUMNS)]
 
     def add(self, name: str, patch: Image, sides: Sides | None = None) -> None:
         """Add a patch (BGR uint8) as a PNG picture, and the sides of its vehicle."""
-        _, data = cv2.imencode(".png", patch)
-        self._write(name, data.tobytes(), zipfile.ZIP_STORED)
+        self._write(name, cv2.imencode(".png", patch)[1].tobytes(), zipfile.ZIP_STORED)
         if sides is not None:
-            self._rows.append((name, sides))
+            self._rows.append([name, *("" if side is None else f"{side:.4f}" for side in sides)])
 
     def add_table(self) -> None:
         """Add the table of all sides, with four decimals, after the last patch."""
         text = io.StringIO(newline="")
-        table = csv.writer(text, lineterminator="\n")
-        table.writerow(COLUMNS)
-        for name, sides in self._rows:
-            table.writerow([name, *("" if side is None else f"{side:.4f}" for side in sides)])
+        csv.writer(text, lineterminator="\n").writerows(self._rows)
         self._write(TABLE, text.getvalue().encode("utf-8"), zipfile.ZIP_DEFLATED)
 
     def _write(self, name: str, data: bytes, method: int) -> None:

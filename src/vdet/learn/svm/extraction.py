@@ -1,4 +1,4 @@
-"""Patch files and their augmented samples → feature vectors, in parallel."""
+"""Patch files and the samples made of them → feature vectors, in parallel."""
 
 import hashlib
 import logging
@@ -6,17 +6,17 @@ from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array
-from vdet.config.schema import FeatureSettings
+from vdet.config.schema import FeatureSettings, SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import UNKNOWN_SIDES, Augmenter, Sample
 from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.media.images import Image
 from vdet.workers import WorkerKilledError, Workers
 
 log = logging.getLogger("vdet")
@@ -24,29 +24,15 @@ log = logging.getLogger("vdet")
 CHUNK = 128
 """Patches that a process describes at a time."""
 MAX_NAMED = 10
-"""Most broken patches that are named in warnings."""
+"""At most this many broken patches are named in warnings."""
 
 RowNumbers = npt.NDArray[np.intp]
+SplitName = Literal["random", "tail"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SampleVectors:
-    """Feature vectors of samples to learn from, row by row.
-
-    `vectors` is float32 `(n, features)`, `vehicle` bool `(n,)`, `sides` float32 `(n, 4)` as in
-    `LabelledVectors`. `origins` is intp `(n,)`: the row of the patch that the sample was made of; a
-    patch has its own row.
-    """
-
-    vectors: Float32Array
-    vehicle: BoolArray
-    sides: Float32Array
-    origins: RowNumbers
-
-
-@dataclass(frozen=True, slots=True)
-class LabelledVectors:
-    """Feature vectors of patches with their labels, row by row.
+class Rows:
+    """Feature vectors of patches, followed by those of the samples made of these patches.
 
     Attributes
     ----------
@@ -54,171 +40,194 @@ class LabelledVectors:
         float32 `(n, features)`.
     vehicle
         bool `(n,)`.
-    groups
-        str `(n,)`.
-    digest
-        SHA-256 over the names, checksums and boxes of all patch files.
-    broken
-        Number of patch files that could not be read.
     sides
-        float32 `(n, 4)`: left, top, right, bottom of each row's vehicle, NaN for unknown sides.
-        None if no side is known.
-    augmented
-        Samples made of the patches, which only the training may use; None if there are none.
+        float32 `(n, 4)`: left, top, right, bottom of each vehicle, NaN for unknown sides.
+    origins
+        intp `(n,)`: the row of the patch that a sample was made of; a patch has its own row.
     """
 
     vectors: Float32Array
     vehicle: BoolArray
+    sides: Float32Array
+    origins: RowNumbers
+
+    @classmethod
+    def of_patches(
+        cls, vectors: Float32Array, vehicle: BoolArray, sides: Float32Array | None = None
+    ) -> "Rows":
+        """Return rows without samples; without `sides`, no side is known."""
+        if sides is None:
+            sides = np.full((len(vehicle), 4), np.nan, np.float32)
+        return cls(vectors, vehicle, sides, np.arange(len(vehicle)))
+
+    @property
+    def patches(self) -> int:
+        """The number of patches; their rows come first."""
+        return int(np.count_nonzero(self.origins == np.arange(len(self.origins))))
+
+    def of(self, kept: BoolArray) -> "Rows":
+        """Return a copy of the kept patches, bool `(patches,)`, with the samples made of them."""
+        used = np.flatnonzero(kept[self.origins])
+        new_rows = np.cumsum(kept) - 1
+        return Rows(
+            self.vectors[used],
+            self.vehicle[used],
+            self.sides[used],
+            new_rows[self.origins[used]],
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledVectors:
+    """The feature vectors of a set of patches.
+
+    `groups` is str `(patches,)`: the group of each patch. `digest` is the SHA-256 over the names,
+    checksums and boxes of all patch files, `broken` the number of files that could not be read.
+    """
+
+    rows: Rows
     groups: npt.NDArray[np.str_]
-    digest: str
-    broken: int
-    sides: Float32Array | None = None
-    augmented: SampleVectors | None = None
+    digest: str = ""
+    broken: int = 0
+
+    @property
+    def vectors(self) -> Float32Array:
+        """The vectors of the patches, float32 `(patches, features)`."""
+        return self.rows.vectors[: len(self.groups)]
+
+    @property
+    def vehicle(self) -> BoolArray:
+        """The labels of the patches, bool `(patches,)`."""
+        return self.rows.vehicle[: len(self.groups)]
 
 
 def extract(
     files: Sequence[PatchFile],
-    settings: FeatureSettings,
+    features: FeatureSettings,
+    training: SvmTrainingSettings,
     *,
-    max_broken: float,
     workers: Workers,
     augmenter: Augmenter | None = None,
-    seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> LabelledVectors:
     """Describe all patches; the result has the order of `files`.
 
     Parameters
     ----------
-    max_broken
-        Tolerated share of unreadable patches; they are named in warnings and skipped.
+    training
+        Has the tolerated share of unreadable patches, which are named in warnings and skipped, and
+        the seed of the augmenter.
     workers
         They describe the patches, `CHUNK` at a time.
     augmenter
-        Makes further samples of each patch, which are described too; None for none.
-    seed
-        Seed of the augmenter. The samples of a patch depend on it and on the patch, not on the
-        other patches.
+        Makes samples of each patch, which are described too. They depend on the patch and the seed,
+        not on the other patches.
     progress
         Called with the number of patches done since the last call.
 
     Raises
     ------
     DataError
-        More patches than `max_broken` are unreadable, or a worker process was killed.
+        Too many patches are unreadable, or a worker process was killed.
     ClusterError
         The cluster of `workers` cannot be used.
     """
-    chunks = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)]
-    describe = partial(_describe_chunk, settings=settings, augmenter=augmenter, seed=seed)
-    parts = _describe_chunks(describe, chunks, workers, progress)
-    good = np.concatenate([part.good for part in parts])
-    _check_broken([file for file, ok in zip(files, good, strict=True) if not ok], files, max_broken)
-    kept = [file for file, ok in zip(files, good, strict=True) if ok]
-    digest = _digest(files, [checksum for part in parts for checksum in part.checksums])
-    vectors, augmented = _joined(parts)
+    describe = partial(_describe, features=features, augmenter=augmenter, seed=training.seed)
+    chunks = _describe_all(describe, files, workers, progress)
+    good = [each for chunk in chunks for each in chunk.good]
+    _check_broken(files, good, training.max_broken)
+    checksums = [each for chunk in chunks for each in chunk.checksums]
     return LabelledVectors(
-        vectors,
-        np.array([file.vehicle for file in kept], bool),
-        np.array([file.group for file in kept], str),
-        digest,
-        len(files) - len(kept),
-        np.array([file.sides or UNKNOWN_SIDES for file in kept], np.float32),
-        augmented,
+        _joined(chunks),
+        np.array([file.group for file, ok in zip(files, good, strict=True) if ok], str),
+        _digest(files, checksums),
+        good.count(False),
     )
 
 
-def _describe_chunks(
-    describe: Callable[[Sequence[PatchFile]], "_Chunk"],
-    chunks: Sequence[Sequence[PatchFile]],
+@dataclass(frozen=True, slots=True, eq=False)
+class _Chunk:
+    """The rows of some patch files; `good` and `checksums` are of all files, also broken ones."""
+
+    rows: Rows
+    good: list[bool]
+    checksums: list[int]
+
+
+def _describe_all(
+    describe: Callable[[Sequence[PatchFile]], _Chunk],
+    files: Sequence[PatchFile],
     workers: Workers,
     progress: Callable[[int], object],
-) -> list["_Chunk"]:
-    parts: dict[int, _Chunk] = {}
+) -> list[_Chunk]:
+    parts = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)]
+    chunks: dict[int, _Chunk] = {}
     try:
-        with closing(workers.map(describe, chunks)) as results:
-            for number, part in results:
-                parts[number] = part
-                progress(len(chunks[number]))
+        with closing(workers.map(describe, parts)) as results:
+            for number, chunk in results:
+                chunks[number] = chunk
+                progress(len(parts[number]))
     except WorkerKilledError as error:
         raise DataError(
             "a process that described patches was killed; there may be too little memory: try "
             "fewer --jobs"
         ) from error
-    return [parts[number] for number in range(len(chunks))]
+    return [chunks[number] for number in range(len(parts))]
 
 
-@dataclass(frozen=True, slots=True)
-class _Chunk:
-    """What is returned for some patch files: `good` bool per file, the rest per readable file."""
-
-    vectors: Float32Array
-    augmented: SampleVectors
-    good: BoolArray
-    checksums: list[int]
-
-
-def _describe_chunk(
-    files: Sequence[PatchFile], settings: FeatureSettings, augmenter: Augmenter | None, seed: int
+def _describe(
+    files: Sequence[PatchFile], features: FeatureSettings, augmenter: Augmenter | None, seed: int
 ) -> _Chunk:
-    extractor = FeatureExtractor(settings)
     patches = list(read_patches(files))
-    readable = [
-        (_sample(patch.file, patch.image), patch.checksum)
-        for patch in patches
-        if patch.image is not None
-    ]
-    augmented = [
-        (row, each)
-        for row, (sample, checksum) in enumerate(readable)
-        for each in (augmenter(sample, (seed, checksum)) if augmenter else ())
-    ]
-    return _Chunk(
-        extractor.describe_all(to_patch(sample.image, settings.patch) for sample, _ in readable),
-        SampleVectors(
-            extractor.describe_all(to_patch(each.image, settings.patch) for _, each in augmented),
-            np.array([each.vehicle for _, each in augmented], bool),
-            np.array([each.sides for _, each in augmented], np.float32).reshape(-1, 4),
-            np.array([row for row, _ in augmented], np.intp),
+    samples, seeds = [], []
+    for patch in patches:
+        if patch.image is not None:
+            sides = np.array(patch.file.sides or UNKNOWN_SIDES, np.float32)
+            samples.append(Sample(patch.image, patch.file.vehicle, sides))
+            seeds.append((seed, patch.checksum))
+    origins = list(range(len(samples)))
+    if augmenter is not None:
+        for row in range(len(samples)):
+            made = list(augmenter(samples[row], seeds[row]))
+            samples += made
+            origins += [row] * len(made)
+    rows = Rows(
+        FeatureExtractor(features).describe_all(
+            to_patch(sample.image, features.patch) for sample in samples
         ),
-        np.array([patch.image is not None for patch in patches]),
-        [patch.checksum for patch in patches],
+        np.array([sample.vehicle for sample in samples], bool),
+        np.array([sample.sides for sample in samples], np.float32).reshape(-1, 4),
+        np.array(origins, np.intp),
     )
+    good = [patch.image is not None for patch in patches]
+    return _Chunk(rows, good, [patch.checksum for patch in patches])
 
 
-def _sample(file: PatchFile, image: Image) -> Sample:
-    return Sample(image, file.vehicle, np.array(file.sides or UNKNOWN_SIDES, np.float32))
-
-
-def _joined(chunks: list[_Chunk]) -> tuple[Float32Array, SampleVectors]:
-    """Join the vectors of all patches, and their samples; origins then count over all patches.
-
-    `chunks` is emptied on the way, so that the vectors are in memory once.
-    """
-    made = [chunk.augmented for chunk in chunks]
-    starts = np.cumsum([0, *(len(chunk.vectors) for chunk in chunks[:-1])])
-    vehicle = np.concatenate([each.vehicle for each in made])
-    sides = np.concatenate([each.sides for each in made])
-    origins = np.concatenate([each.origins + at for each, at in zip(made, starts, strict=True)])
-    width = chunks[0].vectors.shape[1]
-    vectors = np.empty((sum(len(chunk.vectors) for chunk in chunks), width), np.float32)
-    augmented = np.empty((len(vehicle), width), np.float32)
-    del made
-    end, augmented_end = len(vectors), len(augmented)
+def _joined(chunks: list[_Chunk]) -> Rows:
+    """Join all rows, patches first; empty `chunks` on the way: the vectors are in memory once."""
+    patches = [chunk.good.count(True) for chunk in chunks]
+    samples = [len(chunk.rows.origins) - n for chunk, n in zip(chunks, patches, strict=True)]
+    numbers = np.arange(sum(patches) + sum(samples))
+    parts = np.split(numbers, np.cumsum([*patches, *samples])[:-1])
+    halves = parts[: len(chunks)], parts[len(chunks) :]
+    places = [np.concatenate(pair) for pair in zip(*halves, strict=True)]
+    joined = Rows(
+        np.empty((len(numbers), chunks[0].rows.vectors.shape[1]), np.float32),
+        np.empty(len(numbers), bool),
+        np.empty((len(numbers), 4), np.float32),
+        numbers,
+    )
     while chunks:
-        chunk = chunks.pop()
-        end -= len(chunk.vectors)
-        augmented_end -= len(chunk.augmented.vectors)
-        vectors[end : end + len(chunk.vectors)] = chunk.vectors
-        augmented[augmented_end : augmented_end + len(chunk.augmented.vectors)] = (
-            chunk.augmented.vectors
-        )
-    return vectors, SampleVectors(augmented, vehicle, sides, origins)
+        rows, place = chunks.pop().rows, places.pop()
+        joined.vectors[place] = rows.vectors
+        joined.vehicle[place] = rows.vehicle
+        joined.sides[place] = rows.sides
+        joined.origins[place] = place[rows.origins]
+    return joined
 
 
-def _check_broken(
-    broken: Sequence[PatchFile], files: Sequence[PatchFile], max_broken: float
-) -> None:
+def _check_broken(files: Sequence[PatchFile], good: Sequence[bool], max_broken: float) -> None:
+    broken = [file for file, ok in zip(files, good, strict=True) if not ok]
     for file in broken[:MAX_NAMED]:
         log.warning("%s: is no readable picture; skipped", file)
     if len(broken) > MAX_NAMED:
@@ -237,3 +246,37 @@ def _digest(files: Sequence[PatchFile], checksums: Sequence[int]) -> str:
         line = f"{file.group}/{file.name.rpartition('/')[2]} {checksum:08x}{sides}\n"
         digest.update(line.encode("utf-8", "surrogateescape"))  # a file name may be no valid text
     return digest.hexdigest()
+
+
+def hold_out(
+    groups: npt.NDArray[np.str_], name: SplitName, fraction: float, seed: int
+) -> BoolArray:
+    """Choose the test patches.
+
+    Parameters
+    ----------
+    groups
+        Shape `(n,)`: the group of each patch, the patches of a group in numeric order.
+    name
+        `random`: any patches, as in the original system. `tail`: the last ones of each group, so
+        that consecutive video frames are on the same side, except where the two parts meet.
+    fraction
+        Share of patches to hold out, 0 to 1; at least one patch and never all of a part.
+
+    Returns
+    -------
+    bool `(n,)`: True for the patches of the test.
+    """
+    held = np.zeros(len(groups), bool)
+    if name == "random":
+        order = np.random.default_rng(seed).permutation(len(groups))
+        held[order[: _count(len(groups), fraction)]] = True
+    else:
+        for group in np.unique(groups):
+            (rows,) = np.nonzero(groups == group)
+            held[rows[len(rows) - _count(len(rows), fraction) :]] = True
+    return held
+
+
+def _count(total: int, fraction: float) -> int:
+    return min(max(1, round(total * fraction)), total - 1)

@@ -1,4 +1,11 @@
-"""Scale, fit and calibrate with scikit-learn; return a `LinearModel` that does not need it."""
+"""Scale, fit and calibrate with scikit-learn; return a `LinearModel` that does not need it.
+
+The classifier is that of scikit-learn's `LinearSVC`: squared hinge loss, L2 penalty on weights and
+bias. liblinear, which `LinearSVC` calls, copies float32 data to six times their size; L-BFGS needs
+only products of the data with a vector.
+Source of the solver: Liu and Nocedal, "On the Limited Memory BFGS Method for Large Scale
+Optimization", 1989.
+"""
 
 import logging
 import warnings
@@ -6,114 +13,79 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from scipy.optimize import minimize  # type: ignore[import-untyped]
+from sklearn.base import BaseEstimator, ClassifierMixin
+from sklearn.calibration import CalibratedClassifierCV
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.model_selection import StratifiedKFold
+from sklearn.preprocessing import StandardScaler
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
 from vdet.config.schema import FeatureSettings, Settings, SvmTrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
-from vdet.learn.svm.training_set import training_set
+from vdet.learn.svm.extraction import RowNumbers, Rows
 
 log = logging.getLogger("vdet")
 
-_BLOCK = 1024
-"""Rows whose mean and variance are computed at a time."""
+_BLOCK = 1024  # rows that are scaled or scored at a time
+_CORRECTIONS = 20  # of L-BFGS
+_TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 
 
-def fit_patches(data: LabelledVectors, kept: BoolArray, settings: Settings) -> LinearModel:
-    """Fit on the kept patches, bool `(n,)`, and the samples made of these; errors as of `fit`."""
-    samples = training_set(data, kept)
-    return fit(
-        samples.vectors,
-        samples.vehicle,
-        settings.svm.features,
-        settings.train.svm,
-        samples.origins,
-        copy=False,
-    )
-
-
-def fit(
-    vectors: Float32Array,
-    vehicle: BoolArray,
-    features: FeatureSettings,
-    settings: SvmTrainingSettings,
-    origins: RowNumbers | None = None,
-    *,
-    copy: bool = True,
-) -> LinearModel:
+def fit(rows: Rows, settings: Settings) -> LinearModel:
     """Fit StandardScaler → LinearSvm → CalibratedClassifierCV on raw feature vectors.
+
+    The sigmoid is fitted on the patches alone, each scored by an SVM that was fitted without it and
+    without the samples made of it.
 
     Parameters
     ----------
-    vectors
-        float32 `(n, features)`.
-    vehicle
-        bool `(n,)`.
-    origins
-        intp `(n,)`: the row of the patch that each row was made of; a patch has its own row. The
-        sigmoid is fitted on the patches alone, each scored by an SVM that was fitted without it and
-        without the samples made of it. None: all rows are patches.
-    copy
-        False: `vectors` are overwritten, which saves memory.
+    rows
+        Their vectors are overwritten, which saves memory.
 
     Raises
     ------
     DataError
         A class has fewer patches than there are calibration folds.
     """
-    from sklearn.calibration import CalibratedClassifierCV
-    from sklearn.exceptions import ConvergenceWarning
-    from sklearn.preprocessing import StandardScaler
-
-    from vdet.learn.svm.linear_svm import LinearSvm
-
-    origins = np.arange(len(vehicle)) if origins is None else origins
-    folds = settings.calibration.folds
-    (patches,) = np.nonzero(origins == np.arange(len(origins)))
-    fewest = min(np.count_nonzero(vehicle[patches]), np.count_nonzero(~vehicle[patches]))
+    training = settings.train.svm
+    folds = training.calibration.folds
+    labels = rows.vehicle[: rows.patches]
+    fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
     if fewest < folds:
         raise DataError(
             f"a class has {fewest} training patches, train.svm.calibration.folds needs {folds}; "
             "give more patches"
         )
-    scaler = StandardScaler(copy=copy)
-    for start in range(0, len(vectors), _BLOCK):  # as a whole, it needs twice their memory
-        scaler.partial_fit(vectors[start : start + _BLOCK])
-    scaled = scaler.transform(vectors)
+    scaler = StandardScaler(copy=False)
+    for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
+        scaler.partial_fit(rows.vectors[start : start + _BLOCK])
     calibrated = CalibratedClassifierCV(
-        LinearSvm(scaled, C=settings.C, max_iter=settings.max_iterations),
+        LinearSvm(scaler.transform(rows.vectors), C=training.C, max_iter=training.max_iterations),
         method="sigmoid",
-        cv=list(_folds(vehicle[patches], patches, origins, settings)),
-        ensemble=settings.calibration.ensemble,
+        cv=list(_folds(rows, training)),
+        ensemble=training.calibration.ensemble,
     )
+    numbers = np.arange(len(rows.vehicle))
+    weights = (rows.origins == numbers).astype(float)  # samples do not count for the sigmoid
     with warnings.catch_warnings(record=True) as caught:
         warnings.filterwarnings("ignore", "Since .* does not appear to accept sample_weight")
         warnings.simplefilter("always", ConvergenceWarning)
-        calibrated.fit(np.arange(len(vehicle)), vehicle, _weights(patches, len(vehicle)))
+        calibrated.fit(numbers, rows.vehicle, weights)
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
         log.warning(
             "the SVM has not converged; raise train.svm.max_iterations or lower train.svm.C"
         )
-    return _to_model(calibrated.calibrated_classifiers_, scaler, features)
+    return _to_model(calibrated.calibrated_classifiers_, scaler, settings.svm.features)
 
 
-def _weights(patches: RowNumbers, count: int) -> Float64Array:
-    """Return the weights for the sigmoid: 1 for patches, 0 for augmented samples."""
-    weights = np.zeros(count)
-    weights[patches] = 1
-    return weights
-
-
-def _folds(
-    vehicle: BoolArray, patches: RowNumbers, origins: RowNumbers, settings: SvmTrainingSettings
-) -> Iterator[tuple[RowNumbers, RowNumbers]]:
-    """Yield the rows to fit on and to calibrate on; `vehicle` holds the labels of `patches`."""
-    from sklearn.model_selection import StratifiedKFold
-
-    splitter = StratifiedKFold(settings.calibration.folds, shuffle=True, random_state=settings.seed)
-    for _, tested in splitter.split(patches, vehicle):
-        inside = np.isin(origins, patches[tested])
+def _folds(rows: Rows, training: SvmTrainingSettings) -> Iterator[tuple[RowNumbers, RowNumbers]]:
+    """Yield the rows to fit on and those to calibrate on."""
+    splitter = StratifiedKFold(training.calibration.folds, shuffle=True, random_state=training.seed)
+    patches = np.arange(rows.patches)
+    for _, tested in splitter.split(patches, rows.vehicle[patches]):
+        inside = np.isin(rows.origins, tested)
         yield np.flatnonzero(~inside), np.flatnonzero(inside)
 
 
@@ -130,3 +102,62 @@ def _to_model(members: list[Any], scaler: Any, features: FeatureSettings) -> Lin
         np.array([sigmoid.a_ for sigmoid in sigmoids], np.float32),
         np.array([sigmoid.b_ for sigmoid in sigmoids], np.float32),
     )
+
+
+class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
+    """A two-class linear SVM as a scikit-learn estimator, fitted in the memory of its data.
+
+    `vectors` is float32 `(n, features)`. The methods take numbers of its rows, each once,
+    so that a cross-validation copies no vectors. `C` is the penalty of the errors, `max_iter` the
+    most iterations of the solver. `fit` warns with `ConvergenceWarning` if they are not enough. It
+    takes no sample weights.
+    """
+
+    def __init__(self, vectors: Float32Array, C: float = 1.0, max_iter: int = 1000) -> None:
+        self.vectors = vectors
+        self.C = C
+        self.max_iter = max_iter
+
+    def __sklearn_clone__(self) -> "LinearSvm":  # scikit-learn would copy the vectors
+        return LinearSvm(self.vectors, self.C, self.max_iter)
+
+    def fit(self, rows: RowNumbers, y: BoolArray) -> "LinearSvm":
+        """Fit to some rows, with labels `y`, bool `(m,)`."""
+        x = self.vectors  # all of them: a copy of some would take their memory again
+        signs = np.zeros(len(x), np.float32)
+        signs[rows] = np.where(y, 1, -1)
+        used = abs(signs)
+        scale = 1 / (self.C * len(y))  # the loss of zero weights becomes 1
+
+        def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
+            weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
+            errors = np.maximum(0, used - signs * (x @ weights + bias))
+            slopes = -2 * self.C * (errors * signs)
+            gradient = parameters + np.append(slopes @ x, slopes.sum())
+            squares = float(np.square(errors, dtype=np.float64).sum())
+            value = 0.5 * float(parameters @ parameters) + self.C * squares
+            return scale * value, scale * gradient
+
+        limits = {"maxiter": self.max_iter, "maxfun": 10 * self.max_iter}
+        options = {**limits, "maxcor": _CORRECTIONS, "ftol": _TOLERANCE, "gtol": 0}
+        zeros = np.zeros(x.shape[1] + 1)
+        found = minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
+        if found.status == 1:  # the iterations are used up
+            warnings.warn("the solver has not converged", ConvergenceWarning, stacklevel=2)
+        self.classes_ = np.array([False, True])
+        self.coef_ = found.x[np.newaxis, :-1]
+        self.intercept_ = found.x[-1:]
+        return self
+
+    def decision_function(self, rows: RowNumbers) -> Float32Array:
+        """Return the signed distances, float32 `(m,)`: positive for the second class."""
+        weights = self.coef_[0].astype(np.float32)
+        distances = np.empty(len(rows), np.float32)
+        for start in range(0, len(rows), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            distances[block] = self.vectors[rows[block]] @ weights
+        return distances + np.float32(self.intercept_[0])
+
+    def predict(self, rows: RowNumbers) -> BoolArray:
+        """Return the classes, bool `(m,)`; scikit-learn asks for it."""
+        return self.decision_function(rows) > 0

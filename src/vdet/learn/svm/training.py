@@ -17,10 +17,9 @@ from vdet.errors import DataError
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.box_regression import BoxPatches, extract_box_patches, fit_split_boxes
 from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.learn.svm.extraction import LabelledVectors, extract
-from vdet.learn.svm.fitting import fit_patches
+from vdet.learn.svm.extraction import LabelledVectors, SplitName, extract, hold_out
+from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.metrics import Confusion, GroupAccuracy, SplitMetrics, TrainingMetrics
-from vdet.learn.svm.training_set import SplitName, hold_out
 from vdet.progress import Steps, no_steps
 from vdet.version import __version__
 from vdet.workers import make_workers
@@ -53,8 +52,8 @@ def train(
 
     Returns
     -------
-    The model fitted on the training part of `training.split`, with its provenance, and the metrics
-    on both splits, this one first.
+    The model fitted on the training part of `train.svm.split`, with its provenance, and the metrics
+    of both splits, this one first.
 
     Raises
     ------
@@ -69,10 +68,9 @@ def train(
     data = extract(
         files,
         settings.svm.features,
-        max_broken=training.max_broken,
+        training,
         workers=workers,
         augmenter=partial(augment, settings=training.augmentation),
-        seed=training.seed,
         progress=steps("describing patches", len(files)),
     )
     boxes = extract_box_patches(files, boxed, settings, workers=workers, steps=steps)
@@ -111,27 +109,27 @@ def _fit_split(
     name: SplitName,
     steps: Steps,
 ) -> tuple[LinearModel, SplitMetrics]:
-    training = settings.train.svm
-    held = hold_out(data.groups, name, training.test_fraction, training.seed)
+    def held_of(some: LabelledVectors) -> BoolArray:
+        training = settings.train.svm
+        return hold_out(some.groups, name, training.test_fraction, training.seed)
+
+    held = held_of(data)
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")
     began = time.perf_counter()
     steps(f"fitting the classifier, {name} split", None)
-    model = fit_patches(data, ~held, settings)
+    model = fit(data.rows.of(~held), settings)
     regression, error = None, None
     if boxes is not None:
         steps(f"fitting the sides of boxes, {name} split", None)
-        regression, error = fit_split_boxes(data, held, boxes, name, settings)
+        regression, error = fit_split_boxes(data, boxes, held_of, settings)
     seconds = time.perf_counter() - began
     predicted = model.probabilities(data.vectors) >= 0.5
     right = predicted == data.vehicle
-    augmented = 0
-    if data.augmented is not None:
-        augmented = int(np.count_nonzero(~held[data.augmented.origins]))
     return replace(model, box_regression=regression), SplitMetrics(
         split=name,
         train_patches=int(np.count_nonzero(~held)),
-        train_augmented=augmented,
+        train_augmented=int(np.count_nonzero(~held[data.rows.origins[len(held) :]])),
         test_patches=int(np.count_nonzero(held)),
         train_accuracy=float(right[~held].mean()),
         test_accuracy=float(right[held].mean()),
@@ -144,8 +142,8 @@ def _fit_split(
 
 def _by_group(groups: npt.NDArray[np.str_], right: BoolArray) -> tuple[GroupAccuracy, ...]:
     return tuple(
-        GroupAccuracy(str(name), int((groups == name).sum()), float(right[groups == name].mean()))
-        for name in np.unique(groups)
+        GroupAccuracy(name, int((groups == name).sum()), float(right[groups == name].mean()))
+        for name in np.unique(groups).tolist()
     )
 
 

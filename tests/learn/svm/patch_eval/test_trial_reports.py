@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 
 from vdet.learn.svm.dataset import PatchFile
-from vdet.learn.svm.extraction import LabelledVectors
+from vdet.learn.svm.extraction import LabelledVectors, Rows
 from vdet.learn.svm.patch_eval.evaluate import MOST_MISTAKES, TrialReport, report_trial
 from vdet.learn.svm.patch_eval.trials import Trial
 
@@ -12,7 +12,7 @@ def report(vehicle: list[bool], probabilities: list[float]) -> TrialReport:
     """Return the report on patches 0, 1, 2 … in one group per class."""
     flags = np.array(vehicle)
     groups = np.where(flags, "vehicles/a", "non-vehicles/a")
-    data = LabelledVectors(np.zeros((len(flags), 1), np.float32), flags, groups, "", 0)
+    data = LabelledVectors(Rows.of_patches(np.zeros((len(flags), 1), np.float32), flags), groups)
     files = [
         PatchFile(Path("set"), f"{number}.png", str(group), bool(flag))
         for number, (group, flag) in enumerate(zip(groups, flags, strict=True))

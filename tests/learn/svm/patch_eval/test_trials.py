@@ -13,7 +13,7 @@ from vdet.config.schema import (
     TrainSettings,
 )
 from vdet.errors import DataError
-from vdet.learn.svm.extraction import LabelledVectors
+from vdet.learn.svm.extraction import LabelledVectors, Rows
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.patch_eval.trials import holdouts, model_trial, run_trial
 
@@ -32,7 +32,7 @@ def data(groups: dict[str, int]) -> LabelledVectors:
     random = np.random.default_rng(1)
     vectors = random.normal(size=(len(names), 24)).astype(np.float32)
     vectors += np.where(vehicle, 1, -1)[:, np.newaxis]
-    return LabelledVectors(vectors, vehicle, names, digest="", broken=0)
+    return LabelledVectors(Rows.of_patches(vectors, vehicle), names)
 
 
 FOUR = {"non-vehicles/a": 20, "non-vehicles/b": 10, "vehicles/a": 15, "vehicles/b": 20}
@@ -72,9 +72,7 @@ def test_each_patch_is_predicted_once_by_a_model_fitted_without_its_group() -> N
     assert sorted(trial.rows.tolist()) == list(range(65))
     assert (trial.fits, steps) == (4, [1, 1, 1, 1])
     held = parts[0]
-    model = fit(
-        patches.vectors[~held], patches.vehicle[~held], SETTINGS.svm.features, SETTINGS.train.svm
-    )
+    model = fit(patches.rows.of(~held), SETTINGS)
     expected = model.probabilities(patches.vectors[held])
     assert trial.probabilities[:20] == pytest.approx(expected.astype(float))
     assert ((trial.probabilities >= 0.5) == patches.vehicle[trial.rows]).mean() > 0.9
@@ -82,7 +80,7 @@ def test_each_patch_is_predicted_once_by_a_model_fitted_without_its_group() -> N
 
 def test_a_ready_model_predicts_every_patch() -> None:
     patches = data(FOUR)
-    model = fit(patches.vectors, patches.vehicle, FEATURES, SETTINGS.train.svm)
+    model = fit(patches.rows.of(np.ones(65, bool)), SETTINGS)
     trial = model_trial(patches, model)
     assert trial.rows.tolist() == list(range(65))
     assert trial.probabilities == pytest.approx(model.probabilities(patches.vectors).astype(float))

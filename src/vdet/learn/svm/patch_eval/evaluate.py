@@ -137,9 +137,8 @@ def _extract(
     return extract(
         files,
         features,
-        max_broken=settings.train.svm.max_broken,
+        settings.train.svm,
         augmenter=augmenter,
-        seed=settings.train.svm.seed,
         workers=make_workers(jobs),
         progress=advance,
     )

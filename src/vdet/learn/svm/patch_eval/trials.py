@@ -11,9 +11,8 @@ from vdet.boxes import BoolArray, Float64Array, Int64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.extraction import LabelledVectors
-from vdet.learn.svm.fitting import fit_patches
-from vdet.learn.svm.training_set import hold_out
+from vdet.learn.svm.extraction import LabelledVectors, hold_out
+from vdet.learn.svm.fitting import fit
 
 log = logging.getLogger("vdet")
 
@@ -80,7 +79,7 @@ def run_trial(
     """Fit for each part on all other patches, and predict the part. Raises `DataError`."""
     rows, probabilities = [], []
     for held in parts:
-        model = fit_patches(data, ~held, settings)
+        model = fit(data.rows.of(~held), settings)
         rows.append(np.flatnonzero(held))
         probabilities.append(model.probabilities(data.vectors[held]).astype(np.float64))
         progress(1)
