@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Any, Self
+from typing import Any, Self
 
 from vdet.errors import OutputError, VdetError
 from vdet.temporary import create_file, create_folder, remove_stale, sync, try_to_remove
@@ -52,7 +52,7 @@ def check_output(
         `path` is an input, is a folder, is there already (without `overwrite`) or may not be
         replaced, or its folder cannot be written to.
     """
-    if path.resolve() in {source.resolve() for source in inputs}:
+    if any(_is_same(path, source) for source in inputs):
         raise OutputError(f"{path}: is the input itself; give another output")
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file")
@@ -68,6 +68,14 @@ def check_output(
         raise OutputError(f"{path}: the folder {folder} {missing}")
     if not os.access(folder, os.W_OK):
         raise OutputError(f"{path}: the folder {folder} cannot be written to")
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    """Return whether two names lead to one file: the same device and inode."""
+    try:
+        return path.samefile(other)
+    except OSError:  # one of them is not there
+        return False
 
 
 def _check_replaceable(path: Path, may_replace: MayReplace) -> None:
@@ -91,13 +99,7 @@ class _Staged:
 
     temporary: Path
     path: Path
-    may_replace: MayReplace
-
-    def files(self) -> "list[_Staged]":
-        return [self]
-
-    def earlier(self) -> Iterable[Path]:
-        return ()
+    may_replace: MayReplace = any_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,19 +110,12 @@ class _StagedFolder:
     path: Path
     pattern: str
 
-    def files(self) -> list[_Staged]:
-        inside = sorted(self.temporary.iterdir())
-        return [_Staged(file, self.path / file.name, any_file) for file in inside]
-
-    def earlier(self) -> Iterable[Path]:
-        return self.path.glob(self.pattern)
-
 
 class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
     When the block ends without an error, all staged files are synced to the disk and then get their
-    names, in the order in which they were staged. When it ends with an error, none appears.
+    names. When it ends with an error, none appears.
 
     Parameters
     ----------
@@ -139,7 +134,8 @@ class OutputFiles:
 
     def __init__(self, *, overwrite: bool = False) -> None:
         self._overwrite = overwrite
-        self._staged: list[_Staged | _StagedFolder] = []
+        self._files: list[_Staged] = []
+        self._folders: list[_StagedFolder] = []
         self._cleanup = contextlib.ExitStack()
 
     def stage(self, path: Path, may_replace: MayReplace = any_file) -> Path:
@@ -159,7 +155,7 @@ class OutputFiles:
             if self._overwrite and path.is_file() and not path.is_symlink():
                 # What replaces a private file is private from the beginning.
                 temporary.chmod(stat.S_IMODE(path.stat().st_mode) | stat.S_IRUSR | stat.S_IWUSR)
-        self._staged.append(_Staged(temporary, path, may_replace))
+        self._files.append(_Staged(temporary, path, may_replace))
         return temporary
 
     def stage_folder(self, path: Path, pattern: str) -> Path:
@@ -172,7 +168,7 @@ class OutputFiles:
         with output_errors(path):
             remove_stale(path)
             temporary = create_folder(path, self._cleanup)
-        self._staged.append(_StagedFolder(temporary, path, pattern))
+        self._folders.append(_StagedFolder(temporary, path, pattern))
         return temporary
 
     def __enter__(self) -> Self:
@@ -186,7 +182,11 @@ class OutputFiles:
                 self._publish()
 
     def _publish(self) -> None:
-        files = [file for staged in self._staged for file in staged.files()]
+        files = self._files + [
+            _Staged(file, folder.path / file.name)
+            for folder in self._folders
+            for file in sorted(folder.temporary.iterdir())
+        ]
         for file in files:
             with output_errors(file.path):
                 sync(file.temporary)
@@ -200,8 +200,8 @@ class OutputFiles:
                         undo.callback(try_to_remove, file.path)
             undo.pop_all()
         if self._overwrite:
-            found = {path for staged in self._staged for path in staged.earlier()}
-            for old in found - {file.path for file in files}:
+            earlier = {old for folder in self._folders for old in folder.path.glob(folder.pattern)}
+            for old in earlier - {file.path for file in files}:
                 try_to_remove(old)
 
 
@@ -226,22 +226,16 @@ def _add_name(temporary: Path, path: Path) -> None:
             os.link(temporary, path)
         except FileExistsError:
             raise
-        except OSError:  # a file system without hard links
-            _take_name(temporary, path)
+        except OSError:  # a file system without hard links: an empty file takes the name
+            path.touch(exist_ok=False)
+            with contextlib.ExitStack() as undo:
+                undo.callback(try_to_remove, path)
+                temporary.replace(path)
+                undo.pop_all()
     except FileExistsError:
         raise OutputError(
             f"{path}: has appeared during the run, so it is kept; give another output"
         ) from None
-
-
-def _take_name(temporary: Path, path: Path) -> None:
-    """Make an empty file of the final name, and replace it. Raises `FileExistsError`."""
-    os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
-    try:
-        temporary.replace(path)
-    except BaseException:
-        try_to_remove(path)
-        raise
 
 
 @contextlib.contextmanager
@@ -305,21 +299,17 @@ def read_whole(path: Path, *, most: int, what: str, error: type[VdetError]) -> b
     error
         Raised where the file cannot be read, or is larger.
     """
+    data = bytearray()
     try:
         with path.open("rb") as file:
-            data = b"".join(_chunks(file, most + 1))
+            # A single read would set memory aside for all of `most`.
+            while len(data) <= most and (chunk := file.read(min(_CHUNK, most + 1 - len(data)))):
+                data += chunk
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}") from fault
     if len(data) > most:
         raise error(f"{path}: is larger than {most:,} bytes; that is no {what}")
-    return data
-
-
-def _chunks(file: IO[bytes], most: int) -> Iterator[bytes]:
-    """Yield at most `most` bytes. A single read would set memory aside for all of them."""
-    while chunk := file.read(min(most, _CHUNK)):
-        yield chunk
-        most -= len(chunk)
+    return bytes(data)
 
 
 def escaped(text: str) -> str:

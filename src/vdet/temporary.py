@@ -1,17 +1,19 @@
 """Temporary files and folders, which outputs are written into before they appear.
 
-A temporary file lies beside its output and is named `.name.vdet-`, 16 digits and the suffix; a
-temporary folder lies in the folder that its files go into. The writer holds a lock on it, which the
-system releases when the process ends, in whatever way. So what a killed run left can be told from
-what another run is writing at the moment, also from other machines on a shared file system.
+A temporary file lies beside its output and is named `.name.vdet-`, the host, 16 digits and the
+suffix; a temporary folder lies in the folder that its files go into. The writer holds a lock on it,
+which the system releases when the process ends, in whatever way. A lock of another host may not be
+seen on a shared file system; there the age decides what a killed run left.
 """
 
 import contextlib
 import os
+import platform
 import re
 import secrets
 import shutil
 import stat
+import time
 from pathlib import Path
 
 try:
@@ -19,8 +21,10 @@ try:
 except ImportError:  # Windows: files are not locked, and none is taken for stale
     fcntl = None  # type: ignore[assignment]
 
-_NAME = re.compile(r"\..*\.vdet-([0-9a-f]{8}){1,2}(\.[^.]*)?", re.DOTALL)
-_MAX_STEM = 200  # bytes; a whole name may have 255
+_HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
+_NAME = re.compile(r"\..*\.vdet-([a-z0-9]*)-[0-9a-f]{16}(\.[^.]*)?", re.DOTALL)
+_MAX_STEM = 180  # bytes; a whole name may have 255
+_MAX_AGE = 7 * 24 * 3600  # seconds since the last change of a file of another host
 _NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
 _FLAGS = os.O_RDWR | _NOT_A_LINK | getattr(os, "O_BINARY", 0)
 _FOLDER_FLAGS = os.O_RDONLY | _NOT_A_LINK | getattr(os, "O_DIRECTORY", 0)
@@ -34,13 +38,7 @@ def create_file(path: Path, cleanup: contextlib.ExitStack) -> Path:
     while True:
         candidate = _candidate(path, path.parent)
         cleanup.callback(try_to_remove, candidate)  # an interrupt may come as soon as it is there
-        descriptor = os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
-        if fcntl is None:
-            os.close(descriptor)
-            return candidate
-        cleanup.callback(os.close, descriptor)
-        # Another run may have taken it for stale and removed it before it was locked.
-        if try_to_lock(descriptor) and os.fstat(descriptor).st_nlink:
+        if _hold(os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666), cleanup):
             return candidate
 
 
@@ -52,16 +50,20 @@ def create_folder(path: Path, cleanup: contextlib.ExitStack) -> Path:
         candidate.mkdir()
         if fcntl is None:
             return candidate
-        with contextlib.suppress(FileNotFoundError):  # as above
-            descriptor = os.open(candidate, _FOLDER_FLAGS)
-            cleanup.callback(os.close, descriptor)
-            if try_to_lock(descriptor) and candidate.is_dir():
+        with contextlib.suppress(FileNotFoundError):  # it was removed before it was opened
+            if _hold(os.open(candidate, _FOLDER_FLAGS), cleanup):
                 return candidate
+
+
+def _hold(descriptor: int, cleanup: contextlib.ExitStack) -> bool:
+    """Lock a new file or folder; return False if another run took it for stale before that."""
+    cleanup.callback(os.close, descriptor)
+    return try_to_lock(descriptor) and os.fstat(descriptor).st_nlink > 0
 
 
 def _candidate(path: Path, folder: Path) -> Path:
     stem = os.fsencode(path.stem)[:_MAX_STEM].decode(errors="ignore")
-    return folder / f".{stem}.vdet-{secrets.token_hex(8)}{path.suffix}"
+    return folder / f".{stem}.vdet-{_HOST}-{secrets.token_hex(8)}{path.suffix}"
 
 
 def try_to_remove(path: Path) -> None:
@@ -74,15 +76,16 @@ def remove_stale(folder: Path) -> None:
     """Remove the temporary files and folders in `folder` whose writers have ended."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if _NAME.fullmatch(entry.name):
+            if fcntl and (match := _NAME.fullmatch(entry.name)):
                 with contextlib.suppress(OSError):
-                    _remove_if_stale(entry.path)
+                    _remove_if_stale(entry.path, is_ours=match[1] == _HOST)
 
 
-def _remove_if_stale(path: str) -> None:
-    if fcntl is None:
+def _remove_if_stale(path: str, *, is_ours: bool) -> None:
+    status = os.lstat(path)
+    if not is_ours and time.time() - status.st_mtime < _MAX_AGE:
         return
-    is_folder = stat.S_ISDIR(os.lstat(path).st_mode)
+    is_folder = stat.S_ISDIR(status.st_mode)
     descriptor = os.open(path, _FOLDER_FLAGS if is_folder else _FLAGS)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
