@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.config.lanes import LaneSettings
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
@@ -82,7 +81,7 @@ class Drive:
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
         view = lane_view(camera, near=max(6.0, nearest), far=42.0)
-        settings = LaneSettings(view=view)
+        settings = view
         return RoadFinder(LaneRequest(), settings, camera.width, camera.height)
 
 

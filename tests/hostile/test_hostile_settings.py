@@ -38,8 +38,8 @@ tracker:
   min_region: 50
   match_method: ccoeff_normed
 lanes:
-  view: {top: 0.63, bottom: 0.93, length: 37.0, across: 30.0}
-  track: {memory: 0.6, carry: 12}
+  top: 0.63
+  length: 37.0
 output:
   preset: 'superfast'
   crf: 20

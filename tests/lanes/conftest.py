@@ -22,7 +22,7 @@ def settings_for() -> Callable[[PinholeCamera], LaneSettings]:
     """Make settings whose top view shows the road from 6 m to 42 m ahead of a level camera."""
 
     def make(camera: PinholeCamera) -> LaneSettings:
-        return LaneSettings(view=lane_view(camera, near=NEAR, far=FAR))
+        return lane_view(camera, near=NEAR, far=FAR)
 
     return make
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from vdet.config.lanes import LaneSettings
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.synthetic import must_be_found, traffic_scene, true_boxes
@@ -70,7 +69,7 @@ def finder_of(scene: Scene) -> RoadFinder:
     camera = scene.camera
     nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
     view = lane_view(camera, near=max(6.0, nearest), far=42)
-    return RoadFinder(LaneRequest(), LaneSettings(view=view), camera.width, camera.height)
+    return RoadFinder(LaneRequest(), view, camera.width, camera.height)
 
 
 def check(told: list[Told], *, known: float) -> None:

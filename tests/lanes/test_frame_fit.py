@@ -11,7 +11,7 @@ from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
 SETTINGS = LaneSettings()
-TOP_VIEW = TopView(SETTINGS.view, 1280, 720)
+TOP_VIEW = TopView(SETTINGS, 1280, 720)
 LAST = LaneCurves(bend=1 / 2000, heading=0.005, left=-1.8, right=1.9, pitch=0.0)
 SOLID, DASHED = np.s_[:], np.s_[200:232]  # four metres
 

@@ -5,14 +5,22 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.lanes import LaneSettings, MaskSettings
+from vdet.config.lanes import LaneSettings
 from vdet.lanes.curves import LaneCurves
-from vdet.lanes.paint import HIDDEN, PAINT, find_base, hide, paint_along, paint_mask, slide_windows
+from vdet.lanes.paint import (
+    HIDDEN,
+    MARGIN,
+    PAINT,
+    find_base,
+    hide,
+    paint_along,
+    paint_mask,
+    slide_windows,
+)
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
 SETTINGS = LaneSettings()
-ACROSS = 30.0
 WHITE, YELLOW = (215, 215, 215), (60, 180, 225)
 
 
@@ -28,7 +36,7 @@ def painted(image: Image, color: tuple[int, int, int], left: int = 148, width: i
 
 
 def mask_of(image: Image) -> Image:
-    return paint_mask(image, MaskSettings(), ACROSS)
+    return paint_mask(image)
 
 
 @pytest.mark.parametrize("gray", [30, 60, 90, 130])
@@ -86,7 +94,7 @@ def test_paint_at_the_border_is_left_out() -> None:
 
 @pytest.fixture
 def top_view() -> TopView:
-    return TopView(SETTINGS.view, 1280, 720)
+    return TopView(SETTINGS, 1280, 720)
 
 
 def drawn(top_view: TopView, *lines: Float64Array, rows: slice = slice(None)) -> Image:
@@ -121,30 +129,21 @@ def test_an_empty_mask_has_no_base(top_view: TopView) -> None:
     assert find_base(drawn(top_view), top_view, SETTINGS) is None
 
 
-def test_a_top_view_as_narrow_as_a_lane_has_a_base() -> None:
-    narrow = SETTINGS.view.model_copy(update={"margin": 0.0})
-    top_view = TopView(narrow, 1280, 720)
-    mask = np.full((len(top_view.distances), len(top_view.laterals)), 255, np.uint8)
-    base = find_base(mask, top_view, SETTINGS)
-    assert base is not None
-    assert base[1] - base[0] == pytest.approx(3.4, abs=0.4)
-
-
 def test_sliding_windows_follow_a_bend(top_view: TopView) -> None:
     lines = LaneCurves(bend=1 / 500, heading=-0.02, left=-1.85, right=1.85, pitch=0).at(
         top_view.distances
     )
     base = float(lines[0][-1]), float(lines[1][-1])
-    positions = slide_windows(drawn(top_view, *lines), top_view, base, SETTINGS)
+    positions = slide_windows(drawn(top_view, *lines), top_view, base)
     for found, line in zip(positions, lines, strict=True):
-        assert np.abs(found - line).max() < SETTINGS.search.margin
+        assert np.abs(found - line).max() < MARGIN
 
 
 def test_a_window_without_paint_moves_with_the_other_line(top_view: TopView) -> None:
     left, right = LaneCurves(1 / 500, 0, -1.85, 1.85, 0).at(top_view.distances)
     mask = drawn(top_view, left) | drawn(top_view, right, rows=slice(-40, None))
-    positions = slide_windows(mask, top_view, (float(left[-1]), float(right[-1])), SETTINGS)
-    assert np.abs(positions[1] - right).max() < SETTINGS.search.margin
+    positions = slide_windows(mask, top_view, (float(left[-1]), float(right[-1])))
+    assert np.abs(positions[1] - right).max() < MARGIN
 
 
 def test_paint_along_a_line_is_the_middle_of_each_row(top_view: TopView) -> None:
@@ -175,7 +174,7 @@ def test_paint_along_a_line_outside_the_top_view_stays_inside_it(
 
 
 class TestHiddenPaint:
-    VIEW = TopView(SETTINGS.view, 1280, 720)
+    VIEW = TopView(SETTINGS, 1280, 720)
 
     def box_from(self, left: float, right: float, distance: float) -> Box:
         """Return the box of a thing on the road that rises far above the horizon."""

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings, PlaceSettings
+from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.position import RoadPosition, position_on_road
@@ -35,11 +35,9 @@ def pixel_of(
     return x, y
 
 
-def place(
-    foot: tuple[float, float], curves: LaneCurves = STRAIGHT, **settings: float
-) -> RoadPosition | None:
+def place(foot: tuple[float, float], curves: LaneCurves = STRAIGHT) -> RoadPosition | None:
     view = TopView(lane_view(CAMERA, near=6, far=FAR), CAMERA.width, CAMERA.height)
-    return position_on_road(foot, curves, view, PlaceSettings(**settings))
+    return position_on_road(foot, curves, view)
 
 
 class TestGeometry:
@@ -69,7 +67,7 @@ class TestGeometry:
         curves = LaneCurves(0.5 / radius, heading, shift - 1.85, shift + 1.85, pitch)
         pitched = replace(camera, horizon=330 + pitch * camera.focal * height)
         foot = pixel_of(distance, lateral + heading * distance, pitched)
-        position = position_on_road(foot, curves, view, PlaceSettings())
+        position = position_on_road(foot, curves, view)
         assert position is not None
         assert position.distance == pytest.approx(distance, rel=1e-3)
         assert position.lateral == pytest.approx(lateral - shift, abs=0.02)
@@ -114,19 +112,20 @@ class TestWhatIsNotKnown:
         assert place(foot) is not None
         assert place(foot, replace(STRAIGHT, pitch=30 / (CAMERA.focal * 1.2))) is None
 
-    @pytest.mark.parametrize("reach", [0.5, 1.0, 1.25])
-    def test_the_lane_reaches_only_so_far(self, reach: float) -> None:
-        end = reach * FAR
-        assert place(pixel_of(end - 0.5, 0), reach=reach) is not None
-        assert place(pixel_of(end + 0.5, 0), reach=reach) is None
+    def test_the_lane_reaches_a_quarter_farther_than_it_is_fitted(self) -> None:
+        assert place(pixel_of(1.25 * FAR - 0.5, 0)) is not None
+        assert place(pixel_of(1.25 * FAR + 0.5, 0)) is None
 
     def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known(self) -> None:
-        assert place((640, CAMERA.horizon + 41), row=0.025) is not None
-        assert place((640, CAMERA.horizon + 39), row=0.025) is None
+        small = PinholeCamera.dashboard(160, 90)
+        view = TopView(lane_view(small, near=6, far=FAR), small.width, small.height)
+        feet = [(80, small.horizon + rows) for rows in (10.5, 9.5)]
+        positions = [position_on_road(foot, STRAIGHT, view) for foot in feet]
+        assert [each is not None for each in positions] == [True, False]
 
     def test_a_vehicle_far_to_the_side_has_a_distance_but_no_lane(self) -> None:
-        for lanes, lane in ((3, 3), (2, None)):
-            position = place(pixel_of(20, 11.1), lanes=lanes)
+        for lateral, lane in ((11.1, 3), (14.8, None)):
+            position = place(pixel_of(20, lateral))
             assert position is not None
             assert position.lane == lane
             assert position.distance == pytest.approx(20, rel=0.01)
@@ -199,9 +198,3 @@ class TestRoad:
     ) -> None:
         settings = settings_for(scene.camera)
         assert road_in(scene, settings).cuts(box) is cut
-
-    def test_how_near_to_the_edge_is_a_setting(
-        self, scene: Scene, settings_for: LaneSettingsFor
-    ) -> None:
-        settings = settings_for(scene.camera).model_copy(update={"place": PlaceSettings(edge=0.1)})
-        assert road_in(scene, settings).cuts(Box(50, 200, 80, 60))

@@ -10,7 +10,7 @@ import pytest
 from vdet.boxes import Float64Array
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.lane import Lane
-from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.lanes.road import CARRY, LaneRequest, RoadFinder
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
@@ -121,7 +121,7 @@ def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost(
     make_road: MakeRoad, drive: Drive, missing: float
 ) -> None:
     whole = make_road(curvature=1 / 900)
-    carry = LaneSettings().track.carry
+    carry = CARRY
     half = make_road(curvature=1 / 900, lines=(Line(-missing),), frames=carry + 3)
     lanes = drive(whole, half)
     check(lanes[whole.frames + carry - 1], whole.camera)
@@ -130,7 +130,7 @@ def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost(
 
 def test_a_lane_that_reappears_is_found_again(make_road: MakeRoad, drive: Drive) -> None:
     whole = make_road()
-    bare = make_road(lines=(), frames=LaneSettings().track.carry + 1)
+    bare = make_road(lines=(), frames=CARRY + 1)
     lanes = drive(whole, bare, whole)
     assert lanes[whole.frames + bare.frames - 1] is None
     check(lanes[-1], whole.camera)

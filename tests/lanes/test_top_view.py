@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.config.lanes import LaneSettings, TopViewSettings
-from vdet.lanes.top_view import TopView
+from vdet.config.lanes import LaneSettings
+from vdet.lanes.top_view import ACROSS, ALONG, TopView
 from vdet.synthetic.camera import PinholeCamera
 
 SettingsFor = Callable[[PinholeCamera], LaneSettings]
@@ -22,7 +22,7 @@ def camera() -> PinholeCamera:
 
 @pytest.fixture
 def top_view(camera: PinholeCamera, settings_for: SettingsFor) -> TopView:
-    return TopView(settings_for(camera).view, camera.width, camera.height)
+    return TopView(settings_for(camera), camera.width, camera.height)
 
 
 def test_ground_points_lie_where_the_camera_sees_them(
@@ -58,16 +58,16 @@ def test_a_line_on_the_road_is_upright_and_at_its_position(
 
 @given(x=st.floats(-4, 4), z=st.floats(7, 40))
 def test_frame_and_top_view_pixels_show_the_same_ground(x: float, z: float) -> None:
-    top_view = TopView(TopViewSettings(), 1280, 720)
+    top_view = TopView(LaneSettings(), 1280, 720)
     [[column, row]] = top_view.frame_to_top(top_view.ground_to_frame(np.array([x]), np.array([z])))
     assert column == pytest.approx(top_view.columns(np.array([x]))[0], abs=1e-6)
-    assert row == pytest.approx((top_view.distances[0] - z) * top_view.along, abs=1e-6)
+    assert row == pytest.approx((top_view.distances[0] - z) * ALONG, abs=1e-6)
 
 
 def test_outline_is_the_border_of_the_top_view_in_the_frame(
     top_view: TopView, camera: PinholeCamera
 ) -> None:
-    half = len(top_view.laterals) / 2 / top_view.across
+    half = len(top_view.laterals) / 2 / ACROSS
     corners = [[-half, 0, 42], [half, 0, 42], [half, 0, 6], [-half, 0, 6]]
     assert top_view.outline == pytest.approx(camera.project(np.array(corners)), abs=0.5)
 
@@ -75,7 +75,7 @@ def test_outline_is_the_border_of_the_top_view_in_the_frame(
 def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
     camera: PinholeCamera, settings_for: SettingsFor
 ) -> None:
-    middle = settings_for(camera).view
+    middle = settings_for(camera)
     shift = 0.5 * camera.focal / camera.width  # half a metre; divide by the distance
     moved = middle.model_copy(
         update={
@@ -92,7 +92,5 @@ def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
 
 def test_the_same_settings_fit_frames_of_any_size() -> None:
     x, z = np.array([-1.0, 2.0]), np.array([10.0, 30.0])
-    small, large = (
-        TopView(TopViewSettings(), 640 * n, 360 * n).ground_to_frame(x, z) for n in (1, 3)
-    )
+    small, large = (TopView(LaneSettings(), 640 * n, 360 * n).ground_to_frame(x, z) for n in (1, 3))
     assert small * 3 == pytest.approx(large, abs=0.01)

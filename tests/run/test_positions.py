@@ -8,7 +8,6 @@ import pytest
 
 from run.red_runs import video_info
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.detections import Detections
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
@@ -27,7 +26,7 @@ WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 SETTINGS = Settings(
-    lanes=LaneSettings(view=lane_view(CAMERA, near=6, far=42)),
+    lanes=lane_view(CAMERA, near=6, far=42),
     tracker=MotionTrackerSettings(needed=0.05),
 )
 SCENE = Scene(

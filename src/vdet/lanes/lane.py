@@ -16,7 +16,7 @@ class Lane:
     curvature: float
     """1/m, positive in a bend to the right; smoothed over more frames than the lines."""
     radius: float | None
-    """Radius of the bend, metres; None if the road is straight (setting `lanes.track.straight`)."""
+    """Radius of the bend, metres; None if the road is straight (5000 m or more)."""
     offset: float
     """Distance of the camera from the middle of the lane, metres; positive: it is to the right."""
     width: float

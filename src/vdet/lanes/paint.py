@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.lanes import LaneSettings, MaskSettings
-from vdet.lanes.top_view import TopView
+from vdet.config.lanes import LaneSettings
+from vdet.lanes.top_view import ACROSS, ALONG, TopView
 from vdet.media.images import Image
 
 LinePositions = tuple[Float64Array, Float64Array]
@@ -34,28 +34,43 @@ class LinePaint:
 PAINT, HIDDEN = 255, 128
 """Values of a mask of paint: paint, and what a vehicle hides; the rest is 0."""
 
+MARGIN = 0.5
+"""Largest distance of paint from the middle of its window or the last frame's curve, metres."""
+FINE_MARGIN = 0.2
+"""Largest distance of paint from a curve that was fitted to this frame, metres."""
+WIDTH_TOLERANCE = 0.6
+"""Largest difference between the width of the lane and `lanes.lane_width`, metres."""
+
+_LINE_WIDTH = 0.15
+"""Width of a painted line, metres."""
+_REACH = 0.35
+"""Distance to the road on the left and right with which a pixel is compared, metres."""
+_RISE, _LEAST_RISE = 0.10, 10.0
+"""Least rise in lightness from the road to paint: share of the road's, and of 0 to 255."""
+_YELLOW = 9.0
+"""Least rise in b of CIELAB from the road to yellow paint, of 0 to 255."""
+_BASE = 15.0
+"""Length of the nearest part of the road, which the histogram covers, metres."""
+_WINDOW = 3.0
+"""Length of a sliding window, metres."""
+
 NO_PAINT = LinePaint(np.empty(0), np.empty(0))
 
 
-def paint_mask(top: Image, settings: MaskSettings, across: float) -> Image:
+def paint_mask(top: Image) -> Image:
     """Return 255 for paint and 0 for the rest, uint8 `(rows, columns)`.
 
-    Parameters
-    ----------
-    top
-        The road from above, BGR uint8 `(rows, columns, 3)`.
-    across
-        Pixels per metre, across the road.
+    `top` is the road from above, BGR uint8 `(rows, columns, 3)`.
     """
-    width = round(settings.line_width * across) | 1  # odd, so that the blur does not shift lines
-    reach = max(1, round(settings.reach * across))
+    width = round(_LINE_WIDTH * ACROSS) | 1  # odd, so that the blur does not shift lines
+    reach = round(_REACH * ACROSS)
     smooth = cv2.blur(cv2.cvtColor(top, cv2.COLOR_BGR2Lab), (width, 3))
     lightness, yellow = (np.asarray(cv2.extractChannel(smooth, i), np.uint8) for i in (0, 2))
     road = _larger_side(lightness, reach)
     rise = cv2.subtract(lightness, road)  # saturates at 0
-    least = np.maximum(road * np.float32(settings.lightness), settings.least_lightness)
+    least = np.maximum(road * np.float32(_RISE), _LEAST_RISE)
     tint = cv2.subtract(yellow, _larger_side(yellow, reach))
-    paint = (rise > least) | (tint > settings.yellow)
+    paint = (rise > least) | (tint > _YELLOW)
     return np.where(paint, np.uint8(PAINT), np.uint8(0))
 
 
@@ -88,7 +103,7 @@ def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) 
 
     A row is left out if a part of it is hidden there: the middle of the rest would be wrong.
     """
-    half = max(1, round(margin * top_view.across))
+    half = max(1, round(margin * ACROSS))
     around = np.arange(-half, half + 1)
     middles = np.clip(np.rint(top_view.columns(x)), -half - 1, mask.shape[1] + half).astype(np.intp)
     padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
@@ -99,7 +114,7 @@ def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) 
     counts = band.sum(axis=1) * visible
     rows = np.flatnonzero(counts)
     middle = middles[rows] + (band[rows] @ around) / counts[rows]
-    x = top_view.laterals[0] + middle / top_view.across
+    x = top_view.laterals[0] + middle / ACROSS
     return LinePaint(top_view.distances[rows], x, float(visible.mean()))
 
 
@@ -109,10 +124,10 @@ def find_base(mask: Image, top_view: TopView, settings: LaneSettings) -> tuple[f
     The pair has one line on each side of the camera, about a lane's width apart. None if there is
     no such pair.
     """
-    histogram = _histogram(mask, top_view, settings)
-    expected, tolerance = settings.view.lane_width, settings.check.width
-    least = max(1, round((expected - tolerance) * top_view.across))
-    most = min(len(histogram) - 1, round((expected + tolerance) * top_view.across))
+    histogram = _histogram(mask, top_view)
+    expected, tolerance = settings.lane_width, WIDTH_TOLERANCE
+    least = max(1, round((expected - tolerance) * ACROSS))
+    most = round((expected + tolerance) * ACROSS)
     best, base = 0.0, None
     for gap in range(least, most + 1):
         left, right = top_view.laterals[:-gap], top_view.laterals[gap:]
@@ -123,30 +138,28 @@ def find_base(mask: Image, top_view: TopView, settings: LaneSettings) -> tuple[f
     return base
 
 
-def _histogram(mask: Image, top_view: TopView, settings: LaneSettings) -> Float64Array:
+def _histogram(mask: Image, top_view: TopView) -> Float64Array:
     """Return how many of the nearest rows have paint in each column, smoothed, `(columns,)`."""
-    near = top_view.distances < top_view.distances[-1] + settings.search.base
+    near = top_view.distances < top_view.distances[-1] + _BASE
     counts = np.count_nonzero(mask[near] == PAINT, axis=0).astype(np.float64)
-    spread = round(settings.search.fine_margin * top_view.across) | 1
+    spread = round(FINE_MARGIN * ACROSS) | 1
     return np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
 
 
-def slide_windows(
-    mask: Image, top_view: TopView, base: tuple[float, float], settings: LaneSettings
-) -> LinePositions:
+def slide_windows(mask: Image, top_view: TopView, base: tuple[float, float]) -> LinePositions:
     """Follow both lines with sliding windows, from near to far; return the windows' middles.
 
     The lines of a lane run in parallel, so both windows of a step move together, by the paint in
     either. Windows without paint move on as before.
     """
-    rows = max(1, round(settings.search.window * top_view.along))
+    rows = max(1, round(_WINDOW * ALONG))
     middles = np.array(base)
     positions = np.empty((2, len(mask)))
     step = 0.0
     for end in range(len(mask), 0, -rows):
         part = np.s_[max(0, end - rows) : end]
         middles += step
-        shift = _mean_offset(mask[part], top_view, middles, settings.search.margin)
+        shift = _mean_offset(mask[part], top_view, middles, MARGIN)
         middles += shift
         step += shift / 2  # damped: part of the shift may be noise
         positions[:, part] = middles[:, None]

@@ -14,9 +14,15 @@ wide as it is, and to follow the same curve.
 import math
 from dataclasses import dataclass
 
-from vdet.config.lanes import PlaceSettings
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.top_view import TopView
+
+_REACH = 1.25
+"""Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""
+_ROW = 0.1
+"""Largest relative error of a distance for an error of one row: more is near the horizon."""
+_LANES = 3
+"""Number of lanes to each side of the own one that are reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +39,7 @@ class RoadPosition:
 
 
 def position_on_road(
-    foot: tuple[float, float], curves: LaneCurves, top_view: TopView, settings: PlaceSettings
+    foot: tuple[float, float], curves: LaneCurves, top_view: TopView
 ) -> RoadPosition | None:
     """Return where on the road a point is that a pixel of the undistorted frame shows.
 
@@ -44,8 +50,8 @@ def position_on_road(
     slope, nearness = top_view.sight(foot)
     _, below = top_view.sight((x, y + 1))
     nearness, row = nearness - curves.pitch, below - nearness
-    farthest = settings.reach * float(top_view.distances[0])
-    if not (nearness * farthest >= 1 and row <= settings.row * nearness):  # NaN too is not known
+    farthest = _REACH * float(top_view.distances[0])
+    if not (nearness * farthest >= 1 and row <= _ROW * nearness):  # NaN too is not known
         return None
     distance = 1 / nearness
     shift = curves.heading * distance + curves.bend * distance**2  # of all lines, at the distance
@@ -54,5 +60,5 @@ def position_on_road(
     return RoadPosition(
         distance=distance,
         lateral=from_left - curves.width / 2,
-        lane=lane if abs(lane) <= settings.lanes else None,
+        lane=lane if abs(lane) <= _LANES else None,
     )

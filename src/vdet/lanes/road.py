@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.lanes import LaneSettings, LaneTrackSettings, PlaceSettings
+from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves, NormalEquations, solve
 from vdet.lanes.drawing import stage_pictures
@@ -21,6 +21,16 @@ from vdet.lanes.position import RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
+CARRY = 12
+"""Number of frames for which an unseen line is kept."""
+_MEMORY = 0.6
+"""Weight of the frames before, where the newest frame has weight 1."""
+_CURVE_MEMORY = 0.95
+"""Share of the frames before in the radius that is shown."""
+_STRAIGHT = 5000.0
+"""Radius from which the road counts as straight, metres."""
+_EDGE = 0.005
+"""A box that ends this near to the frame's edge is cut off: share of the width or height."""
 _LINE_POINTS = 24  # of each line of a `Lane`
 
 
@@ -55,7 +65,6 @@ class Road:
     """The lines of `lane` on the ground; None if there is no lane."""
     top_view: TopView
     undistorter: Undistorter | None
-    settings: PlaceSettings
 
     @property
     def image(self) -> Image:
@@ -73,9 +82,8 @@ class Road:
     def cuts(self, box: Box) -> bool:
         """Tell whether the original frame's left, right or lower edge cuts a box in that frame."""
         height, width = self.image.shape[:2]
-        near = self.settings.edge
-        beside = box.x <= near * width or box.right >= (1 - near) * width
-        return bool(beside or box.bottom >= (1 - near) * height)
+        beside = box.x <= _EDGE * width or box.right >= (1 - _EDGE) * width
+        return bool(beside or box.bottom >= (1 - _EDGE) * height)
 
     def position(self, foot: tuple[float, float]) -> RoadPosition | None:
         """Return where on the road a vehicle is that stands at `foot` in the original frame.
@@ -87,7 +95,7 @@ class Road:
             return None
         pixel = np.array([foot]) - 0.5
         [[x, y]] = self.place_points(pixel)
-        return position_on_road((x, y), self.curves, self.top_view, self.settings)
+        return position_on_road((x, y), self.curves, self.top_view)
 
     def pictures(self) -> dict[str, Image]:
         """Return a picture of every stage of finding the lane, as `stage_pictures` makes them."""
@@ -125,14 +133,14 @@ class RoadFinder:
         camera = request.camera
         self._settings = settings
         self._undistorter = Undistorter(camera, width, height) if camera else None
-        self._top_view = TopView(settings.view, width, height)
+        self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
 
     def observe(self, image: Image) -> FrameView:
         """Undistort a frame, BGR uint8 `(H, W, 3)`, and mark the paint in its top view."""
         undistorted = self._undistorter.image(image) if self._undistorter else image
         top = self._top_view.image(undistorted)
-        mask = paint_mask(top, self._settings.mask, self._top_view.across)
+        mask = paint_mask(top)
         return FrameView(undistorted, top, mask)
 
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
@@ -146,25 +154,24 @@ class RoadFinder:
         lane, curves = (
             (self._lane(self._state), self._state.curves) if self._state else (None, None)
         )
-        place = self._settings.place
-        return Road(view, lane, curves, self._top_view, self._undistorter, place)
+        return Road(view, lane, curves, self._top_view, self._undistorter)
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""
         settings, state = self._settings, self._state
         near = fit_near(mask, self._top_view, state.curves, settings) if state else None
-        if state and near and (updated := _advance(state, near, settings.track)):
+        if state and near and (updated := _advance(state, near)):
             return updated
         if new := fit_new(mask, self._top_view, settings):
             return _LaneState(new.curves, new.equations, (0, 0), 2 * new.curves.bend)
-        return _advance(state, None, settings.track) if state and not near else None
+        return _advance(state, None) if state and not near else None
 
     def _lane(self, state: _LaneState) -> Lane:
         curves, curvature = state.curves, state.curvature
         far, near = self._top_view.distances[[0, -1]]
         z = np.geomspace(near, far, _LINE_POINTS)
         left, right = curves.at(z)
-        straight = abs(curvature) * self._settings.track.straight < 1
+        straight = abs(curvature) * _STRAIGHT < 1
         return Lane(
             curvature=curvature,
             radius=None if straight else 1 / abs(curvature),
@@ -175,21 +182,19 @@ class RoadFinder:
         )
 
 
-def _advance(
-    state: _LaneState, fit: FrameFit | None, settings: LaneTrackSettings
-) -> _LaneState | None:
+def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:
     """Add the fit of the next frame, None if it shows no lane; None if the lane is lost.
 
-    The lane is lost if one of its lines was not seen in more than `settings.carry` frames in a
+    The lane is lost if one of its lines was not seen in more than `CARRY` frames in a
     row, or if the camera has left it.
     """
     seen = fit.seen if fit else (False, False)
     left, right = (0 if now else before + 1 for now, before in zip(seen, state.unseen, strict=True))
     curves, equations, curvature = state.curves, state.equations, state.curvature
     if fit:
-        equations = fit.equations.plus_earlier(equations, settings.memory)
+        equations = fit.equations.plus_earlier(equations, _MEMORY)
         curves = solve(equations, curves.width)
-        curvature += (1 - settings.curve_memory) * (2 * curves.bend - curvature)
-    if max(left, right) > settings.carry or not curves.contain_camera:
+        curvature += (1 - _CURVE_MEMORY) * (2 * curves.bend - curvature)
+    if max(left, right) > CARRY or not curves.contain_camera:
         return None
     return _LaneState(curves, equations, (left, right), curvature)

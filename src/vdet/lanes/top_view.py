@@ -9,26 +9,29 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array
-from vdet.config.lanes import TopViewSettings
+from vdet.config.lanes import LaneSettings
 from vdet.media.images import Image
+
+ACROSS = 30.0
+"""Pixels per metre, across the road."""
+ALONG = 8.0
+"""Pixels per metre, along the road."""
+_MARGIN = 3.0
+"""Metres of road that are shown on each side of the lane."""
 
 
 class TopView:
     """Converts between ground, undistorted frames of one size, and pictures from above."""
 
-    def __init__(self, settings: TopViewSettings, width: int, height: int) -> None:
+    def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
         self._to_frame = _ground_to_frame(settings, width, height)
         self._to_ground = np.linalg.inv(self._to_frame)
         near = _nearest(settings)
-        rows = round(settings.length * settings.along)
-        columns = round((settings.lane_width + 2 * settings.margin) * settings.across)
-        self.across = settings.across
-        """Pixels per metre, across the road."""
-        self.along = settings.along
-        """Pixels per metre, along the road."""
-        self.distances = near + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / self.along
+        rows = round(settings.length * ALONG)
+        columns = round((settings.lane_width + 2 * _MARGIN) * ACROSS)
+        self.distances = near + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / ALONG
         """z of each row, metres; the first row is the farthest."""
-        self.laterals = (np.arange(columns, dtype=np.float64) + 0.5 - columns / 2) / self.across
+        self.laterals = (np.arange(columns, dtype=np.float64) + 0.5 - columns / 2) / ACROSS
         """x of each column, metres."""
         self._warp = self._to_frame @ self._to_ground_matrix()
 
@@ -57,7 +60,7 @@ class TopView:
 
     def columns(self, x: Float64Array) -> Float64Array:
         """Return the columns of the top view at lateral positions x, metres."""
-        return np.asarray((x - self.laterals[0]) * self.across)
+        return np.asarray((x - self.laterals[0]) * ACROSS)
 
     @property
     def outline(self) -> Float64Array:
@@ -70,8 +73,8 @@ class TopView:
         """Return the matrix `(3, 3)` from `(column, row, 1)` of the top view to `(x, z, 1)`."""
         return np.array(
             [
-                [1 / self.across, 0, self.laterals[0]],
-                [0, -1 / self.along, self.distances[0]],
+                [1 / ACROSS, 0, self.laterals[0]],
+                [0, -1 / ALONG, self.distances[0]],
                 [0, 0, 1],
             ]
         )
@@ -83,19 +86,19 @@ def _transform(matrix: Float64Array, points: Float64Array) -> Float64Array:
     return np.asarray(moved[:, :2] / moved[:, 2:])
 
 
-def _nearest(settings: TopViewSettings) -> float:
+def _nearest(settings: LaneSettings) -> float:
     """Return z of the nearer row of the trapezoid: widths in the frame are proportional to 1/z."""
     far, near = _widths(settings)
     return settings.length * far / (near - far)
 
 
-def _widths(settings: TopViewSettings) -> tuple[float, float]:
+def _widths(settings: LaneSettings) -> tuple[float, float]:
     """Return the width of the lane at the farther and the nearer row, share of the frame's."""
     far = settings.top_right - settings.top_left
     return far, settings.bottom_right - settings.bottom_left
 
 
-def _ground_to_frame(settings: TopViewSettings, width: int, height: int) -> Float64Array:
+def _ground_to_frame(settings: LaneSettings, width: int, height: int) -> Float64Array:
     """Return the homography `(3, 3)` from `(x, z, 1)`, metres, to undistorted pixels."""
     far, near = _widths(settings)
     slope = (settings.top_left - settings.bottom_left) / (near - far)

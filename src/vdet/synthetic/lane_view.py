@@ -1,17 +1,17 @@
 """The view of the lane finder that fits the camera of a scene."""
 
-from vdet.config.lanes import TopViewSettings
+from vdet.config.lanes import LaneSettings
 from vdet.synthetic.camera import PinholeCamera
 
 
 def lane_view(
     camera: PinholeCamera, *, near: float, far: float, width: float = 3.7
-) -> TopViewSettings:
+) -> LaneSettings:
     """Return the settings that show the road from `near` to `far` metres ahead of the camera.
 
     The camera is in the middle of a lane that is `width` metres wide; it sees the road at `near`.
     """
-    return TopViewSettings(
+    return LaneSettings(
         top=_row(camera, far),
         bottom=_row(camera, near),
         top_left=_column(camera, -width / 2, far),
