@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.learn.net.samples import Sample, Source
+from vdet.learn.net.sources import Sample, Source
 
 RED, BLUE = 0, 1
 _COLORS = {RED: (30, 30, 220), BLUE: (220, 40, 30)}

@@ -7,7 +7,7 @@ import pytest
 from learn.net.blocks import block_picture, block_source
 from vdet.config.network import NetworkTrainingSettings
 from vdet.learn.net.augmentation import Drawing, SampleDrawer, _turned
-from vdet.learn.net.samples import MAX_PIXELS, Sample, Source
+from vdet.learn.net.sources import MAX_PIXELS, Sample, Source
 from vdet.learn.net.weather import with_weather
 
 PLAIN = Drawing(width=256, height=128, magnified=1.0, mosaics=0.0)
@@ -28,7 +28,7 @@ def black_on_white() -> Source:
     return Source("block", [Sample(image, boxes, np.array([0]), np.array([False]))])
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(8))
 def test_the_box_lies_around_what_it_is_the_box_of(seed: int) -> None:
     sample = draw(seed, PLAIN, black_on_white())
     dark = sample.image.mean(axis=2)
@@ -44,7 +44,7 @@ def test_the_box_lies_around_what_it_is_the_box_of(seed: int) -> None:
 
 
 @pytest.mark.parametrize("drawing", [PLAIN, MOSAIC], ids=["plain", "mosaic"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_every_box_lies_in_the_picture_and_has_an_area(seed: int, drawing: Drawing) -> None:
     sample = draw(seed, drawing)
     assert sample.image.shape == (128, 256, 3)
@@ -107,12 +107,9 @@ def test_a_turned_box_lies_around_the_ellipse_in_it() -> None:
     turn = cv2.getRotationMatrix2D((0, 0), 90, 1.0)
     [turned] = _turned(np.array([[10, 20, 50, 40]], np.float32), turn)
     assert turned == pytest.approx([20, -50, 40, -10], abs=1e-4)
-
-
-def test_a_circle_keeps_its_size_at_any_angle() -> None:
     turn = cv2.getRotationMatrix2D((100, 100), 30, 1.0)
-    [turned] = _turned(np.array([[90, 90, 110, 110]], np.float32), turn)
-    assert turned == pytest.approx([90, 90, 110, 110], abs=1e-4)
+    [circle] = _turned(np.array([[90, 90, 110, 110]], np.float32), turn)
+    assert circle == pytest.approx([90, 90, 110, 110], abs=1e-4)
 
 
 def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:

@@ -54,6 +54,7 @@ class Network(nn.Module):
 
     def __init__(self, classes: int) -> None:
         super().__init__()
+        self.columns = 5 + classes
         self.stem = nn.Conv2d(3, STEM, 3, 2, 1, bias=False)
         self.stem_norm = nn.BatchNorm2d(STEM)
         widths = [STEM, *(width for width, _ in TRUNK)]
@@ -72,7 +73,7 @@ class Network(nn.Module):
         self.towers = nn.ModuleList(
             nn.Sequential(Block(NECK, NECK), Block(NECK, NECK)) for _ in STRIDES
         )
-        self.heads = nn.ModuleList(nn.Conv2d(NECK, 5 + classes, 1) for _ in STRIDES)
+        self.heads = nn.ModuleList(nn.Conv2d(NECK, self.columns, 1) for _ in STRIDES)
         for head in self.heads:
             assert isinstance(head, nn.Conv2d)
             assert head.bias is not None
@@ -92,7 +93,11 @@ class Network(nn.Module):
         pictures
             BGR, 0 to 255, float32 `(B, 3, H, W)`; H and W are multiples of 32.
         """
-        values = functional.relu(self.stem_norm(self.stem(pictures / 255)))
+        return self.levels(pictures / 255)
+
+    def levels(self, pictures: Tensor) -> list[Tensor]:
+        """Return the raw output of each level for pictures from 0 to 1, as `forward` does."""
+        values = functional.relu(self.stem_norm(self.stem(pictures)))
         levels = []
         for stage in self.stages:
             values = stage(values)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from vdet.boxes import Float32Array
 from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
-from vdet.learn.net.samples import Sample, Source, join
+from vdet.learn.net.sources import Sample, Source, join
 from vdet.learn.net.weather import with_weather
 from vdet.media.images import Image
 
@@ -45,12 +45,8 @@ class SampleDrawer:
     def __init__(self, sources: Sequence[Source], settings: NetworkTrainingSettings) -> None:
         self._sources = sources
         self._settings = settings
-        weights = np.array(
-            [
-                np.sqrt(len(source.samples)) * settings.weights.get(source.name, 1.0)
-                for source in sources
-            ]
-        )
+        counts = [len(source.samples) for source in sources]
+        weights = np.sqrt(counts) * [settings.weights.get(source.name, 1.0) for source in sources]
         self._shares = weights / weights.sum()
 
     def draw(self, rng: np.random.Generator, drawing: Drawing) -> Sample:

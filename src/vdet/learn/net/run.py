@@ -4,22 +4,13 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.files import write_json
-from vdet.labels.pictures.reading import read_labelled_images
 from vdet.learn.net.export import export_network
-from vdet.learn.net.samples import Source
-from vdet.learn.net.sources import (
-    CLASSES,
-    LabelledClip,
-    SourceReport,
-    clip_source,
-    image_source,
-)
+from vdet.learn.net.sources import CLASSES, LabelledClip, SourceReport, clip_source, image_source
 from vdet.learn.net.training import TrainingState, train_network
 from vdet.version import __version__
 
@@ -106,8 +97,11 @@ def train_to_file(
         A file cannot be written.
     """
     began = time.monotonic()
-    base = {"base": _provenance(job.base)} if job.base else {}
-    sources, reports = _read(job)
+    base = {}
+    if job.base:
+        header = read_header(Session(job.base), job.base)
+        base["base"] = header.provenance if header else {}
+    sources = [*map(image_source, job.pictures), *map(clip_source, job.clips)]
     recent: list[float] = []
 
     def note(state: TrainingState) -> None:
@@ -119,7 +113,7 @@ def train_to_file(
         sources, len(CLASSES), settings, job.checkpoint, base=job.base, progress=note
     )
     report = NetworkMetrics(
-        sources=reports,
+        sources=tuple(source.report() for source in sources),
         steps=settings.steps,
         parameters=sum(each.numel() for each in network.parameters()),
         seconds=round(time.monotonic() - began, 1),
@@ -140,14 +134,3 @@ def train_to_file(
     write_json(asdict(report), str(job.metrics), overwrite=job.overwrite)
     job.checkpoint.unlink(missing_ok=True)
     return report
-
-
-def _provenance(path: Path) -> dict[str, Any]:
-    header = read_header(Session(path), path)
-    return header.provenance if header else {}
-
-
-def _read(job: NetworkJob) -> tuple[list[Source], tuple[SourceReport, ...]]:
-    read = [image_source(read_labelled_images(path)) for path in job.pictures]
-    read += [clip_source(clip) for clip in job.clips]
-    return [source for source, _ in read], tuple(report for _, report in read)

@@ -1,33 +1,62 @@
-"""From labelled pictures and videos to the sources of a training."""
+"""Labelled pictures and videos in memory, as the training draws its pictures from them."""
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array
-from vdet.labels.pictures.labelled import LabelledImages
+from vdet.boxes import BoolArray, Float32Array, Float64Array, Int64Array
+from vdet.labels.pictures.reading import read_labelled_images
 from vdet.labels.truth import read_truth
-from vdet.labels.video import LabelledVideo
-from vdet.learn.net.samples import UNKNOWN, Sample, Source
 from vdet.media import VideoReader
 from vdet.media.images import Image
 
 CLASSES = ("car", "truck", "bus")
 """The classes that the network tells apart, in its order."""
 
+MAX_PIXELS = 640_000
+"""Pictures are held with at most this many pixels; larger ones are scaled down."""
+
+UNKNOWN = -1
+"""The class of a vehicle whose kind is not known."""
+
 _VEHICLE = "vehicle"
 
 
-@dataclass(frozen=True, slots=True)
-class LabelledClip:
-    """A video, the file with its true boxes, and of which frames to learn: each `every`-th."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """A picture with its vehicles.
 
-    video: Path
-    truth: Path
-    every: int
+    Attributes
+    ----------
+    image
+        BGR uint8 `(H, W, 3)`.
+    boxes
+        float32 `(n, 4)`: x1, y1, x2, y2, pixels of `image`.
+    classes
+        int64 `(n,)`, `UNKNOWN` for a vehicle whose kind is not known.
+    ignored
+        bool `(n,)`: the box is an ignore region: neither vehicle nor background.
+    """
+
+    image: Image
+    boxes: Float32Array
+    classes: Int64Array
+    ignored: BoolArray
+
+    def shrunk(self) -> "Sample":
+        """Return the sample with at most `MAX_PIXELS` pixels."""
+        height, width = self.image.shape[:2]
+        factor = (MAX_PIXELS / (height * width)) ** 0.5
+        if factor >= 1:
+            return self
+        size = round(width * factor), round(height * factor)
+        image = np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA), np.uint8)
+        scale = np.array([size[0] / width, size[1] / height] * 2, np.float32)
+        return Sample(image, self.boxes * scale, self.classes, self.ignored)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,21 +69,50 @@ class SourceReport:
     sha256: str
 
 
-def image_source(labelled: LabelledImages) -> tuple[Source, SourceReport]:
-    """Read the pictures of a set into memory.
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The samples of one camera or collection; `name` stands in metrics and settings."""
+
+    name: str
+    samples: Sequence[Sample]
+
+    def report(self) -> SourceReport:
+        """Count pictures and vehicles, and compute the SHA-256."""
+        digest = hashlib.sha256()
+        for sample in self.samples:
+            for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
+                digest.update(part.tobytes())
+        vehicles = sum(int(np.count_nonzero(~sample.ignored)) for sample in self.samples)
+        return SourceReport(self.name, len(self.samples), vehicles, digest.hexdigest())
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledClip:
+    """A video and the file with its true boxes; every `every`-th frame is used."""
+
+    video: Path
+    truth: Path
+    every: int
+
+
+def image_source(path: Path) -> Source:
+    """Read a set of labelled pictures into memory.
 
     Raises
     ------
+    TruthError
+        The labels cannot be read.
     ImageError
         A picture cannot be read.
     """
-    samples = (
+    labelled = read_labelled_images(path)
+    samples = [
         _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.images
-    )
-    return _source(Path(labelled.name).resolve().name, samples)
+    ]
+    return Source(Path(labelled.name).resolve().name, samples)
 
 
-def clip_source(clip: LabelledClip) -> tuple[Source, SourceReport]:
+def clip_source(clip: LabelledClip) -> Source:
     """Read frames of a labelled video into memory; all its vehicles are cars.
 
     Raises
@@ -64,16 +122,14 @@ def clip_source(clip: LabelledClip) -> tuple[Source, SourceReport]:
     VideoError
         The video cannot be read.
     """
-    return _source(clip.video.name, _frames(clip, read_truth(clip.truth)))
-
-
-def _frames(clip: LabelledClip, truth: LabelledVideo) -> Iterator[Sample]:
+    truth = read_truth(clip.truth)
+    samples = []
     with VideoReader(clip.video, frames=truth.last_frame) as reader:
         for number, frame in enumerate(reader, start=1):
             if number % clip.every == 0:
                 rows = truth.frame(number)
-                names = ["car"] * len(rows)
-                yield _sample(frame.image, rows.boxes, names, rows.ignored)
+                samples.append(_sample(frame.image, rows.boxes, ["car"] * len(rows), rows.ignored))
+    return Source(clip.video.name, samples)
 
 
 def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray) -> Sample:
@@ -85,12 +141,12 @@ def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: Bo
     ).shrunk()
 
 
-def _source(name: str, samples: Iterable[Sample]) -> tuple[Source, SourceReport]:
-    digest = hashlib.sha256()
-    kept = []
-    for sample in samples:
-        for part in (sample.image, sample.boxes, sample.classes, sample.ignored):
-            digest.update(part.tobytes())
-        kept.append(sample)
-    vehicles = sum(int(np.count_nonzero(~sample.ignored)) for sample in kept)
-    return Source(name, kept), SourceReport(name, len(kept), vehicles, digest.hexdigest())
+def join(samples: Iterable[Sample], image: Image) -> Sample:
+    """Return a sample that shows `image` with the boxes of all `samples`."""
+    parts = list(samples)
+    return Sample(
+        image,
+        np.concatenate([part.boxes for part in parts]),
+        np.concatenate([part.classes for part in parts]),
+        np.concatenate([part.ignored for part in parts]),
+    )

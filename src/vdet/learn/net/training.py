@@ -2,8 +2,8 @@
 
 import copy
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,14 +19,9 @@ from vdet.files import OutputFiles
 from vdet.learn.net.architecture import Network, cell_centers, decode, flatten
 from vdet.learn.net.assignment import Vehicles, assign
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
-from vdet.learn.net.base import start_from
-from vdet.learn.net.losses import (
-    BOX_WEIGHT,
-    CLASS_WEIGHT,
-    giou,
-    quality_focal_loss,
-)
-from vdet.learn.net.samples import UNKNOWN, Sample, Source
+from vdet.learn.net.export import start_from
+from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_loss
+from vdet.learn.net.sources import UNKNOWN, Sample, Source, join
 from vdet.run.threads import prefetch, single_threaded_libraries
 
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
@@ -34,27 +29,23 @@ _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too sma
 
 @dataclass(frozen=True, slots=True)
 class TrainingState:
-    """What a training says of itself: the steps done of all, loss, rate and seconds left."""
+    """How far a training is: the steps done, the last loss and the learning rate."""
 
     step: int
-    steps: int
     loss: float
     rate: float
-    seconds_left: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Batch:
     """Training pictures of one step.
 
-    `pictures` is uint8 `(B, H, W, 3)`, BGR. `picture` is the number of the picture of each box,
-    `boxes` are x1, y1, x2, y2 in pixels; the first rows are `vehicles`, the others ignore regions.
+    `pictures` is uint8 `(B, H, W, 3)`, BGR. `ignored` are the ignore regions, as `Vehicles`.
     """
 
     pictures: Tensor
     vehicles: Vehicles
-    ignored_picture: Tensor
-    ignored_boxes: Tensor
+    ignored: Vehicles
 
 
 def _batches(
@@ -105,38 +96,63 @@ def train_network(
     Raises
     ------
     DataError
-        No source has a vehicle, the base is not such a network, or the checkpoint belongs to
-        another training.
+        No source has a vehicle, a weight is given to a source that is not there, the base is not
+        such a network, or the checkpoint belongs to another training.
     """
+    _check(sources, settings)
+    learnt_with = {
+        "sources": [(each.name, len(each.samples)) for each in sources],
+        "base": str(base),
+        **settings.model_dump(exclude={"score"}),  # it changes no weight
+    }
+    with single_threaded_libraries(), _fast_torch():
+        run = _Run(class_count, settings, learnt_with)
+        if checkpoint.exists():
+            run.restore(checkpoint)
+        elif base is not None:
+            run.start_from(base, next(_batches(sources, settings, run.step)))
+        with prefetch(_batches(sources, settings, run.step)) as batches:
+            for batch in batches:
+                loss = run.learn(batch)
+                progress(TrainingState(run.step, loss, run.rate))
+                if run.step % settings.checkpoint == 0 or run.step == settings.steps:
+                    run.save(checkpoint)
+    return run.averaged.eval()
+
+
+def _check(sources: Sequence[Source], settings: NetworkTrainingSettings) -> None:
     if not any((~sample.ignored).any() for each in sources for sample in each.samples):
         raise DataError("no picture has a vehicle; give labelled pictures")
-    run = _Run(class_count, settings, base)
-    if checkpoint.exists():
-        run.restore(checkpoint)
-    elif base is not None:
-        run.start_from(base, next(_batches(sources, settings, run.step)))
-    began, first = time.monotonic(), run.step
-    with single_threaded_libraries(), prefetch(_batches(sources, settings, first)) as batches:
-        for batch in batches:
-            loss = run.learn(batch)
-            left = (time.monotonic() - began) / (run.step - first) * (settings.steps - run.step)
-            progress(TrainingState(run.step, settings.steps, loss, run.rate, left))
-            if run.step % settings.checkpoint == 0 or run.step == settings.steps:
-                run.save(checkpoint)
-    return run.averaged.eval()
+    names = {each.name for each in sources}
+    if unknown := sorted(settings.weights.keys() - names):
+        raise DataError(
+            f"train.net.weights: no set of pictures is named {unknown[0]}; there are "
+            f"{', '.join(sorted(names))}"
+        )
+
+
+@contextmanager
+def _fast_torch() -> Iterator[None]:
+    """Use one thread and round the smallest numbers to 0, and undo both at the end."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # two threads that wait for each other are slower than one
+    torch.set_flush_denormal(True)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
+        torch.set_flush_denormal(False)
 
 
 class _Run:
     """The state of a training between two steps."""
 
     def __init__(
-        self, class_count: int, settings: NetworkTrainingSettings, base: Path | None
+        self, class_count: int, settings: NetworkTrainingSettings, learnt_with: dict[str, Any]
     ) -> None:
         torch.manual_seed(settings.seed)
-        torch.set_num_threads(1)  # two threads that wait for each other are slower than one
-        torch.set_flush_denormal(True)
         self._settings = settings
-        self._base = base
+        self._learnt_with = learnt_with
         self._network = Network(class_count).to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [each for each in self._network.parameters() if each.ndim > 1]
@@ -189,7 +205,7 @@ class _Run:
     def save(self, path: Path) -> None:
         """Write the state to a file."""
         state = {
-            "settings": self._learnt_with(),
+            "settings": self._learnt_with,
             "step": self.step,
             "network": self._network.state_dict(),
             "averaged": self.averaged.state_dict(),
@@ -198,15 +214,11 @@ class _Run:
         with OutputFiles(overwrite=True) as files:
             torch.save(state, files.stage(path))
 
-    def _learnt_with(self) -> dict[str, Any]:
-        """Return the base, and the settings without those that change no weight."""
-        return {"base": str(self._base)} | self._settings.model_dump(exclude={"score"})
-
     def restore(self, path: Path) -> None:
         """Go on from a file that `save` has written. Raises `DataError`."""
         try:
             state: dict[str, Any] = torch.load(path, weights_only=True)
-            same = state["settings"] == self._learnt_with()
+            same = state["settings"] == self._learnt_with
             self._network.load_state_dict(state["network"])
             self.averaged.load_state_dict(state["averaged"])
             self._optimizer.load_state_dict(state["optimizer"])
@@ -215,7 +227,8 @@ class _Run:
             raise DataError(f"{path}: is no checkpoint of this training; remove it") from error
         if not same:
             raise DataError(
-                f"{path}: belongs to a training with other settings or another base; remove it"
+                f"{path}: belongs to a training with other settings, pictures or another base; "
+                "remove it"
             )
 
 
@@ -228,8 +241,7 @@ def _loss(network: Network, batch: Batch) -> Tensor:
     targets = torch.zeros_like(scores)
     targets[found.picture, found.cell] = found.iou
     counted = torch.ones_like(scores)
-    inside = _inside(batch, centers)
-    counted[inside] = 0
+    counted[_inside(batch.ignored, centers)] = 0
     counted[found.picture, found.cell] = 1
     whole = found.iou.sum().clamp(min=1)
     score_loss = (quality_focal_loss(scores, targets) * counted).sum() / whole
@@ -250,23 +262,22 @@ def _inputs(batch: Batch) -> Tensor:
     return pictures.contiguous(memory_format=torch.channels_last)
 
 
-def _inside(batch: Batch, centers: Tensor) -> tuple[Tensor, Tensor]:
+def _inside(ignored: Vehicles, centers: Tensor) -> tuple[Tensor, Tensor]:
     """Return the picture and the cell of all cells whose middle lies in an ignore region."""
-    boxes = batch.ignored_boxes[:, None]
+    boxes = ignored.boxes[:, None]
     inside = ((centers > boxes[..., :2]) & (centers < boxes[..., 2:])).all(-1)
     row, cell = torch.nonzero(inside, as_tuple=True)
-    return batch.ignored_picture[row], cell
+    return ignored.picture[row], cell
 
 
 def _to_batch(samples: Sequence[Sample]) -> Batch:
+    joined = join(samples, samples[0].image)
     counts = [len(sample.boxes) for sample in samples]
     picture = torch.repeat_interleave(torch.arange(len(samples)), torch.tensor(counts))
-    boxes = torch.from_numpy(np.concatenate([sample.boxes for sample in samples]))
-    classes = torch.from_numpy(np.concatenate([sample.classes for sample in samples]))
-    ignored = torch.from_numpy(np.concatenate([sample.ignored for sample in samples]))
-    return Batch(
-        torch.from_numpy(np.stack([sample.image for sample in samples])),
-        Vehicles(picture[~ignored], boxes[~ignored].float(), classes[~ignored]),
-        picture[ignored],
-        boxes[ignored].float(),
+    boxes, classes = torch.from_numpy(joined.boxes).float(), torch.from_numpy(joined.classes)
+    vehicles, ignored = (
+        Vehicles(picture[rows], boxes[rows], classes[rows])
+        for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
     )
+    pictures = torch.from_numpy(np.stack([sample.image for sample in samples]))
+    return Batch(pictures, vehicles, ignored)
