@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.material import find_video, read_pictures, shipped_config
 from benchmarks.runs import peak_memory, run_times, seconds_of_program, seconds_of_video
 from benchmarks.searches import search_times, times_by_height
-from vdet.run.threads import single_threaded_libraries
+from vdet.workers import limit_library_threads
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ def measure_all(folder: Path, rounds: int) -> list[Measurement]:
     svm, seed = shipped_config("svm"), shipped_config("seed")
     pictures = read_pictures(path)
     print(f"measuring on {path.name} …", file=sys.stderr)
-    with single_threaded_libraries():
-        searched = search_times(path, pictures, svm, seed, rounds)
-        by_height = times_by_height(pictures, svm, rounds)
+    limit_library_threads()
+    searched = search_times(path, pictures, svm, seed, rounds)
+    by_height = times_by_height(pictures, svm, rounds)
     ran = run_times(path, folder, rounds)
     short = statistics.median(seconds_of_program(path, folder, 1.0) for _ in range(rounds))
     memory = [peak_memory(path, folder, *extra) for extra in ((), ("--frames", "40"))]

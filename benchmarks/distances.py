@@ -21,9 +21,8 @@ from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
-from vdet.run.loop import follow_frames, peek
-from vdet.run.positions import with_positions
-from vdet.run.threads import single_threaded_libraries
+from vdet.run.loop import build, peek
+from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic import must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.lane_view import lane_view
@@ -193,16 +192,12 @@ class Shown:
             Frame(i, Fraction(i) / rate, Picture(image)) for i, image in enumerate(drive.images())
         )
         first, all_frames = peek(clip)
-        with single_threaded_libraries():
-            detector = self.model.for_video(camera.width, camera.height, first)
-            results = follow_frames(
-                all_frames, detector, self.settings, video, roads=drive.finder()
-            )
-            for result in results:
-                if result.frame.index in COUNTED:
-                    yield from _matched(
-                        drive.at(result.frame.index), result.frame.index, result.tracks
-                    )
+        lanes = LaneStep(drive.finder(), self.settings.detector.foot)
+        pipeline = build(self.model, self.settings, video, first, steps=[lanes])
+        for result in pipeline.follow(all_frames):
+            index = result.frame.index
+            if index in COUNTED:
+                yield from _matched(drive.at(index), index, result.tracks)
 
 
 def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Sample]:

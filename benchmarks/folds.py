@@ -8,7 +8,8 @@ the fifth.
 import argparse
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
+from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
@@ -30,12 +32,10 @@ from vdet.learn.svm.box_regression import extract_box_patches, fit_boxes
 from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
 from vdet.learn.svm.extraction import extract
 from vdet.learn.svm.fitting import fit
-from vdet.media import VideoReader
-from vdet.run.loop import peek
-from vdet.run.stride import search_frame
-from vdet.run.threads import single_threaded_libraries
+from vdet.media import Frame, Picture, VideoReader
+from vdet.run.loop import follow, peek
 from vdet.track.factory import make_tracker
-from vdet.workers import make_workers
+from vdet.workers import limit_library_threads, make_workers
 
 BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
@@ -59,12 +59,56 @@ Numbers = npt.NDArray[np.intp]
 
 @dataclass(frozen=True)
 class SearchedVideo:
-    """The likely windows of each frame, from a model that has not seen it; None if not searched."""
+    """The likely windows of each searched frame, by index, from a model that has not seen it."""
 
     width: int
     height: int
-    rate: float
-    windows: list[Windows | None]
+    rate: Fraction
+    frames: int
+    stride: int
+    windows: dict[int, Windows]
+
+
+@dataclass(frozen=True)
+class Searching:
+    """A detector that keeps the likely windows of each frame, and detects nothing.
+
+    Attributes
+    ----------
+    detectors
+        Of each block, from the model that was trained without it.
+    last
+        Number of frames.
+    """
+
+    detectors: Sequence[SvmDetector]
+    last: int
+    windows: dict[int, Windows] = field(default_factory=dict)
+
+    def search(self, picture: Picture, index: int | None) -> tuple[int, Windows]:
+        assert index is not None
+        block = int(_block_of(np.array([index + 1]), self.last)[0])
+        candidates = self.detectors[block].search(picture, index)
+        return index, candidates.windows.hits(LEAST)
+
+    def detect(self, candidates: tuple[int, Windows]) -> Detections:
+        index, self.windows[index] = candidates
+        return NO_DETECTIONS
+
+
+@dataclass(frozen=True)
+class Searched:
+    """A detector of which the search is done already."""
+
+    detector: SvmDetector
+    windows: dict[int, Windows]
+
+    def search(self, picture: Picture, index: int | None) -> Candidates:  # noqa: ARG002
+        assert index is not None
+        return Candidates(self.windows[index], is_still=False)
+
+    def detect(self, candidates: Candidates) -> Detections:
+        return self.detector.detect(candidates)
 
 
 def main() -> None:
@@ -77,10 +121,10 @@ def main() -> None:
     truth = read_truth(options.truth)
     settings = load_settings(None, SETTINGS, detector="svm")
     models = _models(options.patches, truth.last_frame, settings)
-    with single_threaded_libraries():
-        searched = _search(options.video, truth.last_frame, models, settings)
-        for key, values in SWEEPS.items():
-            print("\n".join(_sweep(key, values, searched, models[0], truth)), flush=True)
+    limit_library_threads()
+    searched = _search(options.video, truth.last_frame, models, settings)
+    for key, values in SWEEPS.items():
+        print("\n".join(_sweep(key, values, searched, models[0], truth)), flush=True)
 
 
 def _block_of(frames: Numbers, last: int) -> Numbers:
@@ -126,21 +170,21 @@ def _search(
     video: Path, last: int, models: Sequence[LinearModel], settings: Settings
 ) -> SearchedVideo:
     """Search each frame with the model that was trained without its block."""
-    found: list[Windows | None] = []
     with VideoReader(video, frames=last) as reader:
         info = reader.info
         images, frames = peek(reader)
         horizon = horizon_of(settings.svm, images)
-        detectors = [
-            SvmDetector(model, settings.svm, info.width, info.height, horizon=horizon)
-            for model in models
-        ]
+        searching = Searching(
+            [
+                SvmDetector(model, settings.svm, info.width, info.height, horizon=horizon)
+                for model in models
+            ],
+            last,
+        )
         stride = settings.detector.stride_at(info.rate)
-        for frame in frames:
-            block = int(_block_of(np.array([frame.index + 1]), last)[0])
-            search = search_frame(detectors[block], frame, frame.index, stride)
-            found.append(search.candidates.windows.hits(LEAST) if search else None)
-    return SearchedVideo(info.width, info.height, float(info.rate), found)
+        tracker = make_tracker(settings, info.width, info.height)
+        count = sum(1 for _ in follow(frames, searching, tracker, stride=stride))
+    return SearchedVideo(info.width, info.height, info.rate, count, stride, searching.windows)
 
 
 def _sweep(
@@ -173,18 +217,17 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     """Detect and follow vehicles in windows that are searched already; any model will do."""
     detector = SvmDetector(model, settings.svm, searched.width, searched.height)
     tracker = make_tracker(settings, searched.width, searched.height)
-    rows = []
-    for number, windows in enumerate(searched.windows, start=1):
-        time = number / searched.rate
-        if windows is None:
-            tracks = tracker.carry(time)
-        else:
-            detections = detector.detect(Candidates(windows, is_still=False))
-            tracks = tracker.update(detections, time)
-        for track in tracks:
-            box = track.box
-            rows.append(Row(0, number, track.id, box.x, box.y, box.width, box.height))
-    return LabelledVideo.from_rows(rows, frame_count=len(searched.windows), rate=searched.rate)
+    unseen = Picture(np.zeros((1, 1, 3), np.uint8))
+    frames = (Frame(n, n / searched.rate, unseen) for n in range(searched.frames))
+    found = Searched(detector, searched.windows)
+    rows = [
+        Row(0, result.frame.index + 1, track.id, box.x, box.y, box.width, box.height)
+        for result in follow(frames, found, tracker, stride=searched.stride)
+        for track in result.tracks
+        for box in [track.box]
+    ]
+    rate = float(searched.rate)
+    return LabelledVideo.from_rows(rows, frame_count=searched.frames, rate=rate)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

@@ -26,8 +26,8 @@ from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import LaneRequest
 from vdet.media import VideoReader
-from vdet.run.loop import VideoJob, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, run_video
 
 FRAMES = 250
 CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)

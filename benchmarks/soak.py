@@ -15,8 +15,8 @@ import av
 from benchmarks.material import find_video
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
-from vdet.run.loop import VideoJob, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, run_video
 
 FRAMES = 20_000
 MIN_FRAMES = 1000

@@ -2,9 +2,12 @@
 
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -12,6 +15,7 @@ import vdet
 from doc_pages import blocks
 from red_cars import drive
 from running import frames_of
+from vdet.media import VideoReader
 from vdet.media.images import write_image
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
@@ -126,3 +130,40 @@ def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
         tracker.update(found, 0.0)
     (frame,) = drive(1)
     assert tracker.update(found, 0.0, frame.image) == []
+
+
+def test_follow_leaves_the_threads_of_opencv_as_they_are(clip_path: Path) -> None:
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(2)
+    try:
+        assert {cv2.getNumThreads() for _ in vdet.follow(clip_path, frames=3)} == {2}
+    finally:
+        cv2.setNumThreads(before)
+
+
+def test_follow_may_be_left_while_a_frame_is_read(
+    clip_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reads, goes_on, closed = threading.Event(), threading.Event(), threading.Event()
+    deliver, close = VideoReader.__iter__, VideoReader.close
+
+    def slow(self: VideoReader) -> Iterator[vdet.Frame]:
+        for number, frame in enumerate(deliver(self)):
+            yield frame
+            if number == 7:
+                reads.set()
+                goes_on.wait(10)
+
+    def noted(self: VideoReader) -> None:
+        close(self)
+        closed.set()
+
+    monkeypatch.setattr(VideoReader, "__iter__", slow)
+    monkeypatch.setattr(VideoReader, "close", noted)
+    monkeypatch.setattr("vdet.run.threads.JOIN_TIMEOUT", 0.1)
+    results = vdet.follow(clip_path)
+    next(results)
+    assert reads.wait(10)
+    results.close()
+    goes_on.set()
+    assert closed.wait(10), "the file stays open"

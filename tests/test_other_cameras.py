@@ -27,8 +27,7 @@ from vdet.labels.rows import Row
 from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.coding import Coding
-from vdet.run.loop import follow_frames, peek
-from vdet.run.threads import single_threaded_libraries
+from vdet.run.loop import build, peek
 from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.scene import Light, Scene
@@ -80,14 +79,12 @@ def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) ->
     rate, clip = Fraction(25), map(as_planes, clip)
     video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
     images, clip = peek(clip)
-    with single_threaded_libraries():
-        detector = model.for_video(camera.width, camera.height, images)
-        return LabelledVideo.from_rows(
-            row(result.frame.index, track.id, track.box)
-            for result in follow_frames(clip, detector, LINEAR, video)
-            for track in result.tracks
-            if result.frame.index in SCORED
-        )
+    return LabelledVideo.from_rows(
+        row(result.frame.index, track.id, track.box)
+        for result in build(model, LINEAR, video, images).follow(clip)
+        for track in result.tracks
+        if result.frame.index in SCORED
+    )
 
 
 def as_planes(frame: Frame) -> Frame:

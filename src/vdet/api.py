@@ -21,14 +21,13 @@ from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.detections import Detections
 from vdet.detect.factory import DetectorKind, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
-from vdet.errors import ImageError, VdetError, VideoError
-from vdet.media import Frame, Picture, VideoReader
+from vdet.errors import VdetError
+from vdet.media import Frame, Picture
 from vdet.media.images import Image
-from vdet.run.loop import Summary, VideoJob, check_job, follow_frames, peek, run_video
 from vdet.run.pictures import PictureJob, detect_picture, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
-from vdet.run.threads import prefetch, single_threaded_libraries
+from vdet.run.video import RunTotals, VideoJob, check_job, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import Track
@@ -42,10 +41,10 @@ __all__ = [
     "DetectorSettings",
     "Frame",
     "FrameResult",
+    "RunTotals",
     "Settings",
     "SinkContext",
     "SinkKind",
-    "Summary",
     "Track",
     "Tracker",
     "TrackerKind",
@@ -177,21 +176,9 @@ def follow(
     """
     settings = _settings(settings, model)
     detector = load_detector(settings.detector, _path(model))
-    reader = VideoReader(
-        Path(source),
-        start=_exact(start),
-        end=_exact(end),
-        frames=frames,
-        settings=settings.input,
-    )
-    with reader, single_threaded_libraries(), prefetch(reader) as read:
-        images, all_frames = peek(read)
-        try:
-            started = detector.for_video(reader.info.width, reader.info.height, images)
-            del images  # else they stay in memory for the whole run
-            yield from follow_frames(all_frames, started, settings, reader.info, threads=threads)
-        except ImageError as error:
-            raise VideoError(f"{source}: {error}") from error
+    job = VideoJob(Path(source), start=_exact(start), end=_exact(end), frames=frames)
+    with open_video(job, detector, settings, threads=threads) as video:
+        yield from video.results
 
 
 def detect_video(
@@ -204,7 +191,7 @@ def detect_video(
     model: PathName | None = None,
     overwrite: bool = False,
     threads: int | None = None,
-) -> Summary:
+) -> RunTotals:
     """Find and follow the vehicles in a video, and write the outputs that are asked for.
 
     All outputs appear together when the run ends well, and none appears otherwise.

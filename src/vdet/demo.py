@@ -19,8 +19,8 @@ from vdet.learn.svm.metrics import TrainingMetrics
 from vdet.learn.svm.training import train
 from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
-from vdet.run.loop import VideoJob, check_job, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, check_job, run_video
 from vdet.synthetic import demo_scene, write_clip, write_patches, write_truth
 from vdet.synthetic.scene import Scene
 from vdet.traffic.counter import count_events

@@ -40,16 +40,25 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "page": "vdet.run.sinks.page:PAGE",
         "counts": "vdet.run.sinks.counts:COUNTS",
     },
-    STEPS: {},
+    STEPS: {
+        "lanes": "vdet.run.steps:lane_step",
+        "regions": "vdet.run.steps:region_step",
+        "counts": "vdet.run.steps:count_step",
+    },
     FORMATS: {},
     COMMANDS: {},
 }
 """The names of vdet itself: where each is defined."""
 
 
+def built_in_names(group: str) -> list[str]:
+    """Return the names of a group that are those of vdet."""
+    return list(_BUILT_IN[group])
+
+
 def plugin_names(group: str) -> list[str]:
     """Return all names of a group, those of vdet first."""
-    own = list(_BUILT_IN[group])
+    own = built_in_names(group)
     return own + sorted({point.name for point in entry_points(group=group)} - set(own))
 
 

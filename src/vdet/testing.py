@@ -3,7 +3,7 @@
 Each check raises `AssertionError` with what is wrong.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from fractions import Fraction
@@ -14,13 +14,13 @@ import numpy as np
 from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.detect.detections import NO_DETECTIONS, Detections
-from vdet.detect.protocol import DetectorModel, VideoDetector
+from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
-from vdet.run.loop import NullDetector
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
+from vdet.run.steps import StepContext, make_steps
 from vdet.track.protocol import CarryingTracker, VideoTracker
 from vdet.track.track import Track
 
@@ -55,7 +55,7 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     still = model.for_video(width, height, images[:1])
     found = still.detect(still.search(Picture(images[0]), None))
     _check_detections(found, width, height)
-    for name, picture in still.stage_pictures(images[0], found).items():
+    for name, picture in stage_pictures_of(still)(images[0], found).items():
         assert picture.dtype == np.uint8, f"stage picture {name} is {picture.dtype}, not uint8"
         assert picture.ndim == 3, f"stage picture {name} has the shape {picture.shape}"
     plain = np.full_like(images[0], 128)
@@ -195,8 +195,7 @@ class _SinkRun:
         folder.mkdir(parents=True, exist_ok=True)
         try:
             with OutputFiles() as files, self.kind.open(self.path, self._context(files)) as sink:
-                for index in range(1 if self.still else 3):
-                    result = _result(index)
+                for result in self._results():
                     before = result.frame.image.copy()
                     sink.write(result)
                     assert np.array_equal(result.frame.image, before), "the sink changed the frame"
@@ -207,10 +206,27 @@ class _SinkRun:
             left = [path.name for path in folder.iterdir() if ".vdet-" in path.name]
             assert not left, f"temporary files are left: {', '.join(left)}"
 
-    def _context(self, files: OutputFiles) -> SinkContext:
+    @property
+    def _video(self) -> VideoInfo | None:
         rate = Fraction(RATE)
         video = VideoInfo(Path("check.mp4"), 640, 360, rate, 1 / rate, frames=3)
-        return SinkContext(files, self.settings, None if self.still else video)
+        return None if self.still else video
+
+    def _results(self) -> Iterator[FrameResult]:
+        steps = make_steps(StepContext(self.settings, 640, 360, self._video))
+        for index in range(1 if self.still else 3):
+            result = _result(index)
+            for step in steps:
+                result = step.apply(result)
+            yield result
+
+    def _context(self, files: OutputFiles) -> SinkContext:
+        return SinkContext(
+            files,
+            self.settings,
+            self._video,
+            stage_pictures=lambda image, _: {"frame": image},
+        )
 
 
 def _content(path: Path) -> list[Path]:
@@ -220,18 +236,10 @@ def _content(path: Path) -> list[Path]:
     return [path] if path.exists() else []
 
 
-class _ShowsFrame(NullDetector):
-    """A detector whose only stage picture is the frame."""
-
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
-        """Return a picture of the frame."""
-        return {"frame": image}
-
-
 def _result(index: int) -> FrameResult:
     frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
     tracks = tuple(
         Track(number, box, 0.9, predicted=number == 2)
         for number, box in enumerate(_boxes(index), start=1)
     )
-    return FrameResult(Path("check.mp4"), frame, _detections(index), tracks, None, _ShowsFrame())
+    return FrameResult(Path("check.mp4"), frame, _detections(index), tracks)

@@ -22,6 +22,7 @@ from concurrent.futures import (
     wait,
 )
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from vdet.errors import INTERRUPTED, ClusterError
@@ -77,6 +78,18 @@ def core_count() -> int:
     from joblib import cpu_count
 
     return int(cpu_count())
+
+
+def limit_library_threads() -> None:
+    """Let OpenCV and BLAS use one thread a call in this process: frames are searched in parallel.
+
+    For processes that belong to the program. Library code never calls it.
+    """
+    import cv2
+    from threadpoolctl import threadpool_limits
+
+    cv2.setNumThreads(1)
+    threadpool_limits(1)
 
 
 def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:
@@ -172,6 +185,7 @@ def _start_quiet_tracker() -> None:
 def _initialize_worker(parent: int) -> None:
     """Run in a new worker process: ignore Ctrl-C, and end when the process `parent` has ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    limit_library_threads()
     threading.Thread(target=_end_after, args=(parent,), name="vdet-watch", daemon=True).start()
 
 
@@ -224,7 +238,8 @@ class DaskCluster:
             _check_workers(client, self.address, self.worker_timeout)
             from distributed import KilledWorker, as_completed
 
-            futures = client.map(function, items, pure=False, batch_size=TASKS_PER_MESSAGE)
+            call = partial(_call_limited, function)
+            futures = client.map(call, items, pure=False, batch_size=TASKS_PER_MESSAGE)
             numbers = {future.key: number for number, future in enumerate(futures)}
             lost = []
             ended = as_completed(futures, loop=client.loop)  # type: ignore[no-untyped-call]
@@ -249,6 +264,11 @@ class DaskCluster:
             raise ClusterError(
                 f"{self.address}: the scheduler has ended; start it again, and run this again"
             ) from error
+
+
+def _call_limited(function: Callable[[T], R], item: T) -> R:
+    limit_library_threads()
+    return function(item)
 
 
 @contextlib.contextmanager

@@ -12,9 +12,9 @@ from vdet.batch.digest import result_digest
 from vdet.batch.manifest import Origin, Record, open_manifest
 from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
 from vdet.errors import BatchError, ConfigError, OutputError
-from vdet.run.loop import VideoJob
 from vdet.run.sinks import tracks
 from vdet.run.sinks.protocol import BatchTotal, Output
+from vdet.run.video import VideoJob
 
 COMMON = VideoJob(Path(), frames=7)
 DIGEST = "settings"

@@ -11,7 +11,7 @@ from vdet.batch.progress import BatchState, FrameCounts, batch_state, frame_coun
 from vdet.batch.run import run_batch
 from vdet.batch.task import Work
 from vdet.config.schema import Settings
-from vdet.run.loop import VideoJob
+from vdet.run.video import VideoJob
 from vdet.workers import ThisProcess
 
 

@@ -14,8 +14,8 @@ from vdet.batch.run import each_once, run_batch, write_totals
 from vdet.batch.task import Work
 from vdet.config.schema import Settings
 from vdet.errors import OutputError
-from vdet.run.loop import VideoJob
 from vdet.run.sinks.protocol import BatchTotal
+from vdet.run.video import VideoJob
 from vdet.workers import WorkerKilledError
 
 T = TypeVar("T")

@@ -12,8 +12,8 @@ from running import names, write_drive
 from vdet.batch.digest import result_digest
 from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.detect.svm.model import save_model
-from vdet.run.loop import VideoJob, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, run_video
 
 
 @pytest.fixture

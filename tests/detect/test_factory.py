@@ -15,6 +15,7 @@ from vdet.config.loading import load_settings
 from vdet.config.schema import FeatureSettings, NetworkSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.detect.onnx.detector import NetworkModel
+from vdet.detect.protocol import stage_pictures_of
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import load_model, save_model
@@ -69,7 +70,7 @@ class TestLinearModel:
         seed = shipped_model(SvmSettings()).with_name("seed.npz")
         image = np.zeros((720, 1280, 3), np.uint8)
         detector = load_detector(SvmSettings(), seed).for_video(1280, 720, [image])
-        sheet = detector.stage_pictures(
+        sheet = stage_pictures_of(detector)(
             image, detector.detect(detector.search(Picture(image), None))
         )
         assert sheet["patches"].size > 0

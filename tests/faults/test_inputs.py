@@ -15,8 +15,8 @@ from red_cars import SETTINGS, red_model, red_work
 from running import frames_of, names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
-from vdet.run.loop import VideoJob, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, run_video
 
 COUNT = 60
 

@@ -17,8 +17,8 @@ from running import names, until, write_drive
 from vdet.batch.task import process_file
 from vdet.errors import VideoError
 from vdet.media import Frame, VideoWriter
-from vdet.run.loop import VideoJob, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, run_video
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 

@@ -8,15 +8,17 @@ from typing import Any
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import Box
 from vdet.config.schema import Settings
-from vdet.detect.detections import NO_DETECTIONS
+from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.detect.protocol import DetectorModel, StagePictures
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
-from vdet.lanes.road import Road
+from vdet.lanes.road import LaneRequest, Road
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.media.images import Image
-from vdet.run.loop import NullDetector, Summary, VideoJob, follow_frames, peek, run_video
+from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+from vdet.run.video import RunTotals, VideoJob, run_video
 from vdet.track.track import Track
 
 COUNT = 60
@@ -49,7 +51,7 @@ def outputs(**paths: Path) -> tuple[Output, ...]:
     return tuple(Output(sink, path) for sink, path in paths.items())
 
 
-def run_red(job: VideoJob, settings: Settings = SETTINGS, **options: Any) -> Summary:
+def run_red(job: VideoJob, settings: Settings = SETTINGS, **options: Any) -> RunTotals:
     """Run a job that finds red cars."""
     return run_video(job, model_for(settings), settings, **options)
 
@@ -60,12 +62,15 @@ def follow(
     *,
     width: int = WIDTH,
     height: int = HEIGHT,
-    **options: Any,
+    model: DetectorModel | None = None,
+    lanes: LaneRequest | None = None,
+    threads: int = 1,
 ) -> Iterator[FrameResult]:
     """Find and follow red cars through some frames."""
     images, frames = peek(frames)
-    detector = model_for(settings).for_video(width, height, images)
-    return follow_frames(frames, detector, settings, video_info(width, height), **options)
+    model = model_for(settings) if model is None else model
+    pipeline = build(model, settings, video_info(width, height), images, lanes=lanes)
+    return pipeline.follow(frames, VIDEO.path, threads=threads)
 
 
 def result_of(
@@ -85,7 +90,16 @@ def result_of(
         Track(number, each, 0.9, predicted=False) if isinstance(each, Box) else each
         for number, each in enumerate(vehicles, start=1)
     )
-    return FrameResult(source, frame, NO_DETECTIONS, tracks, found, NullDetector())
+    return FrameResult(source, frame, NO_DETECTIONS, tracks, found)
+
+
+def stages_of_trace(image: Image, detections: Detections) -> dict[str, Image]:
+    """Return the stage pictures of the detector of red cars, where it made the detections."""
+    if detections.trace is None:
+        return {}
+    height, width = image.shape[:2]
+    detector = model_for(SETTINGS).for_video(width, height, [image])
+    return detector.stage_pictures(image, detections)
 
 
 def write(
@@ -95,13 +109,14 @@ def write(
     settings: Settings = SETTINGS,
     video: VideoInfo | None = VIDEO,
     at: Fraction = Fraction(0),
+    stage_pictures: StagePictures = stages_of_trace,
 ) -> None:
     """Give results to a sink of its own run.
 
     Without a `video` they are those of pictures. `at` is the moment that is asked for.
     """
     with OutputFiles(overwrite=True) as files:
-        context = SinkContext(files, settings, video, at=at)
+        context = SinkContext(files, settings, video, at=at, stage_pictures=stage_pictures)
         with open_sink(output, context) as sink:
             for result in results:
                 sink.write(result)

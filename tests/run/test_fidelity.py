@@ -23,7 +23,7 @@ from vdet.media.coding import Coding
 from vdet.media.frame import UNSPECIFIED
 from vdet.media.orientation import Orientation
 from vdet.media.planes import Planes
-from vdet.run.loop import VideoJob
+from vdet.run.video import VideoJob
 
 TONE_RATE = 48_000
 

@@ -8,21 +8,16 @@ import pytest
 
 from red_cars import HEIGHT, WIDTH, drive
 from run.red_runs import follow
-from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
-from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.lanes.road import LaneRequest
 from vdet.media.images import Image
 
 LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
 COUNT = 40
 
 
-def road_finder() -> RoadFinder:
-    return RoadFinder(LaneRequest(LENS), LaneSettings(), WIDTH, HEIGHT)
-
-
 def test_vehicles_are_searched_in_the_original_frame() -> None:
-    with_lanes = follow(drive(15), roads=road_finder())
+    with_lanes = follow(drive(15), lanes=LaneRequest(LENS))
     without = follow(drive(15))
     for one, other in zip(with_lanes, without, strict=True):
         assert one.tracks == other.tracks
@@ -31,7 +26,7 @@ def test_vehicles_are_searched_in_the_original_frame() -> None:
 
 def test_every_frame_is_undistorted() -> None:
     undistorter = Undistorter(LENS, WIDTH, HEIGHT)
-    for result in follow(drive(5), roads=road_finder(), threads=2):
+    for result in follow(drive(5), lanes=LaneRequest(LENS), threads=2):
         assert result.road is not None
         np.testing.assert_array_equal(result.road.image, undistorter.image(result.frame.image))
 
@@ -52,7 +47,7 @@ def test_few_undistorted_frames_are_in_memory_at_a_time(
 
     monkeypatch.setattr(Undistorter, "image", watched(Undistorter.image))
     most = 0
-    for _ in follow(drive(COUNT), threads=threads, roads=road_finder()):
+    for _ in follow(drive(COUNT), threads=threads, lanes=LaneRequest(LENS)):
         most = max(most, sum(image() is not None for image in made))
     assert len(made) == COUNT
     assert 0 < most <= threads + 3

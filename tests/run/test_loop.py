@@ -33,7 +33,6 @@ from run.red_runs import (
     outputs,
     read,
     run_red,
-    video_info,
 )
 from running import write_drive
 from vdet.config.loading import load_settings
@@ -43,8 +42,9 @@ from vdet.errors import ImageError, OutputError, VdetError, VideoError
 from vdet.media import Frame, Picture, VideoWriter
 from vdet.media.images import Image, read_image
 from vdet.media.planes import Planes
-from vdet.run.loop import FIRST_FRAMES, VideoJob, follow_frames, peek, run_video
+from vdet.run.loop import FIRST_FRAMES, peek
 from vdet.run.threads import map_ordered
+from vdet.run.video import VideoJob, run_video
 from vdet.synthetic import frames, true_boxes
 from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import RulesTracker
@@ -56,9 +56,9 @@ QUEUED = 24
 class TestFollowFrames:
     def test_finds_the_vehicle_of_a_drawn_scene(self, scene: Scene, model_path: Path) -> None:
         settings = load_settings(None, QUICK)
-        images, drawn = peek(islice(frames(scene), 16))
-        detector = load_detector(settings.detector, model_path).for_video(320, 180, images)
-        results = list(follow_frames(drawn, detector, settings, video_info(320, 180)))
+        model = load_detector(settings.detector, model_path)
+        drawn = islice(frames(scene), 16)
+        results = list(follow(drawn, settings, width=320, height=180, model=model))
         assert [result.frame.index for result in results] == list(range(16))
         nearest = 3  # its number in the scene
         overlaps = []
@@ -257,7 +257,7 @@ class TestRun:
     def test_stages_alone_need_only_the_frames_before_their_moment(
         self, red_clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("vdet.run.loop.LEAD", Fraction(5, 25))
+        monkeypatch.setattr("vdet.run.video.LEAD", Fraction(5, 25))
         at = Fraction(30, 25)
         whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
         for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():

@@ -1,20 +1,22 @@
 """The distance and the lane of vehicles, in videos and in pictures."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from run.red_runs import video_info
+from run.red_runs import follow
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.detections import Detections
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.media import Picture
-from vdet.run.loop import NullDetector, follow_frames
+from vdet.media import Frame, Picture
+from vdet.run.loop import NullDetector
 from vdet.run.pictures import detect_picture
-from vdet.run.positions import with_positions
+from vdet.run.result import FrameResult
+from vdet.run.steps import with_positions
 from vdet.synthetic import frames, render, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.lane_view import lane_view
@@ -57,6 +59,10 @@ class TrueDetector(NullDetector):
         return self
 
 
+def followed(frames: Iterable[Frame], lanes: LaneRequest | None) -> Iterator[FrameResult]:
+    return follow(frames, SETTINGS, width=WIDTH, height=HEIGHT, model=TrueDetector(), lanes=lanes)
+
+
 def roads() -> RoadFinder:
     return RoadFinder(LaneRequest(), SETTINGS.lanes, WIDTH, HEIGHT)
 
@@ -71,11 +77,7 @@ def check(tracks: tuple[Track, ...]) -> None:
 
 
 def test_vehicles_of_a_video_have_their_distance_and_lane() -> None:
-    found = list(
-        follow_frames(
-            frames(SCENE), TrueDetector(), SETTINGS, video_info(WIDTH, HEIGHT), roads=roads()
-        )
-    )
+    found = list(followed(frames(SCENE), LaneRequest()))
     check(found[-1].tracks)
     assert found[-1].frame_tracks.tracks == found[-1].tracks, "all outputs get them"
 
@@ -89,10 +91,7 @@ def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
 @pytest.mark.parametrize("with_roads", [False, True])
 def test_without_a_lane_they_have_none(*, with_roads: bool) -> None:
     grey = [replace(f, picture=Picture(np.full_like(f.image, 90))) for f in frames(SCENE)]
-    finder = roads() if with_roads else None
-    found = list(
-        follow_frames(grey, TrueDetector(), SETTINGS, video_info(WIDTH, HEIGHT), roads=finder)
-    )
+    found = list(followed(grey, LaneRequest() if with_roads else None))
     assert len(found[-1].tracks) == 3
     assert all((t.distance, t.lane) == (None, None) for t in found[-1].tracks)
 

@@ -15,9 +15,9 @@ from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
 from vdet.errors import ImageError, VideoError
 from vdet.media.images import read_image, write_image
-from vdet.run.loop import VideoJob
 from vdet.run.pictures import PictureJob, detect_picture, run_picture
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob
 
 RIGHT = [[100, 0], [320, 0], [320, 240], [100, 240]]
 

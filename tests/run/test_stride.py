@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from red_cars import PERSPECTIVE, SETTINGS, drive
+from red_cars import HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, drive
 from run.red_runs import COUNT, follow, outputs, run_red, write
 from vdet.config.schema import MotionTrackerSettings, Settings, SvmSettings
 from vdet.media import Picture
-from vdet.run.loop import VideoJob
+from vdet.run.loop import NullDetector
+from vdet.run.loop import follow as follow_all
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
-from vdet.run.stride import search_frame
+from vdet.run.video import VideoJob
+from vdet.track.factory import make_tracker
 
 
 def strided(stride: int, settings: Settings = PERSPECTIVE) -> Settings:
@@ -60,12 +62,12 @@ def test_results_do_not_depend_on_the_threads() -> None:
 def test_the_detector_gets_the_number_of_each_frame_that_it_searches() -> None:
     searched: list[int | None] = []
 
-    class Counting:
+    class Noting(NullDetector):
         def search(self, picture: object, index: int | None) -> None:  # noqa: ARG002
             searched.append(index)
 
-    for position, frame in enumerate(list(drive(20))[7:]):
-        search_frame(Counting(), frame, position, 4)  # type: ignore[arg-type]
+    tracker = make_tracker(SETTINGS, WIDTH, HEIGHT)
+    list(follow_all(list(drive(20))[7:], Noting(), tracker, stride=4))
     assert searched == [7, 11, 15, 19]
 
 

@@ -7,9 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import chain, islice
 
-import cv2
 import pytest
-from threadpoolctl import threadpool_info
 
 from running import SOON, until
 from vdet.run.threads import (
@@ -17,7 +15,6 @@ from vdet.run.threads import (
     map_ordered,
     prefetch,
     run_in_thread,
-    single_threaded_libraries,
     write_async,
 )
 
@@ -520,26 +517,3 @@ class TestAllTogether:
         with pytest.raises(KeyboardInterrupt):
             self.run(recording(range(10**9), made), press_at_20, int)
         assert len(made) < 60
-
-
-class TestSingleThreadedLibraries:
-    @pytest.fixture(autouse=True)
-    def two_threads(self) -> Iterator[None]:
-        before = cv2.getNumThreads()
-        cv2.setNumThreads(2)
-        yield
-        cv2.setNumThreads(before)
-
-    def test_inside_they_have_one_thread_and_afterwards_as_many_as_before(self) -> None:
-        before = [pool["num_threads"] for pool in threadpool_info()]
-        with single_threaded_libraries():
-            assert cv2.getNumThreads() == 1
-            assert {pool["num_threads"] for pool in threadpool_info()} == {1}
-        assert cv2.getNumThreads() == 2
-        assert [pool["num_threads"] for pool in threadpool_info()] == before
-
-    @Errors
-    def test_an_error_restores_them_too(self, kind: type[BaseException]) -> None:
-        with pytest.raises(kind), single_threaded_libraries():
-            raise kind
-        assert cv2.getNumThreads() == 2

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from run.red_runs import outputs, run_red
-from vdet.run.loop import VideoJob
-from vdet.run.waits import Part, Waits
+from vdet.run.threads import Part, Waits
+from vdet.run.video import VideoJob
 
 SOON = 0.01
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from vdet.batch.manifest import Origin
 from vdet.config.schema import Settings
-from vdet.run.loop import VideoJob
+from vdet.run.video import VideoJob
 
 _NO_EFFECT = {"train"}  # sections that detection does not read
 

@@ -11,7 +11,6 @@ from vdet.batch.inputs import Source, find_sources
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
-from vdet.run.loop import VideoJob
 from vdet.run.sinks.protocol import (
     BatchTotal,
     Output,
@@ -19,6 +18,7 @@ from vdet.run.sinks.protocol import (
     output_size,
     sink_kind,
 )
+from vdet.run.video import VideoJob
 
 MANIFEST = "manifest.jsonl"
 

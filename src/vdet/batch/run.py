@@ -12,7 +12,7 @@ from vdet.batch.progress import FrameCounts
 from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import OutputFiles, make_folder, output_errors
 from vdet.progress import no_progress
-from vdet.run.loop import VideoJob
+from vdet.run.video import VideoJob
 from vdet.temporary import remove_stale
 from vdet.workers import WorkerKilledError, Workers
 

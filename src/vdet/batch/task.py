@@ -16,8 +16,8 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.errors import in_one_line
 from vdet.progress import Progress, no_progress
-from vdet.run.loop import VideoJob, run_video
 from vdet.run.sinks.protocol import make_folders, output_size
+from vdet.run.video import VideoJob, run_video
 
 
 @dataclass(frozen=True, slots=True)

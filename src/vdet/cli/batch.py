@@ -22,8 +22,8 @@ from vdet.cli.options import PATH, PROCESSES, scheduler_option
 from vdet.config.schema import Settings
 from vdet.detect.factory import model_file
 from vdet.errors import failure_code
-from vdet.run.loop import VideoJob
 from vdet.run.sinks.protocol import Output, sink_kind
+from vdet.run.video import VideoJob
 from vdet.version import __version__
 from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
 

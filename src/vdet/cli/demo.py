@@ -7,6 +7,7 @@ import click
 from vdet.cli.command import Command
 from vdet.cli.messages import print_lines, print_message, progress_steps
 from vdet.cli.options import PATH, overwrite_option
+from vdet.workers import limit_library_threads
 
 
 @click.command(
@@ -36,6 +37,7 @@ def demo(quiet: bool, *, folder: Path, seed: int, overwrite: bool) -> None:
     """
     from vdet.demo import DemoFiles, check_demo, run_demo
 
+    limit_library_threads()
     files = DemoFiles(folder)
     check_demo(files, overwrite=overwrite)
     with progress_steps("", quiet=quiet) as steps:

@@ -26,6 +26,7 @@ from vdet.regions import check_mask
 from vdet.run.pictures import find_images, plan_pictures, run_pictures
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, check_sinks
+from vdet.workers import limit_library_threads
 
 log = logging.getLogger("vdet")
 
@@ -83,6 +84,7 @@ def detect_image(
     Each IMAGE is a file, or a folder of files. Without an output, the vehicles are printed: class,
     score, and box in pixels, as x, y, width and height.
     """
+    limit_library_threads()
     shared = read_sinks(sinks)
     if json_target is not None:
         shared = (Output("json", json_target), *shared)

@@ -34,8 +34,9 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.media.writer import may_replace_video
 from vdet.regions import check_mask
-from vdet.run.loop import VideoJob, check_job, run_video
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob, check_job, run_video
+from vdet.workers import limit_library_threads
 
 
 @click.command(
@@ -155,6 +156,7 @@ def detect_video(
     or a quoted pattern such as 'day*/*.mp4'. The outputs of each video are written into DIR, and a
     record of each into manifest.jsonl there.
     """
+    limit_library_threads()
     batch = BatchOptions(folder, jobs, skip_existing, dry_run, scheduler)
     if start is not None and end is not None and end <= start:
         raise click.UsageError("--end must be later than --start")

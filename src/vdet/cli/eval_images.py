@@ -16,7 +16,7 @@ from vdet.cli.options import (
 )
 from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.evaluate.output import RunName, check_outputs
-from vdet.workers import core_count
+from vdet.workers import core_count, limit_library_threads
 
 SHARE = click.FloatRange(0, 1)
 
@@ -72,6 +72,7 @@ def images(
     from vdet.evaluate.report.images_page import images_page
     from vdet.labels.pictures.reading import read_labelled_images
 
+    limit_library_threads()
     detector = read_whole_frame_settings(config_name, assignments, model_path).detector
     model = load_detector(detector.showing_all(), model_path)
     file = model_file(detector, model_path)

@@ -20,6 +20,7 @@ from vdet.cli.options import (
 from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.evaluate.output import RunName, check_outputs, run_lines
 from vdet.run.sinks.protocol import check_sinks
+from vdet.workers import limit_library_threads
 
 
 @click.command(
@@ -85,6 +86,7 @@ def video(
     from vdet.evaluate.clips.text import plain, result_lines
     from vdet.evaluate.report.video_page import video_page
 
+    limit_library_threads()
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     base = read_whole_frame_settings(config_name, assignments, model_path)

@@ -73,7 +73,7 @@ def set_up_logs(*, verbose: bool, quiet: bool) -> None:
 
 @contextmanager
 def progress_bar(unit: str, *, quiet: bool) -> Iterator[Progress]:
-    """Give a function that starts a bar; see `vdet.run.loop.run_video`.
+    """Give a function that starts a bar; see `vdet.run.video.run_video`.
 
     There is no bar where standard error is no terminal.
     """

@@ -9,6 +9,7 @@ from vdet.cli.messages import print_lines, steps_bar
 from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
 from vdet.errors import DataError, OutputError
 from vdet.files import check_output
+from vdet.workers import limit_library_threads
 
 
 @click.command(
@@ -59,6 +60,7 @@ def train_net(
     when the same command is given again. The metrics are written beside the network as JSON.
     Needs torch and onnx: pip install torch onnx
     """
+    limit_library_threads()
     if not data and not clips:
         raise click.UsageError("nothing to learn from; give DATA or --video")
     if output.suffix.lower() != ".onnx":

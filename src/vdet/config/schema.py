@@ -3,7 +3,7 @@
 The defaults are those of `configs/default.yaml`, which is their printed form.
 """
 
-from pydantic import SerializeAsAny
+from pydantic import Field, SerializeAsAny
 
 from vdet.config.detector import (
     DetectorSettings,
@@ -82,12 +82,19 @@ __all__ = [
 ]
 
 
+class StepSettings(Section):
+    """Steps of other packages, between the tracker and the outputs."""
+
+    names: tuple[str, ...] = Field((), description="the steps, in their order")
+
+
 class Settings(Section):
     """All settings, one field for each section."""
 
     detector: SerializeAsAny[DetectorSettings] = NetworkSettings()
     tracker: SerializeAsAny[TrackerSettings] = MotionTrackerSettings()
     regions: RegionsSettings = RegionsSettings()
+    steps: StepSettings = StepSettings()
     counts: CountSettings = CountSettings()
     lanes: LaneSettings = LaneSettings()
     train: TrainSettings = TrainSettings()

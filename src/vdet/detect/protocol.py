@@ -1,6 +1,6 @@
 """The protocol of all detectors, which is all that the rest of the program knows of them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 from vdet.detect.detections import Detections
@@ -34,11 +34,24 @@ class VideoDetector(Protocol):
         It is called in the order of the frames, and may keep what it needs of earlier ones.
         """
 
+
+@runtime_checkable
+class StagedDetector(VideoDetector, Protocol):
+    """A detector that shows its stages."""
+
     def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
         """Return a picture of each stage of the detection by its name, in the order of the stages.
 
         `detections` is what `detect` returned for this `image`.
         """
+
+
+StagePictures = Callable[[Image, Detections], dict[str, Image]]
+
+
+def stage_pictures_of(detector: VideoDetector) -> StagePictures:
+    """Return the function that makes the stage pictures of a detector, if it has such."""
+    return detector.stage_pictures if isinstance(detector, StagedDetector) else lambda *_: {}
 
 
 @runtime_checkable

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
@@ -10,21 +10,23 @@ from pathlib import Path
 
 import numpy as np
 
+from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
 from vdet.detect.detections import Detections
-from vdet.detect.protocol import DetectorModel, VideoDetector, limited
+from vdet.detect.protocol import DetectorModel, VideoDetector, limited, stage_pictures_of
 from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
-from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions, lay_regions
-from vdet.run.positions import with_positions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
-from vdet.run.threads import single_threaded_libraries
+from vdet.run.steps import ParallelStep, StepContext, make_steps
 from vdet.track.track import Track
+
+_WHOLE_FRAME = RegionsSettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,7 @@ def run_pictures(
     failures: list[ImageError] = []
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles(overwrite=overwrite))
-        context = SinkContext(files, settings)
+        context = _context(files, model, settings)
         sinks = [stack.enter_context(open_sink(output, context)) for output in shared]
         advance = progress(len(jobs))
         for job in jobs:
@@ -158,7 +160,7 @@ def run_picture(
     result = detect_picture(job.source, read_image(job.source), model, settings, lanes)
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles(overwrite=overwrite))
-        context = SinkContext(files, settings)
+        context = _context(files, model, settings)
         own = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         for sink in (*own, *shared):
             sink.write(result)
@@ -181,36 +183,50 @@ def detect_picture(
     ImageError
         The picture cannot be searched.
     """
-    height, width = image.shape[:2]
-    with single_threaded_libraries():
-        with _named(source):
-            regions = lay_regions(settings.regions, width, height)
-        detector, detections = search_picture(source, image, model, regions)
-    tracks = _tracks(detections)
-    with _named(source):
-        road = _road(image, tracks, settings, lanes) if lanes else None
     frame = Frame(0, Fraction(0), Picture(image))
-    placed = with_positions(tracks, road, settings.detector.foot)
-    return FrameResult(source, frame, detections, placed, road, detector)
+    detections = search_picture(source, image, model, settings.regions)
+    result = FrameResult(source, frame, detections, _tracks(detections))
+    with _named(source):
+        height, width = image.shape[:2]
+        for step in make_steps(StepContext(settings, width, height, lanes=lanes)):
+            if isinstance(step, ParallelStep):
+                step.prepare(frame)
+            result = step.apply(result)
+    return result
 
 
 def search_picture(
-    source: Path, image: Image, model: DetectorModel, regions: Regions | None = None
-) -> tuple[VideoDetector, Detections]:
-    """Return what a picture shows, and the detector that found it; threads may call this at once.
+    source: Path, image: Image, model: DetectorModel, regions: RegionsSettings = _WHOLE_FRAME
+) -> Detections:
+    """Return what a picture shows; threads may call this at once.
 
     With `regions`, only vehicles that stand in them are found.
 
     Arguments and errors as in `detect_picture`.
     """
-    height, width = image.shape[:2]
     with _named(source):
-        detector = limited(model.for_video(width, height, [image]), regions)
+        detector, laid = _start(image, model, regions)
         detections = detector.detect(detector.search(Picture(image), None))
-    if regions is None:
-        return detector, detections
+    if laid is None:
+        return detections
     boxes = detections.rounded
-    return detector, detections[[n for n, box in enumerate(boxes) if regions.contains(box.foot)]]
+    return detections[[n for n, box in enumerate(boxes) if laid.contains(box.foot)]]
+
+
+def _start(
+    image: Image, model: DetectorModel, regions: RegionsSettings
+) -> tuple[VideoDetector, Regions | None]:
+    height, width = image.shape[:2]
+    laid = lay_regions(regions, width, height)
+    return limited(model.for_video(width, height, [image]), laid), laid
+
+
+def _context(files: OutputFiles, model: DetectorModel, settings: Settings) -> SinkContext:
+    def stage_pictures(image: Image, detections: Detections) -> dict[str, Image]:
+        detector, _ = _start(image, model, settings.regions)
+        return stage_pictures_of(detector)(image, detections)
+
+    return SinkContext(files, settings, stage_pictures=stage_pictures)
 
 
 @contextlib.contextmanager
@@ -235,9 +251,3 @@ def _tracks(detections: Detections) -> tuple[Track, ...]:
             zip(detections.rounded, detections.scores.tolist(), detections.class_names, strict=True)
         )
     )
-
-
-def _road(image: Image, tracks: Iterable[Track], settings: Settings, lanes: LaneRequest) -> Road:
-    height, width = image.shape[:2]
-    roads = RoadFinder(lanes, settings.lanes, width, height)
-    return roads.update(roads.observe(image), (track.box for track in tracks))

@@ -1,14 +1,13 @@
 """The result of one frame."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.detect.detections import Detections
-from vdet.detect.protocol import VideoDetector
 from vdet.lanes.road import Road
 from vdet.media import Frame
-from vdet.media.images import Image
 from vdet.track.track import FrameTracks, Track
+from vdet.traffic.counter import VehicleCounter
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,27 +23,24 @@ class FrameResult:
     detections, tracks
         In pixels of that frame.
     road
-        The lane, and the undistorted frame; None if lanes are not searched for.
-    detector
-        The detector that found `detections`.
+        The lane, and the undistorted frame; None if lanes are not looked for.
     searched
         Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
         no detections, and the tracks are predicted.
+    counter
+        It has counted up to this frame; None if there are no lines and zones. All results of a
+        video share it.
     """
 
     source: Path
     frame: Frame
     detections: Detections
     tracks: tuple[Track, ...]
-    road: Road | None
-    detector: VideoDetector = field(repr=False)
+    road: Road | None = None
     searched: bool = True
+    counter: VehicleCounter | None = None
 
     @property
     def frame_tracks(self) -> FrameTracks:
         """The tracks with the number and the time of the frame."""
         return FrameTracks(self.frame.index, float(self.frame.time), self.tracks)
-
-    def stage_pictures(self) -> dict[str, Image]:
-        """Return a picture of each stage of the detection, by name, in order."""
-        return self.detector.stage_pictures(self.frame.image, self.detections)

@@ -8,14 +8,13 @@ after `JOIN_TIMEOUT`, together with the files that only it has open.
 import contextlib
 import queue
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
-from typing import Generic, TypeVar
-
-import cv2
-from threadpoolctl import threadpool_limits
+from operator import itemgetter
+from typing import Generic, Literal, TypeVar, get_args
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -216,13 +215,42 @@ def map_ordered(
             pool.shutdown(cancel_futures=True)
 
 
-@contextlib.contextmanager
-def single_threaded_libraries() -> Iterator[None]:
-    """Limit OpenCV and BLAS to one thread a call: frames are what is processed in parallel."""
-    threads = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        with threadpool_limits(1):
+Part = Literal["reading", "searching", "encoding"]
+"""What the threads of a run do; the loop itself tracks and draws."""
+
+
+class Waits:
+    """Seconds that the loop of a run has waited for each part."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[Part, float] = dict.fromkeys(get_args(Part), 0.0)
+
+    @contextlib.contextmanager
+    def on(self, part: Part) -> Iterator[None]:
+        """Count the time of a block as waiting."""
+        began = time.perf_counter()
+        try:
             yield
-    finally:
-        cv2.setNumThreads(threads)
+        finally:
+            self.seconds[part] += time.perf_counter() - began
+
+    def for_each(self, part: Part, items: Iterable[T]) -> Iterator[T]:
+        """Yield the items; the time until each is there counts as waiting."""
+        rest, end = iter(items), object()
+        while True:
+            with self.on(part):
+                item = next(rest, end)
+            if item is end:
+                return
+            yield item  # type: ignore[misc]
+
+    def describe(self, total: float) -> str:
+        """Describe what took most of the `total` seconds of a run, and what took how long."""
+        own = max(0.0, total - sum(self.seconds.values()))
+        part, longest = max(self.seconds.items(), key=itemgetter(1))
+        limit = part if longest > own else "tracking and drawing"
+        waited = ", ".join(f"{seconds:.1f} s for {part}" for part, seconds in self.seconds.items())
+        return (
+            f"{limit} limited the run: in {total:.1f} s it waited {waited}; tracking and drawing "
+            f"took {own:.1f} s"
+        )

@@ -37,15 +37,20 @@ class TrackerKind:
 def make_tracker(settings: Settings, width: int, height: int) -> CarryingTracker:
     """Return a new tracker for the frames of one video, `width` × `height` pixels.
 
-    One that cannot carry vehicles holds them where they are in frames that are not searched.
-
     Raises
     ------
     ConfigError
         There is no such kind.
     """
     kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.kind)
-    tracker = kind.make(settings.tracker, width, height)
+    return carrying(kind.make(settings.tracker, width, height))
+
+
+def carrying(tracker: VideoTracker) -> CarryingTracker:
+    """Return a tracker that can carry vehicles: the tracker itself, or one that holds its vehicles.
+
+    Held vehicles stay where they are in frames that are not searched.
+    """
     return tracker if isinstance(tracker, CarryingTracker) else HoldingTracker(tracker)
 
 

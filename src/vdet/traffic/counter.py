@@ -12,6 +12,7 @@ from vdet.track.track import FrameTracks, Track
 from vdet.traffic.border import CLOCK, BorderState, Change, Sighting
 from vdet.traffic.events import Event
 from vdet.traffic.layout import APPEAR, VANISH, Layout, Zone
+from vdet.traffic.totals import Counts
 
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
@@ -97,10 +98,16 @@ class _Vehicle:
 
 
 class VehicleCounter:
-    """Counts the vehicles of one video; make a new one for every video."""
+    """Counts the vehicles of one video; make a new one for every video.
+
+    Attributes
+    ----------
+    layout
+        The lines and zones in its frames.
+    """
 
     def __init__(self, layout: Layout) -> None:
-        self._layout = layout
+        self.layout = layout
         self._borders = layout.borders
         self._vehicles: dict[int, _Vehicle] = {}
         self._events: list[Event] = []
@@ -123,7 +130,7 @@ class VehicleCounter:
                 sighting = _sighting(track, frame)
                 vehicle = known or self._begin(track.id, sighting, shown)
                 vehicle.classes.add(track.class_name, track.score)
-                vehicle.outward = _touched_sides(track.box, self._layout.size)
+                vehicle.outward = _touched_sides(track.box, self.layout.size)
                 self._see(vehicle, sighting)
 
     def finish(self) -> tuple[Event, ...]:
@@ -131,6 +138,11 @@ class VehicleCounter:
         for vehicle in list(self._vehicles.values()):
             self._close(vehicle)
         return tuple(sorted(self._events, key=lambda e: (e.time, e.frame, e.id, e.name)))
+
+    def counts(self) -> Counts:
+        """Return all results; the video has ended."""
+        zones = [zone.name for zone in self.layout.zones]
+        return Counts.of(self.finish(), self.layout.keys, zones)
 
     def count(self, name: str, direction: str) -> int:
         """Return how many vehicles have been counted so far in a direction of a line or zone."""
@@ -143,7 +155,7 @@ class VehicleCounter:
             number in each.entered
             for each in self._vehicles.values()
             if not each.is_taken_over
-            and self._now - each.shown <= self._layout.settings.gap
+            and self._now - each.shown <= self.layout.settings.gap
             and self._is_confirmed(each)
         )
 
@@ -176,7 +188,7 @@ class VehicleCounter:
 
     def _before(self, sighting: Sighting, shown: set[int]) -> _Vehicle | None:
         """Return the vehicle that has ended where a new one begins."""
-        gap = self._layout.settings.gap
+        gap = self.layout.settings.gap
         near = []
         for vehicle in self._vehicles.values():
             if vehicle.id in shown or vehicle.is_taken_over or vehicle.is_leaving:
@@ -191,7 +203,7 @@ class VehicleCounter:
         return self._vehicles[min(near)[1]] if near else None
 
     def _see(self, vehicle: _Vehicle, sighting: Sighting) -> None:
-        band = self._layout.band(sighting.height)
+        band = self.layout.band(sighting.height)
         for number, (border, state) in enumerate(zip(self._borders, vehicle.states, strict=True)):
             before = state.side
             change = state.see(sighting, border, band, _SETTLED)
@@ -217,7 +229,7 @@ class VehicleCounter:
 
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
         seen = vehicle.last.time - vehicle.first.time
-        return seen >= self._layout.settings.confirmed - CLOCK
+        return seen >= self.layout.settings.confirmed - CLOCK
 
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""

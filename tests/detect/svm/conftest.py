@@ -1,13 +1,10 @@
-"""The tests search as the pipeline does: libraries use a single thread."""
-
-from collections.abc import Iterator
+"""The tests search as the program does: libraries use a single thread."""
 
 import pytest
 
-from vdet.run.threads import single_threaded_libraries
+from vdet.workers import limit_library_threads
 
 
 @pytest.fixture(scope="module", autouse=True)
-def one_thread() -> Iterator[None]:
-    with single_threaded_libraries():
-        yield
+def one_thread() -> None:
+    limit_library_threads()

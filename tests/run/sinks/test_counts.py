@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from red_cars import SETTINGS
-from run.red_runs import outputs, read, result_of, run_red, video_info, write
+from run.red_runs import outputs, read, result_of, run_red, write
 from vdet.boxes import Box
 from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.config.schema import Settings
-from vdet.errors import OutputError
+from vdet.errors import OutputError, VideoError
 from vdet.pages.facts import read_facts
 from vdet.pages.frame import PAGE_NAME
-from vdet.run.loop import VideoJob
 from vdet.run.sinks.counts import COUNTS
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob
 from vdet.testing import check_sink
 from vdet.traffic.count_files import join_counts
 
@@ -98,16 +98,12 @@ def test_without_lines_there_is_nothing_to_count_at(tmp_path: Path) -> None:
         write(Output("counts", tmp_path / "c.csv"), [result_of(Box(1, 1, 9, 9))])
 
 
-def test_lines_for_another_shape_are_refused_before_any_work(tmp_path: Path) -> None:
-    with pytest.raises(
-        OutputError, match=r"red\.mp4: counts\.size: places are given for .*320×240"
-    ):
-        write(
-            Output("counts", tmp_path / "c.csv"),
-            iter(lambda: pytest.fail("a frame was read"), None),
-            settings=with_counts(),
-            video=video_info(320, 180),
-        )
+def test_lines_for_another_shape_are_refused(red_clip: Path, tmp_path: Path) -> None:
+    path = tmp_path / "c.csv"
+    settings = with_counts(COUNTS_AT.model_copy(update={"size": (320, 180)}))
+    with pytest.raises(VideoError, match=r"red\.mp4: counts\.size: places are given for .*320×180"):
+        run_red(VideoJob(red_clip, outputs(counts=path)), settings)
+    assert not path.exists()
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".json"])

@@ -14,8 +14,8 @@ from run.red_runs import COUNT, outputs, read, result_of, run_red, video_info, w
 from running import names
 from vdet.media.images import Image, decode_image
 from vdet.pages.facts import read_facts
-from vdet.run.loop import VideoJob
 from vdet.run.sinks.protocol import Output
+from vdet.run.video import VideoJob
 
 
 def page_of(folder: Path) -> Elements:

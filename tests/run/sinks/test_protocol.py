@@ -18,7 +18,6 @@ from vdet.errors import ConfigError, OutputError
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
-from vdet.run.loop import VideoJob, check_job
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import (
     Output,
@@ -27,6 +26,7 @@ from vdet.run.sinks.protocol import (
     check_sinks,
     open_sink,
 )
+from vdet.run.video import VideoJob, check_job
 
 MOMENTS = ("open", "enter", "first", "middle", "end")
 

@@ -16,7 +16,6 @@ from vdet.draw.boxes import color_of
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import Road
 from vdet.media.images import Image, read_image
-from vdet.run.loop import NullDetector
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track
@@ -29,7 +28,7 @@ def detected(*boxes: Box, time: Fraction = Fraction(0), found: Road | None = Non
     result = result_of(*boxes, time=time, found=found)
     detector = model_for(SETTINGS).for_video(WIDTH, HEIGHT, [result.frame.image])
     detections = detector.detect(detector.search(result.frame.picture, None))
-    return replace(result, detections=detections, detector=detector)
+    return replace(result, detections=detections)
 
 
 def stages(folder: Path, at: Fraction, *results: FrameResult) -> list[str]:
@@ -91,13 +90,11 @@ def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path:
 
 
 def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> None:
-    class Pictures(NullDetector):
-        def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
-            assert len(detections) == 0
-            return {"z-first": image // 2, "a-second": 255 - image}
+    def pictures(image: Image, _: Detections) -> dict[str, Image]:
+        return {"z-first": image // 2, "a-second": 255 - image}
 
-    result = replace(result_of(), detector=Pictures())
-    assert stages(tmp_path, Fraction(0), result) == [
+    write(Output("stages", tmp_path), [result_of()], stage_pictures=pictures)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
         *("1-z-first.png", "2-a-second.png", "3-boxes.png")
     ]
     np.testing.assert_array_equal(read_image(tmp_path / "2-a-second.png"), 255 - road(CAR))

@@ -13,8 +13,8 @@ from vdet.boxes import Box
 from vdet.config.schema import CropSettings
 from vdet.files import OutputFiles
 from vdet.media.images import read_image
-from vdet.run.loop import VideoJob
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+from vdet.run.video import VideoJob
 
 
 def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_path: Path) -> None:

@@ -4,27 +4,32 @@ The search takes nearly all the time, so settings that search alike share it: ev
 searched once for them, and only what follows the search runs for each.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+import itertools
+import threading
+from collections import deque
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel
-from vdet.errors import ImageError, VideoError
+from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
+from vdet.errors import ConfigError, ImageError, VideoError
 from vdet.files import OutputFiles
 from vdet.labels.rows import Row
 from vdet.labels.truth import read_truth
 from vdet.labels.video import LabelledVideo
-from vdet.media import Frame, VideoInfo, VideoReader
+from vdet.media import Frame, Picture, VideoInfo, VideoReader
+from vdet.media.images import Image
 from vdet.progress import Progress
-from vdet.run.loop import peek
+from vdet.run.loop import Pipeline, build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
-from vdet.run.stride import follow_frame, search_frame
-from vdet.run.threads import single_threaded_libraries
-from vdet.track.factory import make_tracker
 from vdet.track.track import Track
+
+_KEPT = 4
+"""Searches that are kept for the other settings; each runs at most two ahead of the results."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,18 +109,26 @@ def find_tracks(
         reader = stack.enter_context(
             VideoReader(clip.video, frames=clip.until, settings=variants[0].settings.input)
         )
-        context = SinkContext(files, variants[0].settings, reader.info)
-        sinks = [stack.enter_context(open_sink(output, context)) for output in outputs]
+        images, read = peek(reader)
         advance = progress(reader.expected)
         try:
-            for results in follow_variants(reader, variants, reader.info):
+            pipelines = build_variants(variants, reader.info, images)
+            del images  # else they stay in memory for the whole run
+            context = SinkContext(
+                files,
+                variants[0].settings,
+                reader.info,
+                stage_pictures=stage_pictures_of(pipelines[0].detector),
+            )
+            sinks = [stack.enter_context(open_sink(output, context)) for output in outputs]
+            for results in follow_together(pipelines, read, clip.video):
                 for sink in sinks:
                     sink.write(results[0])
                 for row, result in zip(rows, results, strict=True):
                     row += [_row(result.frame.index + 1, track) for track in result.tracks]
                 frames = results[0].frame.index + 1
                 advance(1)
-        except ImageError as error:
+        except (ConfigError, ImageError) as error:
             raise VideoError(f"{clip.video}: {error}") from error
         if clip.until is not None and frames < clip.until:
             read_truth(clip.truth_path, frame_count=frames)  # raises an error with the line
@@ -123,44 +136,58 @@ def find_tracks(
     return [LabelledVideo.from_rows(each, frame_count=frames, rate=rate) for each in rows]
 
 
-def follow_variants(
-    frames: Iterable[Frame], variants: Sequence[Variant], video: VideoInfo
-) -> Iterator[list[FrameResult]]:
-    """Return for each frame a result for each of the settings, in their order.
+def build_variants(
+    variants: Sequence[Variant], video: VideoInfo, images: Sequence[Image]
+) -> list[Pipeline]:
+    """Build what the frames go through under each of the settings; `images` are from `peek`.
 
-    The results under one of the settings do not depend on the others, and are those of
-    `vdet.run.loop.follow_frames`.
-
-    Raises
-    ------
-    ImageError
-        Such frames cannot be searched.
+    Those that search alike share their search. Errors as of `vdet.run.loop.build`.
     """
-    images, frames = peek(frames)
-    size = video.width, video.height
-    detectors = [each.model.for_video(*size, images) for each in variants]
-    del images  # else they stay in memory for the whole run
-    trackers = [make_tracker(each.settings, *size) for each in variants]
-    sections = [each.settings.detector for each in variants]
-    keys = [(section.search_key, section.stride_at(video.rate)) for section in sections]
-    searchers = dict(zip(keys, detectors, strict=True))
-    with single_threaded_libraries():
-        for position, frame in enumerate(frames):
-            searches = {
-                key: search_frame(searcher, frame, position, stride=key[1])
-                for key, searcher in searchers.items()
-            }
-            results = []
-            for key, detector, tracker in zip(keys, detectors, trackers, strict=True):
-                found = searches[key]
-                searched = found is not None
-                detections, tracks = follow_frame(detector, tracker, found, frame)
-                results.append(
-                    FrameResult(
-                        video.path, frame, detections, tracks, None, detector, searched=searched
-                    )
-                )
-            yield results
+    searches: dict[Hashable, SharedSearch] = {}
+    pipelines = []
+    for each in variants:
+        own = build(each.model, each.settings, video, images)
+        key = each.settings.detector.search_key, own.stride, each.settings.regions
+        search = searches.setdefault(key, SharedSearch(own.detector))
+        pipelines.append(replace(own, detector=SharingDetector(search, own.detector)))
+    return pipelines
+
+
+def follow_together(
+    pipelines: Sequence[Pipeline], frames: Iterable[Frame], source: Path
+) -> Iterator[tuple[FrameResult, ...]]:
+    """Yield for each frame the results of all pipelines; none depends on the others."""
+    copies = itertools.tee(frames, len(pipelines))
+    runs = [pipeline.follow(copy, source) for pipeline, copy in zip(pipelines, copies, strict=True)]
+    return zip(*runs, strict=True)
+
+
+class SharedSearch:
+    """The search of a detector; each frame is searched once, for several that search alike."""
+
+    def __init__(self, detector: VideoDetector) -> None:
+        self._detector = detector
+        self._lock = threading.Lock()
+        self._latest: deque[tuple[int | None, Any]] = deque(maxlen=_KEPT)
+
+    def search(self, picture: Picture, index: int | None) -> Any:
+        """Return the candidates of a frame."""
+        with self._lock:
+            for known, candidates in self._latest:
+                if known == index:
+                    return candidates
+            candidates = self._detector.search(picture, index)
+            self._latest.append((index, candidates))
+            return candidates
+
+
+class SharingDetector:
+    """A detector that takes its candidates from a `SharedSearch`."""
+
+    def __init__(self, search: SharedSearch, detector: VideoDetector) -> None:
+        self.search = search.search
+        self.detect = detector.detect
+        self.stage_pictures = stage_pictures_of(detector)
 
 
 def _row(number: int, track: Track) -> Row:

@@ -11,7 +11,7 @@ from vdet.detect.protocol import DetectorModel
 from vdet.labels.pictures.labelled import LabelledImage
 from vdet.labels.rows import MAX_IN_FRAME
 from vdet.run.pictures import search_picture
-from vdet.run.threads import map_ordered, single_threaded_libraries
+from vdet.run.threads import map_ordered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,11 +56,11 @@ def search_images(
 
     def search(image: LabelledImage) -> SearchedImage:
         picture = image.read()
-        _, found = search_picture(image.path, picture, model)
+        found = search_picture(image.path, picture, model)
         return _searched(image, picture.shape[1], found)
 
     searched = []
-    with single_threaded_libraries(), map_ordered(search, images, threads) as results:
+    with map_ordered(search, images, threads) as results:
         for _, result in results:
             searched.append(result)
             advance(1)

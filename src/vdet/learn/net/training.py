@@ -22,7 +22,7 @@ from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import start_from
 from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_loss
 from vdet.learn.net.sources import UNKNOWN, Sample, Source, join
-from vdet.run.threads import prefetch, single_threaded_libraries
+from vdet.run.threads import prefetch
 
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
 
@@ -105,7 +105,7 @@ def train_network(
         "base": str(base),
         **settings.model_dump(exclude={"score"}),  # it changes no weight
     }
-    with single_threaded_libraries(), _fast_torch():
+    with _fast_torch():
         run = _Run(class_count, settings, learnt_with)
         if checkpoint.exists():
             run.restore(checkpoint)

@@ -18,7 +18,6 @@ from vdet.pages.index_page import write_index
 from vdet.pages.player import Player
 from vdet.pages.video_page import Thumbnail, VideoReport, video_page
 from vdet.run.result import FrameResult
-from vdet.run.sinks.counts import layout_of
 from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.crops import BestCrops, Crop
@@ -54,8 +53,7 @@ class PageSink:
         self._heat = HeatMap(video.width, video.height)
         self._levels = Levels()
         self._thumbnails: dict[int, Thumbnail] = {}
-        counts = settings.counts
-        self._counter = VehicleCounter(layout_of(context)) if counts else None
+        self._counter: VehicleCounter | None = None
         self._still: Image | None = None
         self._is_even = True
         self._frames = 0
@@ -85,8 +83,7 @@ class PageSink:
         self._records.add(frame)
         self._levels.add(frame)
         self._heat.add(frame)
-        if self._counter:
-            self._counter.update(frame)
+        self._counter = result.counter
         self._keep(self._crops.add(frame, picture))
 
     def _keep(self, crops: list[Crop]) -> None:

@@ -8,6 +8,7 @@ from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
+from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
 from vdet.files import (
     MayReplace,
@@ -20,7 +21,7 @@ from vdet.files import (
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
-from vdet.run.waits import Waits
+from vdet.run.threads import Waits
 
 STANDARD_OUTPUT = Path("-")
 
@@ -75,6 +76,9 @@ class SinkContext:
         Seconds after which a write that does not end is an error.
     outputs
         All outputs of the run, for a sink that refers to another.
+    stage_pictures
+        Returns a picture of each stage of the detection by its name, in order. It takes the image
+        of a frame and its detections.
     waits
         Counts how long the run waits for an encoder.
     """
@@ -87,6 +91,7 @@ class SinkContext:
     codec_threads: int | None = None
     timeout: float | None = None
     outputs: tuple[Output, ...] = ()
+    stage_pictures: StagePictures = lambda *_: {}
     waits: Waits = field(default_factory=Waits)
 
 

@@ -38,7 +38,7 @@ class StagesSink:
             return
         self._is_done = True
         make_folder(self._folder)
-        pictures = result.stage_pictures()
+        pictures = self._context.stage_pictures(result.frame.image, result.detections)
         if self._context.settings.regions:
             pictures["regions"] = _with_regions(result, self._context.settings.regions)
         pictures[_BOXES] = _with_boxes(result)

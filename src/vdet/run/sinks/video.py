@@ -7,7 +7,7 @@ from typing import Any, Self
 from vdet.media import Frame, Picture, VideoWriter
 from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
 from vdet.run.result import FrameResult
-from vdet.run.sinks.counts import CountsPicture, layout_of
+from vdet.run.sinks.counts import draw_running_counts
 from vdet.run.sinks.overlay import Overlay
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.run.threads import write_async
@@ -25,8 +25,6 @@ class VideoSink:
         self._context = context
         self._video = context.video
         self._overlay = Overlay(context.settings, context.video)
-        counts = context.settings.counts
-        self._counts = CountsPicture(layout_of(context)) if counts and counts.drawn else None
         self._stack = ExitStack()
 
     def __enter__(self) -> Self:
@@ -58,8 +56,8 @@ class VideoSink:
     def write(self, result: FrameResult) -> None:
         """Draw the shown vehicles, and give the frame to the encoder."""
         surface = self._overlay.draw(result)
-        if self._counts:
-            self._counts.draw(surface, result)
+        if result.counter and self._context.settings.counts.drawn:
+            draw_running_counts(surface, result.counter, result.road)
         with self._context.waits.on("encoding"):
             self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 

@@ -1,0 +1,172 @@
+"""Steps: what stands between the tracker and the sinks, and the steps of vdet itself.
+
+A step is made for one video or one picture. Its kind, which is registered as an entry point of the
+group `vdet.steps`, is a function that takes a `StepContext` and returns the step, or None where the
+settings do not ask for it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
+
+from vdet.config.schema import Settings
+from vdet.errors import ConfigError
+from vdet.lanes.road import FrameView, LaneRequest, Road, RoadFinder
+from vdet.media import Frame, VideoInfo
+from vdet.plugins import STEPS, built_in_names, load_plugin
+from vdet.regions import Regions, lay_regions
+from vdet.run.result import FrameResult
+from vdet.track.track import Track
+from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.layout import lay_out
+
+
+class Step(Protocol):
+    """Changes or adds to the results of one video."""
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Return the result that the next step and the sinks get.
+
+        It is called in the order of the frames. `dataclasses.replace` makes a changed result.
+        """
+
+
+@runtime_checkable
+class ParallelStep(Step, Protocol):
+    """A step of which a part needs one frame alone."""
+
+    def prepare(self, frame: Frame) -> None:
+        """Do that part; several threads call this at once, each before `apply` for its frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepContext:
+    """What a step is made from.
+
+    Attributes
+    ----------
+    width, height
+        Size of the frames, pixels.
+    video
+        None for a still picture.
+    lanes
+        None if lanes are not looked for.
+    """
+
+    settings: Settings
+    width: int
+    height: int
+    video: VideoInfo | None = None
+    lanes: LaneRequest | None = None
+
+
+StepKind = Callable[[StepContext], Step | None]
+
+
+def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
+    """Make the steps that the settings ask for; `others` come before the counting, at the end.
+
+    Raises
+    ------
+    ConfigError, ImageError
+        The regions, the lines or the camera do not fit the frames.
+    ConfigError
+        There is no step with a name in `settings.steps.names`.
+    """
+
+    def made(names: Sequence[str]) -> list[Step]:
+        steps = [load_plugin(STEPS, name)(context) for name in names]
+        return [step for step in steps if step is not None]
+
+    *before, last = built_in_names(STEPS)
+    return [*made(before), *made(context.settings.steps.names), *others, *made([last])]
+
+
+class LaneStep:
+    """Finds the lane, and the distance and the lane of each vehicle."""
+
+    def __init__(self, roads: RoadFinder, foot: float) -> None:
+        self._roads = roads
+        self._foot = foot
+        self._views: dict[int, FrameView] = {}
+
+    def prepare(self, frame: Frame) -> None:
+        """Undistort a frame and mark its paint."""
+        self._views[frame.index] = self._roads.observe(frame.image)
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Add the road, and where the vehicles are on it."""
+        view = self._views.pop(result.frame.index)
+        road = self._roads.update(view, (track.box for track in result.tracks))
+        return replace(result, road=road, tracks=with_positions(result.tracks, road, self._foot))
+
+
+def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Track, ...]:
+    """Return the tracks of a frame with `distance` and `lane`, None where they are not known.
+
+    They are those of the track's foot. They are not known without a lane, of a vehicle whose lower
+    edge the frame's edge cuts, and where `Road.position` does not know them.
+
+    `foot` is how far boxes end below the tyres, share of their height.
+    """
+
+    def placed(track: Track) -> Track:
+        x, y = track.foot
+        tyres = x, y - foot * track.box.height
+        position = None if road.cuts(track.box) else road.position(tyres)
+        if position is None:
+            return replace(track, distance=None, lane=None)
+        return replace(track, distance=position.distance, lane=position.lane)
+
+    return tuple(map(placed, tracks))
+
+
+class RegionStep:
+    """Leaves out the vehicles that stand outside the regions."""
+
+    def __init__(self, regions: Regions) -> None:
+        self._regions = regions
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Keep the vehicles whose foot is in the regions."""
+        inside = (track for track in result.tracks if self._regions.contains(track.foot))
+        return replace(result, tracks=tuple(inside))
+
+
+class CountStep:
+    """Counts the vehicles that are shown, at the lines and in the zones."""
+
+    def __init__(self, counter: VehicleCounter) -> None:
+        self._counter = counter
+
+    def apply(self, result: FrameResult) -> FrameResult:
+        """Count in the next frame, and add the counter."""
+        self._counter.update(result.frame_tracks)
+        return replace(result, counter=self._counter)
+
+
+def lane_step(context: StepContext) -> Step | None:
+    """Make a `LaneStep` if lanes are looked for."""
+    if context.lanes is None:
+        return None
+    settings = context.settings
+    roads = RoadFinder(context.lanes, settings.lanes, context.width, context.height)
+    return LaneStep(roads, settings.detector.foot)
+
+
+def region_step(context: StepContext) -> Step | None:
+    """Make a `RegionStep` if there are regions."""
+    regions = lay_regions(context.settings.regions, context.width, context.height)
+    return RegionStep(regions) if regions else None
+
+
+def count_step(context: StepContext) -> Step | None:
+    """Make a `CountStep` if there are lines or zones; a still picture has no counts."""
+    counts = context.settings.counts
+    if not counts or context.video is None:
+        return None
+    try:
+        layout = lay_out(counts, context.width, context.height)
+    except ConfigError as error:
+        raise ConfigError(f"counts.{error}") from error
+    return CountStep(VehicleCounter(layout))
