@@ -21,9 +21,8 @@ from vdet.media.probe import period_of
 
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
 _AHEAD = 256  # packets that are read ahead; one or two seconds
-_BACK = Fraction(1, 10)  # seconds; pictures whose clock goes back by more begin a part
+_BACK = Fraction(1, 10)  # seconds; a clock that goes back by more begins a part
 _FORTH = 10  # seconds; a clock that goes forth by more begins a part, as in FFmpeg's own program
-_NEAR = 1  # second; the sound of a part may be so far from its pictures, and may pause for so long
 _FLAGGED = 2  # last packets of a part, which the demultiplexer may take for damaged
 
 
@@ -60,37 +59,30 @@ def continuous_packets(
 
 @dataclass(slots=True)
 class _Part:
-    """From where to where the clock of the pictures runs, seconds.
+    """When each stream begins and ends, by its index, in seconds of the clock of the part.
 
-    `sounds` has the same for each stream of sound, by its index. `offset` is added to the clock.
+    `offset` is added to the clock; it is None until it is needed.
     """
 
-    begin: Fraction
-    end: Fraction
-    sounds: "dict[int, tuple[Fraction, Fraction]]" = field(default_factory=dict)
+    begins: dict[int, Fraction] = field(default_factory=dict)
+    ends: dict[int, Fraction] = field(default_factory=dict)
     offset: Fraction | None = None
 
-    def distance(self, time: Fraction) -> Fraction:
-        return max(self.begin - time, time - self.end, Fraction(0))
+    def goes_on(self, stream: int, begin: Fraction) -> bool:
+        """Return whether the clock of a stream goes on to `begin` without a jump."""
+        last = self.ends.get(stream)
+        return last is None or last - _BACK <= begin <= max(self.ends.values()) + _FORTH
 
-    def add_sound(self, stream: int, begin: Fraction, end: Fraction) -> None:
-        self.sounds[stream] = (self.sounds.get(stream, (begin, end))[0], end)
-
-
-@dataclass(slots=True)
-class _Entry:
-    """A packet with its clock, seconds, and the number of its part, once that is known."""
-
-    packet: "Packet[Stream]"
-    begin: Fraction | None
-    end: Fraction
-    part: int | None = None
+    def add(self, stream: int, begin: Fraction, end: Fraction) -> None:
+        self.begins.setdefault(stream, begin)
+        self.ends[stream] = max(self.ends.get(stream, end), end)
 
 
 class _Joined:
     """The packets of a file, in file order, on one time line.
 
-    The pictures decide where a part begins. The sound comes a little earlier or later in the file.
+    Each stream goes on to the next part where its own clock jumps. Enough packets are read ahead
+    that all streams of a part have begun before its offset is needed.
     """
 
     def __init__(
@@ -98,106 +90,62 @@ class _Joined:
     ) -> None:
         self._main = main.index
         self._period = period_of(main)
-        self._entries = map(self._enter, found)
+        self._found = found
         self._on_restart = on_restart
-        self._ahead: deque[_Entry] = deque()
-        self._parts: list[_Part] = []  # none before the first picture
-        self._latest = Fraction(0)  # of the clock of any sound in the last part
-        self._places: dict[int, int] = {}  # the part of each stream of sound
+        self._ahead: deque[tuple[Packet[Stream], int]] = deque()  # with the number of the part
+        self._parts = [_Part(offset=Fraction(0))]  # the first keeps its clock
+        self._places: dict[int, int] = {}  # the part of each stream
 
     def __iter__(self) -> "Iterator[Packet[Stream]]":
-        for number, entry in enumerate(self._entries):
-            self._ahead.append(entry)
+        for number, packet in enumerate(self._found):
+            self._ahead.append((packet, self._place(packet)))
             # The first packets come at once, also from a pipe.
-            if self._parts and len(self._ahead) > min(number // 2, _AHEAD):
+            if self._main in self._places and len(self._ahead) > min(number // 2, _AHEAD):
                 yield self._next()
         while self._ahead:
             yield self._next()
 
     def _next(self) -> "Packet[Stream]":
-        entry = self._ahead.popleft()
-        part = self._part_of(entry)
-        if part.offset is None:
-            self._align(part)
-        packet = entry.packet
-        if packet.is_corrupt and self._ends_part(entry):
+        packet, number = self._ahead.popleft()
+        if packet.is_corrupt and self._ends_part(number):
             packet = _without_flags(packet)
-        _shift(packet, part.offset or Fraction(0))
+        _shift(packet, self._offset(number))
         return packet
 
-    def _enter(self, packet: "Packet[Stream]") -> _Entry:
+    def _place(self, packet: "Packet[Stream]") -> int:
+        """Return the number of the part of a packet, and note where it begins and ends."""
+        stream, pictures = packet.stream_index, self._places.get(self._main, 0)
+        number = self._places.setdefault(stream, pictures)
         ticks = packet.pts if packet.dts is None else packet.dts
-        begin = None if ticks is None else ticks * packet.time_base
-        is_picture = packet.stream_index == self._main
-        duration = packet.duration or (self._period if is_picture else 0)
-        end = (begin or 0) + duration * packet.time_base
-        if is_picture:
-            self._extend(begin, end)
-            return _Entry(packet, begin, end, len(self._parts) - 1)
-        if not self._parts or self._latest < end <= self._reach():
-            self._latest = end
-        return _Entry(packet, begin, end)
+        if ticks is None:
+            return number
+        begin = ticks * packet.time_base
+        duration = packet.duration or (self._period if stream == self._main else 0)
+        if not self._parts[number].goes_on(stream, begin):
+            number = pictures if number < pictures else pictures + 1
+            if number == len(self._parts):
+                self._parts.append(_Part())
+            self._places[stream] = number
+        self._parts[number].add(stream, begin, begin + duration * packet.time_base)
+        return number
 
-    def _reach(self) -> Fraction:
-        """Return the latest time that the clock of the last part may go on to."""
-        return max(self._parts[-1].end, self._latest) + _FORTH
+    def _offset(self, number: int) -> Fraction:
+        """Return the offset of a part: no stream overlaps that of the part before."""
+        part = self._parts[number]
+        if part.offset is None and self._main not in part.begins:  # no pictures follow the sound
+            return self._offset(number - 1)
+        if part.offset is None:
+            before = self._parts[number - 1]
+            shared = before.ends.keys() & part.begins.keys()
+            overlap = max(before.ends[each] - part.begins[each] for each in shared)
+            part.offset = self._offset(number - 1) + overlap
+            self._on_restart()
+        return part.offset
 
-    def _extend(self, begin: Fraction | None, end: Fraction) -> None:
-        """Add a picture to the last part, or begin one."""
-        if not self._parts:
-            self._parts.append(_Part(begin or Fraction(0), end))
-        elif begin is not None:
-            last = self._parts[-1]
-            if last.end - _BACK <= begin <= self._reach():
-                last.end = max(last.end, end)
-            else:
-                self._parts.append(_Part(begin, end))
-                self._latest = begin
-
-    def _part_of(self, entry: _Entry) -> _Part:
-        if not self._parts:  # there are no pictures
-            self._parts.append(_Part(Fraction(0), Fraction(0)))
-        if entry.part is None:
-            stream = entry.packet.stream_index
-            entry.part = self._places.get(stream, 0)
-            if entry.begin is not None:
-                while self._is_later(stream, entry.begin, entry.part):
-                    entry.part += 1
-                self._parts[entry.part].add_sound(stream, entry.begin, entry.end)
-            self._places[stream] = entry.part
-        return self._parts[entry.part]
-
-    def _is_later(self, stream: int, begin: Fraction, number: int) -> bool:
-        """Return whether sound at `begin` of its clock belongs to a part after this one."""
-        if number == len(self._parts) - 1:
-            return False
-        here, there = self._parts[number : number + 2]
-        _, end = here.sounds.get(stream, (begin, begin))
-        follows = end - _BACK <= begin <= end + _NEAR
-        return there.distance(begin) < here.distance(begin) + (-_NEAR if follows else _NEAR)
-
-    def _align(self, part: _Part) -> None:
-        """Set the offset of a part: no stream overlaps that of the part before."""
-        number = self._parts.index(part)
-        if number == 0:
-            part.offset = Fraction(0)  # the first keeps its clock
-            return
-        before = self._parts[number - 1]
-        if before.offset is None:
-            self._align(before)
-        for entry in islice(self._ahead, _AHEAD // 2):
-            self._part_of(entry)
-        overlaps = [before.end - part.begin]
-        for stream, (begin, _) in part.sounds.items():
-            if stream in before.sounds:
-                overlaps.append(before.sounds[stream][1] - begin)
-        part.offset = max(overlaps) + (before.offset or 0)
-        self._on_restart()
-
-    def _ends_part(self, entry: _Entry) -> bool:
+    def _ends_part(self, number: int) -> bool:
         """Return whether pictures are the last ones of their part."""
-        others = (each.part for each in self._ahead if each.packet.stream_index == self._main)
-        return any(part != entry.part for part in islice(others, _FLAGGED))
+        others = (place for packet, place in self._ahead if packet.stream_index == self._main)
+        return any(place != number for place in islice(others, _FLAGGED))
 
 
 def _without_flags(packet: "Packet[Stream]") -> "Packet[Stream]":
