@@ -86,9 +86,9 @@ def _lost(container: InputContainer, path: Path) -> Iterator[str]:
         yield f"HDR ({name})"
     if context.format and (bits := max(each.bits for each in context.format.components)) > 8:
         yield f"{bits} bits a colour value"
-    held = held_sounds(path, "mp4") if container.streams.audio else {}
+    held = held_sounds(path, "mp4") if container.streams.audio else set()
     for number, stream in enumerate(container.streams.audio, start=1):
-        if not held.get(stream.index):
+        if stream.index not in held:
             yield f"sound {number}"
     if others := len(container.streams) - len(container.streams.audio) - 1:
         moving = len(moving_streams(container)) - 1

@@ -82,9 +82,7 @@ class VideoReader:
         threads: int | None = None,
         settings: InputSettings = _DEFAULTS,
     ) -> None:
-        self._start = start or Fraction(0)
-        self._end = end
-        self._limit = frames
+        self._start, self._end, self._limit = start or Fraction(0), end, frames
         self._tolerated = settings.max_damaged
         self._faults: list[str] = []
         self._length: Fraction | None = None
@@ -100,15 +98,13 @@ class VideoReader:
                     f"{MAX_PIXELS // 10**6} million pixels a frame"
                 )
             check_size(path, first.width, first.height)
-            self.info: VideoInfo = describe(
-                path, self._decoder.container, self._decoder.stream, first
-            )
-            if not restarts_clock(self._decoder.container):
-                self._length = stated_duration(self._decoder.stream, self.info.start)
+            container, stream = self._decoder.container, self._decoder.stream
+            self.info: VideoInfo = describe(path, container, stream, first)
+            if not restarts_clock(container):
+                self._length = stated_duration(stream, self.info.start)
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
-            self._note_what_is_assumed(settings)
-            self._note_what_is_left_out(first)
+            self._faults += self._assumptions(first, settings)
             self._frames = self._deliver(*self._begin(first, open_decoder))
         except BaseException:
             self._decoder.close()
@@ -152,22 +148,19 @@ class VideoReader:
         self._frames.close()
         self._decoder.close()
 
-    def _note_what_is_assumed(self, settings: InputSettings) -> None:
+    def _assumptions(self, first: av.VideoFrame, settings: InputSettings) -> Iterator[str]:
+        """Yield what is read in another way than the file, or the user, may mean."""
         sequence = find_sequence(self.info.path)
         if sequence and sequence.step > 1:
-            self._faults.append(f"the numbers of its pictures rise by {sequence.step}")
+            yield f"the numbers of its pictures rise by {sequence.step}"
         if sequence and settings.frame_rate is None:
-            self._faults.append(
-                f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
-            )
-
-    def _note_what_is_left_out(self, first: av.VideoFrame) -> None:
+            yield f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
         if self._standard_range:
             name = HDR_TRANSFERS[first.color_trc]
-            self._faults.append(f"is HDR ({name}) and is read as standard range (BT.709)")
+            yield f"is HDR ({name}) and is read as standard range (BT.709)"
         streams = len(moving_streams(self._decoder.container))
         if streams > 1:
-            self._faults.append(f"has {streams} video streams; only the first is used")
+            yield f"has {streams} video streams; only the first is used"
 
     def _begin(
         self, first: av.VideoFrame, open_decoder: Callable[..., Decoder]
@@ -205,12 +198,13 @@ class VideoReader:
     def _upright(self, picture: av.VideoFrame) -> Picture:
         """Return a picture as its planes if these need no conversion, else as BGR."""
         info = self.info
-        is_converted = info.orientation != Orientation() or self._standard_range
-        if is_converted or Coding.of(picture) != info.coding:
-            return Picture(self._image(picture))
-        if (picture.width, picture.height) != (info.width, info.height):
-            return Picture(self._image(picture))
-        return Picture(Planes(picture, info.coding))
+        has_same_form = (
+            info.orientation == Orientation()
+            and not self._standard_range
+            and Coding.of(picture) == info.coding
+            and (picture.width, picture.height) == (info.width, info.height)
+        )
+        return Picture(Planes(picture, info.coding) if has_same_form else self._image(picture))
 
     def _image(self, picture: av.VideoFrame) -> Image:
         info = self.info

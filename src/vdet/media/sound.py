@@ -42,7 +42,7 @@ class SoundCopy:
     def __init__(self, source: Path, target: OutputContainer, origin: Fraction) -> None:
         self._path = source
         self._target = target
-        self._damaged = self._untimed = 0
+        self._left_out = 0  # packets
         self._origin = origin
         self._source = open_input(source)
         try:
@@ -60,40 +60,34 @@ class SoundCopy:
             try:
                 self._target.mux(self._next)
             except av.InvalidDataError:  # found while it is repacked for another container
-                self._damaged += 1
+                self._left_out += 1
             self._next = next(self._packets, None)
 
     def close(self) -> None:
         """Close the source; warn of packets that could not be copied."""
-        if self._damaged:
-            _log.warning("%s: %d damaged sound packets left out", self._path, self._damaged)
-        if self._untimed:
-            _log.warning(
-                "%s: %d sound packets without a time of their own left out",
-                self._path,
-                self._untimed,
-            )
+        if self._left_out:
+            fault = "damaged, or without a time of their own"
+            _log.warning("%s: %d sound packets left out: %s", self._path, self._left_out, fault)
         self._packets.close()
         self._source.close()
 
     def _add_streams(self) -> dict[int, AudioStream]:
         """Add streams to the target; return them by their index in the source."""
-        streams = {}
         kind = self._target.format.name
         held = held_sounds(self._path, kind)
+        streams = {}
         for stream in self._source.streams:
             if not isinstance(stream, AudioStream):
                 if stream.index != self._pictures.index or not restarts_clock(self._source):
                     stream.discard = Discard.all
-                continue
-            if not held.get(stream.index):
-                codec = stream.codec_context.name if stream.codec_context else "of unknown codec"
-                fault = f"cannot go into {kind}" if stream.index in held else "is empty"
-                _log.warning("%s: its sound (%s) %s; left out", self._path, codec, fault)
-                continue
-            streams[stream.index] = self._target.add_stream_from_template(stream)
-            if stream.language:
-                streams[stream.index].metadata["language"] = stream.language
+            elif stream.index in held:
+                streams[stream.index] = self._target.add_stream_from_template(stream)
+                if stream.language:
+                    streams[stream.index].metadata["language"] = stream.language
+            else:
+                codec = stream.codec_context.name if stream.codec_context else "unknown codec"
+                fault = f"its sound ({codec}) is empty, or cannot go into {kind}; left out"
+                _log.warning("%s: %s", self._path, fault)
         return streams
 
     def _moved(self) -> "Generator[Packet[Stream], None, None]":
@@ -103,24 +97,18 @@ class SoundCopy:
         wanted = [stream for stream in self._source.streams if stream.index in self._streams]
         last: dict[int, int] = {}
         for packet in continuous_packets(self._source, self._pictures, *wanted):
-            index = packet.stream.index
+            index, pts, dts = packet.stream.index, packet.pts, packet.dts
             if index not in self._streams:
                 continue
-            if (
-                packet.pts is None
-                or packet.dts is None
-                or packet.dts <= last.get(index, packet.dts - 1)
-            ):
-                self._untimed += 1  # muxers refuse times that do not increase
+            if pts is None or dts is None or dts <= last.get(index, dts - 1):
+                self._left_out += 1  # muxers refuse times that do not increase
                 continue
-            last[index] = packet.dts
+            last[index] = dts
             shift = round(self._origin / packet.time_base)
-            packet.pts -= shift
-            packet.dts -= shift
-            if self._is_early(packet):
-                continue
-            packet.stream = self._streams[index]
-            yield packet
+            packet.pts, packet.dts = pts - shift, dts - shift
+            if not self._is_early(packet):
+                packet.stream = self._streams[index]
+                yield packet
 
     def _is_early(self, packet: "Packet[Stream]") -> bool:
         begin = _begin(packet)
@@ -133,13 +121,13 @@ def _begin(packet: "Packet[Stream]") -> Fraction:
     return (packet.pts or 0) * packet.time_base
 
 
-def held_sounds(path: Path, kind: str) -> dict[int, bool]:
-    """Return whether a file of the format `kind` can hold each sound stream of `path`, by index.
+def held_sounds(path: Path, kind: str) -> set[int]:
+    """Return the indices of the sound streams of `path` that a file of the format `kind` can hold.
 
-    Streams without packets are left out. It is tried in memory: an unknown codec and damaged
-    parameters show only when a file is written, and there they would cost the picture too.
+    It is tried in memory: an unknown codec and damaged parameters show only when a file is written,
+    and there they would cost the picture too.
     """
-    found: dict[int, bool] = {}
+    held: set[int] = set()
     trials: Counter[int] = Counter()
     with open_input(path) as source:
         sounds = source.streams.audio
@@ -148,14 +136,12 @@ def held_sounds(path: Path, kind: str) -> dict[int, bool]:
                 stream.discard = Discard.all
         for packet in islice(packets(source, *sounds, on_error=lambda: None), _MAX_PACKETS):
             index = packet.stream.index
-            if not found.get(index) and trials[index] < _MAX_TRIALS:
-                trials[index] += 1
-                found[index] = _can_hold(kind, packet)
-            if len(found) == len(sounds) and all(
-                held or trials[index] == _MAX_TRIALS for index, held in found.items()
-            ):
+            trials[index] += 1
+            if index not in held and trials[index] <= _MAX_TRIALS and _can_hold(kind, packet):
+                held.add(index)
+            if all(each.index in held or trials[each.index] >= _MAX_TRIALS for each in sounds):
                 break
-    return found
+    return held
 
 
 def _can_hold(kind: str, packet: "Packet[Stream]") -> bool:
