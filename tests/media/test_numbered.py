@@ -43,14 +43,6 @@ def test_a_doubled_per_cent_sign_means_one(tmp_path: Path) -> None:
     assert found == PictureSequence(f"{tmp_path}/50%%d/100%%_%d.png", 1)
 
 
-def test_numbers_may_have_any_width(tmp_path: Path) -> None:
-    make(tmp_path, *(f"{number:019d}.png" for number in range(3)))
-    found = find_sequence(tmp_path / "%019d.png")
-    assert found == PictureSequence(str(tmp_path / "%019d.png"), 0)
-    with pytest.raises(VideoError, match="numbers have at most 19 digits"):
-        find_sequence(tmp_path / "%020d.png")
-
-
 class TestFolder:
     @pytest.mark.parametrize(
         ("names", "pattern"),

@@ -18,8 +18,6 @@ _NUMBERED = re.compile(r"(.*?)(\d+)(\D*\.\w+)", re.ASCII | re.DOTALL)  # by its 
 ASSUMED_RATE = 25.0
 """Pictures per second, where the settings do not say."""
 
-_MAX_WIDTH = 19  # digits; FFmpeg has no room for more
-
 
 @dataclass(frozen=True, slots=True)
 class PictureSequence:
@@ -62,61 +60,62 @@ def find_sequence(path: Path) -> PictureSequence | None:
         of a folder are not one sequence.
     """
     if path.is_dir():
-        return _sequence(path, _only_pattern(path), named=path)
-    if path.exists() or not _PATTERN.fullmatch(path.name):
+        folder, names = path, _names(path, path)
+        name = _only_pattern(path, names)
+    elif path.exists() or not _PATTERN.fullmatch(path.name):
         return None
-    return _sequence(path.parent, path.name, named=path)
-
-
-def _sequence(folder: Path, name: str, *, named: Path) -> PictureSequence:
-    """Return the pictures of a pattern in a folder; errors name the path `named`."""
-    pattern = _PATTERN.fullmatch(name)
-    assert pattern is not None
-    if int(pattern[2] or 0) > _MAX_WIDTH:
-        raise VideoError(f"{named}: numbers have at most {_MAX_WIDTH} digits; rename the pictures")
-    names = _names(folder, named)
-    numbers = _numbers(names, pattern)
+    else:
+        folder, name, names = path.parent, path.name, _names(path.parent, path)
+    numbers = _numbers(names, name)
     if not numbers:
-        others = " or ".join(f"{folder / printable(each)}" for each in _patterns(names)[:2])
-        advice = f"give {others}" if others else f"{folder} has no numbered pictures at all"
-        raise VideoError(f"{named}: there is no such file, and no picture of such a name; {advice}")
+        raise VideoError(
+            f"{path}: there is no such file, and no picture of such a name; "
+            f"{_known(folder, names) or f'{folder} has no numbered pictures at all'}"
+        )
     step = min((following - number for number, following in pairwise(numbers)), default=1)
     for number, following in pairwise(numbers):
         if following != number + step:
             raise VideoError(
-                f"{named}: picture {number + step} is missing, between {number} and {following}; "
+                f"{path}: picture {number + step} is missing, between {number} and {following}; "
                 "put a copy of its neighbour there, or number the pictures anew"
             )
-    if step > 1 and len(str(numbers[-1])) > max(int(pattern[2] or 0), len(str(numbers[0]))):
+    if step > 1 and len({len(name % number) for number in (numbers[0], numbers[-1])}) > 1:
         raise VideoError(
-            f"{named}: the numbers rise by {step} and have {len(str(numbers[0]))} or more digits; "
-            "fill them all with zeros to the same length"
+            f"{path}: the numbers rise by {step} and differ in length; fill them all with zeros "
+            "to the same length"
         )
-    whole = _doubled(str(folder.absolute()))
-    return PictureSequence(f"{whole}/{name}", numbers[0], step)
+    return PictureSequence(f"{_doubled(str(folder.absolute()))}/{name}", numbers[0], step)
 
 
-def _numbers(names: list[str], pattern: re.Match[str]) -> list[int]:
-    before, digits, after = pattern.groups()
+def _numbers(names: list[str], pattern: str) -> list[int]:
+    match = _PATTERN.fullmatch(pattern)
+    assert match is not None
+    before, digits, after = match.groups()
     before, after = (re.escape(part.replace("%%", "%")) for part in (before, after))
     number = r"0|[1-9]\d*" if digits is None else rf"\d{{{digits}}}|[1-9]\d{{{digits},}}"
     form = re.compile(f"{before}({number}){after}", re.ASCII | re.DOTALL)
-    found = (form.fullmatch(name) for name in names)
-    return sorted(int(match[1]) for match in found if match)
+    return sorted(int(match[1]) for match in map(form.fullmatch, names) if match)
 
 
-def _only_pattern(folder: Path) -> str:
+def _only_pattern(folder: Path, names: list[str]) -> str:
     """Return the pattern of the pictures in a folder; they must have one. Raises `VideoError`."""
-    patterns = _patterns(_names(folder, folder))
+    patterns = _patterns(names)
     if not patterns:
         raise VideoError(
             f"{folder}: is a folder without numbered pictures; give a video file, or -d DIR for "
             "the videos in it"
         )
     if len(patterns) > 1:
-        some = " or ".join(f"{folder / printable(pattern)}" for pattern in patterns[:2])
-        raise VideoError(f"{folder}: holds pictures with names of several kinds; give {some}")
+        raise VideoError(
+            f"{folder}: holds pictures with names of several kinds; {_known(folder, names)}"
+        )
     return patterns[0]
+
+
+def _known(folder: Path, names: list[str]) -> str:
+    """Return the advice to give one of the patterns that there are."""
+    some = [f"{folder / printable(pattern)}" for pattern in _patterns(names)[:2]]
+    return f"give {' or '.join(some)}" if some else ""
 
 
 def _patterns(names: list[str]) -> list[str]:
@@ -129,7 +128,8 @@ def _patterns(names: list[str]) -> list[str]:
             groups[before, after].append(number)
     ordered = sorted(groups.items(), key=lambda item: (-len(item[1]), item[0]))
     return [
-        f"{_doubled(ends[0])}{_conversion(digits)}{_doubled(ends[1])}" for ends, digits in ordered
+        f"{_doubled(before)}{_conversion(digits)}{_doubled(after)}"
+        for (before, after), digits in ordered
     ]
 
 
