@@ -2,7 +2,6 @@
 
 import os
 import resource
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +12,6 @@ import pytest
 from red_cars import car_at, road
 from running import Running, names, start, write_drive
 from vdet.__main__ import leave_out_current_folder
-from vdet.evaluate.report.page import draw
 from vdet.process import LossyFile
 
 MODULES = ("queue", "typing", "selectors", "socket", "numpy", "joblib", "multiprocessing")
@@ -124,23 +122,6 @@ def test_too_little_memory_is_reported_in_one_line(running: list[Running], tmp_p
     assert result.code == 1
     assert result.err.count("\n") == 1
     assert "emory" in result.err  # the line may be that of OpenBLAS
-
-
-def test_a_report_does_not_depend_on_settings_in_the_current_folder(tmp_path: Path) -> None:
-    (tmp_path / "matplotlibrc").write_text("no setting\nfont.size: 40\ntext.usetex: True\n")
-    code = (
-        "from vdet.evaluate.report.page import draw; "
-        "print(draw(lambda axes: axes.plot([1, 2]), 3, 2))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", code],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stderr == ""
-    assert done.stdout.rstrip() == draw(lambda axes: axes.plot([1, 2]), 3, 2).rstrip()
 
 
 @pytest.mark.parametrize(

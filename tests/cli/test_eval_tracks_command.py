@@ -1,7 +1,6 @@
 """`vdet eval tracks`."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -52,18 +51,9 @@ def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> No
     result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert result.code == 0, result.err
     html = (tmp_path / "page" / "page.html").read_text()
-    for words in ("Vehicle by vehicle", "Largest losses", "vehicle 1 missed", "data:image/svg+xml"):
+    for words in ("Vehicle by vehicle", "Largest losses", "vehicle 1 missed", "<svg"):
         assert words in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
-
-
-def test_without_matplotlib_a_report_is_an_error_of_one_line(
-    run: Run, found: Path, truth: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
-    assert (result.code, result.out) == (1, "")
-    assert result.err == "vdet: --page needs matplotlib; pip install matplotlib\n"
 
 
 def test_bad_truth_is_an_error_of_one_line(run: Run, found: Path, tmp_path: Path) -> None:

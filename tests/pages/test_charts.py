@@ -1,24 +1,23 @@
-"""Charts as SVG."""
+"""Charts as values; the pages that draw them are tested where they are made."""
 
-import re
 from collections.abc import Sequence
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pages.html import Elements
-from vdet.pages.charts import Series, Span, clock, level_chart, minute_chart, span_chart
-
-NASTY = '"><script>alert(1)</script>'
-
-
-def number(text: str | None) -> float:
-    return float((text or "").removesuffix("%"))
-
-
-def bars(elements: Elements) -> list[dict[str, str | None]]:
-    return elements.all("rect")
+from vdet.pages.charts import (
+    Series,
+    Span,
+    clock,
+    curve,
+    level_plot,
+    minute_plot,
+    number_axis,
+    pack,
+    time_axis,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,120 +29,64 @@ def test_times_are_written_as_a_clock_shows_them(seconds: float, text: str) -> N
     assert clock(seconds) == text
 
 
-class TestLevels:
-    def test_bars_are_as_high_as_their_level_and_equal_ones_are_one(self) -> None:
-        seen = Elements(level_chart([0, 2, 2, 4], 0, 8, "levels"))
-        two, four = bars(seen)
-        assert number(four["height"]) == pytest.approx(2 * number(two["height"]))
-        assert (number(two["x"]), number(four["x"])) == (25, 75)
-        assert number(two["width"]) == pytest.approx(50, abs=0.5)
-
-    def test_the_axes_have_round_numbers(self) -> None:
-        html = level_chart([3, 17], 0, 600, "levels")
-        assert re.findall(r">([\d:]+)</text>", html) == [
-            *("5", "10", "15", "20"),
-            *("0:00", "2:00", "4:00", "6:00", "8:00", "10:00"),
-        ]
-
-    def test_the_time_begins_where_the_part_begins(self) -> None:
-        seen = Elements(level_chart([1], 95, 105, "levels"))
-        assert "1:36" in seen.text
-        assert "0:00" not in seen.text
-
-    @given(
-        levels=st.lists(st.integers(0, 10_000), max_size=20),
-        start=st.floats(-1e6, 1e6),
-        length=st.floats(0, 1e6),
-    )
-    @settings(max_examples=30)
-    def test_whatever_is_shown_lies_in_the_chart(
-        self, levels: Sequence[int], start: float, length: float
-    ) -> None:
-        seen = Elements(level_chart(levels, start, start + length, "levels"))
-        (svg,) = seen.all("svg")
-        for bar in bars(seen):
-            assert number(bar["y"]) >= 0
-            assert number(bar["height"]) > 0
-            assert number(bar["y"]) + number(bar["height"]) <= number(svg["height"])
-            assert 0 <= number(bar["x"]) < 100
-        labels = seen.all("text")
-        assert len([label for label in labels if "class" not in label]) <= 7
-        assert len(labels) <= 14
+def test_axes_have_round_numbers() -> None:
+    labels = [text for _, text in time_axis(0, 600).ticks]
+    assert labels == ["0:00", "2:00", "4:00", "6:00", "8:00", "10:00"]
+    assert time_axis(95, 105).ticks[0] == (96, "1:36")
+    assert [text for _, text in number_axis(0, 17).ticks] == ["0", "5", "10", "15", "20"]
+    assert [text for _, text in number_axis(0, 1, least=1).ticks] == ["0", "1"]
+    fixed = number_axis(0.5, 0.95, fixed=True)
+    assert (fixed.low, fixed.high, fixed.ticks[0]) == (0.5, 0.95, (0.5, "0.5"))
 
 
-class TestMinutes:
-    def test_series_are_stacked_and_named_with_their_sums(self) -> None:
-        series = [Series("in", {1: 3, 2: 1}), Series("out", {2: 2})]
-        seen = Elements(minute_chart(series, range(1, 4), "counts"))
-        first, second, third = bars(seen)
-        assert number(first["height"]) == pytest.approx(3 * number(second["height"]), abs=0.2)
-        top = number(third["y"]) + number(third["height"])
-        assert top == pytest.approx(number(second["y"]), abs=0.2)
-        assert first["fill"] == second["fill"] != third["fill"]
-        assert "in: 4" in seen.text
-        assert "out: 2" in seen.text
-
-    def test_without_anything_it_is_empty(self) -> None:
-        assert bars(Elements(minute_chart([], range(1), "counts"))) == []
+@given(low=st.floats(-1e6, 1e6), length=st.floats(0, 1e6))
+@settings(max_examples=50)
+def test_an_axis_holds_its_values_and_has_few_labels(low: float, length: float) -> None:
+    for axis in (number_axis(low, low + length), time_axis(low, low + length)):
+        assert len(axis.ticks) <= 7
+        assert 0 <= axis.at(low) <= axis.at(low + length) <= 100
+    assert (axis.at(low - 10), axis.at(low + length + 10)) == (0, 100)
 
 
-class TestSpans:
-    def chart(self, *spans: tuple[float, float]) -> Elements:
-        made = [
-            Span(number, first, last, f"vehicle {number}", f'href="v.mp4" data-time="{first}"')
-            for number, (first, last) in enumerate(spans, start=1)
-        ]
-        return Elements(span_chart(made, 0, 10, "spans"))
-
-    def places(self, seen: Elements) -> list[tuple[float, float, float]]:
-        return [
-            (number(each["x"]), number(each["width"]), number(each["y"]))
-            for each in seen.all("svg")
-            if "x" in each
-        ]
-
-    def test_each_vehicle_has_a_bar_that_leads_to_its_moment(self) -> None:
-        seen = self.chart((0, 5), (2.5, 10))
-        assert [link["data-time"] for link in seen.all("a")] == ["0", "2.5"]
-        (x1, width1, y1), (x2, width2, y2) = self.places(seen)
-        assert (x1, width1, x2, width2) == (0, 50, 25, 75)
-        assert y1 != y2, "they are there at once"
-
-    def test_vehicles_that_follow_one_another_share_a_row(self) -> None:
-        rows = {y for _, _, y in self.places(self.chart((0, 2), (3, 5), (6, 10)))}
-        assert len(rows) == 1
-
-    def test_an_id_that_does_not_fit_into_its_bar_is_left_out(self) -> None:
-        wide = self.chart((0, 9))
-        narrow = self.chart((0, 0.7))
-        tiny = self.chart((0, 0.1))
-        assert [each.get("class") for each in wide.all("text") if "style" in each] == [None]
-        assert [each.get("class") for each in narrow.all("text") if "style" in each] == ["roomy"]
-        assert [each for each in tiny.all("text") if "style" in each] == []
-        assert self.places(tiny)[0][1] > 0, "the bar can be seen"
-
-    @given(
-        st.lists(
-            st.tuples(st.integers(0, 90), st.integers(0, 30)).map(lambda at: (at[0], sum(at))),
-            max_size=25,
-        )
-    )
-    @settings(max_examples=30)
-    def test_no_two_vehicles_at_once_share_a_row_and_there_are_no_more_rows_than_needed(
-        self, spans: list[tuple[int, int]]
-    ) -> None:
-        made = [Span(n, first, last, "", "") for n, (first, last) in enumerate(spans)]
-        seen = Elements(span_chart(made, 0, 120, "spans"))
-        rows = {number(each["y"]) for each in seen.all("svg") if "y" in each}
-        at_once = [sum(a <= time <= b for a, b in spans) for time in range(121)]
-        assert len(rows) == max(at_once, default=0)
+def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
+    plot = level_plot([0, 2, 4], 0, 9, "levels")
+    assert [(bar.left, bar.low, bar.high) for bar in plot.bars] == [(3, 0, 2), (6, 0, 4)]
+    assert plot.y.high == 4
 
 
-def test_names_are_escaped() -> None:
-    html = (
-        level_chart([1], 0, 1, NASTY)
-        + minute_chart([Series(NASTY, {0: 1})], range(1), NASTY)
-        + span_chart([Span(1, 0, 1, NASTY, "")], 0, 1, NASTY)
-    )
-    assert "<script" not in html
-    assert Elements(html).all("script") == []
+def test_the_series_of_a_minute_are_stacked_and_named_with_their_sums() -> None:
+    series = [Series("in", {1: 3, 2: 1}), Series("out", {2: 2})]
+    plot = minute_plot(series, range(1, 4), "counts")
+    assert [(bar.low, bar.high) for bar in plot.bars] == [(0, 3), (0, 1), (1, 3)]
+    assert plot.bars[0].color == plot.bars[1].color != plot.bars[2].color
+    assert [name for name, _ in plot.legend] == ["in: 4", "out: 2"]
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 90), st.integers(0, 30)).map(lambda at: (at[0], sum(at))),
+        max_size=25,
+    ).map(sorted)
+)
+@settings(max_examples=50)
+def test_no_two_spans_at_one_time_share_a_row_and_no_row_is_needless(
+    spans: Sequence[tuple[int, int]],
+) -> None:
+    rows = pack(spans)
+    at_once = [[row for row, (a, b) in zip(rows, spans, strict=True) if a <= time <= b]
+               for time in range(121)]  # fmt: skip
+    assert all(len(set(each)) == len(each) for each in at_once)
+    assert len(set(rows)) == max(map(len, at_once))
+
+
+def test_a_label_that_does_not_fit_into_its_bar_is_left_out() -> None:
+    span = Span(0, 0, 1, "vehicle 1", "#fff", label="#1")
+    assert [span.fits(width, 700) for width in (1, 7)] == [False, True]
+
+
+def test_a_curve_keeps_its_ends_and_few_points() -> None:
+    xs = np.linspace(0, 1, 100_000)
+    line = curve(xs, 1 - xs, "#fff")
+    assert len(line.points) <= 400
+    assert (line.points[0], line.points[-1]) == ((0, 1), (1, 0))
+    assert curve(np.empty(0), np.empty(0), "#fff").points == []

@@ -29,7 +29,6 @@ from vdet.workers import core_count
 Status = Literal["ok", "absent", "broken"]
 
 EXTRAS = {
-    "report": ("matplotlib",),
     "dask": ("dask", "distributed"),
     "train": ("onnx", "torch"),
 }
@@ -37,7 +36,7 @@ EXTRAS = {
 
 NEEDED = (
     *("onnxruntime", "scipy", "scikit-learn", "pydantic", "click", "PyYAML", "joblib", "loky"),
-    *("pillow", "threadpoolctl", "tqdm"),
+    *("pillow", "threadpoolctl", "tqdm", "Jinja2"),
 )
 DECODERS = ("h264", "hevc", "av1", "vp9", "mpeg4", "mjpeg")
 DATA = ("vehicles.zip", "non-vehicles.zip", "project_video.mp4")

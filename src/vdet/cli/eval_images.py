@@ -67,9 +67,9 @@ def images(
     searched for itself, and compared with its labels.
     """
     from vdet.evaluate.images.evaluate import evaluate_images
+    from vdet.evaluate.images.page import images_page
     from vdet.evaluate.images.scores import Counting
     from vdet.evaluate.images.text import lines, plain
-    from vdet.evaluate.report.images_page import images_page
     from vdet.labels.pictures.reading import read_labelled_images
 
     limit_library_threads()

@@ -33,17 +33,8 @@ from vdet.learn.svm.dataset import find_patches
     "model_path",
     type=PATH,
     metavar="FILE",
-    show_default="models that are trained for each split",
+    show_default="a new model, tested on the last patches of each folder",
     help="Test this model on all of DATA.",
-)
-@click.option(
-    "--split",
-    "splits",
-    multiple=True,
-    type=click.Choice(("random", "tail", "groups")),
-    show_default="all three",
-    help="Train without the patches of this split, and test on them: random patches, the tail of "
-    "each group, or each of the groups in turn. Can be repeated.",
 )
 @settings_options("train.svm.C=1e-4")
 @click.option(
@@ -60,7 +51,6 @@ def patches(
     *,
     data: tuple[Path, ...],
     model_path: Path | None,
-    splits: tuple[str, ...],
     config_name: str | None,
     assignments: tuple[str, ...],
     jobs: int | None,
@@ -72,28 +62,20 @@ def patches(
 
     Each DATA is a folder or a zip file, as vdet train takes it.
     """
-    from vdet.learn.svm.patch_eval import SPLITS, evaluate_model, evaluate_splits
-    from vdet.learn.svm.patch_eval.page import patch_page
-    from vdet.learn.svm.patch_eval.text import lines, plain
+    from vdet.learn.svm.patch_eval import evaluate_patches, lines, patch_page, values
 
-    if model_path is not None and splits:
-        raise click.UsageError("--split trains new models; leave it out, or --model")
     settings = read_settings(config_name, assignments, detector="svm")
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     inputs = [*data, *([model_path] if model_path else [])]
     check_outputs(json_target, page, overwrite=overwrite, inputs=inputs)
     files = find_patches(data)
     with progress_steps("", quiet=quiet) as steps:
-        if model is None:
-            chosen = [split for split in SPLITS if split in (splits or SPLITS)]
-            result = evaluate_splits(files, settings, chosen, jobs=jobs, steps=steps)
-        else:
-            result = evaluate_model(files, model, settings, jobs=jobs, steps=steps)
+        result = evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
     sources = trained_on(model_path) if model_path else ()
     name = RunName("svm", model_path, config_name, assignments, sources)
     print_results(
         [*run_lines(name), *lines(result)],
-        plain_run(name) | plain(result),
+        plain_run(name) | values(result),
         lambda: patch_page(result, name),
         json_target=json_target,
         page=page,

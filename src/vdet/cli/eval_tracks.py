@@ -50,8 +50,8 @@ def tracks(
     labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl as vdet writes it.
     """
     from vdet.evaluate.clips.evaluate import score_files
+    from vdet.evaluate.clips.page import video_page
     from vdet.evaluate.clips.text import plain_clip, result_lines
-    from vdet.evaluate.report.video_page import video_page
 
     check_outputs(json_target, page, overwrite=overwrite, inputs=[prediction, truth])
     with progress_steps("", quiet=quiet) as steps:

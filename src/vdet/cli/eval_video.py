@@ -82,9 +82,9 @@ def video(
     """
     from vdet.evaluate.clips.clip import Variant, open_clip
     from vdet.evaluate.clips.evaluate import evaluate_clips
+    from vdet.evaluate.clips.page import video_page
     from vdet.evaluate.clips.sweep import grid, with_values_in_force
     from vdet.evaluate.clips.text import plain, result_lines
-    from vdet.evaluate.report.video_page import video_page
 
     limit_library_threads()
     if len(videos) != len(truths):

@@ -16,8 +16,7 @@ from vdet.config.kinds import kind_of_model
 from vdet.config.loading import find_config, load_settings, shipped_configs
 from vdet.config.schema import Settings
 from vdet.errors import ConfigError
-from vdet.evaluate.output import write_page
-from vdet.files import write_json
+from vdet.files import staged, write_json
 from vdet.lanes.camera_file import load_camera
 from vdet.lanes.road import LaneRequest
 from vdet.run.sinks.protocol import Output
@@ -317,7 +316,10 @@ def print_results(
     if json_target is not None:
         write_json(values, json_target, overwrite=overwrite)
     if page is not None:
+        from vdet.pages.render import PAGE_NAME, write_page
+
         with progress_steps("", quiet=click.get_current_context().obj) as steps:
             steps("writing the page", None)
-            file = write_page(make_page(), page, overwrite=overwrite)
-        print_lines("", f"{file}: the page", err=to_stderr)
+            with staged(page / PAGE_NAME, overwrite=overwrite) as temporary:
+                write_page(make_page(), temporary)
+        print_lines("", f"{page / PAGE_NAME}: the page", err=to_stderr)

@@ -1,16 +1,12 @@
-"""Results on their way out: tables as text, the checks of the output files, the file of a page."""
+"""Results on their way out: tables as text, and the checks of the output files."""
 
-import contextlib
-import importlib
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vdet.errors import OutputError
-from vdet.files import check_output, make_folder, staged
-from vdet.pages.frame import PAGE_NAME
+from vdet.files import check_output, make_folder
+from vdet.pages.render import PAGE_NAME
 from vdet.version import __version__
 
 ABSENT = "–"
@@ -95,37 +91,10 @@ def check_outputs(
     Raises
     ------
     OutputError
-        A file exists already (and not `overwrite`) or cannot be written, or matplotlib, which
-        draws the charts, is not installed.
+        A file exists already (and not `overwrite`) or cannot be written.
     """
     if json_target not in (None, "-"):
         check_output(Path(json_target), overwrite=overwrite, inputs=inputs)
     if page is not None:
-        load_matplotlib()
         make_folder(page)
         check_output(page / PAGE_NAME, overwrite=overwrite)
-
-
-def write_page(html: str, folder: Path, *, overwrite: bool = False) -> Path:
-    """Write a page into its folder and return the file. Raises `OutputError`."""
-    with staged(folder / PAGE_NAME, overwrite=overwrite) as temporary:
-        # The name of a file may be no valid text.
-        temporary.write_text(html, encoding="utf-8", errors="backslashreplace")
-    return folder / PAGE_NAME
-
-
-def load_matplotlib() -> None:
-    """Import matplotlib; a file `matplotlibrc` in the current folder is not read.
-
-    Raises
-    ------
-    OutputError
-        It is not installed.
-    """
-    if sys.modules.get("matplotlib"):
-        return
-    try:
-        with contextlib.chdir(Path(__file__).parent):  # there is no other way to keep it from that
-            importlib.import_module("matplotlib")
-    except ImportError as error:
-        raise OutputError("--page needs matplotlib; pip install matplotlib") from error

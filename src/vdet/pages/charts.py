@@ -1,52 +1,115 @@
-"""Charts as SVG that is part of the page.
+"""Charts, which the templates of pages draw as SVG.
 
-Places along the time axis are percentages, and text has the size of the page's text, so a chart can
-be read at any width.
+Places along both axes are percentages, and text has the size of the page's text, so a chart can be
+read at any width.
 """
 
 import heapq
-import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from html import escape
 
+import numpy as np
+
+from vdet.boxes import Float64Array
 from vdet.draw.boxes import color_of, text_color
 
-STYLE = """
-.chart { display: block; width: 100%; overflow: hidden; margin: 6px 0 2px;
-  font: 12px system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
-.chart text { fill: var(--soft); } .chart .grid { stroke: var(--line); }
-.chart .value { paint-order: stroke; stroke: var(--paper); stroke-width: 4px; }
-@media (max-width: 800px) { .chart .roomy { display: none; } }
-.chart .level { fill: var(--fill); shape-rendering: crispEdges; }
-.chart a:hover, .chart a:focus-visible { opacity: .75; }
-.legend { display: flex; flex-wrap: wrap; gap: 4px 16px; font-size: 13px; color: var(--soft); }
-.legend i { display: inline-block; width: 11px; height: 11px; border-radius: 3px;
-  margin-right: 6px; }
-"""
+FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
+"""Colours of the style: of what is right, of what is wrong, and of what stands back."""
 
-_HEIGHT = 150  # of the plot, pixels
-_AXIS = 22  # of the labels below it
-_TOP = 16  # above the highest value, for its label
-_OVERLAP = 0.2  # of a level with the next, percent; else there may be a gap as thin as a hair
-_ROW = 24  # of a vehicle
-_NARROWEST = 300  # of a chart on a phone, pixels
-_ROOMY = 700  # of a chart in a window of more than 800 pixels
-_TICKS = 5  # most labels along the time
-_TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
+_TICKS = 5  # most parts of an axis
+_TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
+_MOST_POINTS = 400  # of a curve
+_NOTHING = 1e-9  # length of an axis whose ends are equal
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """The ends of an axis, and its labels: `(value, text)` each."""
+
+    low: float
+    high: float
+    ticks: Sequence[tuple[float, str]]
+    title: str = ""
+
+    def at(self, value: float) -> float:
+        """Return the place of a value on the axis, percent; that of an end for one beyond it."""
+        return min(max(0.0, self.width(self.low, value)), 100.0)
+
+    def width(self, first: float, last: float) -> float:
+        """Return the distance of two values, percent of the axis."""
+        return round(100 * (last - first) / max(self.high - self.low, _NOTHING), 3)
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """A bar from `left` to `right` and from `low` to `high`, in the units of the axes."""
+
+    left: float
+    right: float
+    low: float
+    high: float
+    color: str = FILL
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line through points `(x, y)`; `dots` marks each, `labels` has a text for each dot."""
+
+    points: Sequence[tuple[float, float]]
+    color: str = FILL
+    dots: bool = False
+    labels: Sequence[str] = ()
+    dashed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """Bars and lines on two axes; `what` describes the chart to those who do not see it."""
+
+    what: str
+    x: Axis
+    y: Axis
+    bars: Sequence[Bar] = ()
+    lines: Sequence[Line] = ()
+    legend: Sequence[tuple[str, str]] = ()
+    title: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A vehicle in the chart of spans: `first` and `last` in seconds; a click leads to `link`."""
+    """A bar in a row of a timeline; a click leads to `time` in the video of the page."""
 
-    id: int
+    row: int
     first: float
     last: float
+    title: str
+    color: str
+    ink: str = "#fff"
+    label: str = ""
+    time: float | None = None
+
+    def fits(self, width: float, pixels: int) -> bool:
+        """Tell whether the label fits into the bar, `width` percent of a chart of `pixels`."""
+        return bool(self.label) and width * pixels >= 100 * (10 + 7.5 * len(self.label))
+
+
+@dataclass(frozen=True, slots=True)
+class Timeline:
+    """Spans in rows, which may have names."""
+
     what: str
-    link: str
+    x: Axis
+    spans: Sequence[Span]
+    names: Sequence[str] = ()
+    title: str = ""
+
+    @property
+    def rows(self) -> int:
+        """The number of rows."""
+        return max([len(self.names), *(span.row + 1 for span in self.spans)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +118,23 @@ class Series:
 
     name: str
     by_minute: Mapping[int, int]
+
+    @property
+    def total(self) -> int:
+        """The sum over all minutes."""
+        return sum(self.by_minute.values())
+
+
+def color(number: int) -> str:
+    """Return the colour of the series with this number."""
+    return _COLORS[number % len(_COLORS)]
+
+
+def vehicle_colors(number: int) -> tuple[str, str]:
+    """Return the colour that the box of a vehicle has in the video, and that of text on it."""
+    bgr = color_of(number)
+    fill, ink = ("#{:02x}{:02x}{:02x}".format(*each[::-1]) for each in (bgr, text_color(bgr)))
+    return fill, ink
 
 
 def clock(seconds: float) -> str:
@@ -68,174 +148,77 @@ def clock(seconds: float) -> str:
     return sign + text + (f".{tenth}" if tenth else "")
 
 
-def level_chart(levels: Sequence[int], start: float, end: float, what: str) -> str:
-    """Return a chart of a number over time; `levels` are of equal steps from `start` to `end`."""
-    top = _top(max(levels, default=0))
-    width = 100 / max(1, len(levels))
-    bars, first = [], 0
-    for level, run in itertools.groupby(levels):
-        steps = len(list(run))
-        if level:
-            bars.append(
-                f'<rect class="level" x="{_percent(first * width)}" '
-                f'width="{_percent(steps * width + _OVERLAP)}" {_height(0, level, top)}/>'
-            )
-        first += steps
-    axis = _time_axis(start, end, _bottom())
-    return _svg(what, _bottom() + _AXIS, "".join(bars) + _grid(top) + axis)
-
-
-def minute_chart(series: Sequence[Series], minutes: range, what: str) -> str:
-    """Return a chart with a bar for each minute, in which the series are stacked, and a legend."""
-    sums = [sum(each.by_minute.get(n, 0) for each in series) for n in minutes]
-    top = _top(max(sums, default=0))
-    bars = "".join(_minute_bars(series, minutes, top))
-    axis = _time_axis(60 * minutes.start, 60 * minutes.stop, _bottom())
-    return _svg(what, _bottom() + _AXIS, bars + _grid(top) + axis) + _legend(series)
-
-
-def span_chart(spans: Iterable[Span], start: float, end: float, what: str) -> str:
-    """Return a chart with a bar for each vehicle, from its first to its last time.
-
-    Vehicles that are not there at once share a row.
-    """
-    rows = list(_rows(sorted(spans, key=lambda span: (span.first, span.id))))
-    bars = "".join(
-        _span(span, row, start, max(end - start, 1e-9)) for row, inside in enumerate(rows)
-        for span in inside
-    )  # fmt: skip
-    bottom = _ROW * len(rows) + 4
-    return _svg(what, bottom + _AXIS, bars + _time_axis(start, end, bottom))
-
-
-def _svg(what: str, height: float, content: str) -> str:
-    return (
-        f'<svg class="chart" role="img" aria-label="{escape(what)}" height="{height:g}">'
-        f"{content}</svg>"
-    )
-
-
-def _percent(value: float) -> str:
-    return f"{value:.3f}".rstrip("0").rstrip(".") + "%"
-
-
-def _bottom() -> int:
-    return _TOP + _HEIGHT
-
-
-def _y(value: float, top: float) -> float:
-    return _TOP + _HEIGHT * (1 - value / top)
-
-
-def _height(low: float, high: float, top: float) -> str:
-    """Return the place of a bar from one value to another; it can always be seen."""
-    height = max(1.0, _y(low, top) - _y(high, top))
-    return f'y="{_y(low, top) - height:.1f}" height="{height:.1f}"'
-
-
-def _top(most: int) -> int:
-    """Return the end of the vertical axis: a number with two to five even parts."""
-    step = _grid_step(most)
-    return step * max(1, -(-most // step))
-
-
-def _grid_step(most: int) -> int:
-    for power in range(12):
-        for factor in (1, 2, 5):
-            if most <= 4 * (step := factor * 10**power):
-                return int(step)
-    return most
-
-
-def _grid(top: int) -> str:
-    """Return lines across the plot, each with its value above its left end."""
-    parts = []
-    for value in range(0, top + 1, _grid_step(top)):
-        y = _y(value, top)
-        parts.append(f'<line class="grid" x1="0" x2="100%" y1="{y:.1f}" y2="{y:.1f}"/>')
-        if value:
-            parts.append(f'<text class="value" x="2" y="{y - 3:.1f}">{value}</text>')
-    return "".join(parts)
-
-
-def _time_axis(start: float, end: float, y: float) -> str:
-    length = max(end - start, 1e-9)
+def time_axis(start: float, end: float) -> Axis:
+    """Return an axis of times in seconds."""
+    length = max(end - start, _NOTHING)
     step = next((step for step in _TIMES if length / step <= _TICKS), length / _TICKS)
-    parts = []
-    for number in range(math.ceil(start / step), math.floor(end / step) + 1):
-        share = 100 * (number * step - start) / length
-        anchor = "start" if share < 4 else "end" if share > 96 else "middle"
-        parts.append(
-            f'<line class="grid" x1="{_percent(share)}" x2="{_percent(share)}" '
-            f'y1="{y}" y2="{y + 5}"/><text x="{_percent(share)}" y="{y + 18}" '
-            f'text-anchor="{anchor}">{clock(number * step)}</text>'
-        )
-    return "".join(parts)
+    numbers = range(math.ceil(start / step), math.floor(end / step) + 1)
+    return Axis(start, end, [(number * step, clock(number * step)) for number in numbers])
 
 
-def _minute_bars(series: Sequence[Series], minutes: range, top: float) -> Iterator[str]:
-    width = 100 / max(1, len(minutes))
-    for place, minute in enumerate(minutes):
+def number_axis(
+    low: float, high: float, title: str = "", *, least: float = 0, fixed: bool = False
+) -> Axis:
+    """Return an axis with even parts, each at least `least` long.
+
+    Its ends are round numbers, or those given if they are `fixed`.
+    """
+    length = max(high - low, least, _NOTHING)
+    power = 10.0 ** math.floor(math.log10(length / _TICKS))
+    step = next(power * each for each in (1, 2, 5, 10) if length / (power * each) <= _TICKS)
+    step = max(step, least)
+    first, last = math.floor(low / step + _NOTHING), math.ceil(high / step - _NOTHING)
+    ticks = [(n * step, f"{n * step:g}") for n in range(first, max(first + 1, last) + 1)]
+    if fixed:
+        return Axis(low, high, [each for each in ticks if low <= each[0] <= high], title)
+    return Axis(ticks[0][0], ticks[-1][0], ticks, title)
+
+
+def curve(xs: Float64Array, ys: Float64Array, color: str) -> Line:
+    """Return a line through at most `_MOST_POINTS` of the points, float64 `(n,)` each."""
+    rows = np.unique(np.linspace(0, len(xs) - 1, min(len(xs), _MOST_POINTS)).astype(int))
+    return Line(list(zip(xs[rows].tolist(), ys[rows].tolist(), strict=True)), color)
+
+
+def level_plot(levels: Sequence[int], start: float, end: float, what: str) -> Plot:
+    """Return a number over time; `levels` are of equal steps from `start` to `end`."""
+    step = (end - start) / max(1, len(levels))
+    bars = [
+        Bar(start + n * step, start + (n + 1.2) * step, 0, level)  # gaps would show as hairs
+        for n, level in enumerate(levels)
+        if level
+    ]
+    return Plot(what, time_axis(start, end), _counts(max(levels, default=0)), bars)
+
+
+def minute_plot(series: Sequence[Series], minutes: range, what: str) -> Plot:
+    """Return a bar for each minute, in which the series are stacked, with a legend."""
+    bars, most = [], 0
+    for minute in minutes:
         below = 0
         for number, each in enumerate(series):
-            value = each.by_minute.get(minute, 0)
-            if value:
-                yield (
-                    f'<rect x="{_percent(width * (place + 0.1))}" width="{_percent(width * 0.8)}" '
-                    f'{_height(below, below + value, top)} fill="{_color(number)}">'
-                    f"<title>{clock(60 * minute)}: {value} {escape(each.name)}</title></rect>"
-                )
-            below += value
-
-
-def _color(number: int) -> str:
-    return _COLORS[number % len(_COLORS)]
-
-
-def _legend(series: Sequence[Series]) -> str:
-    items = "".join(
-        f'<span><i style="background:{_color(number)}"></i>{escape(each.name)}: '
-        f"{sum(each.by_minute.values())}</span>"
-        for number, each in enumerate(series)
+            if count := each.by_minute.get(minute, 0):
+                title = f"{clock(60 * minute)}: {count} {each.name}"
+                place = 60 * (minute + 0.1), 60 * (minute + 0.9), below, below + count
+                bars.append(Bar(*place, color(number), title))
+                below += count
+        most = max(most, below)
+    legend = [(f"{each.name}: {each.total}", color(n)) for n, each in enumerate(series)]
+    return Plot(
+        what, time_axis(60 * minutes.start, 60 * minutes.stop), _counts(most), bars, (), legend
     )
-    return f'<div class="legend">{items}</div>'
 
 
-def _rows(spans: Iterable[Span]) -> list[list[Span]]:
-    """Put spans, in the order of their begin, into as few rows as possible."""
-    rows: list[list[Span]] = []
-    free: list[tuple[float, int]] = []  # when the last of a row ends, and the row
-    for span in spans:
-        if free and free[0][0] < span.first:
-            _, row = heapq.heappop(free)
-        else:
-            row = len(rows)
-            rows.append([])
-        rows[row].append(span)
-        heapq.heappush(free, (span.last, row))
+def _counts(most: int) -> Axis:
+    return number_axis(0, max(1, most), least=1)
+
+
+def pack(spans: Iterable[tuple[float, float]]) -> list[int]:
+    """Return a row for each span, in order of their begin; those at one time get different rows."""
+    rows: list[int] = []
+    free: list[tuple[float, int]] = []  # when the last span of a row ends, and the row
+    for first, last in spans:
+        row = heapq.heappop(free)[1] if free and free[0][0] < first else len(free)
+        rows.append(row)
+        heapq.heappush(free, (last, row))
     return rows
-
-
-def _span(span: Span, row: int, start: float, length: float) -> str:
-    """Return a bar with the colour that the vehicle's box has in the video."""
-    blue, green, red = color = color_of(span.id)
-    ink = "#{:02x}{:02x}{:02x}".format(*text_color(color)[::-1])
-    x = 100 * (span.first - start) / length
-    width = 100 * (span.last - span.first) / length
-    return (
-        f'<a {span.link}><svg x="{_percent(x)}" y="{row * _ROW + 2}" '
-        f'width="{_percent(max(width, 0.3))}" height="{_ROW - 4}">'
-        f"<title>{escape(span.what)}</title>"
-        f'<rect width="100%" height="100%" rx="4" fill="rgb({red},{green},{blue})"/>'
-        f"{_name(span.id, width, ink)}</svg></a>"
-    )
-
-
-def _name(number: int, width: float, ink: str) -> str:
-    """Return the id for a bar of a width in percent; nothing where it would be cut off."""
-    text = f"#{number}"
-    needed = 100 * (10 + 7.5 * len(text))
-    if width * _ROOMY < needed:
-        return ""
-    kind = "" if width * _NARROWEST >= needed else ' class="roomy"'
-    return f'<text{kind} x="5" y="{_ROW / 2 + 2:g}" style="fill:{ink}">{text}</text>'

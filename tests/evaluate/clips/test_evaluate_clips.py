@@ -1,9 +1,9 @@
 from pathlib import Path
 
 from vdet.evaluate.clips.evaluate import RunResult, best, score_files, score_video, total
+from vdet.evaluate.clips.page import video_page
 from vdet.evaluate.clips.text import plain, result_lines, sweep_rows
 from vdet.evaluate.output import RunName
-from vdet.evaluate.report.video_page import video_page
 from vdet.labels.rows import Row
 from vdet.labels.video import LabelledVideo, checked_video
 

@@ -83,7 +83,7 @@ def test_without_boxes_and_augmentation_the_report_does_not_mention_them() -> No
 
 def test_the_report_says_how_far_boxes_are_off() -> None:
     text = "\n".join(report().lines())
-    assert "sides of vehicles' boxes: 0.043 of a patch's side off on average (15 patches)" in text
+    assert "sides of vehicles' boxes: mean error 0.043 of a patch's side (15 patches)" in text
 
 
 def test_the_report_is_written_as_json(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from red_cars import CAR, road
 from run.red_runs import COUNT, outputs, read, result_of, run_red, video_info, write
 from running import names
 from vdet.media.images import Image, decode_image
-from vdet.pages.facts import read_facts
+from vdet.pages.video import read_facts
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
 

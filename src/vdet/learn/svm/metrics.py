@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vdet.boxes import BoolArray
+from vdet.evaluate.output import table
 from vdet.files import write_json
 
 
@@ -28,6 +29,13 @@ class Confusion:
             int(np.count_nonzero(truth & ~predicted)),
             int(np.count_nonzero(~truth & ~predicted)),
         )
+
+    def rows(self) -> list[list[str]]:
+        """Return the rows of a table, with the columns "", predicted vehicle, predicted other."""
+        return [
+            ["is vehicle", str(self.true_positives), str(self.false_negatives)],
+            ["is non-vehicle", str(self.false_positives), str(self.true_negatives)],
+        ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,23 +129,21 @@ _SPLITS = {
 }
 
 
-def _split_lines(report: SplitMetrics) -> Iterator[str]:
-    confusion = report.confusion
+def _split_lines(metrics: SplitMetrics) -> Iterator[str]:
     yield ""
-    yield _SPLITS[report.split]
-    more = f" + {report.train_augmented} augmented" if report.train_augmented else ""
+    yield _SPLITS[metrics.split]
+    more = f" + {metrics.train_augmented} augmented" if metrics.train_augmented else ""
     yield (
-        f"  train accuracy {report.train_accuracy:.4f} ({report.train_patches} patches{more}), "
-        f"test accuracy {report.test_accuracy:.4f} ({report.test_patches} patches), "
-        f"fitted in {report.fit_seconds:.1f} s"
+        f"  train accuracy {metrics.train_accuracy:.4f} ({metrics.train_patches} patches{more}), "
+        f"test accuracy {metrics.test_accuracy:.4f} ({metrics.test_patches} patches), "
+        f"fitted in {metrics.fit_seconds:.1f} s"
     )
-    yield "                        said vehicle   said non-vehicle"
-    yield (f"  is vehicle      {confusion.true_positives:18d} {confusion.false_negatives:18d}")
-    yield (f"  is non-vehicle  {confusion.false_positives:18d} {confusion.true_negatives:18d}")
-    for group in report.groups:
+    headings = "", "predicted vehicle", "predicted non-vehicle"
+    yield from (f"  {line}" for line in table(headings, metrics.confusion.rows()))
+    for group in metrics.groups:
         yield f"  {group.group:<28}{group.patches:6d} patches  accuracy {group.accuracy:.4f}"
-    if report.boxes is not None:
+    if metrics.boxes is not None:
         yield (
-            f"  sides of vehicles' boxes: {report.boxes.mean:.3f} of a patch's side off on average "
-            f"({report.boxes.patches} patches)"
+            f"  sides of vehicles' boxes: mean error {metrics.boxes.mean:.3f} of a patch's side "
+            f"({metrics.boxes.patches} patches)"
         )

@@ -13,10 +13,9 @@ from vdet.config.rendering import render
 from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
 from vdet.pages.charts import Series
-from vdet.pages.frame import PAGE_NAME, jpeg_uri
-from vdet.pages.index_page import write_index
-from vdet.pages.player import Player
-from vdet.pages.video_page import Thumbnail, VideoReport, video_page
+from vdet.pages.index import write_index
+from vdet.pages.render import PAGE_NAME, jpeg_uri, write_page
+from vdet.pages.video import Player, Thumbnail, VideoPage
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
@@ -66,9 +65,7 @@ class PageSink:
         if kind is None:
             self._keep(self._crops.end())
             target = self._context.files.stage(self._folder / PAGE_NAME)
-            # The name of a file may be no valid text.
-            html = video_page(self._report())
-            target.write_text(html, encoding="utf-8", errors="backslashreplace")
+            write_page(self._page().html(), target)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -91,10 +88,9 @@ class PageSink:
             small = _at_most(crop.image, _THUMBNAIL, max(crop.image.shape[:2]))
             self._thumbnails[crop.id] = Thumbnail(crop.time, jpeg_uri(small, _QUALITY))
 
-    def _report(self) -> VideoReport:
-        return VideoReport(
+    def _page(self) -> VideoPage:
+        return VideoPage(
             source=self._video.path,
-            folder=self._folder,
             width=self._video.width,
             height=self._video.height,
             frames=self._frames,
@@ -115,10 +111,11 @@ class PageSink:
         """Return the video that this run writes; else the source, if it is a video file."""
         for output in self._context.outputs:
             if output.sink == "video":
-                return Player(output.path, is_drawn=True, start=self._start)
+                return Player.of(output.path, self._folder, is_drawn=True, start=self._start)
         source = self._video.path
         if source.is_file() and not is_picture_name(source):
-            return Player(source, is_drawn=False, start=float(self._video.start))
+            start = float(self._video.start)
+            return Player.of(source, self._folder, is_drawn=False, start=start)
         return None
 
 

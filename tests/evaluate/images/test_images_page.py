@@ -1,4 +1,4 @@
-"""The report on pictures: its contents, not its looks."""
+"""The page on pictures: its contents, not its looks."""
 
 from pathlib import Path
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from evaluate.images.writers import Boxed, Labelled, write_coco
 from vdet.evaluate.images.evaluate import ImagesResult
+from vdet.evaluate.images.page import images_page, worst_tiles
 from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, score_source
 from vdet.evaluate.images.search import SearchedImage
 from vdet.evaluate.output import RunName
-from vdet.evaluate.report.images_page import images_page, worst_pictures
-from vdet.evaluate.report.video_page import FOUND_COLOR, TRUE_COLOR
+from vdet.evaluate.tiles import FOUND, TRUE
 from vdet.labels.pictures.reading import read_labelled_images
 
 COUNTING = Counting(0.5, 0.0, ("car",))
@@ -41,19 +41,19 @@ def test_the_page_names_detector_source_and_labels_left_out(tmp_path: Path) -> N
 
 
 def test_a_page_where_nothing_is_found_can_be_made(tmp_path: Path) -> None:
-    assert "<svg" not in images_page(result_of(tmp_path), RunName("svm", None, None, ()))  # encoded
+    assert "<svg" in images_page(result_of(tmp_path), RunName("svm", None, None, ()))
 
 
 def test_pictures_with_mistakes_are_shown_with_their_boxes(tmp_path: Path) -> None:
     result = result_of(tmp_path, (70, 10, 20, 30))
-    first, second = worst_pictures(result.sources[0], 0.5)
-    assert (first.title, first.caption) == ("a.png", "1 missed, 1 false alarms")
-    assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarms")
-    for color in (TRUE_COLOR, FOUND_COLOR):
+    first, second = worst_tiles(result.sources[0], 0.5)
+    assert (first.title, first.caption) == ("a.png", "1 missed, 1 false alarm")
+    assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarm")
+    for color in (TRUE, FOUND):
         assert np.any((first.image == color).all(axis=2))
 
 
 def test_pictures_without_mistakes_are_not_shown(tmp_path: Path) -> None:
     result = result_of(tmp_path, CAR.box)
-    assert [each.title for each in worst_pictures(result.sources[0], 0.5)] == ["b.png"]
-    assert worst_pictures(result.sources[0], 0.95) != []
+    assert [each.title for each in worst_tiles(result.sources[0], 0.5)] == ["b.png"]
+    assert worst_tiles(result.sources[0], 0.95) != []

@@ -1,0 +1,334 @@
+"""How well the linear model separates patches of vehicles from others.
+
+Without a ready model, one is trained without the last patches of each folder, and tested on these:
+a split that leaks nothing, because patches in a row are near-duplicates.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from vdet.boxes import BoolArray, Float64Array
+from vdet.config.schema import Settings
+from vdet.detect.svm.model import LinearModel
+from vdet.errors import DataError
+from vdet.evaluate.output import ABSENT, RunName, run_lines, share, table
+from vdet.evaluate.tiles import Tile
+from vdet.learn.svm.augmentation import augment
+from vdet.learn.svm.dataset import PatchFile, read_patches
+from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
+from vdet.learn.svm.fitting import fit
+from vdet.learn.svm.metrics import Confusion
+from vdet.pages.charts import FILL, SOFT, Axis, Line, Plot, curve, number_axis
+from vdet.pages.render import render
+from vdet.progress import Steps, no_steps
+from vdet.workers import make_workers
+
+THRESHOLD = 0.5
+"""A patch with at least this probability is classified as a vehicle."""
+BINS = 10
+"""Bins of the calibration, of equal width over the probabilities 0 to 1."""
+MOST_MISTAKES = 24
+"""Most mistakes of either kind that are shown."""
+
+_LEAST_RATE = 1e-3  # of false alarms, in the ROC curve
+_SPLIT = "tail split: leak-free, a new model is tested on the last patches of each folder"
+_SAME = "the model was trained on most of these very patches: the scores are too good"
+_OTHER = "if the model was trained on some of these patches too, the scores are too good"
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """A share of patches, with its 95 % interval; None of no patches.
+
+    Source of the interval: Wilson, "Probable inference", 1927. Patches are taken for independent;
+    with near-duplicates in the test the true interval is wider.
+    """
+
+    value: float | None
+    low: float | None
+    high: float | None
+
+    @staticmethod
+    def of(right: BoolArray) -> "Rate":
+        """Return the share of the True ones, bool `(n,)`."""
+        from scipy.stats import binomtest  # type: ignore[import-untyped]
+
+        if not len(right):
+            return Rate(None, None, None)
+        count = int(np.count_nonzero(right))
+        interval = binomtest(count, len(right)).proportion_ci(method="wilson")
+        return Rate(count / len(right), float(interval.low), float(interval.high))
+
+    def __str__(self) -> str:
+        if self.value is None:
+            return ABSENT
+        return f"{share(self.value, 4)} [{share(self.low)}, {share(self.high)}]"
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationBin:
+    """Patches of similar probability: their number, mean probability and share of vehicles."""
+
+    patches: int
+    probability: float
+    vehicles: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A patch that is classified wrongly, and its probability of being a vehicle."""
+
+    file: PatchFile
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
+class PatchScores:
+    """The metrics on the tested patches.
+
+    Attributes
+    ----------
+    vehicles, non_vehicles, broken
+        Number of patches of the data.
+    tested
+        Number of patches that were tested.
+    meaning
+        How the tested patches are related to those of the training.
+    groups
+        Accuracy of each group.
+    roc_auc, log_loss
+        None if all tested patches are of one class.
+    calibration_error
+        Mean distance of probability and share of vehicles in a bin, weighted by patches.
+    calibration
+        The bins that are not empty, lowest probabilities first.
+    roc
+        Shares of false alarms and of found vehicles at each threshold.
+    mistakes
+        The worst ones of either kind, the worst first.
+    """
+
+    vehicles: int
+    non_vehicles: int
+    broken: int
+    tested: int
+    meaning: str
+    accuracy: Rate
+    precision: Rate
+    recall: Rate
+    roc_auc: float | None
+    log_loss: float | None
+    calibration_error: float
+    confusion: Confusion
+    groups: dict[str, Rate]
+    calibration: tuple[CalibrationBin, ...]
+    roc: tuple[Float64Array, Float64Array]
+    mistakes: tuple[Mistake, ...]
+
+
+def evaluate_patches(
+    files: Sequence[PatchFile],
+    settings: Settings,
+    model: LinearModel | None = None,
+    *,
+    jobs: int | None = None,
+    steps: Steps = no_steps,
+) -> PatchScores:
+    """Test a ready model on all patches, or train one and test it on those that were held out.
+
+    Parameters
+    ----------
+    jobs
+        Processes that describe patches, as joblib counts them: -1 for one per core.
+    steps
+        Called at the start of each step, with the number of patches to describe or None.
+
+    Raises
+    ------
+    DataError
+        Too many patches are unreadable, or there are too few to train on.
+    """
+    training = settings.train.svm
+    data = extract(
+        files,
+        model.features if model else settings.svm.features,
+        training,
+        workers=make_workers(jobs),
+        augmenter=None if model else partial(augment, settings=training.augmentation),
+        progress=steps("describing patches", len(files)),
+    )
+    if model:
+        tested = np.full(len(data.vehicle), True)
+        meaning = _SAME if model.provenance.get("data_sha256") == data.digest else _OTHER
+    else:
+        steps("fitting the model", None)
+        tested = hold_out(data.groups, "tail", training.test_fraction, training.seed)
+        if not tested.any():
+            raise DataError("nothing can be held out; give more patches")
+        model, meaning = fit(data.rows.of(~tested), settings), _SPLIT
+    steps("computing scores", None)
+    kept = list(files)
+    if data.broken:
+        kept = [patch.file for patch in read_patches(files) if patch.image is not None]
+    probabilities = model.probabilities(data.vectors[tested]).astype(np.float64)
+    return score_patches(data, tested, probabilities, kept, meaning)
+
+
+def score_patches(
+    data: LabelledVectors,
+    tested: BoolArray,
+    probabilities: Float64Array,
+    files: Sequence[PatchFile],
+    meaning: str,
+) -> PatchScores:
+    """Compute the metrics.
+
+    Parameters
+    ----------
+    tested
+        bool `(n,)`: the patches of `data` that were tested, at least one.
+    probabilities
+        float64 `(m,)`: the probability of each tested patch of being a vehicle.
+    files
+        The `n` patches of `data`, in its order.
+    meaning
+        How the tested patches are related to those of the training.
+    """
+    from sklearn import metrics
+
+    vehicle, groups = data.vehicle[tested], data.groups[tested]
+    positive = probabilities >= THRESHOLD
+    right = positive == vehicle
+    calibration = tuple(_calibration(vehicle, probabilities))
+    gaps = (each.patches * abs(each.probability - each.vehicles) for each in calibration)
+    both = len(np.unique(vehicle)) == 2
+    roc = metrics.roc_curve(vehicle, probabilities)[:2] if both else (np.empty(0), np.empty(0))
+    rows = np.flatnonzero(tested)
+    return PatchScores(
+        vehicles=int(np.count_nonzero(data.vehicle)),
+        non_vehicles=int(np.count_nonzero(~data.vehicle)),
+        broken=data.broken,
+        tested=len(vehicle),
+        meaning=meaning,
+        accuracy=Rate.of(right),
+        precision=Rate.of(vehicle[positive]),
+        recall=Rate.of(positive[vehicle]),
+        roc_auc=float(metrics.roc_auc_score(vehicle, probabilities)) if both else None,
+        log_loss=float(metrics.log_loss(vehicle, probabilities)) if both else None,
+        calibration_error=sum(gaps) / len(vehicle),
+        confusion=Confusion.of(vehicle, positive),
+        groups={str(name): Rate.of(right[groups == name]) for name in np.unique(groups)},
+        calibration=calibration,
+        roc=roc,
+        mistakes=tuple(
+            Mistake(files[rows[row]], float(probabilities[row]))
+            for row in _worst(vehicle, probabilities)
+        ),
+    )
+
+
+def _calibration(vehicle: BoolArray, probabilities: Float64Array) -> Iterator[CalibrationBin]:
+    bins = np.minimum((probabilities * BINS).astype(int), BINS - 1)  # the last one includes 1
+    for number in np.unique(bins):
+        inside = bins == number
+        mean, vehicles = float(probabilities[inside].mean()), float(vehicle[inside].mean())
+        yield CalibrationBin(int(np.count_nonzero(inside)), mean, vehicles)
+
+
+def _worst(vehicle: BoolArray, probabilities: Float64Array) -> list[int]:
+    """Return the rows of the worst missed vehicles and false alarms, the worst first."""
+    error = np.where(vehicle, THRESHOLD - probabilities, probabilities - THRESHOLD)
+    order = np.argsort(-error, kind="stable")
+    wrong = order[((probabilities >= THRESHOLD) != vehicle)[order]]
+    missed, alarms = (wrong[vehicle[wrong] == kind][:MOST_MISTAKES] for kind in (True, False))
+    return [row for row in wrong.tolist() if row in missed or row in alarms]
+
+
+def lines(scores: PatchScores) -> Iterator[str]:
+    """Yield the scores as lines of text."""
+    broken = f" ({scores.broken} broken ones skipped)" if scores.broken else ""
+    yield f"patches: {scores.vehicles} vehicles, {scores.non_vehicles} non-vehicles{broken}"
+    yield scores.meaning
+    yield ""
+    yield from table(("95 % intervals in brackets", ""), metric_rows(scores))
+    yield ""
+    yield from table(("accuracy by group", ""), group_rows(scores))
+    yield ""
+    yield from table(("", "predicted vehicle", "predicted non-vehicle"), scores.confusion.rows())
+
+
+def metric_rows(scores: PatchScores) -> list[list[str]]:
+    """Return the name of each metric and its value, as text."""
+    return [
+        ["patches tested", str(scores.tested)],
+        ["accuracy", str(scores.accuracy)],
+        ["precision", str(scores.precision)],
+        ["recall", str(scores.recall)],
+        ["ROC AUC", share(scores.roc_auc, 4)],
+        ["log loss", share(scores.log_loss, 4)],
+        ["calibration error", share(scores.calibration_error, 4)],
+    ]
+
+
+def group_rows(scores: PatchScores) -> list[list[str]]:
+    """Return the name of each group and its accuracy, as text."""
+    return [[group, str(rate)] for group, rate in scores.groups.items()]
+
+
+def values(scores: PatchScores) -> dict[str, Any]:
+    """Return the scores as values for JSON, without the points of the ROC curve."""
+    mistakes = [asdict(each) | {"file": str(each.file)} for each in scores.mistakes]
+    found = asdict(scores) | {"mistakes": mistakes}
+    del found["roc"]
+    return found
+
+
+def patch_page(scores: PatchScores, run: RunName) -> str:
+    """Return the page as HTML."""
+    counts = f"{scores.vehicles} patches of vehicles, {scores.non_vehicles} of other things"
+    return render(
+        "eval_patches.html",
+        subtitle="; ".join([counts, *run_lines(run)]),
+        scores=scores,
+        figures=[
+            ("accuracy", share(scores.accuracy.value)),
+            ("precision", share(scores.precision.value)),
+            ("recall", share(scores.recall.value)),
+            ("ROC AUC", share(scores.roc_auc)),
+        ],
+        metrics=metric_rows(scores),
+        groups=group_rows(scores),
+        plots=(_roc_plot(scores), _calibration_plot(scores)),
+        missed=_tiles(scores, vehicle=True),
+        alarms=_tiles(scores, vehicle=False),
+    )
+
+
+def _roc_plot(scores: PatchScores) -> Plot:
+    alarms, found = scores.roc
+    ticks = [(-3, "0.001"), (-2, "0.01"), (-1, "0.1"), (0, "1")]
+    x = Axis(np.log10(_LEAST_RATE), 0, ticks, "false alarms / non-vehicles")
+    roc = [curve(np.log10(np.maximum(alarms, _LEAST_RATE)), found, FILL)] if len(found) else []
+    title = "ROC curve: found vehicles / vehicles"
+    return Plot(title, x, number_axis(0, 1), lines=roc, title=title)
+
+
+def _calibration_plot(scores: PatchScores) -> Plot:
+    points = [(each.probability, each.vehicles) for each in scores.calibration]
+    lines = [Line([(0, 0), (1, 1)], SOFT, dashed=True), Line(points, FILL, dots=True)]
+    title = "Calibration: share of vehicles"
+    return Plot(title, number_axis(0, 1, "probability"), number_axis(0, 1), (), lines, (), title)
+
+
+def _tiles(scores: PatchScores, *, vehicle: bool) -> list[Tile]:
+    mistakes = [each for each in scores.mistakes if each.file.vehicle == vehicle]
+    patches = read_patches([each.file for each in mistakes])
+    return [
+        Tile(patch.image, f"p = {mistake.probability:.3f}", str(mistake.file.name))
+        for mistake, patch in zip(mistakes, patches, strict=True)
+        if patch.image is not None
+    ]

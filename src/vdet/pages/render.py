@@ -1,0 +1,67 @@
+"""From values to a page: one HTML file that loads nothing from the network, light and dark."""
+
+import base64
+import os
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import cv2
+
+from vdet.files import escaped
+from vdet.media.images import Image
+from vdet.pages.charts import clock
+from vdet.version import __version__
+
+PAGE_NAME = "page.html"
+"""Name of the file of a page in its folder."""
+
+
+def render(template: str, **values: Any) -> str:
+    """Return the page that a file in `templates` makes of the values; all of them are escaped."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        undefined=StrictUndefined,
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "clock": clock,
+        "counted": counted,
+        "jpeg": jpeg_uri,
+        "line": lambda text: escaped(str(text)),
+    }
+    return environment.get_template(template).render(values, version=__version__)
+
+
+def write_page(html: str, path: Path) -> None:
+    """Write a page into a file; the name of a video in it may be no valid text."""
+    path.write_text(html, encoding="utf-8", errors="backslashreplace")
+
+
+def jpeg_uri(image: Image, quality: int = 85) -> str:
+    """Return a BGR uint8 image as a data URI."""
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def counted(count: int, noun: str) -> str:
+    """Return `1 car`, `6 cars`."""
+    return f"{count:,} {plural(noun) if count != 1 else noun}"
+
+
+def plural(noun: str) -> str:
+    """Return `cars`, `buses`."""
+    return noun + ("es" if noun.endswith(("s", "x", "ch", "sh")) else "s")
+
+
+def link_to(path: Path, folder: Path) -> str:
+    """Return the address of a file for a page in `folder`: relative, or absolute if it must be."""
+    try:
+        relative = os.path.relpath(os.path.abspath(path), os.path.abspath(folder))  # noqa: PTH100
+    except ValueError:  # another drive of Windows
+        return path.absolute().as_uri()
+    return quote(os.fsencode(relative.replace(os.sep, "/")))

@@ -1,0 +1,156 @@
+"""The evaluation of the classifier on patches."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pages.html import Elements
+from vdet.config.schema import (
+    FeatureSettings,
+    HistogramSettings,
+    HogSettings,
+    Settings,
+    SvmSettings,
+    SvmTrainingSettings,
+    TrainSettings,
+)
+from vdet.evaluate.output import RunName
+from vdet.learn.svm.dataset import PatchFile, find_patches
+from vdet.learn.svm.extraction import LabelledVectors, Rows
+from vdet.learn.svm.metrics import Confusion
+from vdet.learn.svm.patch_eval import (
+    MOST_MISTAKES,
+    PatchScores,
+    Rate,
+    evaluate_patches,
+    lines,
+    patch_page,
+    score_patches,
+    values,
+)
+from vdet.learn.svm.training import train
+from vdet.media.images import write_image
+
+FEATURES = FeatureSettings(
+    patch=16, hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8)
+)
+SETTINGS = Settings(
+    detector=SvmSettings(features=FEATURES),
+    train=TrainSettings(svm=SvmTrainingSettings(C=1, max_broken=0.1)),
+)
+
+
+@pytest.fixture
+def bright_and_dark(tmp_path: Path) -> Path:
+    """Vehicles are bright, other things dark, in two groups each of 12 patches."""
+    random = np.random.default_rng(0)
+    for class_, level in (("vehicles", 180), ("non-vehicles", 60)):
+        for group in ("a", "b"):
+            folder = tmp_path / class_ / group
+            folder.mkdir(parents=True)
+            for number in range(12):
+                image = random.normal(level, 20, (16, 16, 3)).clip(0, 255).astype(np.uint8)
+                write_image(folder / f"{number}.png", image)
+    return tmp_path
+
+
+def scores_of(vehicle: list[bool], probabilities: list[float]) -> PatchScores:
+    """Return the scores of patches 0, 1, 2 … in one group per class."""
+    flags = np.array(vehicle)
+    groups = np.where(flags, "vehicles/a", "non-vehicles/a")
+    data = LabelledVectors(Rows.of_patches(np.zeros((len(flags), 1), np.float32), flags), groups)
+    files = [
+        PatchFile(Path("set"), f"{number}.png", str(group), bool(flag))
+        for number, (group, flag) in enumerate(zip(groups, flags, strict=True))
+    ]
+    return score_patches(data, np.full(len(flags), True), np.array(probabilities), files, "a test")
+
+
+def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(bright_and_dark: Path) -> None:
+    light = np.full((16, 16, 3), 180, np.uint8)
+    write_image(bright_and_dark / "non-vehicles" / "b" / "11.png", light, overwrite=True)
+    (bright_and_dark / "non-vehicles" / "a" / "3.png").write_bytes(b"broken")
+    steps: list[tuple[str, int | None]] = []
+
+    def start(what: str, total: int | None) -> Callable[[int], object]:
+        steps.append((what, total))
+        return lambda _: None
+
+    files = find_patches([bright_and_dark])
+    scores = evaluate_patches(files, SETTINGS, jobs=1, steps=start)
+    assert (scores.vehicles, scores.non_vehicles, scores.broken, scores.tested) == (24, 23, 1, 8)
+    (mistake,) = scores.mistakes
+    assert str(mistake.file).endswith("non-vehicles/b/11.png"), "beside a broken patch"
+    assert scores.accuracy.value == 7 / 8
+    assert scores.groups["non-vehicles/b"].value == 0.5
+    assert "leak-free" in scores.meaning
+    assert steps == [("describing patches", 48), ("fitting the model", None),
+                     ("computing scores", None)]  # fmt: skip
+    page = Elements(patch_page(scores, RunName("svm", None, None, ())))
+    assert len(page.all("img")) == 1
+    for words in ("11.png", "ROC curve", "Calibration", "non-vehicles/b"):
+        assert words in page.text
+
+
+@pytest.mark.parametrize(
+    ("digest", "words"),
+    [(None, "was trained on most of these very patches"), ("other", "if the model was trained")],
+)
+def test_the_scores_say_what_a_ready_model_was_trained_on(
+    bright_and_dark: Path, digest: str | None, words: str
+) -> None:
+    files = find_patches([bright_and_dark])
+    model, _ = train(files, SETTINGS, jobs=1)
+    if digest is not None:
+        model = replace(model, provenance={"data_sha256": digest})
+    scores = evaluate_patches(files, SETTINGS, model, jobs=1)
+    assert words in scores.meaning
+    assert scores.tested == 48
+
+
+def test_the_metrics_are_those_of_the_definition() -> None:
+    scores = scores_of([True, True, False, False], [0.9, 0.4, 0.6, 0.2])
+    assert scores.confusion == Confusion(1, 1, 1, 1)
+    assert (scores.precision.value, scores.recall.value, scores.roc_auc) == (0.5, 0.5, 0.75)
+    assert scores.log_loss == pytest.approx(-np.log([0.9, 0.4, 0.4, 0.8]).mean())
+    assert scores.calibration_error == pytest.approx((0.1 + 0.6 + 0.6 + 0.2) / 4)
+    assert [each.probability for each in scores.calibration] == [0.2, 0.4, 0.6, 0.9]
+
+
+def test_the_interval_is_that_of_wilson() -> None:
+    rate = Rate.of(np.arange(1000) % 10 != 0)  # p = 0.9, n = 1000
+    assert (rate.value, rate.low, rate.high) == pytest.approx((0.9, 0.8798, 0.9171), abs=1e-4)
+    assert str(Rate.of(np.zeros(0, bool))) == "–"
+
+
+def test_patches_of_one_class_have_no_ranking() -> None:
+    scores = scores_of([False, False], [0.2, 0.1])
+    assert (scores.accuracy.value, scores.recall.value) == (1, None)
+    assert scores.roc_auc is scores.log_loss is None
+    assert "<svg" in patch_page(scores, RunName("svm", None, None, ()))
+
+
+def test_the_worst_mistakes_come_first() -> None:
+    mistakes = scores_of([True, False, True, False, True], [0.3, 0.95, 0.9, 0.6, 0.01]).mistakes
+    assert [(m.file.name, m.probability) for m in mistakes] == [
+        *(("4.png", 0.01), ("1.png", 0.95)),
+        *(("0.png", 0.3), ("3.png", 0.6)),
+    ]
+    many = scores_of([False] * 40 + [True], [0.99] * 40 + [0.4]).mistakes
+    assert len(many) == MOST_MISTAKES + 1
+    assert many[-1].file.vehicle, "mistakes of one kind do not hide the other"
+
+
+def test_text_and_json_have_the_scores() -> None:
+    scores = scores_of([True, True, False], [0.9, 0.2, 0.1])
+    text = "\n".join(lines(scores))
+    assert "accuracy                    0.6667 [0.208, 0.939]" in text
+    assert "predicted non-vehicle" in text
+    found = json.loads(json.dumps(values(scores), allow_nan=False))
+    assert found["accuracy"].keys() == {"value", "low", "high"}
+    assert found["groups"]["vehicles/a"]["value"] == 0.5
+    assert found["mistakes"] == [{"file": "set: 1.png", "probability": 0.2}]

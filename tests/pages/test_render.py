@@ -1,0 +1,68 @@
+"""What all pages have in common."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pages.html import Elements
+from vdet.evaluate.tiles import Tile
+from vdet.pages.charts import Bar, Line, Plot, number_axis
+from vdet.pages.render import counted, link_to, render, write_page
+
+NASTY = '"><script>alert("&")</script>'
+
+
+@pytest.fixture(scope="module")
+def html() -> str:
+    axis = number_axis(0, 1, NASTY)
+    lines = [Line([(0, 0), (1, 1)], dots=True, labels=[NASTY, NASTY])]
+    bars = [Bar(0, 1, 0, 1, title=NASTY)]
+    tile = Tile(np.zeros((4, 6, 3), np.uint8), NASTY, NASTY)
+    return render(
+        "eval_images.html",
+        subtitle=NASTY,
+        figures=[(NASTY, NASTY)],
+        headings=[NASTY],
+        rows=[[NASTY]],
+        others=[NASTY],
+        plots=[Plot(NASTY, axis, axis, bars, lines, [(NASTY, "#fff")], NASTY)],
+        size_headings=[NASTY],
+        size_rows=[[NASTY]],
+        sheets=[(NASTY, [tile])],
+    )
+
+
+def test_text_is_escaped_everywhere(html: str) -> None:
+    seen = Elements(html)
+    assert seen.all("script") == []
+    assert seen.text.count("<script>") >= 15
+    assert {"section", "table", "figure", "img", "polyline", "rect"} <= {
+        tag for tag, _ in seen.seen
+    }
+
+
+def test_nothing_is_loaded_from_elsewhere(html: str) -> None:
+    assert [each.partition(";")[0] for each in Elements(html).addresses()] == ["data:image/jpeg"]
+    assert "url(" not in html
+    assert "@import" not in html
+
+
+def test_a_page_fits_a_phone_and_both_colour_schemes(html: str) -> None:
+    assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in html
+    assert "color-scheme: light dark" in html
+    assert "@media (prefers-color-scheme: dark)" in html
+
+
+def test_one_is_singular() -> None:
+    assert [counted(n, "car") for n in (0, 1, 6000)] == ["0 cars", "1 car", "6,000 cars"]
+    assert counted(2, "bus") == "2 buses"
+
+
+def test_addresses_are_relative_and_quoted() -> None:
+    assert link_to(Path("found/a b#?.mp4"), Path("found/a.page")) == "../a%20b%23%3F.mp4"
+
+
+def test_a_page_can_name_a_file_whose_name_is_no_text(tmp_path: Path) -> None:
+    write_page("<p>r\udcff.mp4", tmp_path / "page.html")
+    assert (tmp_path / "page.html").read_text() == "<p>r\\udcff.mp4"
