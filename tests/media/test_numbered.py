@@ -1,6 +1,5 @@
 """Which pictures a pattern names."""
 
-import contextlib
 import tempfile
 from pathlib import Path
 
@@ -27,12 +26,6 @@ def test_numbers_may_have_more_digits_than_the_pattern(tmp_path: Path) -> None:
     make(tmp_path, "98.png", "99.png", "100.png", "0101.png")
     found = find_sequence(tmp_path / "%02d.png")
     assert found == PictureSequence(str(tmp_path / "%02d.png"), 98)
-
-
-def test_without_a_width_numbers_have_no_leading_zeros(tmp_path: Path) -> None:
-    make(tmp_path, "0.png", "1.png", "02.png", "007.png")
-    found = find_sequence(tmp_path / "%d.png")
-    assert found == PictureSequence(str(tmp_path / "%d.png"), 0)
 
 
 def test_a_doubled_per_cent_sign_means_one(tmp_path: Path) -> None:
@@ -118,17 +111,6 @@ def test_numbers_may_rise_by_a_step(tmp_path: Path) -> None:
     make(tmp_path, "7_0006.png", "7_0009.png", "7_0012.png")
     pattern = str(tmp_path / "7_%04d.png")
     assert find_sequence(tmp_path) == PictureSequence(pattern, 6, 3)
-
-
-def test_a_folder_that_is_missing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(VideoError, match="its folder cannot be read: No such file"):
-        find_sequence(tmp_path / "none" / "%d.png")
-
-
-@given(st.text(st.sampled_from("%0123d4s.png\n*[("), min_size=1, max_size=12))
-def test_any_name_is_a_pattern_or_none(name: str) -> None:
-    with contextlib.suppress(VideoError):
-        assert find_sequence(Path("no-such-folder") / name) is None
 
 
 @given(

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import av
-import cv2
 import numpy as np
 import pytest
-from av.stream import Disposition
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -106,26 +104,6 @@ class TestRange:
             assert next(iter(reader)).index == 0
         assert list(reader) == []
         assert warnings() == []
-
-    def test_two_readers_of_one_file_are_independent(self, plain_clip: Path) -> None:
-        with VideoReader(plain_clip) as one, VideoReader(plain_clip, threads=1) as other:
-            pairs = list(zip(one, other, strict=True))
-        assert len(pairs) == 12
-        assert all((a.image == b.image).all() for a, b in pairs)
-
-
-@pytest.mark.parametrize("rotation", [90, 180, 270])
-def test_a_turned_clip_looks_as_opencv_shows_it(
-    rotation: int, tmp_path: Path, write_clip: Writer
-) -> None:
-    path = write_clip(tmp_path / "turned.mp4", rotation=rotation)
-    capture = cv2.VideoCapture(str(path))
-    _, other = capture.read()
-    capture.release()
-    with VideoReader(path) as reader:
-        ours = next(iter(reader)).image
-        assert reader.info.orientation == Orientation(rotation)
-    assert np.abs(ours.astype(int) - other).mean() < 3
 
 
 def set_matrix(path: Path, a: float, b: float, c: float, d: float) -> Path:
@@ -267,51 +245,6 @@ class TestPlanes:
             other = decoded.to_ndarray(format="bgr24").astype(int)
             assert np.abs(frame.image - other).mean() < 3
 
-    @pytest.mark.parametrize(
-        ("suffix", "spec"),
-        [
-            ("mp4", {"pix_fmt": "yuv444p"}),
-            ("mp4", {"pix_fmt": "yuv422p"}),
-            ("mp4", {"pix_fmt": "yuv420p10le"}),
-            ("mkv", {"codec": "ffv1", "pix_fmt": "bgr0"}),
-            ("mp4", {"rotation": 90}),
-            ("mp4", {"rotation": 180}),
-            ("mp4", {"rotation": 270, "matrix": 1}),
-        ],
-    )
-    def test_of_frames_that_are_turned_or_of_another_form_there_are_none(
-        self, suffix: str, spec: dict[str, Any], *, tmp_path: Path, write_clip: Writer
-    ) -> None:
-        with VideoReader(write_clip(tmp_path / f"clip.{suffix}", **spec)) as reader:
-            assert reader.info.coding == Coding()
-            assert all(frame.picture.planes is None for frame in reader)
-
-    def test_of_mirrored_frames_there_are_none(self, tmp_path: Path, write_clip: Writer) -> None:
-        path = set_matrix(write_clip(tmp_path / "clip.mp4"), -1, 0, 0, 1)
-        with VideoReader(path) as reader:
-            assert reader.info.orientation == Orientation(mirrored=True)
-            assert all(frame.picture.planes is None for frame in reader)
-
-    @pytest.mark.parametrize(("bits", "matrix"), [(10, 9), (8, 9), (8, 1)])
-    @pytest.mark.parametrize("transfer", [16, 18])
-    def test_of_hdr_there_are_none(
-        self, transfer: int, bits: int, matrix: int, *, tmp_path: Path
-    ) -> None:
-        path = write_hdr(tmp_path / "hdr.mkv", transfer, 100, bits=bits, matrix=matrix)
-        with VideoReader(path) as reader:
-            assert reader.info.coding == Coding()
-            assert [frame.picture.planes for frame in reader] == [None]
-
-    def test_of_frames_that_are_scaled_there_are_none(
-        self, tmp_path: Path, write_clip: Writer
-    ) -> None:
-        small = write_clip(tmp_path / "small.h264", count=6)
-        large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
-        path = joined(tmp_path / "both.h264", small, large)
-        with VideoReader(path) as reader:
-            planar = [frame.picture.planes is not None for frame in reader]
-        assert planar == [True] * 6 + [False] * 9
-
     def test_of_frames_that_are_coded_unlike_the_first_there_are_none(
         self, tmp_path: Path, write_clip: Writer
     ) -> None:
@@ -328,16 +261,6 @@ class TestPlanes:
             assert np.abs(corner - (40, 30, 210)).max() < 5, "its own coding counts"
 
 
-def test_raw_motion_jpeg_is_read(
-    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
-) -> None:
-    spec = {"codec": "mjpeg", "pix_fmt": "yuvj420p", "options": {"q": "2"}}
-    path = write_clip(tmp_path / "clip.mjpeg", **spec).rename(tmp_path / "clip.raw")
-    with VideoReader(path) as reader:
-        assert [read_number(frame.image) for frame in reader] == list(range(12))
-    assert warnings() == []
-
-
 def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> None:
     rate = Fraction(30_000, 1001)
     path = write_clip(tmp_path / "a.mp4", rate=rate, matrix=1, sounds=["aac"])
@@ -349,40 +272,6 @@ def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> N
     assert info.duration == pytest.approx(12 / rate, abs=0.001)
     assert (info.color.matrix, info.color.primaries, info.color.transfer) == (1, 2, 2)
     assert info.has_sound
-
-
-def test_a_cover_picture_is_not_the_video(
-    tmp_path: Path, write_clip: Writer, read_number: Number
-) -> None:
-    source = write_clip(tmp_path / "plain.mp4")
-    path = tmp_path / "cover.mp4"
-    with av.open(str(source)) as original, av.open(str(path), "w") as target:
-        cover = target.add_stream("png", rate=1)
-        assert isinstance(cover, av.VideoStream)
-        cover.width, cover.height, cover.pix_fmt = 32, 32, "rgb24"
-        cover.disposition = Disposition.attached_pic
-        copy = target.add_stream_from_template(original.streams.video[0])
-        target.mux(cover.encode(av.VideoFrame(32, 32, "rgb24")) + cover.encode(None))
-        for packet in original.demux(original.streams.video[0]):
-            if packet.size:
-                packet.stream = copy
-                target.mux(packet)
-    with VideoReader(path) as reader:
-        assert [read_number(frame.image) for frame in reader] == list(range(12))
-
-
-def test_frames_of_another_size_are_scaled_to_the_first(
-    tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
-) -> None:
-    small = write_clip(tmp_path / "small.h264", count=6)
-    large = write_clip(tmp_path / "large.h264", count=9, size=(320, 192))
-    path = joined(tmp_path / "both.h264", small, large)
-    with VideoReader(path) as reader:
-        frames = list(reader)
-    assert {frame.image.shape for frame in frames} == {(96, 160, 3)}
-    assert [read_number(frame.image) for frame in frames] == [*range(6), *range(9)]
-    assert [frame.time for frame in frames] == [Fraction(index, 25) for index in range(15)]
-    assert warnings() == [f"{path}: frames of 320×192 pixels scaled to 160×96"]
 
 
 class TestFaults:
@@ -439,17 +328,6 @@ class TestFaults:
         (warning,) = set(warnings())
         assert f"{path}: {damaged} of " in warning
 
-    def test_damage_in_the_middle_spares_both_ends(
-        self, tmp_path: Path, write_clip: Writer, read_number: Number
-    ) -> None:
-        path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
-        overwrite(path, 1, size=600)
-        with VideoReader(path, settings=TOLERANT) as reader:
-            frames = list(reader)
-        assert [read_number(frame.image) for frame in frames[:10]] == list(range(10))
-        assert read_number(frames[-1].image) == 59
-        assert frames[-1].time == Fraction(59, 25)
-
     def test_more_damage_than_is_tolerated_is_an_error_after_the_last_frame(
         self, tmp_path: Path, write_clip: Writer, warnings: Warnings
     ) -> None:
@@ -503,18 +381,9 @@ class TestRefusals:
     def test_a_missing_file(self, tmp_path: Path) -> None:
         assert "no such file" in self.refusal(tmp_path / "none.mp4")
 
-    def test_a_folder(self, tmp_path: Path) -> None:
-        assert "is a folder" in self.refusal(tmp_path)
-
     @pytest.mark.parametrize("address", ["rtsp://camera/1", "https://host/a.mp4", "udp://@:1234"])
     def test_an_address(self, address: str) -> None:
         assert "streams are not read; record it into a file" in self.refusal(Path(address))
-
-    def test_standard_input(self) -> None:
-        assert "standard input is not read" in self.refusal(Path("-"))
-
-    def test_a_wrong_pattern_of_pictures(self, tmp_path: Path) -> None:
-        assert "give numbered pictures as img_%04d.png" in self.refusal(tmp_path / "img_%4d.png")
 
     @pytest.mark.parametrize(
         "content", ["", "plain text\n" * 40, "1\n00:00:01,000 --> 00:00:02,000\nsubtitle\n"]
@@ -547,21 +416,8 @@ def clock_times(*stamps: int | None) -> list[Fraction]:
     return [clock.time(stamp) for stamp in stamps]
 
 
-def test_stamps_that_increase_are_taken_exactly() -> None:
-    assert clock_times(-7, 0, 3, 1000) == [-7 * TICK, 0, 3 * TICK, 1]
-
-
 def test_a_missing_stamp_is_one_period_after_the_frame_before() -> None:
     assert clock_times(None, None, 200, None) == [0, PERIOD, Fraction(1, 5), Fraction(6, 25)]
-
-
-def test_a_stamp_that_repeats_or_goes_back_counts_as_missing() -> None:
-    assert clock_times(100, 100, 20, 500) == [
-        Fraction(1, 10),
-        Fraction(7, 50),
-        Fraction(9, 50),
-        Fraction(1, 2),
-    ]
 
 
 @given(st.lists(st.none() | st.integers(-(2**40), 2**40)))

@@ -77,16 +77,6 @@ def test_frames_that_change_size_are_scaled_to_the_first_with_a_warning(
     assert "both.h264: frames of 320×192 pixels scaled to 160×96" in warning
 
 
-def test_frames_that_change_from_landscape_to_portrait_are_scaled(
-    tmp_path: Path, process: Process
-) -> None:
-    wide = write_clip(tmp_path / "wide.h264", count=3)
-    high = write_clip(tmp_path / "high.h264", count=3, size=(96, 160))
-    shown = process(joined(tmp_path / "both.h264", wide, high))
-    assert {image.shape for image in shown.images} == {(96, 160, 3)}
-    assert_whole(shown, [0, 1, 2, 0, 1, 2])
-
-
 def _tiny(path: Path, size: tuple[int, int]) -> Path:
     return write_clip(path, size=size, count=5, codec="ffv1", pix_fmt="bgr0")
 
@@ -109,15 +99,6 @@ def test_frames_too_small_for_any_window_pass_with_a_warning(
     width, height = size
     assert "tiny.mkv: gets no boxes: no search window fits into a frame" in warning
     assert f"{width}×{height}" in warning
-
-
-@pytest.mark.parametrize("size", [(16, 16), (15, 9)])
-def test_frames_smaller_than_a_patch_are_searched_in_windows_as_small(
-    size: tuple[int, int], tmp_path: Path, process: Process
-) -> None:
-    shown = process(_tiny(tmp_path / "tiny.mkv", size))
-    assert_complete(shown, size)
-    assert shown.warnings == []
 
 
 def test_frames_with_too_many_windows_are_refused(run: Run, tmp_path: Path) -> None:
