@@ -25,7 +25,6 @@ from vdet.run.loop import build, peek
 from vdet.run.steps import LaneStep, with_positions
 from vdet.synthetic import must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.lane_view import lane_view
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
 from vdet.synthetic.truth import TruePlace, true_places
@@ -79,7 +78,7 @@ class Drive:
         """Return the lane finder, set to the road from 6 m, or the nearest seen, to 42 m."""
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
-        view = lane_view(camera, near=max(6.0, nearest), far=42.0)
+        view = camera.lane_view(near=max(6.0, nearest), far=42.0)
         settings = view
         return RoadFinder(LaneRequest(), settings, camera.width, camera.height)
 

@@ -8,7 +8,7 @@ import pytest
 from red_cars import SETTINGS, red_finder
 from vdet.config.rendering import render
 from vdet.detect.svm.model import save_model
-from vdet.synthetic.clip import write_truth
+from vdet.synthetic import write_truth
 from vdet.synthetic.scene import Scene
 
 

@@ -21,7 +21,7 @@ from vdet.labels.mot import read_mot
 from vdet.labels.truth import read_truth
 from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
 from vdet.media import VideoReader
-from vdet.synthetic.clip import write_truth
+from vdet.synthetic import write_truth
 from vdet.synthetic.scene import Scene
 from vdet.track.track import FrameTracks
 

@@ -9,7 +9,6 @@ from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.lane_view import lane_view
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Carriageway, Light, Line, Scene
 
@@ -22,7 +21,7 @@ def settings_for() -> Callable[[PinholeCamera], LaneSettings]:
     """Make settings whose top view shows the road from 6 m to 42 m ahead of a level camera."""
 
     def make(camera: PinholeCamera) -> LaneSettings:
-        return lane_view(camera, near=NEAR, far=FAR)
+        return camera.lane_view(near=NEAR, far=FAR)
 
     return make
 

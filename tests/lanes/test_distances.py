@@ -10,7 +10,6 @@ from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.synthetic import must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.lane_view import lane_view
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
 from vdet.synthetic.truth import true_places
@@ -68,7 +67,7 @@ def told_of(scene: Scene, index: int, road: Road) -> Iterable[Told]:
 def finder_of(scene: Scene) -> RoadFinder:
     camera = scene.camera
     nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
-    view = lane_view(camera, near=max(6.0, nearest), far=42)
+    view = camera.lane_view(near=max(6.0, nearest), far=42)
     return RoadFinder(LaneRequest(), view, camera.width, camera.height)
 
 

@@ -16,7 +16,6 @@ from vdet.lanes.position import RoadPosition, position_on_road
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.lanes.top_view import TopView
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.lane_view import lane_view
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
 
@@ -36,7 +35,7 @@ def pixel_of(
 
 
 def place(foot: tuple[float, float], curves: LaneCurves = STRAIGHT) -> RoadPosition | None:
-    view = TopView(lane_view(CAMERA, near=6, far=FAR), CAMERA.width, CAMERA.height)
+    view = TopView(CAMERA.lane_view(near=6, far=FAR), CAMERA.width, CAMERA.height)
     return position_on_road(foot, curves, view)
 
 
@@ -63,7 +62,7 @@ class TestGeometry:
         height: float,
     ) -> None:
         camera = PinholeCamera(1280, 720, focal * 720, 330, height, curvature=1 / radius)
-        view = TopView(lane_view(camera, near=20, far=FAR), 1280, 720)
+        view = TopView(camera.lane_view(near=20, far=FAR), 1280, 720)
         curves = LaneCurves(0.5 / radius, heading, shift - 1.85, shift + 1.85, pitch)
         pitched = replace(camera, horizon=330 + pitch * camera.focal * height)
         foot = pixel_of(distance, lateral + heading * distance, pitched)
@@ -118,7 +117,7 @@ class TestWhatIsNotKnown:
 
     def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known(self) -> None:
         small = PinholeCamera.dashboard(160, 90)
-        view = TopView(lane_view(small, near=6, far=FAR), small.width, small.height)
+        view = TopView(small.lane_view(near=6, far=FAR), small.width, small.height)
         feet = [(80, small.horizon + rows) for rows in (10.5, 9.5)]
         positions = [position_on_road(foot, STRAIGHT, view) for foot in feet]
         assert [each is not None for each in positions] == [True, False]

@@ -19,7 +19,6 @@ from vdet.run.result import FrameResult
 from vdet.run.steps import with_positions
 from vdet.synthetic import frames, render, true_boxes
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.lane_view import lane_view
 from vdet.synthetic.scene import Carriageway, Light, Line, Scene, SceneVehicle, Waypoint
 from vdet.synthetic.truth import true_places
 from vdet.track.track import Track
@@ -28,7 +27,7 @@ WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 SETTINGS = Settings(
-    lanes=lane_view(CAMERA, near=6, far=42),
+    lanes=CAMERA.lane_view(near=6, far=42),
     tracker=MotionTrackerSettings(needed=0.05),
 )
 SCENE = Scene(

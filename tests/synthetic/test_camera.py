@@ -8,12 +8,6 @@ from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near
 metres = st.floats(-50, 50)
 
 
-def test_a_point_at_camera_height_far_ahead_lies_on_the_horizon() -> None:
-    camera = PinholeCamera.dashboard(1280, 720)
-    [[u, v]] = camera.project(np.array([[0.0, camera.above_ground, 1000.0]]))
-    assert (u, v) == pytest.approx((640, camera.horizon))
-
-
 def test_projection_is_that_of_a_pinhole() -> None:
     camera = PinholeCamera(800, 600, focal=1000, horizon=300, above_ground=1.2)
     [[u, v]] = camera.project(np.array([[2.0, 0.0, 20.0]]))
@@ -25,18 +19,6 @@ def test_a_right_hand_bend_moves_the_road_by_half_its_curvature_times_distance_s
     point = np.array([[1.0, 0.0, 40.0]])
     moved = straight.project(point + np.array([40.0**2 / 2 / 500, 0, 0]))
     assert bent.project(point) == pytest.approx(moved)
-
-
-def test_a_polygon_behind_the_camera_has_no_outline() -> None:
-    behind = np.array([[0, 0, -1], [1, 0, -1], [1, 1, -2]], dtype=float)
-    assert PinholeCamera.dashboard(1280, 720).outline(behind).shape == (0, 2)
-
-
-def test_a_polygon_that_reaches_behind_the_camera_is_cut_at_near() -> None:
-    polygon = np.array([[0, 0, -3], [2, 0, -3], [2, 0, 5], [0, 0, 5]], dtype=float)
-    kept = beyond_near(polygon)
-    assert kept.min(axis=0).tolist() == [0, 0, NEAR]
-    assert kept.max(axis=0).tolist() == [2, 0, 5]
 
 
 @given(st.lists(st.tuples(metres, metres, metres), min_size=3, max_size=6))

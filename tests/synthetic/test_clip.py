@@ -1,14 +1,12 @@
 from collections.abc import Callable
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vdet.errors import OutputError
 from vdet.media import VideoReader
-from vdet.synthetic.clip import frames, write_clip, write_truth
+from vdet.synthetic import frames, write_clip, write_truth
 from vdet.synthetic.scene import Scene, SceneVehicle
 from vdet.synthetic.truth import true_boxes
 
@@ -21,15 +19,6 @@ def scene(make_scene: MakeScene, parked: Parked) -> Scene:
     """Three frames: a vehicle in full view, one hidden behind it, one too small."""
     vehicles = parked(1, 10.0, 0.0), parked(2, 30.0, 0.0), parked(3, 90.0, 9.0)
     return make_scene(*vehicles, size=(640, 360), frames=3)
-
-
-def test_frames_have_exact_times(scene: Scene) -> None:
-    ntsc = replace(scene, rate=Fraction(30000, 1001))
-    assert [(frame.index, frame.time) for frame in frames(ntsc)] == [
-        (0, 0),
-        (1, Fraction(1001, 30000)),
-        (2, Fraction(1001, 15000)),
-    ]
 
 
 def test_the_video_shows_the_rendered_frames(tmp_path: Path, scene: Scene) -> None:
@@ -57,14 +46,3 @@ def test_hidden_and_small_vehicles_are_ignore_regions(tmp_path: Path, scene: Sce
     rows = np.loadtxt(tmp_path / "gt.txt", delimiter=",")
     assert rows[:3, 6].tolist() == [1, 0, 0]
     assert rows[:3, 8] == pytest.approx([1, 0, 1], abs=0.01)
-
-
-def test_files_of_the_same_scene_are_equal_to_the_byte(tmp_path: Path, scene: Scene) -> None:
-    for name in ("one.txt", "two.txt"):
-        write_truth(tmp_path / name, scene)
-    assert (tmp_path / "one.txt").read_bytes() == (tmp_path / "two.txt").read_bytes()
-
-
-def test_the_error_names_a_file_that_cannot_be_written(tmp_path: Path, scene: Scene) -> None:
-    with pytest.raises(OutputError, match=r"gt\.txt"):
-        write_truth(tmp_path / "missing" / "gt.txt", scene)

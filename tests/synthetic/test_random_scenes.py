@@ -1,11 +1,10 @@
-from dataclasses import replace
 from itertools import pairwise
 
 import pytest
 
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.random_scenes import LANE_WIDTH, demo_scene, traffic_scene
-from vdet.synthetic.scene import Light, Scene
+from vdet.synthetic.random_scenes import demo_scene, traffic_scene
+from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 
 
@@ -22,10 +21,6 @@ def history(scene: Scene, number: int) -> list[tuple[int, TrueBox]]:
 @pytest.fixture(params=[0, 1, 2])
 def scene(request: pytest.FixtureRequest) -> Scene:
     return demo_scene(request.param)
-
-
-def test_ids_count_from_1(scene: Scene) -> None:
-    assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4]
 
 
 def test_one_vehicle_leaves_at_the_right_edge(scene: Scene) -> None:
@@ -71,18 +66,6 @@ CAMERAS = (PinholeCamera.dashboard(1280, 720), PinholeCamera(1242, 375, 721, 172
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("lane", [0, 1, 2])
-def test_each_lane_has_a_near_and_a_far_vehicle(camera: PinholeCamera, lane: int) -> None:
-    scene = traffic_scene(camera, lane=lane, lanes=3, frames=30, seed=1)
-    lanes: dict[int, list[float]] = {0: [], 1: [], 2: []}
-    for vehicle in scene.vehicles:
-        ahead, lateral = vehicle.position(0.0) or (0.0, 0.0)
-        lanes[round(lateral / LANE_WIDTH) + lane].append(ahead)
-    assert [vehicle.id for vehicle in scene.vehicles] == [1, 2, 3, 4, 5, 6]
-    assert all(8 < near < 20 < far < 40 for near, far in lanes.values())
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize(("lane", "hidden"), [(0, {2, 6}), (1, {4}), (2, {2, 6})])
 def test_all_vehicles_must_be_found_except_those_that_nearer_ones_hide(
     camera: PinholeCamera, lane: int, hidden: set[int]
@@ -102,12 +85,3 @@ def test_traffic_keeps_its_speed_and_lane_to_the_last_frame() -> None:
         assert steps[0] == pytest.approx(steps[1])
         assert 0.5 < steps[0] < 2.5
         assert len({lateral for _, lateral in places}) == 1
-
-
-def test_traffic_uses_the_light_that_it_is_given() -> None:
-    dusk = Light(gain=0.5)
-    given = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1, light=dusk)
-    drawn = traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=1)
-    assert given == replace(drawn, light=dusk)
-    assert drawn.light != dusk
-    assert drawn != traffic_scene(CAMERAS[0], lane=1, lanes=3, frames=30, seed=2)

@@ -1,4 +1,4 @@
-"""The pinhole camera: from points in metres to pixels.
+"""The pinhole camera: from points in metres to pixels, and outlines filled with colours.
 
 Points are metres: x to the right of the camera, y up from the ground, z ahead of the camera,
 measured along the road. Pixels are x to the right, y down, whole numbers at pixel centres.
@@ -6,12 +6,19 @@ measured along the road. Pixels are x to the right, y down, whole numbers at pix
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+import numpy.typing as npt
 
 from vdet.boxes import Float64Array
+from vdet.config.lanes import LaneSettings
+from vdet.draw.paint import Color
+from vdet.media.images import Image
 
 NEAR = 0.5
 """Metres; nothing nearer than this is drawn."""
+
+_SHIFT = 4  # fractional bits of the coordinates given to OpenCV
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +50,33 @@ class PinholeCamera:
         pixels[:, 1] = self.horizon + self.focal * (self.above_ground - y) / z
         return pixels
 
-    def outline(self, polygon: Float64Array) -> Float64Array:
-        """Return the pixels `(m, 2)` of the part of a polygon `(n, 3)` beyond `NEAR`."""
-        return self.project(beyond_near(polygon))
+    def draw(self, image: Image, polygon: Float64Array, color: Color) -> None:
+        """Fill the part of a polygon `(n, 3)` beyond `NEAR`."""
+        fill(image, self.project(beyond_near(polygon)), color)
+
+    def lane_view(self, *, near: float, far: float, width: float = 3.7) -> LaneSettings:
+        """Return the settings of a lane finder that shows the road from `near` to `far` metres.
+
+        The camera is in the middle of a lane that is `width` metres wide; it sees the road at
+        `near`.
+        """
+
+        def column(lateral: float, distance: float) -> float:
+            return 0.5 + self.focal * lateral / distance / self.width
+
+        def row(distance: float) -> float:
+            return (self.horizon + self.focal * self.above_ground / distance) / self.height
+
+        return LaneSettings(
+            top=row(far),
+            bottom=row(near),
+            top_left=column(-width / 2, far),
+            top_right=column(width / 2, far),
+            bottom_left=column(-width / 2, near),
+            bottom_right=column(width / 2, near),
+            lane_width=width,
+            length=far - near,
+        )
 
 
 def beyond_near(polygon: Float64Array) -> Float64Array:
@@ -67,3 +98,31 @@ def beyond_near(polygon: Float64Array) -> Float64Array:
 def distances(start: float, end: float) -> Float64Array:
     """Return distances from `start` to `end`, 5 % apart, which is enough to follow any bend."""
     return np.geomspace(start, end, 2 + int(20 * np.log(end / start)))
+
+
+def fill(image: Image, outline: Float64Array, color: Color) -> None:
+    """Fill an outline of pixels `(n, 2)` with smooth edges; an empty outline changes nothing."""
+    if len(outline):
+        cv2.fillPoly(image, [_fixed(outline)], color, cv2.LINE_AA, _SHIFT)
+
+
+def fill_mask(mask: Image, outline: Float64Array) -> None:
+    """Set the pixels `(H, W)` inside an outline to 255, its border included."""
+    if len(outline):
+        cv2.fillPoly(mask, [_fixed(outline)], 255, cv2.LINE_8, _SHIFT)
+
+
+def shaded(color: Color, factor: float) -> Color:
+    """Return a colour made darker (below 1) or lighter (above 1)."""
+    blue, green, red = (min(255, max(0, round(value * factor))) for value in color)
+    return blue, green, red
+
+
+def mixed(color: Color, other: Color, share: float) -> Color:
+    """Return a colour with this `share` of another one, 0 to 1."""
+    blue, green, red = (round(a + (b - a) * share) for a, b in zip(color, other, strict=True))
+    return blue, green, red
+
+
+def _fixed(outline: Float64Array) -> npt.NDArray[np.int32]:
+    return np.rint(outline * (1 << _SHIFT)).astype(np.int32)

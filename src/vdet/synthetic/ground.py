@@ -10,8 +10,7 @@ import numpy as np
 
 from vdet.boxes import Float32Array, Float64Array
 from vdet.media.images import Image
-from vdet.synthetic.camera import NEAR, distances
-from vdet.synthetic.painting import fill, mixed
+from vdet.synthetic.camera import NEAR, distances, mixed
 from vdet.synthetic.scene import PERIOD, Carriageway, Line, Scene, Shadow
 
 _TEXEL = 0.1  # metres a pixel of the finest texture
@@ -160,13 +159,8 @@ def _dashes(line: Line, station: float) -> Iterator[tuple[float, float]]:
 
 def _draw_stripe(image: Image, scene: Scene, line: Line, start: float, end: float) -> None:
     """Draw a lane line from `start` to `end`, metres ahead."""
-    outline = scene.camera.outline(_stripe(line, start, end))
-    fill(image, outline, mixed(scene.road.asphalt, line.color, line.strength))
-
-
-def _stripe(line: Line, start: float, end: float) -> Float64Array:
-    """Return the outline of a piece of lane line on the ground, points `(n, 3)` in metres."""
     z = distances(start, end)
-    side = np.repeat([-0.5, 0.5], len(z)) * line.width
+    x = line.lateral + np.repeat([-0.5, 0.5], len(z)) * line.width
     z = np.concatenate([z, z[::-1]])
-    return np.stack([line.lateral + side, np.zeros_like(z), z], axis=1)
+    stripe = np.stack([x, np.zeros_like(z), z], axis=1)
+    scene.camera.draw(image, stripe, mixed(scene.road.asphalt, line.color, line.strength))

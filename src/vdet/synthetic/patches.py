@@ -7,14 +7,14 @@ is far too small for the patch).
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.errors import OutputError
+from vdet.files import make_folder
 from vdet.media.images import Image, write_image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
@@ -25,8 +25,8 @@ from vdet.synthetic.truth import TrueBox, true_boxes
 PATCH = 64
 """Side of a patch, pixels."""
 
-VEHICLE_GROUPS = ("near", "far")
-BACKGROUND_GROUPS = ("road", "roadside", "parts")
+VEHICLE_GROUPS: tuple[str, ...] = ("near", "far")
+BACKGROUND_GROUPS: tuple[str, ...] = ("road", "roadside", "parts")
 
 _MAX_VEHICLE = 0.15  # largest share of a background patch that vehicles fill
 _FAR = 130  # windows narrower than this many pixels are `far`
@@ -37,29 +37,28 @@ _CARS = 50  # different cars on each road
 _OBJECTS = 8  # most roadside objects taken from a frame
 
 
-@dataclass(frozen=True, slots=True)
-class _LabelledFrame:
-    """A rendered frame, its vehicles, and the boxes of some objects beside the road."""
+_Sample = tuple[str, Image]
+"""The group of a patch, and the patch, BGR uint8 `(64, 64, 3)`."""
 
-    image: Image
-    vehicles: tuple[TrueBox, ...]
-    objects: tuple[Box, ...]
+_Frame = tuple[Image, tuple[TrueBox, ...], tuple[Box, ...]]
+"""A rendered frame, its vehicles, and the boxes of some objects beside the road."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Sample:
-    group: str
-    patch: Image
+def draw_patches(count: int, rng: np.random.Generator, *, vehicles: bool) -> list[_Sample]:
+    """Draw patches of cars seen from behind, or patches without a whole vehicle.
 
-
-def vehicle_patches(count: int, rng: np.random.Generator) -> Image:
-    """Return patches of cars seen from behind, BGR uint8 `(count, 64, 64, 3)`."""
-    return _stacked(_collect(_vehicle_samples(rng), VEHICLE_GROUPS, count))
-
-
-def background_patches(count: int, rng: np.random.Generator) -> Image:
-    """Return patches without a whole vehicle, BGR uint8 `(count, 64, 64, 3)`."""
-    return _stacked(_collect(_background_samples(rng), BACKGROUND_GROUPS, count))
+    The groups get the same number of patches, to within one.
+    """
+    samples = _vehicle_samples(rng) if vehicles else _background_samples(rng)
+    groups = VEHICLE_GROUPS if vehicles else BACKGROUND_GROUPS
+    missing = {group: (count + i) // len(groups) for i, group in enumerate(groups)}
+    kept: list[_Sample] = []
+    while len(kept) < count:
+        group, patch = next(samples)
+        if missing[group]:
+            missing[group] -= 1
+            kept.append((group, patch))
+    return kept
 
 
 def write_patches(
@@ -67,70 +66,42 @@ def write_patches(
 ) -> None:
     """Write `vehicles/<group>/image0001.png` … and `non-vehicles/<group>/…` below a folder.
 
-    The groups of a class get the same number of patches, to within one.
-
     Raises
     ------
     OutputError
         A folder or file cannot be written.
     """
     rng = np.random.default_rng(seed)
-    cars = _collect(_vehicle_samples(rng), VEHICLE_GROUPS, vehicles)
-    background = _collect(_background_samples(rng), BACKGROUND_GROUPS, non_vehicles)
-    _write(folder / "vehicles", cars, overwrite=overwrite)
-    _write(folder / "non-vehicles", background, overwrite=overwrite)
-
-
-def _stacked(samples: list[_Sample]) -> Image:
-    patches = [sample.patch for sample in samples]
-    return np.stack(patches) if patches else np.zeros((0, PATCH, PATCH, 3), np.uint8)
-
-
-def _write(folder: Path, samples: list[_Sample], *, overwrite: bool) -> None:
-    numbers: Counter[str] = Counter()
-    for sample in samples:
-        numbers[sample.group] += 1
-        path = folder / sample.group / f"image{numbers[sample.group]:04}.png"
-        _make_folder(path.parent)
-        write_image(path, sample.patch, overwrite=overwrite)
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made: {error.strerror}") from error
-
-
-def _collect(samples: Iterator[_Sample], groups: tuple[str, ...], count: int) -> list[_Sample]:
-    """Take samples until each group has its share of `count`, equal to within one."""
-    missing = {group: (count + i) // len(groups) for i, group in enumerate(groups)}
-    kept: list[_Sample] = []
-    while len(kept) < count:
-        sample = next(samples)
-        if missing[sample.group]:
-            missing[sample.group] -= 1
-            kept.append(sample)
-    return kept
+    drawn = {
+        "vehicles": draw_patches(vehicles, rng, vehicles=True),
+        "non-vehicles": draw_patches(non_vehicles, rng, vehicles=False),
+    }
+    for name, samples in drawn.items():
+        numbers: Counter[str] = Counter()
+        for group, patch in samples:
+            numbers[group] += 1
+            make_folder(folder / name / group)
+            path = folder / name / group / f"image{numbers[group]:04}.png"
+            write_image(path, patch, overwrite=overwrite)
 
 
 def _vehicle_samples(rng: np.random.Generator) -> Iterator[_Sample]:
-    for frame in _labelled_frames(rng):
-        for vehicle in frame.vehicles * 2:
+    for image, vehicles, _ in _labelled_frames(rng):
+        for vehicle in vehicles * 2:
             window = _around(vehicle.box, rng)
-            if vehicle.visibility > 0.9 and _fits(window, frame.image):
+            if vehicle.visibility > 0.9 and _fits(window, image):
                 group = "far" if window.width < _FAR else "near"
-                yield _Sample(group, _cut(frame.image, window, rng))
+                yield group, _cut(image, window, rng)
 
 
 def _background_samples(rng: np.random.Generator) -> Iterator[_Sample]:
-    for frame in _labelled_frames(rng):
-        windows = [("road", _along_road(frame.image, rng)) for _ in range(8)]
-        windows += [("roadside", _around(box, rng)) for box in frame.objects]
-        windows += [("parts", _at_edge(vehicle.box, rng)) for vehicle in frame.vehicles * 4]
+    for image, vehicles, objects in _labelled_frames(rng):
+        windows = [("road", _along_road(image, rng)) for _ in range(8)]
+        windows += [("roadside", _around(box, rng)) for box in objects]
+        windows += [("parts", _at_edge(vehicle.box, rng)) for vehicle in vehicles * 4]
         for group, window in windows:
-            if _fits(window, frame.image) and not _is_filled(window, frame.vehicles):
-                yield _Sample(group, _cut(frame.image, window, rng))
+            if _fits(window, image) and not _is_filled(window, vehicles):
+                yield group, _cut(image, window, rng)
 
 
 def _around(box: Box, rng: np.random.Generator) -> Box:
@@ -183,14 +154,14 @@ def _cut(image: Image, window: Box, rng: np.random.Generator) -> Image:
     return np.asarray(np.clip(patch * rng.uniform(0.75, 1.25), 0, 255), np.uint8)
 
 
-def _labelled_frames(rng: np.random.Generator) -> Iterator[_LabelledFrame]:
+def _labelled_frames(rng: np.random.Generator) -> Iterator[_Frame]:
     """Render frames of one random road after another, without end."""
     while True:
         scene = _busy_road(rng)
         renderer = Renderer(scene)
         for index in range(scene.frames):
             image = _compressed(renderer.image(index), rng)
-            yield _LabelledFrame(image, true_boxes(scene, index), _objects(scene, index))
+            yield image, true_boxes(scene, index), _objects(scene, index)
 
 
 def _compressed(image: Image, rng: np.random.Generator) -> Image:

@@ -1,17 +1,26 @@
-"""Rendering: from scenes to frames."""
+"""Rendering: from scenes to frames, and to a video file."""
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.config.schema import OutputSettings
 from vdet.draw.paint import Color
+from vdet.files import staged
+from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
+from vdet.media.writer import may_replace_video
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.ground import Ground, brightness
 from vdet.synthetic.roadside import Roadside
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import draw_vehicle
 
+_CRF = 20  # of the video; it is material to be searched, so it is finer than what is shown
 _SHIFT = 61  # pixels by which the noise image is larger than a frame
 
 
@@ -59,6 +68,37 @@ class Renderer:
 def render(scene: Scene, index: int) -> Image:
     """Return one frame, BGR uint8 `(H, W, 3)`; use a `Renderer` for many frames of a scene."""
     return Renderer(scene).image(index)
+
+
+def frames(scene: Scene) -> Iterator[Frame]:
+    """Render the frames of a scene, the first at 0 s."""
+    renderer = Renderer(scene)
+    for index in range(scene.frames):
+        yield Frame(index, Fraction(index) / scene.rate, Picture(renderer.image(index)))
+
+
+def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
+    """Write a scene as an H.264 video without sound.
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written, or its suffix is not that of a video.
+    """
+    info = VideoInfo(
+        path=path,
+        width=scene.camera.width,
+        height=scene.camera.height,
+        rate=scene.rate,
+        time_base=1 / scene.rate,
+        frames=scene.frames,
+    )
+    with (
+        staged(path, overwrite=overwrite, may_replace=may_replace_video) as temporary,
+        VideoWriter(temporary, info, OutputSettings(crf=_CRF), name=path) as writer,
+    ):
+        for frame in frames(scene):
+            writer.write(frame)
 
 
 def _sensor_noise(scene: Scene) -> npt.NDArray[np.int16]:

@@ -4,16 +4,36 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array
-from vdet.draw.paint import Color
 from vdet.media.images import Image
-from vdet.synthetic.camera import NEAR, PinholeCamera, distances
-from vdet.synthetic.painting import fill, shaded
+from vdet.synthetic.camera import NEAR, PinholeCamera, distances, shaded
 from vdet.synthetic.scene import PERIOD, RoadsideObject, Scene, Wall
 
 _FAR = 140.0  # metres; nothing is drawn beyond
 _NEAREST = 3.0
 _SPRITE = 96  # side of an image of foliage, pixels
 _SPRITES = 6
+
+_Part = tuple[float, float, float, float]
+"""Left, right, bottom and top of a part of an object, 0 to 1."""
+
+_CONTAINER = (
+    ((0.0, 1.0, 0.0, 1.0), 1.0),
+    ((0.0, 1.0, 0.9, 1.0), 1.3),
+    ((0.15, 0.85, 0.55, 0.75), 0.35),
+)
+_PANELS: dict[str, tuple[tuple[_Part, float], ...]] = {
+    "sign": (
+        ((0.15, 0.2, 0.0, 0.5), 0.8),
+        ((0.8, 0.85, 0.0, 0.5), 0.8),
+        ((0.0, 1.0, 0.5, 1.0), 1.0),
+        ((0.12, 0.85, 0.82, 0.88), 3.0),
+        ((0.12, 0.7, 0.68, 0.74), 3.0),
+        ((0.12, 0.78, 0.58, 0.64), 3.0),
+    ),
+    "bin": _CONTAINER,
+    "hut": _CONTAINER,
+}
+"""The parts of each kind of object, with the brightness of their colour."""
 
 
 class Roadside:
@@ -29,31 +49,27 @@ class Roadside:
         camera = self._scene.camera
         placed = [((item.station - station) % PERIOD, item) for item in self._scene.roadside]
         for ahead, item in sorted(placed, key=lambda pair: -pair[0]):
-            if _NEAREST < ahead < _FAR:
-                self._draw_object(image, camera, item, ahead)
+            if not _NEAREST < ahead < _FAR:
+                continue
+            if item.kind in ("tree", "bush"):
+                sprite = self._foliage[int(item.station * 10) % _SPRITES]
+                _draw_foliage(image, camera, item, ahead, sprite)
+            else:
+                for part, factor in _PANELS[item.kind]:
+                    panel = _panel(item, ahead, part)
+                    camera.draw(image, panel, shaded(item.color, factor))
         for wall in self._scene.road.walls:
             _draw_wall(image, camera, wall, station)
-
-    def _draw_object(
-        self, image: Image, camera: PinholeCamera, item: RoadsideObject, ahead: float
-    ) -> None:
-        if item.kind in ("tree", "bush"):
-            number = int(item.station * 10) % _SPRITES
-            _draw_foliage(image, camera, item, ahead, self._foliage[number])
-        elif item.kind == "sign":
-            _draw_sign(image, camera, item, ahead)
-        else:
-            _draw_container(image, camera, item, ahead)
 
 
 def _draw_wall(image: Image, camera: PinholeCamera, wall: Wall, station: float) -> None:
     z = distances(NEAR, 4 * _FAR)
     dark, bright = shaded(wall.color, 0.7), shaded(wall.color, 1.35)
-    fill(image, camera.outline(_strip(wall, z, wall.bottom, wall.top)), wall.color)
-    fill(image, camera.outline(_strip(wall, z, wall.top - 0.08, wall.top)), bright)
+    camera.draw(image, _strip(wall, z, wall.bottom, wall.top), wall.color)
+    camera.draw(image, _strip(wall, z, wall.top - 0.08, wall.top), bright)
     for start in np.arange(wall.spacing - station % wall.spacing, 60.0, wall.spacing):
         joint = np.array([start, start + 0.12])
-        fill(image, camera.outline(_strip(wall, joint, 0.0, wall.top - 0.1)), dark)
+        camera.draw(image, _strip(wall, joint, 0.0, wall.top - 0.1), dark)
 
 
 def _strip(wall: Wall, z: Float64Array, bottom: float, top: float) -> Float64Array:
@@ -62,49 +78,12 @@ def _strip(wall: Wall, z: Float64Array, bottom: float, top: float) -> Float64Arr
     return np.stack([np.full_like(y, wall.lateral), y, np.concatenate([z, z[::-1]])], axis=1)
 
 
-def _panel(
-    item: RoadsideObject, ahead: float, part: tuple[float, float, float, float]
-) -> Float64Array:
-    """Return a rectangle facing the camera; `part` is its left, right, bottom and top, 0 to 1."""
+def _panel(item: RoadsideObject, ahead: float, part: _Part = (0.0, 1.0, 0.0, 1.0)) -> Float64Array:
+    """Return a part of an object as a rectangle facing the camera."""
     left, right, bottom, top = part
     x0, x1 = (item.lateral + (share - 0.5) * item.width for share in (left, right))
     y0, y1 = bottom * item.height, top * item.height
     return np.array([[x0, y0, ahead], [x0, y1, ahead], [x1, y1, ahead], [x1, y0, ahead]])
-
-
-def _draw_sign(image: Image, camera: PinholeCamera, item: RoadsideObject, ahead: float) -> None:
-    """Draw two posts and a board with lines of text."""
-
-    def paint(part: tuple[float, float, float, float], color: Color) -> None:
-        fill(image, camera.outline(_panel(item, ahead, part)), color)
-
-    for left in (0.15, 0.8):
-        paint((left, left + 0.05, 0.0, 0.6), (90, 92, 94))
-    paint((0.0, 1.0, 0.5, 1.0), (215, 218, 218))
-    paint((0.03, 0.97, 0.53, 0.97), item.color)
-    for bottom, right in ((0.82, 0.85), (0.68, 0.7), (0.58, 0.78)):
-        paint((0.12, right, bottom, bottom + 0.06), (215, 218, 218))
-
-
-def _draw_container(
-    image: Image, camera: PinholeCamera, item: RoadsideObject, ahead: float
-) -> None:
-    """Draw a bin or hut: a box with a visible side, a dark slot, and a lid."""
-    inner = item.lateral + (-0.5 if item.lateral > 0 else 0.5) * item.width
-    depth = ahead + item.width
-    side = [
-        [inner, 0, ahead],
-        [inner, item.height, ahead],
-        [inner, item.height, depth],
-        [inner, 0, depth],
-    ]
-    fill(image, camera.outline(np.array(side, dtype=float)), shaded(item.color, 0.75))
-    for part, factor in (
-        ((0.0, 1.0, 0.0, 1.0), 1.0),
-        ((0.0, 1.0, 0.9, 1.0), 1.3),
-        ((0.15, 0.85, 0.55, 0.75), 0.35),
-    ):
-        fill(image, camera.outline(_panel(item, ahead, part)), shaded(item.color, factor))
 
 
 def _foliage(rng: np.random.Generator) -> tuple[Image, Image]:
@@ -126,7 +105,7 @@ def _draw_foliage(
     sprite: tuple[Image, Image],
 ) -> None:
     """Draw the part of a tree or a bush that lies in the frame."""
-    corners = camera.project(_panel(item, ahead, (0.0, 1.0, 0.0, 1.0)))
+    corners = camera.project(_panel(item, ahead))
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     left, top = max(0, int(x0)), max(0, int(y0))
     right, bottom = min(image.shape[1], int(x1) + 1), min(image.shape[0], int(y1) + 1)

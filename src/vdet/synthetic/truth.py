@@ -2,20 +2,22 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
+from vdet.files import staged
 from vdet.media.images import Image
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.painting import fill_mask
+from vdet.synthetic.camera import PinholeCamera, fill_mask
 from vdet.synthetic.scene import Line, Scene
 from vdet.synthetic.vehicle import STANDS, outlines
 
 SMALLEST = (40, 24)
 """Least width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
 
+_CAR = 3  # class number in MOTChallenge
 _RASTER = 256  # pixels along the longer side of the image in which a whole outline is measured
 
 
@@ -117,3 +119,30 @@ def _area(parts: list[Float64Array]) -> float:
     for part in parts:
         fill_mask(mask, (part - low) * scale)
     return cv2.countNonZero(mask) / scale**2
+
+
+def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
+    """Write the true box of each vehicle, in the columns of MOTChallenge ground truth.
+
+    One line per box: `frame, id, left, top, width, height, flag, class, visibility`; frames and
+    pixels count from 1, the class is 3 (car). The flag is 1 for a vehicle that must be
+    found and 0 for an ignore region (`must_be_found`).
+
+    Raises
+    ------
+    OutputError
+        The file cannot be written.
+    """
+    with (
+        staged(path, overwrite=overwrite) as temporary,
+        temporary.open("w", encoding="ascii", newline="\n") as file,
+    ):
+        for index in range(scene.frames):
+            for box in true_boxes(scene, index):
+                file.write(_line(index + 1, box, scene.camera.height))
+
+
+def _line(number: int, vehicle: TrueBox, frame_height: int) -> str:
+    box, flag = vehicle.box, int(must_be_found(vehicle, frame_height))
+    place = f"{box.x + 1},{box.y + 1},{box.width},{box.height}"
+    return f"{number},{vehicle.id},{place},{flag},{_CAR},{vehicle.visibility:.3f}\n"

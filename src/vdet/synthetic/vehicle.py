@@ -5,18 +5,16 @@ its rear. The lower body is a prism, the cabin a frustum on top of it. Lights, p
 wheels are facets painted on them.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
+import cv2
 import numpy as np
-import numpy.typing as npt
 
 from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
 from vdet.media.images import Image
-from vdet.synthetic.camera import NEAR, PinholeCamera, beyond_near
-from vdet.synthetic.painting import fill, mixed, shaded
+from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
 from vdet.synthetic.scene import Body, SceneVehicle
 
 _SHADOW: Color = (34, 32, 32)
@@ -35,12 +33,8 @@ STANDS = _REAR_AXLE - _WHEEL
 """Metres ahead of its rear at which a vehicle is drawn to stand on the road: its rear tyres."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Facet:
-    """A flat polygon `(n, 3)`, its corners clockwise as seen from outside."""
-
-    corners: Float64Array
-    color: Color
+_Facet = tuple[Float64Array, Color]
+"""A flat polygon `(n, 3)`, its corners clockwise as seen from outside, and its colour."""
 
 
 def outlines(
@@ -55,18 +49,12 @@ def outlines(
         return []
     ahead, lateral = position
     offset = np.array([lateral, 0.0, ahead])
-    parts = _facets(vehicle.body, vehicle.color)
-    polygons = [part.corners + offset for part in parts]
-    if ahead < 2 * NEAR:  # lights and plate stand out a little behind the rear
-        polygons = [beyond_near(polygon) for polygon in polygons]
-    ends = np.cumsum([len(polygon) for polygon in polygons])
-    pixels = camera.project(np.concatenate(polygons))
-    facing = _signed_areas(pixels, ends) > 0
-    return [
-        (pixels[end - len(polygon) : end], part.color)
-        for part, polygon, end, seen in zip(parts, polygons, ends, facing, strict=True)
-        if seen
-    ]
+    visible = []
+    for corners, color in _facets(vehicle.body, vehicle.color):
+        pixels = camera.project(beyond_near(corners + offset))
+        if len(pixels) and cv2.contourArea(pixels.astype(np.float32), oriented=True) > 0:
+            visible.append((pixels, color))
+    return visible
 
 
 def draw_vehicle(
@@ -86,8 +74,10 @@ def draw_vehicle(
     if position is None:
         return
     ahead, lateral = position
-    shadow = _footprint(vehicle.body, sun) + np.array([lateral, 0.0, ahead])
-    fill(image, camera.outline(shadow), _SHADOW)
+    half, front = vehicle.body.width / 2, vehicle.body.length
+    left, right = min(0.0, sun) - half, max(0.0, sun) + half
+    shadow = _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
+    camera.draw(image, shadow + np.array([lateral, 0.0, ahead]), _SHADOW)
     for outline, color in outlines(vehicle, camera, time):
         fill(image, outline, shaded(color, light))
 
@@ -104,22 +94,15 @@ def _facets(body: Body, color: Color) -> tuple[_Facet, ...]:
     )
 
 
-def _footprint(body: Body, sun: float) -> Float64Array:
-    """Return the outline of a car's shadow on the ground; with `sun` 0 it stays below the car."""
-    left, right = min(0.0, sun) - body.width / 2, max(0.0, sun) + body.width / 2
-    front = body.length
-    return _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
-
-
 def _underside(body: Body) -> list[_Facet]:
     half = body.width / 2
     tyre = 0.24
     tyres = [
-        _Facet(_upright(left, left + tyre, 0.0, _SILL + 0.05, STANDS), _TYRE)
+        (_upright(left, left + tyre, 0.0, _SILL + 0.05, STANDS), _TYRE)
         for left in (-half + 0.04, half - 0.04 - tyre)
     ]
     below = _upright(-half + 0.1, half - 0.1, 0.1, _SILL + 0.05, STANDS)
-    return [_Facet(below, _UNDERSIDE), *tyres]
+    return [(below, _UNDERSIDE), *tyres]
 
 
 def _lower_body(body: Body, color: Color) -> list[_Facet]:
@@ -139,8 +122,8 @@ def _lower_body(body: Body, color: Color) -> list[_Facet]:
     for (x0, y0), (x1, y1) in pairwise(outline):
         corners = [[x0, y0, 0], [x0, y0, body.length], [x1, y1, body.length], [x1, y1, 0]]
         upward = (x1 - x0) / np.hypot(x1 - x0, y1 - y0)
-        parts.append(_Facet(np.array(corners, dtype=float), shaded(color, 0.78 + 0.3 * upward)))
-    parts.append(_Facet(np.array([[x, y, 0.0] for x, y in outline]), shaded(color, 0.92)))
+        parts.append((np.array(corners, dtype=float), shaded(color, 0.78 + 0.3 * upward)))
+    parts.append((np.array([[x, y, 0.0] for x, y in outline]), shaded(color, 0.92)))
     return parts
 
 
@@ -150,9 +133,9 @@ def _wheels(body: Body, color: Color) -> list[_Facet]:
     for side in (-1, 1):
         x = side * (body.width / 2 + 0.005)
         for axle in (_REAR_AXLE, body.length - 0.9):
-            parts.append(_Facet(_disc(x, axle, _WHEEL + 0.06), shaded(color, 0.3)))
-            parts.append(_Facet(_disc(x, axle, _WHEEL), _TYRE))
-            parts.append(_Facet(_disc(x, axle, 0.62 * _WHEEL), _RIM))
+            parts.append((_disc(x, axle, _WHEEL + 0.06), shaded(color, 0.3)))
+            parts.append((_disc(x, axle, _WHEEL), _TYRE))
+            parts.append((_disc(x, axle, 0.62 * _WHEEL), _RIM))
     return parts
 
 
@@ -161,14 +144,14 @@ def _rear(body: Body, color: Color) -> list[_Facet]:
     half, belt = body.width / 2, body.belt
     bumper = _SILL + 0.32
     parts = [
-        _Facet(_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
-        _Facet(_upright(-half, half, bumper, bumper + 0.03, -0.01), shaded(color, 0.5)),
-        _Facet(_upright(-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01), shaded(color, 1.12)),
-        _Facet(_upright(-0.27, 0.27, bumper + 0.05, bumper + 0.17, -0.02), _PLATE),
+        (_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
+        (_upright(-half, half, bumper, bumper + 0.03, -0.01), shaded(color, 0.5)),
+        (_upright(-half + 0.1, half - 0.1, belt - 0.05, belt, -0.01), shaded(color, 1.12)),
+        (_upright(-0.27, 0.27, bumper + 0.05, bumper + 0.17, -0.02), _PLATE),
     ]
     for left in (-half + 0.02, half - 0.36):
         box = (left, left + 0.34, belt - 0.24, belt - 0.06)
-        parts.append(_Facet(_upright(*box, -0.02), mixed(_LIGHT, shaded(color, 0.5), 0.2)))
+        parts.append((_upright(*box, -0.02), mixed(_LIGHT, shaded(color, 0.5), 0.2)))
     return parts
 
 
@@ -190,13 +173,13 @@ def _cabin(body: Body, color: Color) -> list[_Facet]:
     )
     rear = _quad(left[0], left[1], right[1], right[0])
     top = _quad(left[1], left[2], right[2], right[1])
-    parts = [_Facet(top, shaded(color, 1.1))]
+    parts = [(top, shaded(color, 1.1))]
     for side in (_quad(*reversed(left)), _quad(*right)):
-        parts.append(_Facet(side, shaded(color, 0.85)))
-        parts.append(_Facet(_inset(side, 0.08, 0.47), shaded(_GLASS, 0.8)))
-        parts.append(_Facet(_inset(side, 0.53, 0.92), shaded(_GLASS, 0.8)))
-    parts.append(_Facet(rear, shaded(color, 0.95)))
-    parts.append(_Facet(_inset(rear, 0.1, 0.9), _GLASS))
+        parts.append((side, shaded(color, 0.85)))
+        parts.append((_inset(side, 0.08, 0.47), shaded(_GLASS, 0.8)))
+        parts.append((_inset(side, 0.53, 0.92), shaded(_GLASS, 0.8)))
+    parts.append((rear, shaded(color, 0.95)))
+    parts.append((_inset(rear, 0.1, 0.9), _GLASS))
     return parts
 
 
@@ -228,16 +211,3 @@ def _inset(quad: Float64Array, left: float, right: float) -> Float64Array:
         return np.asarray(lower + up * (upper - lower))
 
     return np.array([at(left, 0.14), at(left, 0.86), at(right, 0.86), at(right, 0.14)])
-
-
-def _signed_areas(pixels: Float64Array, ends: npt.NDArray[np.intp]) -> Float64Array:
-    """Return the areas of outlines in pixels, positive where corners run clockwise on the screen.
-
-    Outline i ends before row `ends[i]` of `pixels`, `(n, 2)`; an empty one has the area 0.
-    """
-    starts = np.concatenate([[0], ends[:-1]])
-    following = np.arange(1, len(pixels) + 1)
-    following[ends[ends > starts] - 1] = starts[ends > starts]
-    x, y = pixels.T
-    total = np.concatenate([[0.0], np.cumsum(x * y[following] - x[following] * y)])
-    return np.asarray(total[ends] - total[starts]) / 2

@@ -17,7 +17,7 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
 from vdet.media.images import Image
-from vdet.synthetic import background_patches, demo_scene, render, vehicle_patches
+from vdet.synthetic import demo_scene, draw_patches, render
 
 Exact = npt.NDArray[np.float64]
 
@@ -114,7 +114,8 @@ def _ridge(vectors: Exact, targets: Exact) -> tuple[Exact, Exact]:
 @functools.cache
 def _patches() -> tuple[list[Image], Float32Array]:
     rng = np.random.default_rng(1)
-    patches = [*vehicle_patches(_EACH, rng), *background_patches(_EACH, rng)]
+    drawn = (draw_patches(_EACH, rng, vehicles=vehicles) for vehicles in (True, False))
+    patches = [patch for samples in drawn for _, patch in samples]
     return patches, np.repeat(np.array([1, -1], np.float32), _EACH)
 
 

@@ -28,7 +28,7 @@ from vdet.progress import no_progress
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
-from vdet.synthetic.clip import write_truth
+from vdet.synthetic import write_truth
 from vdet.synthetic.scene import Scene
 
 FRAMES = 10
