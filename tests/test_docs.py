@@ -10,7 +10,7 @@ import click
 import pytest
 
 from vdet.cli.main import cli
-from vdet.cli.options import read_settings
+from vdet.cli.options import SettingsChoice
 
 ROOT = Path(__file__).parents[1]
 PAGES = [
@@ -86,7 +86,7 @@ def test_every_command_shown_is_understood(page: str, line: str) -> None:
         pytest.fail(f"{page}: {line}: {error.format_message()}")
     config = given.get("config_name")
     if config in (None, "default", "seed"):  # others are the reader's own
-        read_settings(config, given.get("assignments", ()))
+        SettingsChoice(config, given.get("assignments", ())).read()
 
 
 def test_every_make_target_named_is_there() -> None:

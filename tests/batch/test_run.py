@@ -8,7 +8,6 @@ from typing import TypeVar
 import pytest
 
 from running import write_drive
-from vdet.batch.manifest import Origin
 from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, Total, make_plan
 from vdet.batch.run import each_once, run_batch, write_totals
 from vdet.batch.task import Work
@@ -55,10 +54,6 @@ def test_every_item_is_done_once_and_paired_with_its_result() -> None:
     assert workers.calls == [[5, 6, 7, 5]]
 
 
-def test_nothing_to_do() -> None:
-    assert list(each_once(same, [], FakeWorkers(2))) == []
-
-
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_only_items_that_kill_their_process_have_no_result(count: int) -> None:
     items = list(range(10))
@@ -85,7 +80,7 @@ def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: P
     plan = make_plan([clip], tmp_path / "out", VideoJob(Path()), outputs)
     workers = FakeWorkers(1, deadly=list(enumerate(plan.jobs)), kills_left=1)
     work = Work(Settings(), None, threads=1)
-    ((job, record),) = run_batch(plan, work, Origin("", None, None), workers=workers)
+    ((job, record),) = run_batch(plan, work, workers=workers)
     assert len(workers.calls) == 2
     assert record.error is None
     assert all(output.path.exists() for output in job.outputs)

@@ -9,8 +9,7 @@ import pytest
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, red_finder
 from running import names, write_drive
-from vdet.batch.digest import result_digest
-from vdet.batch.task import Work, process_file, record_of_killed
+from vdet.batch.task import Work, process_file, record_of_killed, result_digest
 from vdet.detect.svm.model import save_model
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
@@ -49,6 +48,7 @@ def test_the_record_says_what_was_done_and_folders_are_made(
     assert names(tmp_path / "out") == ["day/a.csv", "day/a.mp4"]
     paths = [output.path for output in job.outputs]
     assert record.sizes == {str(path): path.stat().st_size for path in paths}
+    assert record.times == {str(path): path.stat().st_mtime_ns for path in paths}
     assert record.digest == result_digest(work.digest, job.source)
 
 

@@ -139,7 +139,10 @@ def test_other_settings_another_model_or_a_newer_input_are_not_there_already(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("-d", "out", "--tracks", "all.txt"), "with -d give --tracks a suffix: .txt, .csv, .jso"),
+        (
+            ("-d", "out", "--tracks", "all.txt"),
+            "tracks: with -d give only the ending of the names: .txt, .csv, .jso",
+        ),
         (("-d", "out", "--no-video"), "nothing would be written"),
         (("-d", "out", "--stages", "x", "--at", "1"), "are for one video"),
         (("-d", "out", "--overwrite", "--skip-existing"), "do not go together"),

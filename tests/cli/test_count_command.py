@@ -106,7 +106,11 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (["t.csv"], 2, "nothing to count at; give --lines FILE"),
         (["t.csv", "--lines", "none.yaml"], 1, "none.yaml: cannot be read"),
         (["t.csv", "--lines", "l.yaml", "--size", "320x200"], 1, "given for frames of 320×240"),
-        (["t.csv", "--lines", "l.yaml", "--size", "big"], 2, "'big' is no size"),
+        (
+            ["t.csv", "--lines", "l.yaml", "--size", "big"],
+            2,
+            "'big' is not two numbers, as in 1280x720",
+        ),
         (["t.csv", "--lines", "l.yaml", "--counts", "c.txt"], 2, "written as .csv, .json"),
         (["t.csv", "--lines", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
         (["t.txt", "--lines", "l.yaml"], 1, "has no times; give the frames per second"),

@@ -64,7 +64,7 @@ def test_several_videos_and_a_sweep(
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        ((), 2, "Missing option '--truth'"),
+        ((), 2, "1 videos, 0 --truth; give one for each"),
         (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "1 videos, 2 --truth"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (

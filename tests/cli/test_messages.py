@@ -9,7 +9,10 @@ from tqdm import tqdm
 
 from conftest import Run
 from running import until, write_drive
-from vdet.cli.messages import batch_bar, counted, progress_steps
+from vdet.batch.plan import Plan
+from vdet.cli.batch import batch_bar
+from vdet.cli.messages import counted, progress_steps
+from vdet.run.video import VideoJob
 
 
 class Terminal(io.StringIO):
@@ -27,21 +30,24 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
         def __init__(self, **options: Any) -> None:
             super().__init__(file=terminal, mininterval=0, **options)
 
-    monkeypatch.setattr("vdet.cli.messages.tqdm", Bar)
+    monkeypatch.setattr("tqdm.tqdm", Bar)
     return terminal
 
 
+def plan_of(*names: str) -> Plan:
+    """Return a plan of the first frames of videos."""
+    return Plan(Path(), tuple(VideoJob(Path(name), frames=100) for name in names), ())
+
+
 def test_the_bar_of_a_batch_names_the_running_files_and_counts_frames(terminal: Terminal) -> None:
-    sources = [Path("a.mp4"), Path("b\x1b.mp4"), Path("c.mp4")]
-    with batch_bar(sources, by_size=False, quiet=False) as counts:
+    with batch_bar(plan_of("a.mp4", "b\x1b.mp4", "c.mp4"), quiet=False) as counts:
         assert counts is not None
         counts.progress_of(0)(100)(100)
         counts.end(0, 100)
         counts.progress_of(1)(50)(25)
     last = terminal.getvalue().rstrip("\n").rpartition("\r")[2]
     assert " 125/225 frames [" in last  # the third file is as long as the mean of the others
-    assert " left, " in last
-    assert "1 of 3 files, b\\x1b.mp4 50%]" in last
+    assert " frames/s, 1 of 3 files, b\\x1b.mp4 50%]" in last
 
 
 def test_a_bar_shows_that_the_program_is_at_work(
@@ -105,7 +111,7 @@ class TestNamesThatControlATerminal:
 
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
-    with batch_bar([Path("a.mp4")], by_size=True, quiet=True) as counts:
+    with batch_bar(plan_of("a.mp4"), quiet=True) as counts:
         assert counts is None
     with progress_steps("", quiet=True) as steps:
         steps("fitting", None)

@@ -325,11 +325,23 @@ class TestBatch:
         ("arguments", "code", "words"),
         [
             (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
-            (("--sink", "tracks=a.csv"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
-            (("--sink", "tracks=.json"), 2, "with -d give --tracks a suffix: .txt, .csv, .jsonl"),
-            (("--sink", "video=.avi"), 2, "with -d give --sink video a suffix: .mp4, .mov, .mkv"),
-            (("--sink", "json=.json"), 2, "json: is for pictures; give another sink"),
-            (("--sink", "stages=.png"), 2, "stages: is for one video; leave out -d"),
+            (
+                ("--sink", "tracks=a.csv"),
+                2,
+                "with -d give only the ending of the names: .txt, .csv, .jsonl",
+            ),
+            (
+                ("--sink", "tracks=.json"),
+                2,
+                "with -d give only the ending of the names: .txt, .csv, .jsonl",
+            ),
+            (
+                ("--sink", "video=.avi"),
+                2,
+                "video: with -d give only the ending of the names: .mp4, .mov, .mkv",
+            ),
+            (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
+            (("--sink", "stages=.png"), 2, "stages: cannot be written with -d"),
             (("--sink", "tallies=.csv"), 1, f"tallies: is no sink; {KNOWN}"),
             (("--tracks", ".csv", "--sink", "tracks=.csv"), 2, "tracks is given .csv twice"),
         ],

@@ -86,9 +86,9 @@ def test_a_video_that_fails_leaves_no_folder(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--crops", "crops"), "with -d give --crops a suffix: as in .crops"),
-        (("--page", "page"), "with -d give --page a suffix: as in .page"),
-        (("--summary", ".xml"), "with -d give --summary a suffix: .csv, .json"),
+        (("--crops", "crops"), "crops: with -d give only the ending of the names: as in .crops"),
+        (("--page", "page"), "page: with -d give only the ending of the names: as in .page"),
+        (("--summary", ".xml"), "summary: with -d give only the ending of the names: .csv, .json"),
     ],
 )
 def test_an_end_that_is_none_is_wrong_usage(

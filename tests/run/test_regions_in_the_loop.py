@@ -8,8 +8,7 @@ import pytest
 
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, drive, road
 from run.red_runs import follow, model_for, outputs, run_red
-from vdet.batch.digest import work_digest
-from vdet.batch.manifest import Origin
+from vdet.batch.task import Work
 from vdet.boxes import Box
 from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
@@ -79,10 +78,13 @@ def test_the_stages_show_the_regions(tmp_path: Path) -> None:
 
 def test_a_mask_that_is_drawn_anew_makes_results_out_of_date(tmp_path: Path) -> None:
     mask = tmp_path / "mask.png"
-    settings = within([], mask=str(mask))
-    job, origin = VideoJob(Path("a.mp4")), Origin("vdet", None, None)
+    chosen = Settings(regions=within([], mask=str(mask)).regions)
+
+    def digest() -> str:
+        return Work.of(VideoJob(Path("a.mp4")), ["tracks"], chosen, None, None).digest
+
     write_image(mask, np.zeros((24, 32, 3), np.uint8))
-    before = work_digest(origin, settings, job)
-    assert before == work_digest(origin, settings, job)
+    before = digest()
+    assert before == digest()
     write_image(mask, np.full((24, 32, 3), 255, np.uint8), overwrite=True)
-    assert before != work_digest(origin, settings, job)
+    assert before != digest()

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from vdet.errors import OutputError
 from vdet.files import output_errors
 from vdet.temporary import try_to_lock
+from vdet.version import __version__
 
 _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
@@ -26,9 +27,9 @@ class Origin:
     The last two are None for a detector without a model file.
     """
 
-    program: str
-    model: str | None
-    model_sha256: str | None
+    program: str = f"vdet {__version__}"
+    model: str | None = None
+    model_sha256: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +48,14 @@ class Record:
     width, height
         Size of the upright picture, pixels.
     frames, tracks
-        How many frames were read, and how many tracks were shown.
+        Number of frames read, and of tracks shown.
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
     digest
-        Of all that the outputs depend on: see `vdet.batch.digest`. None if there are none.
-    sizes
-        Bytes of each output, by its path; of a folder those of the files in it.
+        Of everything that the outputs depend on: see `vdet.batch.task`. None without outputs.
+    sizes, times
+        Bytes of each output and the time of its last change (nanoseconds since 1970), by its path;
+        of a folder the sum and the latest of the files in it.
     """
 
     input: str
@@ -68,19 +70,17 @@ class Record:
     error: str | None = None
     digest: str | None = None
     sizes: Mapping[str, int] = field(default_factory=dict)
+    times: Mapping[str, int] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
-    """An output that a manifest names: the digest of what it depends on, and its size in bytes."""
-
-    digest: str
-    size: int
+Written = tuple[str, int, int]
+"""What the manifest says about an output: digest, size and time, as in `Record`."""
 
 
 class _Line(BaseModel):
     digest: str
     sizes: dict[str, int]
+    times: dict[str, int] = {}
 
 
 def check_manifest(path: Path) -> None:
@@ -96,9 +96,9 @@ def check_manifest(path: Path) -> None:
 
 
 def read_written(path: Path) -> dict[str, Written]:
-    """Return the latest record of each output, by its real path; none if there is no manifest.
+    """Return what is written of each output, by its real path; the latest record counts.
 
-    Lines that are no records of outputs are skipped.
+    Lines that are no records of outputs are skipped. Without a manifest there is none.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def read_written(path: Path) -> dict[str, Written]:
             except ValidationError:
                 continue
             for name, size in line.sizes.items():
-                found[os.path.realpath(name)] = Written(line.digest, size)
+                found[os.path.realpath(name)] = line.digest, size, line.times.get(name, 0)
     return found
 
 

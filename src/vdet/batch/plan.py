@@ -1,26 +1,28 @@
 """The plan of a batch: a job for each video. A wrong plan is refused before any work."""
 
 import os
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vdet.batch.digest import result_digest
 from vdet.batch.inputs import Source, find_sources
 from vdet.batch.manifest import Written, check_manifest, read_written
+from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
+from vdet.media.writer import may_replace_video
 from vdet.run.sinks.protocol import (
     BatchTotal,
     Output,
     check_sinks,
-    output_size,
+    output_state,
     sink_kind,
 )
 from vdet.run.video import VideoJob
 
 MANIFEST = "manifest.jsonl"
+
+_TOGETHER = 1_000_000_000  # nanoseconds between the last writes to the outputs of one video
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,7 @@ class OutputSuffix:
     sink
         The name of its sink.
     suffix
-        What its name ends in, after that of the video. None: the video's own suffix if the sink
+        The ending of its name, after that of the video. None: the video's own suffix if the sink
         can write it, else the first that the sink can write.
     """
 
@@ -51,8 +53,8 @@ class OutputOptions:
     overwrite
         Outputs that are there already are replaced.
     skip_existing
-        A job is left out if all its outputs are there, and the manifest says that they are up to
-        date. Else all are made again.
+        A job is skipped if all its outputs are there, and the manifest says that they are up to
+        date. Else all are made again, but only outputs that vdet wrote are replaced.
     """
 
     suffixes: Sequence[OutputSuffix]
@@ -107,7 +109,7 @@ def make_plan(
     ------
     BatchError
         There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
-        name.
+        name; with `skip_existing`, an output is there that vdet did not write.
     OutputError
         An output cannot be written, or is there already; the manifest cannot be used.
     ConfigError
@@ -115,25 +117,24 @@ def make_plan(
     """
     _refuse_nested(clips, folder)
     sources = find_sources(clips)
-    jobs = [_job(source, folder, common, options) for source in sources]
     _refuse_inside(sources, folder)
+    jobs = [_job(source, folder, common, options) for source in sources]
     totals = _totals(sources, folder, options)
-    _refuse_equal(totals)
-    _refuse_shared(jobs, folder, totals)
+    _refuse_shared(jobs, totals, folder)
     manifest = folder / MANIFEST
     check_manifest(manifest)
     check_output(manifest, overwrite=True, makes_folder=True)
     written = read_written(manifest) if options.skip_existing else {}
-    to_do: list[VideoJob] = []
-    skipped: list[VideoJob] = []
-    for job in jobs:
-        (skipped if written and _is_done(job, digest, written) else to_do).append(job)
+    skipped = tuple(job for job in jobs if written and _is_done(job, digest, written))
+    to_do = [job for job in jobs if job not in skipped]
+    if options.skip_existing:
+        to_do = [_replacing_ours(job, written, manifest) for job in to_do]
     for job in to_do:
         check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
     for total in totals:
-        replaces = options.overwrite or options.skip_existing
+        replaces = options.overwrite or (options.skip_existing and manifest.exists())
         check_output(total.path, overwrite=replaces, makes_folder=True)
-    return Plan(folder, tuple(to_do), tuple(skipped), totals)
+    return Plan(folder, tuple(to_do), skipped, totals)
 
 
 def _totals(sources: Sequence[Source], folder: Path, options: OutputOptions) -> tuple[Total, ...]:
@@ -153,11 +154,8 @@ def _totals(sources: Sequence[Source], folder: Path, options: OutputOptions) -> 
 
 def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions) -> VideoJob:
     place = folder / source.place
-    outputs = [Output(each.sink, _path(place, each)) for each in options.suffixes]
-    replaces = options.overwrite or (
-        options.skip_existing and any(os.path.lexists(output.path) for output in outputs)
-    )
-    return replace(common, source=source.path, outputs=tuple(outputs), overwrite=replaces)
+    outputs = tuple(Output(each.sink, _path(place, each)) for each in options.suffixes)
+    return replace(common, source=source.path, outputs=outputs, overwrite=options.overwrite)
 
 
 def _path(place: Path, output: OutputSuffix) -> Path:
@@ -172,11 +170,41 @@ def _path(place: Path, output: OutputSuffix) -> Path:
 def _is_done(job: VideoJob, digest: str, written: Mapping[str, Written]) -> bool:
     """Return whether all outputs of a job are as they were written, for this work and input."""
     digest = result_digest(digest, job.source)
-    return all(
-        (size := output_size(output)) is not None
-        and written.get(os.path.realpath(output.path)) == Written(digest, size)
-        for output in job.outputs
-    )
+    for output in job.outputs:
+        state, known = output_state(output), written.get(os.path.realpath(output.path))
+        if state is None or known is None or known[:2] != (digest, state[0]):
+            return False
+    return True
+
+
+def _replacing_ours(job: VideoJob, written: Mapping[str, Written], manifest: Path) -> VideoJob:
+    """Return a job that replaces its outputs, where vdet wrote all of them that are there.
+
+    They have the sizes and times that the manifest says; or the batch was killed after it had
+    written them, and before the manifest: then there is a video of vdet, and none is newer.
+
+    Raises
+    ------
+    BatchError
+        One is there that vdet did not write, or that was changed since.
+    """
+    unknown = {}
+    for output in job.outputs:
+        state = output_state(output)
+        if state and state[0] and written.get(os.path.realpath(output.path), ())[1:] != state:
+            unknown[output] = state[1]
+    videos = [
+        changed
+        for output, changed in unknown.items()
+        if output.sink == "video" and manifest.exists() and may_replace_video(output.path)
+    ]
+    for output, changed in unknown.items():
+        if not videos or changed > max(videos) + _TOGETHER:
+            raise BatchError(
+                f"{output.path}: vdet did not write it, or it was changed since; move it away, or "
+                "give --overwrite in place of --skip-existing"
+            )
+    return replace(job, overwrite=any(os.path.lexists(output.path) for output in job.outputs))
 
 
 def _refuse_nested(clips: Iterable[Path], folder: Path) -> None:
@@ -197,36 +225,18 @@ def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
             )
 
 
-def _refuse_equal(totals: Sequence[Total]) -> None:
-    for path, count in Counter(total.path for total in totals).items():
-        if count > 1:
-            raise BatchError(f"{path}: two outputs over all videos would have this name; keep one")
-
-
-def _refuse_shared(jobs: Iterable[VideoJob], folder: Path, totals: Sequence[Total]) -> None:
+def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[Total], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
     inputs = {job.source.resolve() for job in jobs}
-    owners: dict[Path, Path] = {}
-    total_paths = {total.path for total in totals}
-    for job in jobs:
-        for path in (output.path for output in job.outputs):
-            if path.resolve() in inputs:
-                raise OutputError(f"{path}: is an input itself; give another folder")
-            if path == folder / MANIFEST:
-                raise BatchError(
-                    f"{job.source}: one of its outputs would be {path}, which is the manifest"
-                )
-            if path in total_paths:
-                raise BatchError(
-                    f"{job.source}: one of its outputs would be {path}, which is over all videos; "
-                    "rename the video"
-                )
-            if path not in owners:
-                owners[path] = job.source
-            elif (other := owners[path]) == job.source:
-                raise BatchError(f"{path}: two outputs of {job.source} would have this name")
-            else:
-                raise BatchError(
-                    f"{other} and {job.source}: both would become {path}; rename one, or take "
-                    "them from a folder above both"
-                )
+    owners = {folder / MANIFEST: "the manifest"}
+    makers = [(total.path, "the outputs of all videos") for total in totals]
+    makers += [(output.path, str(job.source)) for job in jobs for output in job.outputs]
+    for path, maker in makers:
+        if path.resolve() in inputs:
+            raise OutputError(f"{path}: is an input itself; give another folder")
+        if path in owners:
+            raise BatchError(
+                f"{owners[path]} and {maker}: both would become {path}; rename an input, give "
+                "another ending, or name a folder above both inputs"
+            )
+        owners[path] = maker

@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
-from vdet.batch.manifest import Origin, Record, open_manifest
+from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import Plan
 from vdet.batch.progress import FrameCounts
 from vdet.batch.task import Work, process_file, record_of_killed
@@ -21,12 +21,7 @@ R = TypeVar("R")
 
 
 def run_batch(
-    plan: Plan,
-    work: Work,
-    origin: Origin,
-    *,
-    workers: Workers,
-    counts: FrameCounts | None = None,
+    plan: Plan, work: Work, *, workers: Workers, counts: FrameCounts | None = None
 ) -> Generator[tuple[VideoJob, Record]]:
     """Process the files of a plan; yield each when it has ended, with its record in the manifest.
 
@@ -48,7 +43,7 @@ def run_batch(
     function = partial(_process_numbered, work=work, counts=counts)
     try:
         with (
-            open_manifest(plan.manifest, origin) as add,
+            open_manifest(plan.manifest, work.origin) as add,
             closing(
                 each_once(function, list(enumerate(plan.jobs)), workers, again=_replacing)
             ) as results,

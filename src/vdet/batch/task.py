@@ -1,23 +1,30 @@
-"""One file of a batch: process it, and return its record."""
+"""One file of a batch: what it is processed with, what its result depends on, and its record."""
 
+import hashlib
 import logging
 import os
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any, Self
 
-from vdet.batch.digest import result_digest
-from vdet.batch.manifest import Record
+from vdet.batch.manifest import Origin, Record
 from vdet.config.schema import Settings
-from vdet.detect.factory import load_detector
+from vdet.detect.factory import load_detector, model_file
 from vdet.errors import in_one_line
 from vdet.progress import Progress, no_progress
-from vdet.run.sinks.protocol import make_folders, output_size
+from vdet.run.sinks.protocol import make_folders, output_state
 from vdet.run.video import VideoJob, run_video
+
+_SEARCH = {"input", "detector", "tracker", "regions"}
+"""The sections of the settings that tracks depend on."""
+
+_READ_BY = {"tracks": set[str](), "counts": {"counts"}, "crops": {"crops"}}
+"""The sections that a sink reads in addition. Another sink may read all but `train`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,15 +36,98 @@ class Work:
     model
         A model file; None for the shipped one, or for a detector without one.
     threads
-        Of the search, of the decoder and of the encoder of each video.
-    digest
-        From `work_digest`, for the records.
+        Of the search, of the decoder and of the encoder of each video; None for one per core.
+    origin, digest
+        For the records. The digest is of program, model and settings, and of the part and lanes
+        that are wanted.
     """
 
     settings: Settings
-    model: Path | None
-    threads: int
+    model: Path | None = None
+    threads: int | None = None
+    origin: Origin = field(default_factory=Origin)
     digest: str = ""
+
+    @classmethod
+    def of(
+        cls,
+        job: VideoJob,
+        sinks: Iterable[str],
+        settings: Settings,
+        model: Path | None,
+        threads: int | None,
+    ) -> Self:
+        """Return the work of jobs that differ from `job` in their input and outputs only.
+
+        Raises
+        ------
+        ConfigError, ModelError
+            The detector cannot be loaded.
+        """
+        load_detector(settings.detector, model)
+        file, origin = model_file(settings.detector, model), Origin()
+        if file is not None:
+            origin = replace(origin, model=file.name, model_sha256=_digest_of(file))
+        sections = _sections(sinks, with_lanes=job.lanes is not None)
+        wanted = (
+            *(origin.program, origin.model_sha256, job.start, job.end, job.frames, job.lanes),
+            _digest_of(settings.regions.mask),
+            settings.model_dump_json(include=sections),
+        )
+        return cls(settings, model, threads, origin, _digest(*map(repr, wanted)))
+
+    def with_absolute_paths(self) -> Self:
+        """Return the same for processes that were started in other folders."""
+        mask = self.settings.regions.mask
+        regions = self.settings.regions.model_copy(
+            update={"mask": str(Path(mask).absolute()) if mask else mask}
+        )
+        return replace(
+            self,
+            settings=self.settings.model_copy(update={"regions": regions}),
+            model=self.model.absolute() if self.model else None,
+        )
+
+
+def _sections(sinks: Iterable[str], *, with_lanes: bool) -> set[str]:
+    """Return the sections of the settings that outputs depend on."""
+    all_of_them = set(Settings.model_fields) - {"train"}
+    found = _SEARCH.union(*(_READ_BY.get(sink, all_of_them) for sink in sinks))
+    return found | {"lanes"} if with_lanes else found - {"lanes"}
+
+
+def result_digest(work: str, source: Path) -> str:
+    """Return a digest of all that the result for an input depends on.
+
+    Parameters
+    ----------
+    work
+        The digest of the `Work`.
+    source
+        The input. It counts by its size and the time of its last change; numbered pictures count by
+        those of all files in their folder.
+    """
+    states = []
+    with suppress(OSError):  # there is no such input; reading it is an error soon
+        states = [(file.name, file.stat()) for file in _files(source)]
+    return _digest(work, *(repr((name, s.st_size, s.st_mtime_ns)) for name, s in states))
+
+
+def _files(source: Path) -> list[Path]:
+    if source.is_file():
+        return [source]
+    return sorted((source if source.is_dir() else source.parent).iterdir())
+
+
+def _digest(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def _digest_of(path: Path | str | None) -> str:
+    """Return a digest of a file; nothing where there is none."""
+    with suppress(OSError):
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest() if path else ""
+    return ""
 
 
 def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress) -> Record:
@@ -45,81 +135,62 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
 
     Errors are recorded, and not raised. `progress` is as `run_video` takes it.
     """
-    began, started = time.perf_counter(), _now()
-    summary, error = None, None
-    sizes: dict[str, int] = {}
+    began, record = time.perf_counter(), _record(job)
     digest = result_digest(work.digest, job.source)
-    threads = work.threads
     with _collected_warnings(job) as warnings:
         try:
-            for output in job.outputs:
-                make_folders(output)
-            model = load_detector(work.settings.detector, work.model)
-            summary = run_video(
-                job,
-                model,
-                work.settings,
-                threads=threads,
-                codec_threads=threads,
-                progress=progress,
-            )
-            for output in job.outputs:
-                sizes[str(output.path.absolute())] = output_size(output) or 0
+            record = replace(record, digest=digest, **_run(job, work, progress))
         except Exception as failure:
-            error = in_one_line(failure)
+            record = replace(record, error=in_one_line(failure))
             for output in job.outputs:
                 with suppress(OSError):
                     output.path.rmdir()  # only a folder, and only if it is empty
             if os.environ.get("VDET_DEBUG") == "1":
                 traceback.print_exc()
-    seconds = time.perf_counter() - began
-    record = _record(job, started, seconds, warnings=tuple(warnings), error=error)
-    if summary is None or error:
-        return record
-    return replace(
-        record,
-        width=summary.width,
-        height=summary.height,
-        frames=summary.frames,
-        tracks=summary.tracks,
-        digest=digest,
-        sizes=sizes,
-    )
+    seconds = round(time.perf_counter() - began, 3)
+    return replace(record, seconds=seconds, warnings=tuple(warnings))
 
 
 def record_of_killed(job: VideoJob) -> Record:
     """Return the record of a job whose process was killed each time."""
     error = f"{job.source}: its process was killed, or crashed; there may be too little memory"
-    return _record(job, _now(), 0.0, error=error)
+    return replace(_record(job), error=error)
 
 
-def _record(
-    job: VideoJob,
-    started: str,
-    seconds: float,
-    *,
-    error: str | None,
-    warnings: tuple[str, ...] = (),
-) -> Record:
-    return Record(
-        input=str(job.source.absolute()),
-        outputs=_paths_by_sink(job),
-        started=started,
-        seconds=round(seconds, 3),
-        warnings=warnings,
-        error=error,
+def _run(job: VideoJob, work: Work, progress: Progress) -> dict[str, Any]:
+    """Run a job, and return what its record says about the result."""
+    for output in job.outputs:
+        make_folders(output)
+    totals = run_video(
+        job,
+        load_detector(work.settings.detector, work.model),
+        work.settings,
+        threads=work.threads,
+        codec_threads=work.threads,
+        progress=progress,
     )
+    states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in job.outputs}
+    return {
+        "width": totals.width,
+        "height": totals.height,
+        "frames": totals.frames,
+        "tracks": totals.tracks,
+        "sizes": {path: size for path, (size, _) in states.items()},
+        "times": {path: changed for path, (_, changed) in states.items()},
+    }
 
 
-def _paths_by_sink(job: VideoJob) -> dict[str, str | tuple[str, ...]]:
+def _record(job: VideoJob) -> Record:
+    """Return the record of a job that begins now."""
     paths: dict[str, tuple[str, ...]] = {}
     for output in job.outputs:
         paths[output.sink] = (*paths.get(output.sink, ()), str(output.path.absolute()))
-    return {sink: each[0] if len(each) == 1 else each for sink, each in paths.items()}
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
+    return Record(
+        input=str(job.source.absolute()),
+        outputs={sink: each[0] if len(each) == 1 else each for sink, each in paths.items()},
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        seconds=0.0,
+    )
 
 
 class _WarningCollector(logging.Handler):

@@ -1,38 +1,39 @@
 """`vdet detect-video -d DIR CLIP...`: many videos in one run."""
 
-import hashlib
 import logging
 import re
-from collections import Counter
-from collections.abc import Callable, Sequence
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.batch.digest import work_digest
-from vdet.batch.manifest import Origin, Record
-from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
-from vdet.batch.run import run_batch, write_totals
-from vdet.batch.task import Work
-from vdet.cli.messages import batch_bar, counted, print_lines, print_message
-from vdet.cli.options import PATH, PROCESSES, scheduler_option
-from vdet.config.schema import Settings
-from vdet.detect.factory import model_file
+from vdet.cli.messages import counted, live_bar, print_lines, print_message
+from vdet.cli.options import PATH, Wanted, bundle, jobs_option, scheduler_option
 from vdet.errors import failure_code
-from vdet.run.sinks.protocol import Output, sink_kind
-from vdet.run.video import VideoJob
-from vdet.version import __version__
-from vdet.workers import DaskCluster, LocalProcesses, Workers, core_count
+from vdet.files import escaped
 
-F = TypeVar("F", bound=Callable[..., Any])
+if TYPE_CHECKING:
+    from tqdm import tqdm
+
+    from vdet.batch.manifest import Record
+    from vdet.batch.plan import OutputOptions, Plan
+    from vdet.batch.progress import FrameCounts
+    from vdet.batch.task import Work
+    from vdet.run.video import VideoJob
+    from vdet.workers import Workers
 
 log = logging.getLogger("vdet")
 
 _SUFFIX = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
-"""The end of an output's name, such as `.csv` or `.cars.csv`."""
+"""The ending of an output's name, such as `.csv` or `.cars.csv`."""
+
+_BAR = (
+    "{percentage:3.0f}%|{bar:10}| {n_fmt}/{total_fmt} frames "
+    "[{elapsed}<{remaining}, {rate_noinv_fmt}{postfix}]"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,106 +46,87 @@ class BatchOptions:
     dry_run: bool
     scheduler: str | None
 
-    @property
-    def need_folder(self) -> bool:
-        """Whether an option is given that has no effect without a folder."""
-        return bool(self.jobs or self.skip_existing or self.dry_run or self.scheduler)
+    def check(self, *, overwrite: bool) -> None:
+        """Raise `click.UsageError` where options do not go together."""
+        others = self.jobs or self.skip_existing or self.dry_run or self.scheduler
+        if self.folder is None and others:
+            raise click.UsageError(
+                "--jobs, --skip-existing, --dry-run and --scheduler go with -d DIR"
+            )
+        if overwrite and self.skip_existing:
+            raise click.UsageError("--overwrite and --skip-existing do not go together")
+        if self.jobs and self.scheduler:
+            raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
 
 
-def batch_options(command: F) -> F:
-    """Add the options of a batch; they make a `BatchOptions`."""
-    for option in (
-        scheduler_option,
-        click.option(
-            "--dry-run", is_flag=True, help="With -d: list what would be written, and end."
-        ),
-        click.option(
-            "--skip-existing",
-            is_flag=True,
-            help="With -d: leave out videos whose outputs are all there and up to date.",
-        ),
-        click.option(
-            "--jobs",
-            type=PROCESSES,
-            metavar="N",
-            show_default="one for each core",
-            help="With -d: process N videos at once, each in its own process.",
-        ),
-        click.option(
-            "-d",
-            "--directory",
-            "folder",
-            type=PATH,
-            metavar="DIR",
-            help="Process every CLIP, and write the outputs into DIR.",
-        ),
-    ):
-        command = option(command)
-    return command
+batch_options = bundle(
+    "batch",
+    BatchOptions,
+    click.option(
+        "-d",
+        "--directory",
+        "folder",
+        type=PATH,
+        metavar="DIR",
+        help="Process every CLIP, and write the outputs into DIR.",
+    ),
+    jobs_option("With -d: process N videos at once, each in its own process."),
+    click.option(
+        "--skip-existing",
+        is_flag=True,
+        help="With -d: skip videos whose outputs are all there and up to date.",
+    ),
+    click.option("--dry-run", is_flag=True, help="With -d: list what would be written, and stop."),
+    scheduler_option,
+)
 
 
-def output_options(
-    options: BatchOptions,
-    *,
-    no_video: bool,
-    others: Sequence[Output],
-    overwrite: bool,
-) -> OutputOptions:
+def read_output_options(
+    wanted: Sequence[Wanted], options: BatchOptions, *, no_video: bool, overwrite: bool
+) -> "OutputOptions":
     """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
-    suffixes = [OutputSuffix(output.sink, _suffix(output)) for output in others]
-    for each, count in Counter(suffixes).items():
-        if count > 1:
+    from vdet.batch.plan import OutputOptions, OutputSuffix
+
+    suffixes = [OutputSuffix(sink, _suffix(sink, path)) for sink, path in wanted]
+    for each in suffixes:
+        if suffixes.count(each) > 1:
             raise click.UsageError(f"{each.sink} is given {each.suffix} twice; leave one out")
     if not no_video and not any(each.sink == "video" for each in suffixes):
         suffixes.insert(0, OutputSuffix("video"))
-    if not suffixes:
-        raise click.UsageError(
-            "nothing would be written; leave out --no-video, or give --tracks or --sink"
-        )
-    if overwrite and options.skip_existing:
-        raise click.UsageError("--overwrite and --skip-existing do not go together")
-    if options.jobs and options.scheduler:
-        raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
     return OutputOptions(suffixes, overwrite=overwrite, skip_existing=options.skip_existing)
 
 
-def _suffix(output: Output) -> str:
-    """Return the suffix of an output in a batch; the rest of its name is that of the video."""
-    kind, suffix = sink_kind(output.sink), str(output.path).lower()
-    if kind.takes == "pictures":
-        raise click.UsageError(f"{output.sink}: is for pictures; give another sink")
-    if kind.one_frame:
-        raise click.UsageError(f"{output.sink}: is for one video; leave out -d")
+def _suffix(sink: str, path: Path) -> str:
+    """Return the ending of an output's name; the rest of it is the name of the video."""
+    from vdet.run.sinks.protocol import sink_kind
+
+    kind, suffix = sink_kind(sink), str(path).lower()
+    if kind.takes == "pictures" or kind.one_frame:
+        raise click.UsageError(f"{sink}: cannot be written with -d; leave one of them out")
     if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
-        example = f".{output.sink}" if kind.marker else ".txt"
-        known = ", ".join(kind.suffixes) or f"as in {example}"
-        flags = {flag for each in click.get_current_context().command.params for flag in each.opts}
-        option = f"--{output.sink}"
-        option = option if option in flags else f"--sink {output.sink}"
-        raise click.UsageError(f"with -d give {option} a suffix: {known}")
+        known = ", ".join(kind.suffixes) or f"as in .{sink if kind.marker else 'txt'}"
+        raise click.UsageError(f"{sink}: with -d give only the ending of the names: {known}")
     return suffix
 
 
 def process_batch(
     clips: Sequence[Path],
-    common: VideoJob,
-    outputs: OutputOptions,
+    common: "VideoJob",
+    outputs: "OutputOptions",
+    work: "Work",
     options: BatchOptions,
     *,
-    settings: Settings,
-    model: Path | None,
-    threads: int | None,
     quiet: bool,
 ) -> int:
     """Process a batch, or list what would be written, and return the exit code."""
+    from vdet.batch.plan import make_plan
+    from vdet.batch.run import write_totals
+
     folder = options.folder or Path()
     if options.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
-        model = model.absolute() if model else None
-        settings = _with_absolute_mask(settings)
-    origin = _origin(settings, model)
-    digest = work_digest(origin, settings, common)
-    plan = make_plan(clips, folder, common, outputs, digest)
+        work = work.with_absolute_paths()
+    plan = make_plan(clips, folder, common, outputs, work.digest)
     if options.dry_run:
         print_lines(*_plan_lines(plan))
         return 0
@@ -152,21 +134,12 @@ def process_batch(
         write_totals(plan)  # a run that was interrupted may have left them out
         print_message(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already")
         return 0
-    workers, search_threads = _workers(options, len(plan.jobs))
-    work = Work(settings, model, threads or search_threads, digest)
-    failed = _run(plan, work, origin, workers, quiet=quiet)
-    return failure_code(len(failed), len(plan.jobs) + len(plan.skipped))
+    workers, threads = _workers(options, len(plan.jobs))
+    failed = _run(plan, replace(work, threads=work.threads or threads), workers, quiet=quiet)
+    return failure_code(failed, len(plan.jobs) + len(plan.skipped))
 
 
-def _with_absolute_mask(settings: Settings) -> Settings:
-    regions = settings.regions
-    if not regions.mask:
-        return settings
-    regions = regions.model_copy(update={"mask": str(Path(regions.mask).absolute())})
-    return settings.model_copy(update={"regions": regions})
-
-
-def _plan_lines(plan: Plan) -> list[str]:
+def _plan_lines(plan: "Plan") -> list[str]:
     """Return a line for each file: what would be written."""
     return [
         *(f"{job.source}: {_output_names(job)} there already" for job in plan.skipped),
@@ -174,46 +147,14 @@ def _plan_lines(plan: Plan) -> list[str]:
     ]
 
 
-def _output_names(job: VideoJob) -> str:
+def _output_names(job: "VideoJob") -> str:
     return ", ".join(str(output.path) for output in job.outputs)
 
 
-def _run(plan: Plan, work: Work, origin: Origin, workers: Workers, *, quiet: bool) -> list[Record]:
-    """Run the batch, print the result of each file, and return the records of those that failed."""
-    failed = []
-    sources = [job.source for job in plan.jobs]
-    with (
-        batch_bar(sources, by_size=not _is_limited(plan), quiet=quiet) as counts,
-        closing(run_batch(plan, work, origin, workers=workers, counts=counts)) as results,
-    ):
-        for job, record in results:
-            _print_result(job, record, quiet=quiet)
-            if record.error:
-                failed.append(record)
-    if not quiet:
-        skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
-        done = len(plan.jobs) - len(failed)
-        print_message(
-            f"{plan.manifest}: {counted(done, 'file')} done, {skipped}{len(failed)} failed"
-        )
-    return failed
-
-
-def _is_limited(plan: Plan) -> bool:
-    """Return whether about as many frames are read of a long video as of a short one."""
-    return any(job.frames is not None or job.end is not None for job in plan.jobs)
-
-
-def _origin(settings: Settings, model: Path | None) -> Origin:
-    program = f"vdet {__version__}"
-    path = model_file(settings.detector, model)
-    if path is None:
-        return Origin(program, None, None)
-    return Origin(program, path.name, hashlib.sha256(path.read_bytes()).hexdigest())
-
-
-def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
+def _workers(options: BatchOptions, files: int) -> "tuple[Workers, int]":
     """Return the workers of a batch, and how many threads search each file there."""
+    from vdet.workers import DaskCluster, LocalProcesses, core_count
+
     if options.scheduler:
         return DaskCluster(options.scheduler), 1
     cores = core_count()
@@ -221,7 +162,26 @@ def _workers(options: BatchOptions, files: int) -> tuple[Workers, int]:
     return LocalProcesses(jobs), max(1, cores // jobs)
 
 
-def _print_result(job: VideoJob, record: Record, *, quiet: bool) -> None:
+def _run(plan: "Plan", work: "Work", workers: "Workers", *, quiet: bool) -> int:
+    """Run the batch, print the result of each file, and return how many failed."""
+    from vdet.batch.run import run_batch
+
+    failed = 0
+    with (
+        batch_bar(plan, quiet=quiet) as counts,
+        closing(run_batch(plan, work, workers=workers, counts=counts)) as results,
+    ):
+        for job, record in results:
+            _print_result(job, record, quiet=quiet)
+            failed += record.error is not None
+    if not quiet:
+        skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
+        done = counted(len(plan.jobs) - failed, "file")
+        print_message(f"{plan.manifest}: {done} done, {skipped}{failed} failed")
+    return failed
+
+
+def _print_result(job: "VideoJob", record: "Record", *, quiet: bool) -> None:
     for warning in record.warnings:
         log.warning("%s", warning)
     if record.error:
@@ -229,3 +189,30 @@ def _print_result(job: VideoJob, record: Record, *, quiet: bool) -> None:
     elif not quiet:
         found = f"{counted(record.frames, 'frame')}, {counted(record.tracks, 'track')}"
         print_message(f"{job.source}: {found}, {record.seconds:.1f} s")
+
+
+@contextmanager
+def batch_bar(plan: "Plan", *, quiet: bool) -> "Iterator[FrameCounts | None]":
+    """Give counts of frames to the files of a plan, and show them in a bar.
+
+    Gives None where there is no bar, or no temporary file for the counts can be made.
+    """
+    from vdet.batch.progress import frame_counts
+
+    counts: FrameCounts | None = None
+
+    def show(bar: "tqdm[Any]") -> None:
+        if counts is None:
+            return
+        state = counts.state()
+        bar.n, bar.total = state.done, state.total
+        parts = [f"{state.ended} of {counted(len(plan.jobs), 'file')}"]
+        parts += [f"{escaped(plan.jobs[n].source.name)} {share:.0%}" for n, share in state.running]
+        bar.set_postfix_str(", ".join(parts), refresh=False)
+
+    with (
+        frame_counts(plan.jobs) as made,
+        live_bar(quiet=quiet, refresh=show, bar_format=_BAR, unit=" frames") as bar,
+    ):
+        counts = None if bar.disable else made
+        yield counts

@@ -1,45 +1,32 @@
 """`vdet calibrate`: from photographs of a chessboard to a camera file."""
 
 import logging
-import re
 from pathlib import Path
-from typing import Any
 
 import click
 
 from vdet.cli.command import Command
 from vdet.cli.messages import counted, print_lines, progress_steps
-from vdet.cli.options import PATH, overwrite_option
-from vdet.errors import OutputError
+from vdet.cli.options import (
+    PATH,
+    check_suffix,
+    output_file_option,
+    overwrite_option,
+    parse_pair,
+)
 from vdet.files import check_output
-from vdet.lanes.calibration import Pattern, check_previews, write_previews
-from vdet.lanes.calibration import calibrate as fit_camera
-from vdet.lanes.camera_file import save_camera
-from vdet.run.pictures import find_images
 
 log = logging.getLogger("vdet")
 
 
-class PatternType(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.4 on
-    """The inner corners of a chessboard, along and across: 9x6."""
-
-    name = "pattern"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, context: click.Context | None
-    ) -> Pattern:
-        """Return both numbers."""
-        if isinstance(value, tuple):
-            return value[0], value[1]
-        match = re.fullmatch(r"([0-9]{1,3})[x×]([0-9]{1,3})", value)
-        if not match or min(int(n) for n in match.groups()) < 3:
-            self.fail(
-                f"{value!r} is no pattern; give the inner corners of the board, 3 or more along "
-                "and across, as in 9x6",
-                param,
-                context,
-            )
-        return int(match[1]), int(match[2])
+def parse_corners(text: str) -> tuple[int, int]:
+    """Return the inner corners of a board, along and across."""
+    along, across = parse_pair(text, "9x6")
+    if not (3 <= along <= 999 and 3 <= across <= 999):
+        raise click.BadParameter(
+            f"{text!r}: give 3 to 999 inner corners of the board along and across, as in 9x6"
+        )
+    return along, across
 
 
 @click.command(
@@ -50,14 +37,13 @@ class PatternType(click.ParamType):  # type: ignore[type-arg]  # generic from cl
     ),
 )
 @click.argument("photos", nargs=-1, required=True, type=PATH, metavar="PHOTO...")
-@click.option(
-    "-o", "--output", required=True, type=PATH, metavar="FILE", help="Camera file to write, .yaml."
-)
+@output_file_option("Camera file to write, .yaml.")
 @click.option(
     "--pattern",
     default="9x6",
     show_default=True,
-    type=PatternType(),
+    type=parse_corners,
+    metavar="NxM",
     help="Inner corners of the board, along and across.",
 )
 @click.option(
@@ -73,7 +59,7 @@ def calibrate(
     *,
     photos: tuple[Path, ...],
     output: Path,
-    pattern: Pattern,
+    pattern: tuple[int, int],
     preview: Path | None,
     overwrite: bool,
 ) -> None:
@@ -82,22 +68,25 @@ def calibrate(
     Its focal length and lens distortion are computed. Each PHOTO is a file, or a folder of files.
     Take ten or more, of the whole flat board, from different sides.
     """
-    if output.suffix.lower() not in (".yaml", ".yml"):
-        raise OutputError(f"{output}: cameras are written as .yaml; name it so")
+    from vdet.lanes import calibration
+    from vdet.lanes.camera_file import save_camera
+    from vdet.run.pictures import find_images
+
+    check_suffix(output, ".yaml", ".yml", what="cameras")
     found = find_images(photos)
     check_output(output, overwrite=overwrite, inputs=found)
     if preview:
-        check_previews(preview, found, overwrite=overwrite)
+        calibration.check_previews(preview, found, overwrite=overwrite)
     with progress_steps("", quiet=quiet) as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)
-        calibration = fit_camera(found, pattern)
-    for skip in calibration.skipped:
+        result = calibration.calibrate(found, pattern)
+    for skip in result.skipped:
         log.warning("%s: not used: %s", skip.path, skip.reason)
-    save_camera(calibration.camera, output, overwrite=overwrite)
+    save_camera(result.camera, output, overwrite=overwrite)
     if preview:
-        write_previews(preview, calibration, pattern, overwrite=overwrite)
-    camera = calibration.camera
+        calibration.write_previews(preview, result, pattern, overwrite=overwrite)
+    camera = result.camera
     print_lines(
         f"{output}: {camera.width}×{camera.height}, focal length {camera.focal[0]:.0f} px, "
-        f"RMS error {camera.rms:.2f} px, {len(calibration.photos)} of {len(found)} photographs used"
+        f"RMS error {camera.rms:.2f} px, {len(result.photos)} of {len(found)} photographs used"
     )

@@ -1,4 +1,4 @@
-"""Commands whose help groups its options, and groups that import a command when it is asked for."""
+"""Commands whose help groups its options, and groups that import a command when it is called."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -9,24 +9,23 @@ from typing import Any
 import click
 
 from vdet.cli.messages import set_up_logs
+from vdet.errors import ConfigError
+
+_OTHERS = "What is processed"
 
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--summary", "--crops", "--json"),
         *("--page", "--preview", "--stages", "--at", "--sink", "--overwrite"),
     ),
-    "What is processed": (
-        *("--truth", "--video", "--start", "--end", "--frames", "--stride", "--every", "--from"),
-        *("--until", "--regions", "--lines", "--size", "--rate", "--seed", "--split", "--sweep"),
-        *("--pattern", "--score", "--least-width"),
-    ),
+    _OTHERS: (),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),
     "Lanes": ("--lanes", "--camera"),
     "Model and settings": ("--model", "--base", "--config", "--set"),
     "Parallel work": ("--jobs", "--threads", "--scheduler"),
     "General": ("--quiet", "--verbose", "--version", "--help"),
 }
-"""Under which heading of the help an option stands, and in which order."""
+"""Heading of each option in the help, in order. Options that are not named come under `_OTHERS`."""
 
 
 class Command(click.Command):
@@ -50,10 +49,13 @@ class Command(click.Command):
         records = {
             parameter.opts[-1]: record
             for parameter in self.get_params(context)
-            if (record := parameter.get_help_record(context))
+            if isinstance(parameter, click.Option)
+            and (record := parameter.get_help_record(context))
         }
+        named = {name for names in HEADINGS.values() for name in names}
+        others = [name for name in records if name not in named]
         for heading, names in HEADINGS.items():
-            rows = [records[name] for name in names if name in records]
+            rows = [records[name] for name in names or others if name in records]
             if rows:
                 with formatter.section(heading):
                     formatter.write_dl(rows)
@@ -64,30 +66,57 @@ class Command(click.Command):
 
 
 class LazyGroup(click.Group):
-    """A group that imports the module of a command when it is asked for: the program starts sooner.
+    """A group that imports a command when it is called, and not to list it.
 
     Parameters
     ----------
-    modules
-        The module of each command, by the command's name. In it the command has this name too, with
-        underscores.
+    summaries
+        The summary of each command, by its name.
+    place
+        Format of the module of a command, as "vdet.cli.{}". In it the command has its own name,
+        with underscores.
+    plugins
+        The group of entry points in which other packages register commands; empty for none.
     """
 
-    def __init__(self, *arguments: Any, modules: Mapping[str, str], **options: Any) -> None:
+    def __init__(
+        self,
+        *arguments: Any,
+        summaries: Mapping[str, str],
+        place: str,
+        plugins: str = "",
+        **options: Any,
+    ) -> None:
         super().__init__(*arguments, **options)
-        self._modules = modules
+        self._summaries = summaries
+        self._place = place
+        self._plugins = plugins
 
     def list_commands(self, context: click.Context) -> list[str]:
-        """Return the names of all commands in the order of the alphabet."""
-        return sorted([*super().list_commands(context), *self._modules])
+        """Return the names of all commands in alphabetical order."""
+        own = {*super().list_commands(context), *self._summaries}
+        return sorted(own | set(self._plugin_names()))
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
-        """Return a command; None if there is none of that name."""
-        if name not in self._modules:
-            return super().get_command(context, name)
-        module = import_module(self._modules[name])
-        command: click.Command = getattr(module, name.replace("-", "_"))
-        return command
+        """Return a command, None if there is none of that name.
+
+        Raises
+        ------
+        ConfigError
+            It belongs to another package, and cannot be loaded.
+        """
+        if name in self._summaries:
+            word = name.replace("-", "_")
+            command: click.Command = getattr(import_module(self._place.format(word)), word)
+            return command
+        return super().get_command(context, name) or self._plugin(name)
+
+    def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write all names with their summaries; nothing is imported."""
+        own = {name: command.short_help or "" for name, command in self.commands.items()}
+        others = dict.fromkeys(self._plugin_names(), "Added by an installed package.")
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted((others | own | {**self._summaries}).items()))
 
     def resolve_command(
         self, context: click.Context, words: list[str]
@@ -101,6 +130,23 @@ class LazyGroup(click.Group):
                 raise
             message = f"No such command '{words[0]}'. Did you mean '{close[0]}'?"
             raise click.UsageError(message, context) from error
+
+    def _plugin_names(self) -> list[str]:
+        if not self._plugins:
+            return []
+        from vdet.plugins import plugin_names
+
+        return plugin_names(self._plugins)
+
+    def _plugin(self, name: str) -> click.Command | None:
+        if name not in self._plugin_names():
+            return None
+        from vdet.plugins import load_plugin
+
+        command = load_plugin(self._plugins, name)
+        if not isinstance(command, click.Command):
+            raise ConfigError(f"{name}: is no click command; repair or reinstall that package")
+        return command
 
 
 def _verbosity_option(name: str) -> click.Option:

@@ -7,7 +7,6 @@ import click
 from vdet.cli.command import Command
 from vdet.cli.messages import print_lines, print_message, progress_steps
 from vdet.cli.options import PATH, overwrite_option
-from vdet.workers import limit_library_threads
 
 
 @click.command(
@@ -33,9 +32,10 @@ def demo(quiet: bool, *, folder: Path, seed: int, overwrite: bool) -> None:
 
     A road with vehicles is drawn. The network finds and counts them. Then a linear model is trained
     on drawn patches and finds them too. Both are compared with the truth. All files are written
-    into DIR, or into demo where it is not given.
+    into DIR, by default into demo.
     """
     from vdet.demo import DemoFiles, check_demo, run_demo
+    from vdet.workers import limit_library_threads
 
     limit_library_threads()
     files = DemoFiles(folder)

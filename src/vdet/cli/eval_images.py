@@ -1,24 +1,14 @@
 """`vdet eval images`: measure detection in labelled pictures."""
 
+from functools import partial
 from pathlib import Path
 
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import progress_bar
-from vdet.cli.options import (
-    PATH,
-    model_option,
-    print_results,
-    read_whole_frame_settings,
-    results_options,
-    settings_options,
-)
-from vdet.detect.factory import load_detector, model_file, trained_on
-from vdet.evaluate.output import RunName, check_outputs
-from vdet.workers import core_count, limit_library_threads
-
-SHARE = click.FloatRange(0, 1)
+from vdet.cli.messages import progress_steps
+from vdet.cli.options import PATH, SHARE, SettingsChoice, model_option, settings_options
+from vdet.cli.results import Results, results_options
 
 
 @click.command(
@@ -44,8 +34,7 @@ SHARE = click.FloatRange(0, 1)
     show_default=True,
     help="Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
 )
-@model_option
-@settings_options("detector.still_score=0.5")
+@settings_options("detector.still_score=0.5", model_option)
 @results_options
 @click.pass_obj
 def images(
@@ -54,44 +43,35 @@ def images(
     data: tuple[Path, ...],
     score: float | None,
     least_width: float,
-    model_path: Path | None,
-    config_name: str | None,
-    assignments: tuple[str, ...],
-    json_target: str | None,
-    page: Path | None,
-    overwrite: bool,
+    choice: SettingsChoice,
+    results: Results,
 ) -> None:
     """Measure detection in labelled pictures.
 
     Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC form, or a COCO file. Each picture is
-    searched for itself, and compared with its labels.
+    searched on its own, and compared with its labels.
     """
+    detector = choice.read_for_whole_frames().detector
+    from vdet.detect.factory import model_file
     from vdet.evaluate.images.evaluate import evaluate_images
     from vdet.evaluate.images.page import images_page
     from vdet.evaluate.images.scores import Counting
     from vdet.evaluate.images.text import lines, plain
+    from vdet.evaluate.output import run_name
     from vdet.labels.pictures.reading import read_labelled_images
+    from vdet.workers import core_count
 
-    limit_library_threads()
-    detector = read_whole_frame_settings(config_name, assignments, model_path).detector
-    model = load_detector(detector.showing_all(), model_path)
-    file = model_file(detector, model_path)
-    check_outputs(json_target, page, overwrite=overwrite, inputs=[*data, *([file] if file else [])])
+    model = choice.load_detector(detector.showing_all())
+    file = model_file(detector, choice.model_path)
+    results.check([*data, *([file] if file else [])])
     sets = [read_labelled_images(path) for path in data]
     counting = Counting(
         score=detector.shown_score if score is None else score,
         least_width=least_width,
         classes=detector.vehicle_classes,
     )
-    with progress_bar(" pictures", quiet=quiet) as progress:
-        threads = core_count()
-        result = evaluate_images(sets, model, counting, threads=threads, progress=progress)
-    run = RunName(detector.kind, file, config_name, assignments, trained_on(detector, file))
-    print_results(
-        lines(result, run),
-        plain(result, run),
-        lambda: images_page(result, run),
-        json_target=json_target,
-        page=page,
-        overwrite=overwrite,
-    )
+    with progress_steps(" pictures", quiet=quiet) as steps:
+        progress = partial(steps, "")
+        result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
+    run = run_name(detector, choice.model_path, choice.config_name, choice.assignments)
+    results.print(lines(result, run), plain(result, run), lambda: images_page(result, run))

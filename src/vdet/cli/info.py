@@ -1,17 +1,18 @@
 """`vdet info`: what a video, a picture or a model file is."""
 
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 
-from vdet.cli.clip_info import clip_facts, picture_facts
 from vdet.cli.command import Command
-from vdet.cli.model_info import linear_facts, network_facts
-from vdet.cli.options import PATH, facts_options, print_facts
-from vdet.files import check_output
-from vdet.media.images import is_picture_name
+from vdet.cli.options import PATH
+from vdet.cli.results import Results, facts_options
+from vdet.files import printable
 
-_FACTS = {".npz": linear_facts, ".onnx": network_facts}
+Facts = dict[str, Any]
+"""Values for JSON, by name; each is also a line of text."""
 
 
 @click.command(
@@ -20,16 +21,113 @@ _FACTS = {".npz": linear_facts, ".onnx": network_facts}
 )
 @click.argument("path", type=PATH, metavar="FILE")
 @facts_options
-def info(path: Path, json_target: str | None, overwrite: bool) -> None:
-    """Say what a file is: a video, a picture or a model.
+def info(path: Path, results: Results) -> None:
+    """Describe a video, a picture or a model file.
 
-    FILE is a video or numbered pictures (what it holds, what of it a written video keeps or loses,
-    where the horizon lies), a picture, a linear model (.npz), or a network (.onnx) of vdet or of
+    FILE is a video or numbered pictures (what it holds, what a written video keeps or loses of it,
+    where the horizon is), a picture, a linear model (.npz), or a network (.onnx) of vdet or of
     another tool.
     """
-    if json_target not in (None, "-"):
-        check_output(Path(json_target), overwrite=overwrite, inputs=[path])
-    describe = _FACTS.get(path.suffix.lower())
+    from vdet.media.images import is_picture_name
+
+    results.check([path])
+    describe = {".npz": _linear_model, ".onnx": _network}.get(path.suffix.lower())
     if describe is None:
-        describe = picture_facts if is_picture_name(path) and "%" not in path.name else clip_facts
-    print_facts(describe(path), json_target, overwrite=overwrite)
+        describe = _picture if is_picture_name(path) and "%" not in path.name else _video
+    facts = {"file": str(path)} | describe(path)
+    results.print(
+        [f"{name.replace('_', ' ')}: {_text(value)}" for name, value in facts.items()], facts
+    )
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, list):
+        return "; ".join(map(_text, value)) or "none"
+    if isinstance(value, dict):
+        simple = {key: each for key, each in value.items() if not isinstance(each, dict | list)}
+        return ", ".join(f"{key} {_text(each)}" for key, each in simple.items()) or "none"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return "unknown" if value is None else printable(str(value))
+
+
+def _linear_model(path: Path) -> Facts:
+    from vdet.detect.svm.model import load_model
+
+    model = load_model(path)
+    return {
+        "kind": "linear model of vdet",
+        "features": model.weights.shape[1],
+        "patch": model.features.patch,
+        "learnt_boxes": model.box_regression is not None,
+        "trained_on": _trained_on(path),
+        "provenance": model.provenance,
+    }
+
+
+def _network(path: Path) -> Facts:
+    from vdet.detect.classes import our_name
+    from vdet.detect.onnx.recognition import recognize
+    from vdet.detect.onnx.session import Session
+
+    found = recognize(Session(path), path).for_frames(1280, 720)
+    known = {name: our_name(name) for name in found.names}
+    return {
+        "kind": "network",
+        "form": found.name,
+        "reasons": list(found.reasons),
+        "input_for_1280x720": f"{found.form.width}x{found.form.height}",
+        "vehicles": [name for name, ours in known.items() if ours is not None],
+        "other_classes": [name for name, ours in known.items() if ours is None],
+        "trained_on": _trained_on(path),
+        "provenance": found.header.provenance if found.header is not None else {},
+    }
+
+
+def _trained_on(path: Path) -> list[str]:
+    from vdet.config.kinds import kind_of_model
+    from vdet.plugins import DETECTORS, load_plugin
+
+    kind = load_plugin(DETECTORS, str(kind_of_model(path)))
+    return list(kind.trained_on(path))
+
+
+def _picture(path: Path) -> Facts:
+    from vdet.detect.svm.horizon import seen_horizon
+    from vdet.media.images import read_image
+
+    image = read_image(path)
+    height, width = image.shape[:2]
+    return {
+        "kind": "picture",
+        "width": width,
+        "height": height,
+        "horizon": seen_horizon([image]),
+    }
+
+
+def _video(path: Path) -> Facts:
+    from vdet.detect.svm.horizon import seen_horizon
+    from vdet.media.inspection import inspect_video
+    from vdet.run.loop import FIRST_FRAMES
+
+    report = inspect_video(path, FIRST_FRAMES)
+    info = report.info
+    return {
+        "kind": "video",
+        "container": report.container,
+        "bytes": report.size,
+        "codec": report.codec,
+        "pixel_format": report.pixels,
+        "width": info.width,
+        "height": info.height,
+        **asdict(info.orientation),
+        "frames": info.frames,
+        "rate": float(info.rate),
+        "start": float(info.start),
+        "seconds": None if info.duration is None else float(info.duration),
+        "sounds": list(report.sounds),
+        "tags": {name: value for name, value in asdict(info.tags).items() if value},
+        "lost_in_mp4": list(report.lost),
+        "horizon": seen_horizon(report.images),
+    }

@@ -8,24 +8,40 @@ from typing import NoReturn
 
 import click
 
-from vdet.cli.command import Command, LazyGroup
+from vdet.cli.command import LazyGroup
 from vdet.cli.messages import print_lines, set_up_logs
-from vdet.cli.options import read_settings, settings_options
-from vdet.config.rendering import render
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
 from vdet.version import __version__
 
-_COMMANDS = (
-    *("calibrate", "count", "demo", "detect-image", "detect-video", "doctor", "info", "mine"),
-    *("train", "train-net"),
-)
-_EVALUATIONS = "images", "patches", "tracks", "video"
+_COMMANDS = {
+    "calibrate": "Measure a camera with photographs of a chessboard.",
+    "config": "Print the effective settings as commented YAML.",
+    "count": "Count the vehicles of track files at lines and in zones.",
+    "demo": "Try the whole program on a drawn road.",
+    "detect-image": "Find vehicles in pictures.",
+    "detect-video": "Find and follow vehicles in one video, or in many.",
+    "doctor": "Check whether vdet works on this machine.",
+    "info": "Describe a video, a picture or a model file.",
+    "mine": "Cut patches for vdet train out of labelled videos and pictures.",
+    "train": "Train a linear model on labelled patches or pictures.",
+    "train-net": "Train a network on labelled pictures.",
+}
+"""A line for each command: its name and the first sentence of its help."""
+
+_EVALUATIONS = {
+    "images": "Measure detection in labelled pictures.",
+    "patches": "Measure the classifier on labelled patches.",
+    "tracks": "Compare a file of tracks with the truth.",
+    "video": "Measure detection and tracking in labelled video.",
+}
 
 
 @click.group(
     cls=LazyGroup,
-    modules={name: f"vdet.cli.{name.replace('-', '_')}" for name in _COMMANDS},
+    summaries=_COMMANDS,
+    place="vdet.cli.{}",
+    plugins="vdet.commands",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(__version__, prog_name="vdet")
@@ -41,27 +57,12 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
 @cli.group(
     "eval",
     cls=LazyGroup,
-    modules={name: f"vdet.cli.eval_{name}" for name in _EVALUATIONS},
+    summaries=_EVALUATIONS,
+    place="vdet.cli.eval_{}",
     short_help="Measure detection, tracking or the classifier.",
 )
 def evaluate() -> None:
     """Measure detection, tracking or the classifier."""
-
-
-@cli.command(
-    cls=Command,
-    examples=(
-        "vdet config > my.yaml",
-        "vdet config -c seed --set output.crf=18",
-    ),
-)
-@settings_options("tracker.kind=rules")
-def config(config_name: str | None, assignments: tuple[str, ...]) -> None:
-    """Print the effective settings as commented YAML.
-
-    Save them, change what you like, and give the file to a command with -c.
-    """
-    print_lines(*render(read_settings(config_name, assignments)).splitlines())
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
@@ -74,7 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
     except click.ClickException as error:
-        error.message = escaped(error.message)  # type: ignore[misc]  # it may name a file
+        if not isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):
+            error.message = escaped(error.message)  # type: ignore[misc]  # it may name a file
         error.show()
         sys.exit(error.exit_code)
     except (KeyboardInterrupt, click.Abort):

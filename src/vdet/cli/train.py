@@ -1,4 +1,4 @@
-"""`vdet train`: from labelled patches or pictures to a model."""
+"""`vdet train`: from labelled patches or pictures to a linear model."""
 
 import tempfile
 from pathlib import Path
@@ -9,16 +9,15 @@ from vdet.cli.command import Command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import (
     PATH,
-    PROCESSES,
+    SettingsChoice,
+    check_suffix,
+    jobs_option,
+    output_file_option,
     overwrite_option,
-    read_settings,
     scheduler_option,
     settings_options,
 )
-from vdet.detect.svm.model import save_model
-from vdet.errors import OutputError
 from vdet.files import check_output
-from vdet.learn.svm.dataset import find_boxed, find_patches
 
 
 @click.command(
@@ -29,17 +28,9 @@ from vdet.learn.svm.dataset import find_boxed, find_patches
     ),
 )
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
-@click.option(
-    "-o", "--output", required=True, type=PATH, metavar="FILE", help="Model file to write, .npz."
-)
+@output_file_option("Model file to write, .npz.")
 @settings_options("train.svm.C=1e-4")
-@click.option(
-    "--jobs",
-    type=PROCESSES,
-    metavar="N",
-    show_default="one for each core",
-    help="Work in N processes.",
-)
+@jobs_option()
 @scheduler_option
 @overwrite_option
 @click.pass_obj
@@ -48,13 +39,12 @@ def train(
     *,
     data: tuple[Path, ...],
     output: Path,
-    config_name: str | None,
-    assignments: tuple[str, ...],
+    choice: SettingsChoice,
     jobs: int | None,
     scheduler: str | None,
     overwrite: bool,
 ) -> None:
-    """Train a model on labelled patches or pictures.
+    """Train a linear model on labelled patches or pictures.
 
     Each DATA is a folder or a zip file of patches, or labelled pictures (COCO, KITTI, YOLO or
     Pascal VOC), out of which patches of vehicles and of other things are cut. Patches lie in
@@ -62,18 +52,19 @@ def train(
     a patch the vehicle is; vdet mine writes it. With it the model learns where the sides of
     vehicles are. The metrics are printed, and written beside the model as JSON.
     """
-    from vdet.labels.pictures.reading import holds_labelled_images
-    from vdet.learn.svm.mining import MiningJob, PictureSource, mine
-    from vdet.learn.svm.training import train as fit_model
-
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
-    settings = read_settings(config_name, assignments, detector="svm")
-    if output.suffix.lower() != ".npz":
-        raise OutputError(f"{output}: models are written as .npz; name it so")
+    settings = choice.read(detector="svm")
+    check_suffix(output, ".npz", what="models")
     metrics_path = output.with_suffix(".json")
     for path in (output, metrics_path):
         check_output(path, overwrite=overwrite, inputs=data)
+    from vdet.detect.svm.model import save_model
+    from vdet.labels.pictures.reading import holds_labelled_images
+    from vdet.learn.svm.dataset import find_boxed, find_patches
+    from vdet.learn.svm.mining import MiningJob, PictureSource, mine
+    from vdet.learn.svm.training import train as fit_model
+
     if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
     pictures = [path for path in data if holds_labelled_images(path)]
@@ -89,12 +80,7 @@ def train(
             patches.append(archive)
         files, boxed = find_patches(patches), find_boxed(patches)
         model, metrics = fit_model(
-            files,
-            settings,
-            boxed=boxed,
-            jobs=jobs,
-            scheduler=scheduler,
-            steps=steps,
+            files, settings, boxed=boxed, jobs=jobs, scheduler=scheduler, steps=steps
         )
     save_model(model, output, overwrite=overwrite)
     metrics.write(metrics_path, overwrite=overwrite)

@@ -1,15 +1,25 @@
 """`vdet train-net`: from labelled pictures to a network."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from vdet.cli.command import Command
-from vdet.cli.messages import print_lines, steps_bar
-from vdet.cli.options import PATH, overwrite_option, read_settings, settings_options
-from vdet.errors import DataError, OutputError
+from vdet.cli.messages import live_bar, print_lines
+from vdet.cli.options import (
+    PATH,
+    SettingsChoice,
+    check_suffix,
+    output_file_option,
+    overwrite_option,
+    settings_options,
+)
+from vdet.errors import DataError
 from vdet.files import check_output
-from vdet.workers import limit_library_threads
+
+if TYPE_CHECKING:
+    from vdet.learn.net.training import TrainingState
 
 
 @click.command(
@@ -21,9 +31,7 @@ from vdet.workers import limit_library_threads
     ),
 )
 @click.argument("data", nargs=-1, type=PATH, metavar="[DATA]...")
-@click.option(
-    "-o", "--output", required=True, type=PATH, metavar="FILE", help="Network to write, .onnx."
-)
+@output_file_option("Network to write, .onnx.")
 @click.option(
     "--video",
     "clips",
@@ -31,7 +39,7 @@ from vdet.workers import limit_library_threads
     multiple=True,
     type=PATH,
     metavar="CLIP TRUTH",
-    help="Learn from every n-th frame of a labelled video too (train.net.every). Can be repeated.",
+    help="Learn from every N-th frame of a labelled video too (train.net.every). Can be repeated.",
 )
 @click.option(
     "--base",
@@ -49,23 +57,20 @@ def train_net(
     output: Path,
     clips: tuple[tuple[Path, Path], ...],
     base: Path | None,
-    config_name: str | None,
-    assignments: tuple[str, ...],
+    choice: SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Train a network on labelled pictures.
 
     Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The state of the
-    training is kept beside the network, as .ckpt; a training that was stopped goes on from there
-    when the same command is given again. The metrics are written beside the network as JSON.
+    training is kept beside the network, as .ckpt. If the training was stopped, the same command
+    continues it. The metrics are written beside the network as JSON.
     Needs torch and onnx: pip install torch onnx
     """
-    limit_library_threads()
     if not data and not clips:
         raise click.UsageError("nothing to learn from; give DATA or --video")
-    if output.suffix.lower() != ".onnx":
-        raise OutputError(f"{output}: networks are written as .onnx; name it so")
-    settings = read_settings(config_name, assignments).train.net
+    check_suffix(output, ".onnx", what="networks")
+    settings = choice.read().train.net
     try:
         import onnx  # noqa: F401
         import torch  # noqa: F401
@@ -73,12 +78,21 @@ def train_net(
         raise DataError("torch or onnx is not installed; pip install torch onnx") from error
     from vdet.learn.net.run import NetworkJob, train_to_file
     from vdet.learn.net.sources import LabelledClip
+    from vdet.workers import limit_library_threads
 
+    limit_library_threads()
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
     job = NetworkJob(data, labelled, output, base, overwrite)
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
-    with steps_bar(settings.steps, quiet=quiet) as advance:
+    with live_bar(quiet=quiet, total=settings.steps, unit=" steps") as bar:
+
+        def advance(state: "TrainingState") -> None:
+            if bar.n == 0:  # a training that continues is not as fast as its first step seems
+                bar.initial = state.step - 1
+            bar.set_postfix_str(f"loss {state.loss:.3f}, rate {state.rate:.1e}", refresh=False)
+            bar.update(state.step - bar.n)
+
         metrics = train_to_file(job, settings, progress=advance)
     print_lines(*metrics.lines(), "", f"{output}: the network; {job.metrics}: the metrics")

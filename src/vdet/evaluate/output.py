@@ -1,12 +1,12 @@
-"""Results on their way out: tables as text, and the checks of the output files."""
+"""Results as text: tables, ratios, and which detector was measured."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vdet.files import check_output, make_folder
-from vdet.pages.render import PAGE_NAME
+from vdet.config.schema import DetectorSettings
+from vdet.detect.factory import model_file, trained_on
 from vdet.version import __version__
 
 ABSENT = "–"
@@ -25,6 +25,14 @@ class RunName:
     config: str | None
     assignments: tuple[str, ...]
     trained_on: tuple[str, ...] = ()
+
+
+def run_name(
+    detector: DetectorSettings, model: Path | None, config: str | None, assignments: tuple[str, ...]
+) -> RunName:
+    """Return which detector is measured; `model` is its file, None for the shipped one."""
+    file = model_file(detector, model)
+    return RunName(detector.kind, file, config, assignments, trained_on(detector, file))
 
 
 def run_lines(run: RunName) -> list[str]:
@@ -72,29 +80,3 @@ def _line(row: Sequence[str], widths: Sequence[int]) -> str:
 def share(value: float | None, digits: int = 3) -> str:
     """Write a ratio; a dash for None."""
     return ABSENT if value is None else f"{value:.{digits}f}"
-
-
-def check_outputs(
-    json_target: str | None, page: Path | None, *, overwrite: bool, inputs: Iterable[Path]
-) -> None:
-    """Refuse outputs that could not be written, before any work; make the page's folder.
-
-    Parameters
-    ----------
-    json_target
-        File for the numbers, `-` for standard output, None for neither.
-    page
-        Folder for the page, None for no page.
-    inputs
-        Files that the work reads.
-
-    Raises
-    ------
-    OutputError
-        A file exists already (and not `overwrite`) or cannot be written.
-    """
-    if json_target not in (None, "-"):
-        check_output(Path(json_target), overwrite=overwrite, inputs=inputs)
-    if page is not None:
-        make_folder(page)
-        check_output(page / PAGE_NAME, overwrite=overwrite)

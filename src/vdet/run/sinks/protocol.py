@@ -210,15 +210,17 @@ def make_folders(output: Output) -> None:
     make_folder(output.path if sink_kind(output.sink).marker else output.path.parent)
 
 
-def output_size(output: Output) -> int | None:
-    """Return the bytes of an output, of a folder those of all its files; None if it is not there.
+def output_state(output: Output) -> tuple[int, int] | None:
+    """Return the bytes of an output and the time of its last change; None if it is not there.
 
-    In a folder only the files count that the sink writes.
+    The time is in nanoseconds since 1970. Of a folder they are the sum and the latest of the files
+    in it that the sink writes.
     """
     marker, path = sink_kind(output.sink).marker, output.path
-    if not marker:
-        return path.stat().st_size if path.is_file() else None
-    return sum(file.stat().st_size for file in path.glob(marker)) if path.is_dir() else None
+    if not (path.is_dir() if marker else path.is_file()):
+        return None
+    states = [file.stat() for file in (path.glob(marker) if marker else [path])]
+    return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
 
 
 def open_sink(output: Output, context: SinkContext) -> Sink:

@@ -1,0 +1,25 @@
+"""`vdet config`: the effective settings."""
+
+import click
+
+from vdet.cli.command import Command
+from vdet.cli.messages import print_lines
+from vdet.cli.options import SettingsChoice, settings_options
+
+
+@click.command(
+    cls=Command,
+    examples=(
+        "vdet config > my.yaml",
+        "vdet config -c seed --set output.crf=18",
+    ),
+)
+@settings_options("tracker.kind=rules")
+def config(choice: SettingsChoice) -> None:
+    """Print the effective settings as commented YAML.
+
+    Save them, change what you like, and give the file to a command with -c.
+    """
+    from vdet.config.rendering import render
+
+    print_lines(*render(choice.read()).splitlines())
