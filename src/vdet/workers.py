@@ -14,13 +14,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Future,
-    wait,
-)
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Protocol, TypeVar
@@ -81,10 +75,7 @@ def core_count() -> int:
 
 
 def limit_library_threads() -> None:
-    """Let OpenCV and BLAS use one thread a call in this process: frames are searched in parallel.
-
-    For processes that belong to the program. Library code never calls it.
-    """
+    """Do as `SINGLE_THREADED` in a process that has loaded the libraries. No library code does."""
     import cv2
     from threadpoolctl import threadpool_limits
 
@@ -185,7 +176,6 @@ def _start_quiet_tracker() -> None:
 def _initialize_worker(parent: int) -> None:
     """Run in a new worker process: ignore Ctrl-C, and end when the process `parent` has ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    limit_library_threads()
     threading.Thread(target=_end_after, args=(parent,), name="vdet-watch", daemon=True).start()
 
 
@@ -280,30 +270,18 @@ def _connection(address: str, timeout: float) -> "Iterator[distributed.Client]":
         raise ClusterError(
             "--scheduler needs Dask, which is not installed; pip install dask distributed"
         ) from error
-    with _without_logs("distributed", "distributed.client"):  # errors are raised
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", VersionMismatchWarning)  # see `_check_workers`
-            try:
-                client = Client(address, timeout=timeout, set_as_default=False)  # type: ignore[no-untyped-call]
-            except (OSError, ValueError) as error:  # ValueError: not the form of an address
-                raise ClusterError(
-                    f"{address}: no Dask scheduler answers there; start one with `dask scheduler`"
-                ) from error
-        with client:
-            yield client
-
-
-@contextlib.contextmanager
-def _without_logs(*names: str) -> Iterator[None]:
-    loggers = [logging.getLogger(name) for name in names]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are raised
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", VersionMismatchWarning)  # see `_check_workers`
+        try:
+            client = Client(address, timeout=timeout, set_as_default=False)  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:  # ValueError: not the form of an address
+            raise ClusterError(
+                f"{address}: no Dask scheduler answers there; start one with `dask scheduler`"
+            ) from error
+    with client:
+        yield client
 
 
 def _check_workers(client: "distributed.Client", address: str, timeout: float) -> None:

@@ -182,7 +182,7 @@ class SettingsChoice:
         return load_settings(path, (*self.assignments, *more), places, detector=detector)
 
     def load_detector(self, settings: "DetectorSettings") -> "DetectorModel":
-        """Load the detector, in a program that searches frames in parallel.
+        """Load the detector.
 
         Raises
         ------
@@ -190,9 +190,7 @@ class SettingsChoice:
             It cannot be loaded.
         """
         from vdet.detect.factory import load_detector
-        from vdet.workers import limit_library_threads
 
-        limit_library_threads()
         return load_detector(settings, self.model_path)
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":

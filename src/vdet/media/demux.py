@@ -1,5 +1,6 @@
 """Open a video file, and read its packets in spite of damage."""
 
+import os
 import re
 from collections.abc import Callable, Iterator
 from fractions import Fraction
@@ -12,7 +13,7 @@ from av.stream import Stream
 
 from vdet.errors import VideoError
 from vdet.media.images import PICTURE_SUFFIXES
-from vdet.media.mp4_index import check_mp4_index
+from vdet.media.mp4_index import check_mp4_index, first_bytes
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
 
 MAX_PIXELS = 8192 * 4608
@@ -62,16 +63,16 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
         if sequence.step > 1:
             name, options["pattern_type"] = sequence.glob, "glob"
     else:
-        _check_exists(path)
+        if not os.path.exists(path):  # noqa: PTH110  # False, too, where it cannot be looked at
+            hint = ", or give numbered pictures as img_%04d.png" if "%" in path.name else ""
+            raise VideoError(f"{path}: there is no such file; check the name{hint}")
         check_mp4_index(path)
         if _is_raw_mjpeg(path):
             kind = "mjpeg"  # FFmpeg may take it for a pipe of pictures, which is not read
     try:
         options["max_pixels"] = str(MAX_PIXELS)  # the file is probed with decoders
         return av.open(name, "r", kind, options, metadata_errors="replace")  # tags: any encoding
-    except av.PermissionError as error:
-        raise VideoError(f"{path}: may not be read; check its permissions") from error
-    except av.error.MemoryError as error:
+    except (av.PermissionError, av.error.MemoryError) as error:
         raise VideoError(f"{path}: cannot be opened: {error.strerror}") from error
     except av.FFmpegError as error:
         raise VideoError(
@@ -90,16 +91,6 @@ def refuse_stream(path: Path) -> None:
         raise VideoError("-: standard input is not read; give the name of a file")
 
 
-def _check_exists(path: Path) -> None:
-    try:
-        path.stat()
-    except (FileNotFoundError, NotADirectoryError) as error:
-        hint = ", or give numbered pictures as img_%04d.png" if "%" in path.name else ""
-        raise VideoError(f"{path}: there is no such file; check the name{hint}") from error
-    except OSError:  # it is refused where it is opened
-        return
-
-
 def is_pipe(path: Path) -> bool:
     """Return whether what is read from `path` can be read only once, as from a FIFO."""
     return path.exists() and not path.is_file() and not path.is_dir()
@@ -107,13 +98,8 @@ def is_pipe(path: Path) -> bool:
 
 def _is_raw_mjpeg(path: Path) -> bool:
     """Return whether a file begins with a JPEG picture, and is not named as a single one."""
-    if not path.is_file() or path.suffix.lower() in PICTURE_SUFFIXES:
-        return False
-    try:
-        with path.open("rb") as file:
-            return file.read(3) == b"\xff\xd8\xff"
-    except OSError:  # it is refused where it is opened
-        return False
+    is_jpeg = path.is_file() and first_bytes(path).startswith(b"\xff\xd8\xff")
+    return is_jpeg and path.suffix.lower() not in PICTURE_SUFFIXES
 
 
 def packets(

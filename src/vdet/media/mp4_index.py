@@ -4,7 +4,6 @@ An index can claim any number of samples of one size in a few bytes, and the dem
 entry for each: a file of 5 kB can ask for gigabytes of memory.
 """
 
-import struct
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -48,8 +47,16 @@ def check_mp4_index(path: Path) -> None:
 
 def begins_like_mp4(path: Path) -> bool:
     """Return whether the first bytes of a file are those of an MP4 or MOV file."""
-    with path.open("rb") as file:
-        return file.read(8)[4:] in _FIRST_BOXES
+    return first_bytes(path)[4:] in _FIRST_BOXES
+
+
+def first_bytes(path: Path) -> bytes:
+    """Return the first 8 bytes of a file; none where it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(8)
+    except OSError:
+        return b""
 
 
 def _claims(file: BinaryIO, size: int) -> Iterator[int]:
@@ -58,19 +65,15 @@ def _claims(file: BinaryIO, size: int) -> Iterator[int]:
     while position + 8 <= size:
         file.seek(position)
         head = file.read(24)
-        length, kind = struct.unpack(">I4s", head[:8])
+        length, kind, inside = int.from_bytes(head[:4]), head[4:8], 8
         if position == 0 and kind not in _FIRST_BOXES:
             return
-        inside = 8
-        if length == 1 and len(head) >= 16:
+        if length == 1:
             length, inside = int.from_bytes(head[8:16]), 16
         yield _claim(kind, head)
-        if kind in _PARENTS:
-            position += inside
-        elif length < inside:  # 0: to the end of the file; else damaged
+        if kind not in _PARENTS and length < inside:  # 0: to the end of the file; else damaged
             return
-        else:
-            position += length
+        position += inside if kind in _PARENTS else length
 
 
 def _claim(kind: bytes, head: bytes) -> int:

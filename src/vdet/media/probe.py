@@ -71,6 +71,8 @@ def describe(
     start = (first.pts or 0) * time_base
     duration = stated_duration(stream, start) or _longest(container)
     turn = _orientation(path, first)
+    is_hdr = first.color_trc in HDR_TRANSFERS
+    colors = ColorTags(first.color_primaries, first.color_trc, first.colorspace)
     width, height, aspect = first.width, first.height, stream.sample_aspect_ratio or Fraction(1)
     if turn.is_sideways:
         width, height, aspect = height, width, 1 / aspect
@@ -85,21 +87,11 @@ def describe(
         duration=duration,
         orientation=turn,
         pixel_aspect=aspect,
-        color=_BT709 if first.color_trc in HDR_TRANSFERS else _colors(first),
-        coding=_coding(first, turn),
+        color=_BT709 if is_hdr else colors,
+        coding=(not is_hdr and turn == Orientation() and Coding.of(first)) or Coding(),
         has_sound=bool(container.streams.audio),
         tags=_tags(container, stream),
     )
-
-
-def _coding(first: av.VideoFrame, turn: Orientation) -> Coding:
-    """Return the coding of planes that need not be converted; else the default one."""
-    is_converted = turn != Orientation() or first.color_trc in HDR_TRANSFERS
-    return Coding() if is_converted else Coding.of(first) or Coding()
-
-
-def _colors(picture: av.VideoFrame) -> ColorTags:
-    return ColorTags(picture.color_primaries, picture.color_trc, picture.colorspace)
 
 
 def _tags(container: InputContainer, stream: VideoStream) -> Tags:
