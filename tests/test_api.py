@@ -1,9 +1,11 @@
 """The public API: docs/api.md runs as it stands, and `import vdet` does nothing else."""
 
+import json
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,11 @@ import pytest
 
 import vdet
 from doc_pages import blocks
-from red_cars import drive
-from running import frames_of
+from red_cars import HEIGHT, WIDTH, car_at, drive
+from running import frames_of, write_drive
+from vdet.config.loading import load_settings
 from vdet.media import VideoReader
-from vdet.media.images import write_image
+from vdet.media.images import Image, write_image
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
 
@@ -40,7 +43,7 @@ def page(
 def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -> None:
     folder, names = page
     assert sorted(path.name for path in folder.iterdir()) == [
-        *("found.png", "in.mp4", "out.csv", "out.mp4", "road.png")
+        *("found.png", "in.mp4", "lines.yaml", "out.csv", "out.mp4", "road.png")
     ]
     assert frames_of(folder / "out.mp4") == frames_of(folder / "in.mp4")
     assert isinstance(names["detections"], vdet.Detections)
@@ -50,7 +53,7 @@ def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -
 
 
 def test_every_public_name_is_there_and_documented() -> None:
-    for name in vdet.__all__:
+    for name in vdet.api.__all__:
         assert getattr(vdet, name).__doc__, f"vdet.{name} has no docstring"
 
 
@@ -130,6 +133,127 @@ def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
         tracker.update(found, 0.0)
     (frame,) = drive(1)
     assert tracker.update(found, 0.0, frame.image) == []
+
+
+class Red:
+    """A detector of the user's own: red things."""
+
+    def __init__(self) -> None:
+        self.searched: list[int | None] = []
+
+    def search(self, picture: vdet.Picture, index: int | None) -> vdet.Detections:
+        self.searched.append(index)
+        return red_boxes(picture.image)
+
+    def detect(self, candidates: vdet.Detections) -> vdet.Detections:
+        return candidates
+
+
+def red_boxes(image: Image) -> vdet.Detections:
+    x, y, width, height = cv2.boundingRect(
+        (image[..., 2].astype(int) - image[..., 0] > 80).astype(np.uint8)
+    )
+    return vdet.Detections([(x, y, x + width, y + height)][: width > 0], [0.9][: width > 0])
+
+
+class Latest:
+    """A tracker of the user's own: the latest detections."""
+
+    def update(
+        self,
+        detections: vdet.Detections,
+        time: float,  # noqa: ARG002
+        picture: vdet.Picture | None = None,  # noqa: ARG002
+    ) -> list[vdet.Track]:
+        return [
+            vdet.Track(number, box, 0.9, predicted=False)
+            for number, box in enumerate(detections.rounded, start=1)
+        ]
+
+
+class Even:
+    """A step of the user's own: vehicles are shown in every other frame."""
+
+    def apply(self, result: vdet.FrameResult) -> vdet.FrameResult:
+        return result if result.frame.index % 2 == 0 else replace(result, tracks=())
+
+
+@pytest.fixture(scope="module")
+def red_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_drive(tmp_path_factory.mktemp("red") / "red.mp4", 60)
+
+
+@pytest.mark.parametrize("detector", [Red(), red_boxes, vdet.Detector(detector=red_boxes)])
+@pytest.mark.parametrize("tracker", [Latest(), vdet.Tracker(WIDTH, HEIGHT), "motion", None])
+def test_follow_takes_objects_and_names(red_clip: Path, detector: Any, tracker: Any) -> None:
+    results = list(vdet.follow(red_clip, detector=detector, tracker=tracker))
+    assert all(result.searched for result in results)
+    (track,) = results[-1].tracks
+    assert abs(track.box.x - car_at(59).x) <= 3
+
+
+def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Path) -> None:
+    seen: list[tuple[int, int | None]] = []
+    totals = vdet.detect_video(
+        red_clip,
+        tracks=[tmp_path / "a.csv", tmp_path / "a.jsonl"],
+        outputs={"stages": tmp_path / "stages"},
+        detector=red_boxes,
+        tracker=Latest(),
+        steps=[Even()],
+        start=0.08,
+        end=0.4,
+        frames=6,
+        at=0.2,
+        lanes=True,
+        progress=lambda done, total: seen.append((done, total)),
+    )
+    assert (totals.frames, totals.tracks) == (6, 1)
+    assert seen == [(number, 6) for number in range(1, 7)]
+    records = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
+    assert [len(each["tracks"]) for each in records] == [1, 0] * 3
+    assert "lane" in records[0]
+    assert (tmp_path / "stages" / "1-boxes.png").exists()
+    assert (tmp_path / "a.csv").exists()
+
+
+def test_detect_image_takes_an_object(tmp_path: Path) -> None:
+    (frame,) = drive(1)
+    write_image(tmp_path / "red.png", frame.image)
+    assert len(vdet.detect_image(tmp_path / "red.png", detector=red_boxes)) == 1
+    with pytest.raises(ValueError, match="leave model out"):
+        vdet.detect_image(tmp_path / "red.png", detector=red_boxes, model="my.npz")
+
+
+def test_live_counts_are_those_of_the_file_and_of_the_frames(
+    red_clip: Path, tmp_path: Path
+) -> None:
+    lines = tmp_path / "lines.yaml"
+    lines.write_text(
+        f"size: [{WIDTH}, {HEIGHT}]\nconfirmed: 0\nlines:\n"
+        "- {name: gate, start: [100, 0], end: [100, 240]}\n"
+    )
+    settings = vdet.load_settings(assignments=[])
+    counts = load_settings(None, (), {"counts": lines}).counts
+    settings = settings.model_copy(update={"counts": counts})
+    results = list(vdet.follow(red_clip, detector=red_boxes, tracker=Latest(), settings=settings))
+    counter = results[-1].counter
+    assert counter is not None
+    tracks = tmp_path / "t.jsonl"
+    vdet.detect_video(
+        red_clip, tracks=tracks, detector=red_boxes, tracker=Latest(), settings=settings
+    )
+    from_file = vdet.count_tracks(tracks, lines)
+    assert sum(total.count for total in from_file.totals) == 1
+    assert from_file == counter.counts()
+    assert from_file == vdet.count_tracks([result.frame_tracks for result in results], lines)
+
+
+def test_tracks_are_compared_with_the_truth(red_clip: Path, tmp_path: Path) -> None:
+    tracks = tmp_path / "t.csv"
+    vdet.detect_video(red_clip, tracks=tracks, detector=red_boxes, tracker=Latest())
+    scores = vdet.evaluate_tracks(tracks, tracks)
+    assert (scores.f1, scores.id_switches) == (1, 0)
 
 
 def test_follow_leaves_the_threads_of_opencv_as_they_are(clip_path: Path) -> None:

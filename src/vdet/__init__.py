@@ -1,69 +1,21 @@
 """Find and follow vehicles in road video on an ordinary CPU.
 
-The names below are the public API; `docs/api.md` shows them in use. They are loaded when they are
-first used: importing vdet itself does nothing else.
+The public API is `vdet.api.__all__`; `docs/api.md` shows it in use. Its names are loaded when they
+are first used: importing vdet itself does nothing else.
 """
 
 TYPE_CHECKING = False  # as in `typing`, which a module of the current folder could replace here
 if TYPE_CHECKING:
-    from vdet.api import (
-        Box,
-        Detections,
-        Detector,
-        DetectorKind,
-        DetectorModel,
-        DetectorSettings,
-        Frame,
-        FrameResult,
-        RunTotals,
-        Settings,
-        SinkContext,
-        SinkKind,
-        Track,
-        Tracker,
-        TrackerKind,
-        TrackerSettings,
-        VdetError,
-        VideoDetector,
-        VideoTracker,
-        detect_image,
-        detect_video,
-        follow,
-        load_settings,
-    )
+    from vdet.api import *  # noqa: F403
 
 from vdet.version import __version__ as __version__  # noqa: E402
 
-__all__ = [
-    "Box",
-    "Detections",
-    "Detector",
-    "DetectorKind",
-    "DetectorModel",
-    "DetectorSettings",
-    "Frame",
-    "FrameResult",
-    "RunTotals",
-    "Settings",
-    "SinkContext",
-    "SinkKind",
-    "Track",
-    "Tracker",
-    "TrackerKind",
-    "TrackerSettings",
-    "VdetError",
-    "VideoDetector",
-    "VideoTracker",
-    "detect_image",
-    "detect_video",
-    "follow",
-    "load_settings",
-]
-
 
 def __getattr__(name: str) -> object:
-    if name not in __all__:
-        raise AttributeError(f"module 'vdet' has no attribute {name!r}")
-    from vdet import api
+    if name == "__all__" or not name.startswith("__"):
+        from importlib import import_module
 
-    return getattr(api, name)
+        api = import_module("vdet.api")
+        if name == "__all__" or name in api.__all__:
+            return getattr(api, name)
+    raise AttributeError(f"module 'vdet' has no attribute {name!r}")

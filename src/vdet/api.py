@@ -2,13 +2,21 @@
 
 Images are BGR uint8 arrays `(H, W, 3)`, as OpenCV reads them.
 
-The detector is the network where neither `settings` nor `model` is given. A model file decides
-which detector runs: the linear model with .npz, a network with .onnx. Settings choose a detector
-too, for example `load_settings("svm")`; without `model`, the shipped file that fits them is used.
+The detector is the network where none is chosen. A model file decides which detector runs: the
+linear model with .npz, a network with .onnx. Settings choose a detector too, for example
+`load_settings("svm")`; without `model`, the shipped file that fits them is used.
+
+A detector or a tracker of your own is an object, which is used as it is:
+
+* a detector is a function that takes an image and returns `Detections`, or a `VideoDetector`, or a
+  `DetectorModel`, which makes a detector for each video;
+* a tracker is a `VideoTracker`, for one video.
+
+A name is that of a kind of detector or tracker, also of another package.
 """
 
 import os
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from fractions import Fraction
 from os import PathLike
 from pathlib import Path
@@ -19,46 +27,41 @@ from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.detections import Detections
-from vdet.detect.factory import DetectorKind, load_detector
+from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError
+from vdet.evaluate.clips.evaluate import score_files
+from vdet.evaluate.scores import Scores
+from vdet.lanes.camera_file import load_camera
+from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import Image
+from vdet.progress import no_progress, reporting
 from vdet.run.pictures import PictureJob, detect_picture, run_picture
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, SinkKind, check_sinks
+from vdet.run.steps import Step, StepContext
 from vdet.run.video import RunTotals, VideoJob, check_job, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.protocol import VideoTracker
-from vdet.track.track import Track
+from vdet.track.track import FrameTracks, Track
+from vdet.traffic.count_files import count_file, count_frames
+from vdet.traffic.events import Event
+from vdet.traffic.totals import Counts
 
-__all__ = [
-    "Box",
-    "Detections",
-    "Detector",
-    "DetectorKind",
-    "DetectorModel",
-    "DetectorSettings",
-    "Frame",
-    "FrameResult",
-    "RunTotals",
-    "Settings",
-    "SinkContext",
-    "SinkKind",
-    "Track",
-    "Tracker",
-    "TrackerKind",
-    "TrackerSettings",
-    "VdetError",
-    "VideoDetector",
-    "VideoTracker",
-    "detect_image",
-    "detect_video",
-    "follow",
-    "load_settings",
-]
+__all__ = (
+    "Box", "Counts", "Detections", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",
+    "Event", "Frame", "FrameResult", "FrameTracks", "Picture", "RunTotals", "Scores", "Settings",
+    "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker", "TrackerKind",
+    "TrackerSettings", "VdetError", "VideoDetector", "VideoTracker", "count_tracks", "detect_image",
+    "detect_video", "evaluate_tracks", "follow", "load_settings",
+)  # fmt: skip
 
 PathName = str | PathLike[str]
+Paths = PathName | Sequence[PathName]
+AnyDetector = str | DetectorObject
+AnyTracker = str | VideoTracker
+Seconds = float | Fraction
 
 
 def load_settings(config: PathName | None = None, assignments: Sequence[str] = ()) -> Settings:
@@ -81,7 +84,7 @@ def load_settings(config: PathName | None = None, assignments: Sequence[str] = (
 
 
 class Detector:
-    """Finds vehicles in single pictures.
+    """Finds vehicles in single pictures; `follow` and the others take it as their detector too.
 
     Raises
     ------
@@ -89,9 +92,15 @@ class Detector:
         The detector is unknown, or its model file cannot be used.
     """
 
-    def __init__(self, settings: Settings | None = None, model: PathName | None = None) -> None:
-        self._settings = _settings(settings, model)
-        self._model = load_detector(self._settings.detector, _path(model))
+    def __init__(
+        self,
+        settings: Settings | None = None,
+        model: PathName | None = None,
+        *,
+        detector: AnyDetector | None = None,
+    ) -> None:
+        self._settings, self._model, _ = _resolved(settings, model, detector, None)
+        self.for_video = self._model.for_video
 
     def detect(self, image: Image) -> Detections:
         """Find the vehicles in a picture, BGR uint8 `(H, W, 3)`.
@@ -125,7 +134,7 @@ class Tracker:
         self._tracker = make_tracker(settings or Settings(), width, height)
 
     def update(
-        self, detections: Detections, time: float, image: Image | None = None
+        self, detections: Detections, time: float, image: Image | Picture | None = None
     ) -> list[Track]:
         """Follow the vehicles into the next frame, and return those that are shown, by id.
 
@@ -140,7 +149,7 @@ class Tracker:
         """
         return self._tracker.update(detections, time, _picture(image))
 
-    def carry(self, time: float, image: Image | None = None) -> list[Track]:
+    def carry(self, time: float, image: Image | Picture | None = None) -> list[Track]:
         """Follow the vehicles into a frame in which no detector looked for them.
 
         Nothing is missed there. The tracks are predicted. Arguments as of `update`.
@@ -151,21 +160,33 @@ class Tracker:
 def follow(
     source: PathName,
     *,
+    detector: AnyDetector | None = None,
+    tracker: AnyTracker | None = None,
+    steps: Sequence[Step] = (),
     settings: Settings | None = None,
     model: PathName | None = None,
-    start: float | Fraction | None = None,
-    end: float | Fraction | None = None,
+    start: Seconds | None = None,
+    end: Seconds | None = None,
     frames: int | None = None,
+    lanes: bool = False,
+    camera: PathName | None = None,
     threads: int = 1,
 ) -> Generator[FrameResult]:
-    """Give a result for each frame of a video: the frame, its detections and its tracks.
+    """Yield a result for each frame of a video: the frame, its detections and its tracks.
 
     Parameters
     ----------
+    detector, tracker
+        Objects or names, as the module describes them; None for those of the settings. With an
+        object, and without settings, every frame is searched.
+    steps
+        Each gets every result, and returns it or a changed one.
     start, end
         Seconds from the first frame; frames with start ≤ time < end are taken.
     frames
-        Most frames to take.
+        Largest number of frames to take.
+    lanes, camera
+        Whether the lane is found too, and the file of the camera that `vdet calibrate` wrote.
     threads
         Threads of the search; the results do not depend on it.
 
@@ -174,10 +195,16 @@ def follow(
     VideoError
         The video cannot be read or searched.
     """
-    settings = _settings(settings, model)
-    detector = load_detector(settings.detector, _path(model))
-    job = VideoJob(Path(source), start=_exact(start), end=_exact(end), frames=frames)
-    with open_video(job, detector, settings, threads=threads) as video:
+    settings, loaded, tracker = _resolved(settings, model, detector, tracker)
+    job = VideoJob(
+        Path(source),
+        start=_exact(start),
+        end=_exact(end),
+        frames=frames,
+        lanes=_lanes(lanes, camera),
+    )
+    opened = open_video(job, loaded, settings, tracker=tracker, steps=steps, threads=threads)
+    with opened as video:
         yield from video.results
 
 
@@ -185,12 +212,22 @@ def detect_video(
     source: PathName,
     video: PathName | None = None,
     *,
-    tracks: PathName | None = None,
-    outputs: Mapping[str, PathName] | None = None,
+    tracks: Paths | None = None,
+    outputs: Mapping[str, Paths] | None = None,
+    detector: AnyDetector | None = None,
+    tracker: AnyTracker | None = None,
+    steps: Sequence[Step] = (),
     settings: Settings | None = None,
     model: PathName | None = None,
-    overwrite: bool = False,
+    start: Seconds | None = None,
+    end: Seconds | None = None,
+    frames: int | None = None,
+    at: Seconds = 0,
+    lanes: bool = False,
+    camera: PathName | None = None,
     threads: int | None = None,
+    overwrite: bool = False,
+    progress: Callable[[int, int | None], object] | None = None,
 ) -> RunTotals:
     """Find and follow the vehicles in a video, and write the outputs that are asked for.
 
@@ -201,31 +238,50 @@ def detect_video(
     video
         The video with the vehicles drawn in: .mp4, .mov or .mkv.
     tracks
-        Every shown box: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml (CVAT), .kitti.txt or
-        .yolo.zip.
+        Every shown box, in one file or several: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml
+        (CVAT), .kitti.txt or .yolo.zip.
     outputs
-        Other outputs, by the name of their sink.
+        Other outputs, one path or several, by the name of their sink.
+    at
+        The moment of the output "stages", seconds from the first frame.
     threads
         Threads of the search; None for one a core.
+    overwrite
+        Replace outputs that are there already.
+    progress
+        Called after each frame with the number of frames done, and that of all if it is known.
 
-    Raises
-    ------
-    VdetError
-        As the command `vdet detect-video`.
+    The others are those of `follow`, and the errors those of the command `vdet detect-video`.
     """
-    settings = _settings(settings, model)
-    named = {"video": video, "tracks": tracks, **(outputs or {})}
-    wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
-    job = VideoJob(Path(source), wanted, overwrite=overwrite)
+    settings, loaded, tracker = _resolved(settings, model, detector, tracker)
+    job = VideoJob(
+        Path(source),
+        _outputs({"video": video, "tracks": tracks, **(outputs or {})}),
+        _exact(start),
+        _exact(end),
+        frames,
+        Fraction(str(at)),
+        _lanes(lanes, camera),
+        overwrite,
+    )
     check_job(job)
-    return run_video(job, load_detector(settings.detector, _path(model)), settings, threads=threads)
+    return run_video(
+        job,
+        loaded,
+        settings,
+        tracker=tracker,
+        steps=steps,
+        threads=threads,
+        progress=reporting(progress) if progress else no_progress,
+    )
 
 
 def detect_image(
     source: PathName,
     picture: PathName | None = None,
     *,
-    outputs: Mapping[str, PathName] | None = None,
+    outputs: Mapping[str, Paths] | None = None,
+    detector: AnyDetector | None = None,
     settings: Settings | None = None,
     model: PathName | None = None,
     overwrite: bool = False,
@@ -236,37 +292,109 @@ def detect_image(
     ----------
     picture
         The picture with the vehicles drawn in.
-    outputs
-        Other outputs, by the name of their sink.
+
+    The others are those of `detect_video`.
+    """
+    settings, loaded, _ = _resolved(settings, model, detector, None)
+    job = PictureJob(Path(source), _outputs({"picture": picture, **(outputs or {})}))
+    check_sinks(job.outputs, overwrite=overwrite, inputs=[job.source])
+    return run_picture(job, loaded, settings, overwrite=overwrite).detections
+
+
+def count_tracks(
+    tracks: PathName | Iterable[FrameTracks],
+    lines: PathName | None = None,
+    *,
+    size: tuple[int, int] | None = None,
+    rate: float | None = None,
+    settings: Settings | None = None,
+) -> Counts:
+    """Count the vehicles of a video at lines and in zones, from its tracks.
+
+    `follow` counts too, where its settings have lines or zones: `FrameResult.counter`.
+
+    Parameters
+    ----------
+    tracks
+        A file that `detect_video` wrote, or the tracks of each frame: `FrameResult.frame_tracks`.
+    lines
+        The file of lines and zones; None for those of the settings.
+    size
+        Width and height of the frames, pixels; None: as the tracks or the lines say.
+    rate
+        Frames per second, for a file of tracks without times.
+    """
+    counts = (settings or Settings()).counts
+    if lines is not None:
+        counts = load_layers(places={"counts": Path(lines)}).counts
+    if isinstance(tracks, str | PathLike):
+        return count_file(Path(tracks), counts, size, rate)
+    return count_frames(tracks, counts, size)
+
+
+def evaluate_tracks(
+    tracks: PathName, truth: PathName, *, until: int | None = None, rate: float | None = None
+) -> Scores:
+    """Compare a file of tracks with the truth.
+
+    Parameters
+    ----------
+    until
+        Number of the last frame to use, from 1; None: the last that the truth covers.
+    rate
+        Frames per second of the video, where the files do not say it.
 
     Raises
     ------
-    VdetError
-        As the command `vdet detect-image`.
+    TruthError
+        A file cannot be used.
     """
-    settings = _settings(settings, model)
-    named = {"picture": picture, **(outputs or {})}
-    wanted = tuple(Output(sink, Path(path)) for sink, path in named.items() if path is not None)
-    check_sinks(wanted, overwrite=overwrite, inputs=[Path(source)])
-    job = PictureJob(Path(source), wanted)
-    detector = load_detector(settings.detector, _path(model))
-    return run_picture(job, detector, settings, overwrite=overwrite).detections
+    return score_files(Path(tracks), Path(truth), until=until, rate=rate).total
 
 
-def _settings(settings: Settings | None, model: PathName | None) -> Settings:
-    """Return the settings, or those of the detector that a model file is for."""
-    if settings is not None:
-        return settings
-    return load_layers(detector=kind_of_model(Path(model)) if model else None)
+def _resolved(
+    settings: Settings | None,
+    model: PathName | None,
+    detector: AnyDetector | None,
+    tracker: AnyTracker | None,
+) -> tuple[Settings, DetectorModel, VideoTracker | None]:
+    """Return the settings, the detector, and the tracker; None for that of the settings."""
+    path = None if model is None else Path(model)
+    changes: dict[str, object] = {}
+    if isinstance(tracker, str):
+        changes["tracker"] = load_layers(assignments=[f"tracker.kind={tracker}"]).tracker
+        tracker = None
+    if detector is None or isinstance(detector, str):
+        if detector or settings is None:
+            kind = detector or (kind_of_model(path) if path else None)
+            changes["detector"] = load_layers(detector=kind).detector
+        chosen = (settings or Settings()).model_copy(update=changes)
+        return chosen, load_detector(chosen.detector, path), tracker
+    if path is not None:
+        raise ValueError("model: the detector is an object, which has its own; leave model out")
+    if settings is None:
+        changes["detector"] = DetectorSettings(kind="object")  # every frame is searched
+    return (settings or Settings()).model_copy(update=changes), as_model(detector), tracker
 
 
-def _path(path: PathName | None) -> Path | None:
-    return None if path is None else Path(path)
+def _outputs(named: Mapping[str, Paths | None]) -> tuple[Output, ...]:
+    return tuple(
+        Output(sink, Path(path))
+        for sink, paths in named.items()
+        if paths is not None
+        for path in ([paths] if isinstance(paths, str | PathLike) else paths)
+    )
 
 
-def _exact(seconds: float | Fraction | None) -> Fraction | None:
-    return None if seconds is None else Fraction(seconds)
+def _lanes(lanes: bool, camera: PathName | None) -> LaneRequest | None:
+    if camera is not None:
+        return LaneRequest(load_camera(Path(camera)))
+    return LaneRequest() if lanes else None
 
 
-def _picture(image: Image | None) -> Picture | None:
-    return None if image is None else Picture(image)
+def _exact(seconds: Seconds | None) -> Fraction | None:
+    return None if seconds is None else Fraction(str(seconds))  # 0.04 means 1/25
+
+
+def _picture(image: Image | Picture | None) -> Picture | None:
+    return image if image is None or isinstance(image, Picture) else Picture(image)

@@ -1,5 +1,6 @@
 """How library code reports progress: it calls functions that the caller gives."""
 
+import itertools
 from collections.abc import Callable
 
 Advance = Callable[[int], object]
@@ -20,3 +21,18 @@ def no_steps(_: str, __: int | None) -> Advance:
 def no_progress(_: int | None) -> Advance:
     """Show no progress."""
     return lambda _: None
+
+
+def reporting(report: Callable[[int, int | None], object]) -> Progress:
+    """Return a `Progress` that calls a function with the number of items done, and that of all."""
+
+    def begin(total: int | None) -> Advance:
+        done = itertools.count(1)
+
+        def advance(count: int) -> None:
+            for _ in range(count):
+                report(next(done), total)
+
+        return advance
+
+    return begin

@@ -17,11 +17,9 @@ from vdet.cli.options import (
     parse_pair,
     settings_options,
 )
-from vdet.errors import TruthError
 from vdet.files import check_output, printable, staged
 
 if TYPE_CHECKING:
-    from vdet.config.places import CountSettings
     from vdet.traffic.totals import Counts
 
 
@@ -76,7 +74,7 @@ def count(
     settings = choice.read().counts
     if not settings:
         raise click.UsageError("there is nothing to count at; give --lines FILE")
-    from vdet.traffic.count_files import SUFFIXES, write_counts, write_counts_of_all
+    from vdet.traffic.count_files import SUFFIXES, count_file, write_counts, write_counts_of_all
 
     if target is not None:
         if target.suffix.lower() not in SUFFIXES:
@@ -86,7 +84,7 @@ def count(
     with progress_steps(" files", quiet=quiet) as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         for path in tracks:
-            videos[str(path)] = _count(path, settings, size, rate)
+            videos[str(path)] = count_file(path, settings, size, rate)
             advance(1)
     if target is not None:
         with staged(target, overwrite=overwrite) as temporary:
@@ -95,25 +93,6 @@ def count(
             else:
                 write_counts_of_all(temporary, videos)
     print_lines(*_table(videos))
-
-
-def _count(
-    path: Path, settings: "CountSettings", size: tuple[int, int] | None, rate: float | None
-) -> "Counts":
-    from vdet.labels.registry import read_tracks
-    from vdet.traffic.counter import count_events
-    from vdet.traffic.layout import lay_out
-    from vdet.traffic.totals import Counts
-
-    saved = read_tracks(path, rate)
-    if not saved.has_times:
-        raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
-    known = size or saved.size or settings.size
-    if known is None:
-        raise click.UsageError("the lines are shares of the frame; give --size, as in 1280x720")
-    layout = lay_out(settings, *known)
-    zones = [zone.name for zone in layout.zones]
-    return Counts.of(count_events(saved.frames, layout), layout.keys, zones)
 
 
 def _table(videos: "Mapping[str, Counts]") -> list[str]:

@@ -1,14 +1,17 @@
 """Detectors of any kind, loaded from settings and a model file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from vdet.config.kinds import kind_of_model
 from vdet.config.schema import DetectorSettings
-from vdet.detect.protocol import DetectorModel
+from vdet.detect.detections import Detections
+from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError
+from vdet.media import Picture
+from vdet.media.images import Image
 from vdet.plugins import DETECTORS, load_plugin
 
 
@@ -75,3 +78,37 @@ def trained_on(settings: DetectorSettings, path: Path | None) -> tuple[str, ...]
 def _kind(settings: DetectorSettings) -> DetectorKind:
     kind: DetectorKind = load_plugin(DETECTORS, settings.kind)
     return kind
+
+
+DetectorObject = DetectorModel | VideoDetector | Callable[[Image], Detections]
+"""A detector: for any video, for one video, or as a function of an image."""
+
+
+def as_model(detector: DetectorObject) -> DetectorModel:
+    """Return a detector object as one that any video can be searched with."""
+    if isinstance(detector, DetectorModel):
+        return detector
+    return _Shared(detector if isinstance(detector, VideoDetector) else _Function(detector))
+
+
+@dataclass(frozen=True, slots=True)
+class _Shared:
+    """A detector that is used as it is for every video."""
+
+    detector: VideoDetector
+
+    def for_video(self, width: int, height: int, images: Sequence[Image]) -> VideoDetector:  # noqa: ARG002
+        return self.detector
+
+
+@dataclass(frozen=True, slots=True)
+class _Function:
+    """A detector that is a function of an image."""
+
+    find: Callable[[Image], Detections]
+
+    def search(self, picture: Picture, index: int | None) -> Detections:  # noqa: ARG002
+        return self.find(picture.image)
+
+    def detect(self, candidates: Detections) -> Detections:
+        return candidates

@@ -9,6 +9,7 @@ from vdet.media.images import Image
 from vdet.regions import Regions, SearchArea
 
 
+@runtime_checkable
 class VideoDetector(Protocol):
     """Finds vehicles in the frames of one video, or in one still picture.
 
@@ -72,6 +73,7 @@ def limited(detector: VideoDetector, regions: Regions | None) -> VideoDetector:
     return detector
 
 
+@runtime_checkable
 class DetectorModel(Protocol):
     """A detector as it is loaded from settings and a model file; threads may share it."""
 

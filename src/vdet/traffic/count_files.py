@@ -11,12 +11,61 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from vdet.config.places import CountSettings
+from vdet.errors import ConfigError, TruthError
+from vdet.labels.registry import read_tracks
+from vdet.track.track import FrameTracks
+from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.events import Event
+from vdet.traffic.layout import lay_out
 from vdet.traffic.totals import Counts, Total
 
 SUFFIXES = (".csv", ".json")
 
 _COLUMNS = ("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds")
+
+
+def count_file(
+    path: Path,
+    settings: CountSettings,
+    size: tuple[int, int] | None = None,
+    rate: float | None = None,
+) -> Counts:
+    """Count the vehicles of a file of tracks at the lines and in the zones of the settings.
+
+    Parameters
+    ----------
+    size
+        Width and height of the frames, pixels; None: as the file says, else as the lines say.
+    rate
+        Frames per second, for a file without times.
+
+    Raises
+    ------
+    TruthError
+        The file cannot be used, or has no times.
+    ConfigError
+        The lines do not fit the frames, or the size of the frames is not known.
+    """
+    saved = read_tracks(path, rate)
+    if not saved.has_times:
+        raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
+    return count_frames(saved.frames, settings, size or saved.size)
+
+
+def count_frames(
+    frames: Iterable[FrameTracks], settings: CountSettings, size: tuple[int, int] | None = None
+) -> Counts:
+    """Count the vehicles in the tracks of each frame; arguments and errors as of `count_file`."""
+    size = size or settings.size
+    if not settings:
+        raise ConfigError("there is nothing to count at; give lines or zones")
+    if size is None:
+        raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
+    counter = VehicleCounter(lay_out(settings, *size))
+    for frame in frames:
+        counter.update(frame)
+    return counter.counts()
 
 
 def write_counts(path: Path, counts: Counts) -> None:
