@@ -46,9 +46,7 @@ SETTINGS = (
 )
 SWEEPS = {
     "detector.search.probability": (0.2, 0.3, 0.4, 0.5),
-    "detector.heat.votes.least": (0.06, 0.12, 0.18),
-    "detector.heat.votes.sharpness": (2.0, 3.0, 4.0, 6.0),
-    "detector.heat.votes.agreement": (0.25, 0.35, 0.45),
+    "detector.heat.votes": (0.06, 0.12, 0.18),
     "detector.score.middle": (0.3, 0.4, 0.5, 0.6),
     "tracker.leak": (0.1, 0.2, 0.3),
     "tracker.needed": (0.06, 0.1, 0.16),

@@ -20,45 +20,48 @@ from vdet.config.schema import (
     Settings,
     StillSettings,
     SvmSettings,
-    VoteSettings,
     WindowSettings,
 )
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
 from vdet.media import Frame, Picture
 from vdet.media.images import Image
 
 WIDTH, HEIGHT = 320, 240
+SCALE = REFERENCE_HEIGHT / HEIGHT
 CAR = Box(96, 120, 64, 48)
 BINS = 8
 COLOUR = FeatureSettings(
     color_space="RGB", hog=HogSettings(channels=()), histogram=HistogramSettings(bins=BINS)
 )
+BAND = WindowSettings(size=32, overlap=0.75, top=96, bottom=192)
 SETTINGS = Settings(
     detector=SvmSettings(
         stride=1,
-        reference_height=HEIGHT,
         features=COLOUR,
         search=SearchSettings(
             probability=0.5,
-            windows=(WindowSettings(size=32, overlap=0.75, top=96, bottom=192),),
+            windows=(
+                scale_lengths(WindowSettings(size=32, overlap=0.75, top=96, bottom=192), SCALE),
+            ),
             perspective=PerspectiveSettings(sizes=()),
         ),
         heat=HeatSettings(
-            frames=2, weight="none", shrink=1, blur=5, threshold=1.4, regions="outline"
+            frames=2, weight="none", shrink=1, blur=15, threshold=1.4, regions="outline"
         ),
         score=ScoreSettings(middle=1.4),
         stills=StillSettings(strength=0, width=30 / WIDTH, height=30 / HEIGHT),
     ),
-    tracker=RulesTrackerSettings(reference_height=HEIGHT, min_region=30, confident_peak=4),
+    tracker=scale_lengths(RulesTrackerSettings(min_region=30, confident_peak=4), SCALE),
 )
 """The original's way: sets over fixed rows, outlines, rules."""
 
 
-def by_perspective(horizon: float, *sizes: float) -> Settings:
+def by_perspective(horizon: float | None, *sizes: float) -> Settings:
     """Give the default's way, for cars as large as `CAR`; without box regression votes agree less.
 
-    Rows are right for a horizon of 0.35; at 0 it is looked for.
+    Rows are right for a horizon of 0.35; at None it is looked for.
     """
     perspective = PerspectiveSettings(sizes=sizes, horizon=horizon, highest=0.9, lowest=2.1, step=2)
     return Settings(
@@ -66,7 +69,7 @@ def by_perspective(horizon: float, *sizes: float) -> Settings:
             stride=1,
             features=COLOUR,
             search=SearchSettings(probability=0.5, perspective=perspective),
-            heat=HeatSettings(votes=VoteSettings(least=0.5)),
+            heat=HeatSettings(votes=0.5),
             score=ScoreSettings(middle=0.2, slope=4),
             stills=StillSettings(strength=0.3),
         )

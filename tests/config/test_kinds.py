@@ -196,8 +196,8 @@ class TestOtherPackages:
         assert type(detector.detector).__name__ == "FakeSettings"
         assert detector.detector.model_dump() == {
             "kind": "fake",
-            "searches": 0.0,
-            "stride": 0,
+            "searches": None,
+            "stride": None,
             "foot": 0.0,
             "level": 9,
             "parts": ({"size": 5},),

@@ -121,7 +121,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         "--set nonsense: expected KEY=VALUE, as in output.crf=18",
         "--set: output.crf: should be less than or equal to 51 (got 99)",
         "my.yaml:1:19: detector.heat.frames: should be greater than or equal to 1 (got 0)",
-        "my.yaml:1:30: detector.heat.blur: should be greater than or equal to 0 (got -1)",
+        "my.yaml:1:30: detector.heat.blur: should be greater than or equal to 1 (got -1)",
         "my.yaml:3:9: train.svm.C: should be greater than 0 (got -1)",
         "my.yaml:4:1: trakcer: is no setting; did you mean tracker?",
     ]
@@ -143,7 +143,7 @@ def test_all_errors_are_given_at_once(path: Path) -> None:
         ("features: {hog: {block: 8, cell: 16}}", 12, "features: hog.block × hog.cell must not"),
         ("features: {hog: {channels: [0, 0]}}", 29, "features.hog.channels: channels must differ"),
         (
-            "features: {hog: {channels: []}, histogram: {bins: 0}}",
+            "features: {hog: {channels: []}, histogram: {bins: null}}",
             12,
             "features: at least one of hog and histogram must be on",
         ),

@@ -20,7 +20,6 @@ SETTINGS = """\
 # for one picture
 detector:
   kind: svm
-  reference_height: 720
   search:
     probability: 0.5
     windows:
@@ -36,7 +35,7 @@ tracker:
   kind: rules
   history: 10
   min_region: 50
-  match_method: ccoeff_normed
+  match_distance: 40
 lanes:
   top: 0.63
   length: 37.0
@@ -49,7 +48,7 @@ tracker:
   kind: motion
   smallest: 0.03
   needed: 0.25
-  hidden: 5e-1
+  overlap: 5e-1
   carried: 1
 input: {max_damaged: 0.1, frame_rate: 30}
 output: {scores: true}

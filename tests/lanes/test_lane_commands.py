@@ -17,6 +17,7 @@ from red_cars import SETTINGS, red_finder
 from vdet.boxes import Box
 from vdet.config.lanes import LaneSettings
 from vdet.config.schema import OutputSettings, Settings, WindowSettings
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.lanes.camera import CalibratedCamera, Undistorter
@@ -120,10 +121,11 @@ def write_video(path: Path, images: list[Image]) -> None:
 
 
 def red_settings(lanes: LaneSettings) -> Settings:
-    windows = WindowSettings(size=32, overlap=0.75, top=280, bottom=400)
-    search = SETTINGS.svm.search.model_copy(update={"windows": (windows,)})
-    detector = SETTINGS.svm.model_copy(update={"reference_height": HEIGHT, "search": search})
-    tracker = SETTINGS.tracker.model_copy(update={"reference_height": HEIGHT})
+    band = WindowSettings(size=32, overlap=0.75, top=280, bottom=400)
+    windows = (scale_lengths(band, REFERENCE_HEIGHT / HEIGHT),)
+    search = SETTINGS.svm.search.model_copy(update={"windows": windows})
+    detector = SETTINGS.svm.model_copy(update={"search": search})
+    tracker = scale_lengths(SETTINGS.tracker, 1 / 2)  # `SETTINGS` is for frames half as high
     output = OutputSettings(crf=4)
     return Settings(detector=detector, tracker=tracker, lanes=lanes, output=output)
 

@@ -125,7 +125,7 @@ class TestFirstFrames:
     The horizon is looked for only where it is not set.
     """
 
-    FREE = by_perspective(0, 0.15, 0.2)
+    FREE = by_perspective(None, 0.15, 0.2)
 
     @pytest.fixture
     def asked(self, monkeypatch: pytest.MonkeyPatch) -> list[list[Image]]:

@@ -126,10 +126,10 @@ def test_at_least_so_many_frames_a_second_are_searched(rate: float, stride: int)
 
 
 def test_every_frame_is_searched_where_no_number_is_given() -> None:
-    assert SvmSettings(searches=0).stride_at(Fraction(25)) == 1
+    assert SvmSettings(searches=None).stride_at(Fraction(25)) == 1
 
 
 def test_which_frames_are_searched_follows_from_the_rate_of_the_video() -> None:
-    detector = PERSPECTIVE.detector.model_copy(update={"searches": 12.0, "stride": 0})
+    detector = PERSPECTIVE.detector.model_copy(update={"searches": 12.0, "stride": None})
     results = follow(drive(5), PERSPECTIVE.model_copy(update={"detector": detector}))
     assert [result.searched for result in results] == [True, False, True, False, True]

@@ -121,9 +121,15 @@ def _read_assignments(assignments: Sequence[str], errors: list[str]) -> Document
         except ConfigError as error:
             errors.append(str(error))
         else:
-            values = _overlay(values, document.values)
+            values = _joined(values, document.values)
             places |= document.places
     return Document("--set", values, places)
+
+
+def _joined(below: Any, above: Any) -> Any:
+    if isinstance(below, dict) and isinstance(above, dict):
+        return below | {key: _joined(below.get(key), value) for key, value in above.items()}
+    return above
 
 
 def _merge(layers: Sequence[Document], errors: list[str]) -> tuple[Document, Chosen]:
@@ -131,9 +137,9 @@ def _merge(layers: Sequence[Document], errors: list[str]) -> tuple[Document, Cho
 
     Where a layer chooses an unknown kind, an error is added and the layer's section is left out.
     """
-    values: dict[str, Any] = Settings().model_dump(mode="json")
-    chosen = {
-        name: kinds.settings(values[name][kinds.key]) for name, kinds in SECTIONS_WITH_KINDS.items()
+    values: dict[str, Any] = {}
+    chosen: dict[str, type[Section]] = {
+        name: type(getattr(Settings(), name)) for name in SECTIONS_WITH_KINDS
     }
     places: dict[Key, str] = {}
     for layer in layers:
@@ -141,7 +147,7 @@ def _merge(layers: Sequence[Document], errors: list[str]) -> tuple[Document, Cho
         for name, kinds in SECTIONS_WITH_KINDS.items():
             section = given.get(name)
             kind = section.get(kinds.key) if isinstance(section, dict) else None
-            if isinstance(kind, str) and kind != values[name][kinds.key]:
+            if isinstance(kind, str) and kind != chosen[name].model_fields[kinds.key].default:
                 try:
                     chosen[name] = kinds.settings(kind)
                 except ConfigError as error:
@@ -149,29 +155,38 @@ def _merge(layers: Sequence[Document], errors: list[str]) -> tuple[Document, Cho
                     errors.append(f"{layer.place_of(key)}: {format_key(key)}: {error}")
                     del given[name]
                 else:
-                    values[name] = chosen[name]().model_dump(mode="json")
-        values = _overlay(values, given)
+                    values[name] = {kinds.key: kind}
+        values = _overlay(_defaults(chosen), values, given)
         places |= layer.places
     return Document("settings", values, places), chosen
 
 
-def _overlay(below: Any, above: Any) -> Any:
-    if isinstance(below, dict) and above is None:  # a section of which nothing is given
-        return below
-    if isinstance(below, dict) and isinstance(above, dict):
-        return below | {key: _overlay(below.get(key), value) for key, value in above.items()}
-    if (
-        isinstance(below, list)
-        and isinstance(above, dict)
-        and all(k in range(len(below)) for k in above)
-    ):
-        return [_overlay(item, above[i]) if i in above else item for i, item in enumerate(below)]
+def _defaults(chosen: Chosen) -> dict[str, Any]:
+    sections: dict[str, Any] = {name: section() for name, section in chosen.items()}
+    return Settings.model_construct(**sections).model_dump(mode="json")
+
+
+def _overlay(default: Any, below: Any, above: Any) -> Any:
+    """Lay values over those of the layers below; `default` holds where no layer gives a list."""
+    if isinstance(default, dict) and above is None:  # a section of which nothing is given
+        return {} if below is None else below
+    if isinstance(default, dict) and isinstance(above, dict):
+        below = below if isinstance(below, dict) else {}
+        given = {
+            key: _overlay(default.get(key), below.get(key), value) for key, value in above.items()
+        }
+        return below | given
+    items = default if below is None else below
+    if isinstance(items, list) and isinstance(above, dict) and above.keys() <= {*range(len(items))}:
+        return [
+            _overlay(item, item, above[i]) if i in above else item for i, item in enumerate(items)
+        ]
     return above
 
 
 def _validate(values: Mapping[str, Any], chosen: Chosen) -> Settings:
     """Check values against the sections of the chosen kinds."""
-    fields: Any = {name: (section, ...) for name, section in chosen.items()}
+    fields: Any = {name: (section, section()) for name, section in chosen.items()}
     checked = create_model("Settings", __base__=Settings, **fields).model_validate(values)
     return Settings.model_construct(
         **{name: getattr(checked, name) for name in Settings.model_fields}

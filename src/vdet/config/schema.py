@@ -5,20 +5,7 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 
 from pydantic import Field, SerializeAsAny
 
-from vdet.config.detector import (
-    DetectorSettings,
-    NetworkSettings,
-    ScoreSettings,
-    StillSettings,
-    SvmSettings,
-)
-from vdet.config.features import (
-    ColorSpace,
-    FeatureSettings,
-    HistogramSettings,
-    HogSettings,
-)
-from vdet.config.heat import HeatSettings, VoteSettings
+from vdet.config.detector import DetectorSettings, NetworkSettings
 from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
 from vdet.config.network import NetworkTrainingSettings
@@ -29,8 +16,20 @@ from vdet.config.places import (
     RegionsSettings,
     ZoneSettings,
 )
-from vdet.config.search import PerspectiveSettings, SearchSettings, WindowSettings
 from vdet.config.section import Section
+from vdet.config.svm import (
+    ColorSpace,
+    FeatureSettings,
+    HeatSettings,
+    HistogramSettings,
+    HogSettings,
+    PerspectiveSettings,
+    ScoreSettings,
+    SearchSettings,
+    StillSettings,
+    SvmSettings,
+    WindowSettings,
+)
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
 from vdet.config.train import TrainSettings
 from vdet.config.training import (
@@ -76,7 +75,6 @@ __all__ = [
     "SvmTrainingSettings",
     "TrackerSettings",
     "TrainSettings",
-    "VoteSettings",
     "WindowSettings",
     "ZoneSettings",
 ]

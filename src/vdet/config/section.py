@@ -6,10 +6,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class _FrameLength:
-    """Marks a length in pixels of a frame `reference_height` rows high (see `scale_lengths`)."""
+    """Marks a length in pixels of a frame `REFERENCE_HEIGHT` rows high (see `scale_lengths`)."""
 
 
 FRAME_LENGTH = _FrameLength()
+REFERENCE_HEIGHT = 720
+"""Rows of the frames that lengths in frame pixels are given for."""
 Pixels = Annotated[int, Field(ge=0, le=100_000), FRAME_LENGTH]
 Share = Annotated[float, Field(ge=0, le=1)]
 

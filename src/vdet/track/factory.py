@@ -10,7 +10,7 @@ from vdet.config.schema import (
     Settings,
     TrackerSettings,
 )
-from vdet.config.section import scale_lengths
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.holding import HoldingTracker
 from vdet.track.motion.tracker import MotionTracker
@@ -55,7 +55,7 @@ def carrying(tracker: VideoTracker) -> CarryingTracker:
 
 
 def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001
-    return RulesTracker(scale_lengths(settings, height / settings.reference_height))
+    return RulesTracker(scale_lengths(settings, height / REFERENCE_HEIGHT))
 
 
 MOTION = TrackerKind(MotionTrackerSettings, MotionTracker)

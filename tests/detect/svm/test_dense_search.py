@@ -28,7 +28,9 @@ from vdet.detect.svm.windows import WindowGrid
 from vdet.media import Picture
 from vdet.media.images import Image
 
-FEATURES = FeatureSettings(patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=0))
+FEATURES = FeatureSettings(
+    patch=64, hog=HogSettings(cell=8), histogram=HistogramSettings(bins=None)
+)
 GRIDS = [
     (AlignedSearch, 64, 8),
     (AlignedSearch, 64, 16),

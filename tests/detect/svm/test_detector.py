@@ -279,7 +279,7 @@ class TestHorizon:
     def test_each_still_picture_has_its_own_horizon(self, monkeypatch: pytest.MonkeyPatch) -> None:
         for horizon in (0.35, 0.45):
             monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda _, h=horizon: h)
-            first = trace_of(detect_still(road(CAR), by_perspective(0, 0.15, 0.2).svm)).grids[0]
+            first = trace_of(detect_still(road(CAR), by_perspective(None, 0.15, 0.2).svm)).grids[0]
             assert float(first.top) == pytest.approx(horizon * HEIGHT - 0.1 * first.size, abs=1)
 
 

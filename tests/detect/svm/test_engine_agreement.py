@@ -59,7 +59,7 @@ GRIDS = {
     "enlarged, third pixels": (LocatedSearch, grid_of(48, overlap=0.85)),
 }
 FEATURES = {
-    "no histogram": FeatureSettings(histogram=HistogramSettings(bins=0)),
+    "no histogram": FeatureSettings(histogram=HistogramSettings(bins=None)),
     "fine histogram": FeatureSettings(histogram=HistogramSettings(bins=256)),
     "luma only": FeatureSettings(hog=HogSettings(channels=(0,))),
     "other order": FeatureSettings(hog=HogSettings(channels=(2, 0))),

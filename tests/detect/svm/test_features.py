@@ -105,7 +105,7 @@ def test_a_red_patch_is_red_in_rgb() -> None:
 @pytest.mark.parametrize("channels", [(0,), (2, 0), (1, 2)])
 def test_hog_may_be_of_some_channels_in_any_order(channels: tuple[int, ...]) -> None:
     some = FEATURES.hog.model_copy(update={"channels": channels})
-    extractor = FeatureExtractor(seed_but(hog=some, histogram=HistogramSettings(bins=0)))
+    extractor = FeatureExtractor(seed_but(hog=some, histogram=HistogramSettings(bins=None)))
     everything = FeatureExtractor(FEATURES).describe(PATCH)[:4704].reshape(3, 1568)
     assert extractor.layout.length == 1568 * len(channels)
     np.testing.assert_array_equal(

@@ -24,7 +24,7 @@ def parts(windows: Windows) -> list[np.ndarray]:
 
 def heat_map(
     frames: int = 2,
-    blur: int = 0,
+    blur: int = 1,
     weight: Literal["none", "coverage"] = "none",
     shrink: Literal[1, 2, 4, 8] = 1,
 ) -> HeatMap:
@@ -99,9 +99,8 @@ def test_an_even_blur_is_rounded_up_to_the_next_odd_one() -> None:
     )
 
 
-@pytest.mark.parametrize("blur", [0, 1])
-def test_a_blur_of_a_pixel_or_none_changes_nothing(blur: int) -> None:
-    assert values_of(heat_map(blur=blur), found((0, 0, 9, 9, 1))).sum() == 81
+def test_a_blur_of_a_pixel_changes_nothing() -> None:
+    assert values_of(heat_map(blur=1), found((0, 0, 9, 9, 1))).sum() == 81
 
 
 @pytest.mark.parametrize(

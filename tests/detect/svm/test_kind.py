@@ -8,7 +8,6 @@ from red_cars import red_finder
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import (
     FeatureSettings,
-    HeatSettings,
     SvmSettings,
 )
 from vdet.detect.factory import load_detector, model_file
@@ -40,10 +39,14 @@ def test_features_that_no_shipped_model_has_are_refused_with_advice() -> None:
         shipped_model(SvmSettings(features=HSV))
 
 
-def test_features_are_asked_for_where_they_differ_from_the_default() -> None:
+def test_features_are_asked_for_where_they_are_given() -> None:
+    same = FeatureSettings()
     assert requested_features(SvmSettings(features=HSV)) == HSV
-    assert requested_features(SvmSettings(features=FeatureSettings(patch=32))) is None
-    assert requested_features(SvmSettings(heat=HeatSettings(frames=3))) is None
+    assert requested_features(SvmSettings(features=same)) == same
+    given = load_settings(None, ["detector.features.patch=32"], detector="svm").svm
+    assert requested_features(given) == same
+    assert requested_features(SvmSettings()) is None
+    assert requested_features(load_settings(None, ["detector.kind=svm"]).svm) is None
 
 
 def test_a_model_file_brings_its_own_features_but_not_others_than_are_asked_for() -> None:

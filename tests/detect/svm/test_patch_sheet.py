@@ -57,7 +57,7 @@ class TestShape:
         [
             ({"hog": HogSettings(channels=())}, 5),
             ({"hog": HogSettings(channels=(1,))}, 6),
-            ({"histogram": HistogramSettings(bins=0)}, 7),
+            ({"histogram": HistogramSettings(bins=None)}, 7),
         ],
     )
     def test_features_that_are_off_have_no_tile(self, change: dict[str, Any], tiles: int) -> None:

@@ -15,6 +15,7 @@ from vdet.config.schema import (
     SvmSettings,
     WindowSettings,
 )
+from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
@@ -51,7 +52,7 @@ def laid(
 
 
 def search_of(features: FeatureSettings, engine: Engine = dense_search) -> FrameSearch:
-    settings = SvmSettings(reference_height=120, features=features, search=fixed(*SETS))
+    settings = SvmSettings(features=features, search=scale_lengths(fixed(*SETS), 720 / 120))
     return FrameSearch(model_of(features), settings, 160, 120, engine=engine)
 
 
@@ -80,7 +81,7 @@ def with_sides(sides: Sides, probability: float | None = None) -> FrameSearch:
     search = fixed(*SETS).model_copy(
         update={"probability": MEDIAN if probability is None else probability}
     )
-    settings = SvmSettings(reference_height=120, features=SMALL, search=search)
+    settings = SvmSettings(features=SMALL, search=scale_lengths(search, 720 / 120))
     return FrameSearch(replace(model_of(SMALL), box_regression=boxes), settings, 160, 120)
 
 
@@ -169,8 +170,7 @@ class TestLayingGrids:
         assert [grid.size for grid in lay_grids(SEED, COLOUR, 100, 720)] == [64]
 
     def test_no_window_is_ever_smaller_than_a_pixel(self) -> None:
-        settings = SEED.model_copy(update={"reference_height": 100_000})
-        assert lay_grids(settings, COLOUR, 400, 300) == []
+        assert lay_grids(SEED, COLOUR, 400, 2) == []
 
 
 class TestSearching:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, red_finder, road
+from red_cars import CAR, HEIGHT, PERSPECTIVE, SCALE, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import Box
 from vdet.config.schema import FeatureSettings, SvmSettings, WindowSettings
+from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.stages import Trace, blend_heat, stage_pictures
@@ -17,8 +18,8 @@ from vdet.media.images import Image
 NAMES = ["patches", "windows", "hits", "heat"]
 ROWS = SETTINGS.svm
 HOG = red_finder().features
-SMALLER_SET = WindowSettings(size=24, overlap=0.5, top=100, bottom=160)
-OUTSIDE = WindowSettings(size=240, overlap=0.5, top=120, bottom=360)
+SMALLER_SET = scale_lengths(WindowSettings(size=24, overlap=0.5, top=100, bottom=160), SCALE)
+OUTSIDE = scale_lengths(WindowSettings(size=240, overlap=0.5, top=120, bottom=360), SCALE)
 
 
 def pictures_of(image: Image, settings: SvmSettings = ROWS) -> dict[str, Image]:

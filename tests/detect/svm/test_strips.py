@@ -32,7 +32,7 @@ from vdet.detect.svm.windows import WindowGrid
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 
-NO_HISTOGRAM = HistogramSettings(bins=0)
+NO_HISTOGRAM = HistogramSettings(bins=None)
 FRAME = np.random.default_rng(0).integers(0, 256, (300, 400, 3), dtype=np.uint8)
 
 
@@ -198,14 +198,14 @@ SMALL_STRIP = noise(40, 70)
 X, Y = np.array([0, 3, 38])[:, np.newaxis], np.array([0, 1, 7, 8])[np.newaxis]
 
 
-def features_of(bins: int) -> FeatureSettings:
+def features_of(bins: int | None) -> FeatureSettings:
     histogram = HistogramSettings.model_validate({"bins": bins})
     return FeatureSettings(halved=(), hog=HogSettings(channels=(0,)), histogram=histogram)
 
 
 def weights_of(features: FeatureSettings, members: int) -> tuple[StripWeights, np.ndarray]:
     """Return a model's sorted weights, and those of its histogram, `(members, 3, bins)`."""
-    layout, bins = Layout.of(features), features.histogram.bins
+    layout, bins = Layout.of(features), features.histogram.bins or 0
     weights = np.random.default_rng(bins).normal(size=(members, layout.length)).astype(np.float32)
     model = LinearModel(features, weights, *np.zeros((3, members), np.float32))
     return StripWeights.of(model), weights[:, layout.histogram].reshape(members, 3, bins)
@@ -235,7 +235,7 @@ def test_tables_are_summed_for_a_list_of_windows_too() -> None:
 
 
 def test_without_a_histogram_nothing_is_added() -> None:
-    features = features_of(0)
+    features = features_of(None)
     tables = weights_of(features, 2)[0].tables
     assert not table_sums(SMALL_STRIP, tables, features, X, Y).any()
 

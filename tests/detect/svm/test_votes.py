@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
-from vdet.config.schema import VoteSettings
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.votes import MAX_VOTES, Votes, split_regions
 from vdet.detect.svm.windows import Windows
@@ -38,10 +37,10 @@ def exactly(box: Box, weight: float) -> Vote:
     return box.x, box.y, box.width, box.height, weight
 
 
-def split(votes: Sequence[Vote], *regions: Box, **settings: float) -> list[HotRegion]:
+def split(votes: Sequence[Vote], *regions: Box, least: float = 0.12) -> list[HotRegion]:
     """Return the vehicles in regions; by default in one region that covers all votes."""
     hot = [HotRegion(box, box.center, 1.0) for box in regions or [EVERYWHERE]]
-    return split_regions(hot, votes_of(*votes), VoteSettings.model_validate(settings))
+    return split_regions(hot, votes_of(*votes), least)
 
 
 def boxes(regions: list[HotRegion]) -> list[Box]:
@@ -110,7 +109,7 @@ class TestWeights:
         off = LEFT.moved_to(120, 100)
         table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
         votes = Votes(table, presence=np.array([0.2, 0.6]), position=np.array([1e4, 1.0]))
-        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
         assert vehicle.box == LEFT
         assert vehicle.strength == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
 
@@ -120,7 +119,7 @@ class TestWeights:
         votes = Votes(
             table, presence=np.array([0.01, 0.1, 0.1, 0.1]), position=np.array([9, 1, 1, 1.0])
         )
-        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, VoteSettings())
+        (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
         assert vehicle.box == LEFT
 
     def test_votes_without_weight_do_not_count(self) -> None:
@@ -160,7 +159,6 @@ class TestParts:
         beside = self.BONNET.moved_to(LEFT.right - 18, 130)  # half of it in LEFT
         found = split([exactly(LEFT, 1), exactly(beside, 0.5)])
         assert boxes(found) == [LEFT, beside]
-        assert boxes(split([exactly(LEFT, 1), exactly(beside, 0.5)], inside=0.4)) == [LEFT]
 
 
 class TestRegions:
@@ -191,12 +189,12 @@ class TestRegions:
     def test_a_region_without_votes_has_no_vehicles(self) -> None:
         assert split([]) == []
         assert split(around(LEFT), Box(0, 0, 10, 10)) == []
-        assert split_regions([], votes_of(*around(LEFT)), VoteSettings()) == []
+        assert split_regions([], votes_of(*around(LEFT)), 0.12) == []
 
 
-def collected(*windows: Windows, **settings: float) -> Votes:
+def collected(*windows: Windows) -> Votes:
     """Collect the votes in a frame of 100 × 100 pixels."""
-    return Votes.of(windows, (100, 100), VoteSettings.model_validate(settings))
+    return Votes.of(windows, (100, 100))
 
 
 class TestCollecting:
@@ -217,12 +215,11 @@ class TestCollecting:
         box = np.tile(np.array([10, 10, 20, 20], np.float32), (3, 1))
         sure, ones = np.array([0.5, 0.9, 1], np.float32), np.ones(3, np.float32)
         windows = Windows(np.zeros((3, 4), np.int32), sure, ones, box)
-        where = collected(windows, sharpness=2).position
-        assert where[0] == pytest.approx(np.log(2) ** 2)
-        assert where[1] == pytest.approx(np.log(10) ** 2, rel=1e-5)
+        where = collected(windows).position
+        assert where[0] == pytest.approx(np.log(2) ** 4)
+        assert where[1] == pytest.approx(np.log(10) ** 4, rel=1e-5)
         assert np.isfinite(where[2])
         assert where[2] > 10 * where[1]
-        assert collected(windows, sharpness=0).position.tolist() == [1, 1, 1]
 
     def test_boxes_are_cut_off_at_the_sides_of_the_frame(self) -> None:
         vehicles = [[90, 10, 30, 20], [-5, -5, 10, 10], [100, 0, 10, 10], [60, 95, 20, 20]]
@@ -237,7 +234,7 @@ class TestCollecting:
         quarters = np.full(4, 0.25, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
         regions = [HotRegion(Box(60, 40, 40, 30), (80, 55), 1)]
-        (vehicle,) = split_regions(regions, collected(windows), VoteSettings())
+        (vehicle,) = split_regions(regions, collected(windows), 0.12)
         assert vehicle.box == Box(60, 40, 40, 30)
         assert vehicle.strength == pytest.approx(0.25)
 
@@ -255,14 +252,6 @@ class TestCollecting:
         assert vehicle.box.iou(LEFT) > 0.9
 
 
-@pytest.mark.parametrize("agreement", [0, 1])
-@pytest.mark.parametrize("inside", [0, 1])
-def test_the_split_ends_for_any_settings(agreement: float, inside: float) -> None:
-    votes = around(LEFT) + around(RIGHT)
-    found = split(votes, agreement=agreement, inside=inside, least=0)
-    assert 1 <= len(found) <= len(votes)
-
-
 some_votes = st.lists(  # no two of equal weight, because their order would matter
     st.tuples(
         st.floats(-50, 400),
@@ -277,13 +266,11 @@ some_votes = st.lists(  # no two of equal weight, because their order would matt
 )
 
 
-@given(some_votes, st.floats(0, 1), st.floats(0, 1))
-def test_boxes_lie_within_the_hull_of_the_votes(
-    votes: list[Vote], agreement: float, inside: float
-) -> None:
+@given(some_votes)
+def test_boxes_lie_within_the_hull_of_the_votes(votes: list[Vote]) -> None:
     table = np.array(votes)
     (left, top), (right, bottom) = table[:, :2].min(axis=0), (table[:, :2] + table[:, 2:4]).max(0)
-    found = split(votes, agreement=agreement, inside=inside, least=0)
+    found = split(votes, least=0)
     for box in boxes(found):
         assert left - 1 <= box.x < box.right <= right + 1
         assert top - 1 <= box.y < box.bottom <= bottom + 1

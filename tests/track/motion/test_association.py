@@ -107,7 +107,6 @@ def test_no_other_pairs_add_up_to_more(values: Float64Array) -> None:
 
 # Vehicles that are the same one
 
-SETTINGS = MotionTrackerSettings()
 SIZE = (1000, 500)
 BOX = np.array([400.0, 200.0, 100.0, 60.0])
 
@@ -120,7 +119,7 @@ def vehicle(
     confirmed: bool = True,
     unseen: float = 0,
 ) -> Vehicle:
-    made = Vehicle.new(Observation(box, score), 0.04, SETTINGS)
+    made = Vehicle.new(Observation(box, score), 0.04, MotionTrackerSettings())
     made.confirmed, made.id, made.unseen = confirmed, number, unseen
     return made
 
@@ -165,7 +164,7 @@ def test_of_two_lost_vehicles_the_nearest_is_taken_and_only_by_one() -> None:
 
 
 def without(*vehicles: Vehicle) -> list[Vehicle]:
-    return without_duplicates(vehicles, SIZE, SETTINGS)
+    return without_duplicates(vehicles, SIZE)
 
 
 def test_of_two_tracks_with_equal_scores_the_older_one_stays() -> None:

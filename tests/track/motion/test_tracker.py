@@ -20,6 +20,7 @@ from track.motion.scenes import (
 )
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
+from vdet.track.motion.overlapping import PART
 from vdet.track.motion.tracker import MotionTracker
 
 CAR = Box(400, 400, 100, 70)
@@ -216,7 +217,7 @@ def test_weak_detections_on_the_nearer_vehicle_do_not_move_the_hidden_one() -> N
 
 def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detected() -> None:
     hiding, half = VAN.moved_to(370, 390), Box(480, 400, 110, 70)  # it went on behind the van
-    assert half.intersection(hiding).area > DEFAULTS.part * half.area
+    assert half.intersection(hiding).area > PART * half.area
     before = [[CAR, van] for van in moving(VAN, dx=6, frames=46)]
     shown = follow([*before, *[[hiding]] * 20, *[[hiding, half]] * 6])
     assert id_at(shown[-1], half) == id_at(shown[10], CAR)

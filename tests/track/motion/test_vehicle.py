@@ -23,7 +23,7 @@ def seen(
     """Give a vehicle after so many frames with a detection."""
     vehicle = Vehicle.new(observation(score=score), seconds, SETTINGS)
     for n in range(1, frames):
-        vehicle.predict(seconds, SETTINGS)
+        vehicle.predict(seconds)
         found = observation(400 + n * dx, 100 * growth**n, score)
         vehicle.see(found, seconds, SIZE, SETTINGS)
     return vehicle
@@ -31,7 +31,7 @@ def seen(
 
 def missed(vehicle: Vehicle, frames: int, seconds: float = FRAME) -> Vehicle:
     for _ in range(frames):
-        vehicle.predict(seconds, SETTINGS)
+        vehicle.predict(seconds)
         vehicle.miss(seconds, SETTINGS)
     return vehicle
 

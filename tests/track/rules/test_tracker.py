@@ -183,14 +183,6 @@ def test_the_least_score_of_a_match_is_a_setting() -> None:
         assert len(update(cars, noisy)) == found
 
 
-def test_the_method_of_the_match_is_a_setting() -> None:
-    darker = road(SEDAN) // 3
-    for method, found in (("ccoeff_normed", 1), ("sqdiff_normed", 0)):
-        cars = RulesTracker(tracker_but(match_method=method, match_score=0.8))
-        show(cars, SEDAN)
-        assert len(update(cars, darker)) == found
-
-
 def test_a_car_that_was_never_shown_is_not_searched() -> None:
     cars = RulesTracker(SEED_TRACKER)
     for _ in range(8):

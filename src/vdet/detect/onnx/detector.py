@@ -41,7 +41,7 @@ class NetworkModel:
     def __init__(self, path: Path, settings: NetworkSettings) -> None:
         self._settings = settings
         self._session = Session(path)
-        self._recognized = recognize(self._session, path, settings.names)
+        self._recognized = recognize(self._session, path, settings.names or ())
         names, wanted = self._recognized.names, settings.classes
         self._numbers = np.array(our_classes(names, wanted), np.int32)
         if (self._numbers < 0).all():

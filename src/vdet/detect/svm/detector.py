@@ -9,7 +9,7 @@ import numpy as np
 
 from vdet.boxes import are_nested
 from vdet.config.schema import StillSettings, SvmSettings
-from vdet.config.section import scale_lengths
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.detections import Detections
 from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
@@ -107,7 +107,7 @@ class SvmDetector:
         self._features = model.features
         self._size = width, height
         self._settings = settings
-        self._heat = scale_lengths(settings.heat, height / settings.reference_height)
+        self._heat = scale_lengths(settings.heat, height / REFERENCE_HEIGHT)
         self._map = HeatMap(width, height, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
 
@@ -162,7 +162,7 @@ class SvmDetector:
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
         if self._heat.regions == "votes":
-            votes = Votes.of(self._recent, self._size, self._heat.votes)
+            votes = Votes.of(self._recent, self._size)
             regions = split_regions(regions, votes, self._heat.votes)
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
@@ -201,4 +201,4 @@ def horizon_of(settings: SvmSettings, images: Sequence[Image]) -> float:
     perspective = settings.search.perspective
     if not perspective.sizes:
         return DEFAULT_HORIZON  # no window set depends on it
-    return perspective.horizon or find_horizon(images)
+    return find_horizon(images) if perspective.horizon is None else perspective.horizon

@@ -43,7 +43,7 @@ class Layout:
         blocks = settings.patch // hog.cell - hog.block + 1
         length = blocks**2 * hog.block**2 * hog.orientations
         starts = [i * length for i in range(len(hog.channels) + 1)]
-        histogram = slice(starts[-1], starts[-1] + 3 * settings.histogram.bins)
+        histogram = slice(starts[-1], starts[-1] + 3 * (settings.histogram.bins or 0))
         return Layout(tuple(itertools.starmap(slice, itertools.pairwise(starts))), histogram)
 
     @property

@@ -34,8 +34,8 @@ def shipped_model(settings: SvmSettings) -> Path:
 def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
     """Load a linear model; `path` is its file, None for the shipped one.
 
-    Where the settings leave the default features, the model's own are used; other features must be
-    those that the model was trained with.
+    Features that the settings give must be those that the model was trained with. Where they give
+    none, the model's own are used.
 
     Raises
     ------
@@ -54,8 +54,8 @@ def _load_network() -> DetectorModel:
 
 
 def requested_features(settings: SvmSettings) -> FeatureSettings | None:
-    """Return the features that a model must have; None where the settings leave the default."""
-    return None if settings.features == FeatureSettings() else settings.features
+    """Return the features that a model must have; None where the settings give none."""
+    return settings.features if "features" in settings.model_fields_set else None
 
 
 def trained_on(path: Path) -> tuple[str, ...]:

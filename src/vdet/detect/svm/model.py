@@ -208,6 +208,8 @@ def _features(header: dict[str, Any], path: Path) -> FeatureSettings:
         # Older files do not say which channels are halved: none is. They name shrunk patches too.
         known = {"halved": ()} | header["features"]
         known.pop("spatial", None)
+        if known.get("histogram") == {"bins": 0}:
+            known["histogram"] = {"bins": None}
         return FeatureSettings.model_validate(known)
     except (KeyError, TypeError, ValidationError) as error:
         raise ModelError(

@@ -7,7 +7,7 @@ import numpy as np
 
 from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings, SvmSettings
-from vdet.config.section import scale_lengths
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
 from vdet.detect.svm.limits import ALIGNMENT, limited_grid
@@ -153,7 +153,7 @@ def lay_grids(
     horizon: float = DEFAULT_HORIZON,
 ) -> list[WindowGrid]:
     """Lay the window sets over a frame; sets of which no window fits are left out."""
-    search = scale_lengths(settings.search, height / settings.reference_height)
+    search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
     cells = features.patch // features.hog.cell
     grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
     grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)

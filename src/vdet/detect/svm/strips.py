@@ -70,7 +70,7 @@ class StripWeights:
         return StripWeights(np.concatenate(hog, axis=-1), tables)
 
 
-def _tables(weights: Float32Array, bins: int) -> Float32Array:
+def _tables(weights: Float32Array, bins: int | None) -> Float32Array:
     if not bins:
         return np.zeros((len(weights), 3, 256), np.float32)
     return np.repeat(weights.reshape(len(weights), 3, bins), 256 // bins, axis=2)

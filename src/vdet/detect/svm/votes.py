@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Box, Float64Array, coverage, iou_matrix, visible
-from vdet.config.schema import VoteSettings
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
@@ -25,6 +24,14 @@ MAX_VOTES = 400
 _MAX_PROBABILITY = 1 - 2**-24
 """Higher ones are lowered to it, because the position weight of 1 is infinite."""
 
+_AGREEMENT = 0.35
+"""Least intersection over union of two boxes that agree."""
+
+_INSIDE = 0.7
+"""A box with more than this share inside a larger vehicle is a part of it."""
+
+_SHARPNESS = 4.0
+"""Power of -log(1 - probability) that is a hit's `position` weight: the best fit counts most."""
 
 _FAR_STRONGER = 4
 """How many times the weight of the box around it a box needs, so that it is no part of it."""
@@ -49,7 +56,7 @@ class Votes:
     position: Float64Array
 
     @staticmethod
-    def of(hits: Sequence[Windows], size: tuple[int, int], settings: VoteSettings) -> "Votes":
+    def of(hits: Sequence[Windows], size: tuple[int, int]) -> "Votes":
         """Collect the votes of the hits of some frames.
 
         Boxes are cut off at the sides of the frame of `size` (width and height, pixels): windows
@@ -59,7 +66,7 @@ class Votes:
         shares = np.concatenate([each.shares for each in hits], dtype=np.float64)
         probabilities = np.concatenate([each.probabilities for each in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
-        position = (-np.log1p(-bounded)) ** settings.sharpness
+        position = (-np.log1p(-bounded)) ** _SHARPNESS
         inside = visible(boxes, size)
         seen = (inside[:, 2:] >= 1).all(axis=1)
         return Votes(inside[seen], (probabilities * shares)[seen], position[seen])
@@ -96,20 +103,19 @@ class _VotedBox:
         return float(self.box[2] * self.box[3])
 
 
-def split_regions(
-    regions: Sequence[HotRegion], votes: Votes, settings: VoteSettings
-) -> list[HotRegion]:
+def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
 
     Regions whose boxes overlap are split as one, so that no vote counts twice. A box in another one
     is left if it is far stronger: the tracker, or `SvmDetector` in a still picture, shows one.
+    `least` is the least weight of the votes that agree on a vehicle.
     """
     found = [
         vehicle
         for group in _overlapping([region.box for region in regions])
-        for vehicle in _vehicles(votes.within(group), settings)
+        for vehicle in _vehicles(votes.within(group), least)
     ]
-    return [_region(each) for each in found if not _is_part(each, found, settings.inside)]
+    return [_region(each) for each in found if not _is_part(each, found)]
 
 
 def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
@@ -126,43 +132,41 @@ def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
     return groups
 
 
-def _vehicles(votes: Votes, settings: VoteSettings) -> list[_VotedBox]:
+def _vehicles(votes: Votes, least: float) -> list[_VotedBox]:
     overlaps = iou_matrix(votes.boxes, votes.boxes)
     presence, position = votes.presence.copy(), votes.position.copy()
     found: list[_VotedBox] = []
     # Presence only falls: once no box has enough, none will be found any more.
-    while position.any() and (overlaps @ presence).max() >= settings.least:
+    while position.any() and (overlaps @ presence).max() >= least:
         agreed = np.where(position > 0, overlaps @ position, 0)
         mode = int(agreed.argmax())
-        box = _average(votes.boxes, position, overlaps[mode], settings.agreement)
+        box = _average(votes.boxes, position, overlaps[mode])
         around = iou_matrix(box[np.newaxis], votes.boxes)[0]
-        box = _average(votes.boxes, position, around, settings.agreement)
+        box = _average(votes.boxes, position, around)
         vehicle = _VotedBox(box, float(agreed[mode]), float(overlaps[mode] @ presence))
-        used = np.maximum(around, overlaps[mode]) > settings.agreement
-        used[mode] = True  # with an agreement of 1, no overlap is above it
-        if vehicle.presence >= settings.least:
+        used = np.maximum(around, overlaps[mode]) > _AGREEMENT
+        used[mode] = True
+        if vehicle.presence >= least:
             found.append(vehicle)
-            used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > settings.inside
+            used |= coverage(votes.boxes, box[np.newaxis])[:, 0] > _INSIDE
         presence[used] = position[used] = 0
     return found
 
 
-def _average(
-    boxes: Float64Array, weights: Float64Array, overlaps: Float64Array, agreement: float
-) -> Float64Array:
+def _average(boxes: Float64Array, weights: Float64Array, overlaps: Float64Array) -> Float64Array:
     """Average the boxes that agree; a better overlap counts more."""
-    shares = np.where(overlaps > agreement, weights * overlaps**2, 0)
+    shares = np.where(overlaps > _AGREEMENT, weights * overlaps**2, 0)
     total = shares.sum()
     if not total:
         return np.asarray(boxes[int(overlaps.argmax())])
     return np.asarray(shares @ boxes / total)
 
 
-def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox], inside: float) -> bool:
+def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox]) -> bool:
     """Return whether it lies in a larger box that has enough of its `position` weight."""
     return any(
         other.area > vehicle.area
-        and coverage(vehicle.box[np.newaxis], other.box[np.newaxis])[0, 0] > inside
+        and coverage(vehicle.box[np.newaxis], other.box[np.newaxis])[0, 0] > _INSIDE
         and _FAR_STRONGER * other.position > vehicle.position
         for other in others
     )

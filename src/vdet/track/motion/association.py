@@ -12,9 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vdet.boxes import Float64Array, iou, visible
-from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.assignment import assign
-from vdet.track.motion.overlapping import CLEAR, is_part, is_same
+from vdet.track.motion.overlapping import CLEAR, PART, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
 
 Pairs = dict[int, int]
@@ -93,9 +92,7 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     return left
 
 
-def without_duplicates(
-    vehicles: Sequence[Vehicle], size: tuple[int, int], settings: MotionTrackerSettings
-) -> list[Vehicle]:
+def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> list[Vehicle]:
     """Leave one track for each vehicle: the one with the highest score, or else the oldest one.
 
     It takes the lowest id of those dropped. A track that is not confirmed replaces no other one; it
@@ -104,7 +101,7 @@ def without_duplicates(
     kept: list[Vehicle] = []
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
     for vehicle in sorted(vehicles, key=_rank):
-        same = _track_of_same(vehicle, kept, hidden, size, settings)
+        same = _track_of_same(vehicle, kept, hidden, size)
         if same is None:
             kept.append(vehicle)
         elif vehicle.id is not None:
@@ -122,7 +119,6 @@ def _track_of_same(
     others: Sequence[Vehicle],
     hidden: Sequence[Vehicle],
     size: tuple[int, int],
-    settings: MotionTrackerSettings,
 ) -> Vehicle | None:
     """Return the track among `others`, higher in rank, that shows the same vehicle.
 
@@ -135,7 +131,7 @@ def _track_of_same(
             continue
         boxes = visible(np.stack([vehicle.state.box, other.state.box]), size)
         weaker = vehicle.confirmed or vehicle.score <= other.score
-        inside = not vehicle.confirmed and is_part(boxes[0], boxes[1:], settings.part)
+        inside = not vehicle.confirmed and is_part(boxes[0], boxes[1:], PART)
         part = inside and not _comes_out(vehicle, other, hidden)
         if part or (weaker and is_same(boxes[0], boxes[1:])):
             return other

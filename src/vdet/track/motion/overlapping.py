@@ -10,6 +10,12 @@ import numpy.typing as npt
 
 from vdet.boxes import Float64Array, coverage, iou_matrix
 
+PART = 0.6
+"""A detection with more than this share inside a shown vehicle is a part of it."""
+
+HIDDEN = 0.5
+"""A vehicle is hidden where a nearer one covers more than this share of it."""
+
 _LEVEL = 0.15
 """Bottoms that differ by less than this share of the lesser height are level."""
 

@@ -10,7 +10,15 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
 from vdet.media import Picture
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
-from vdet.track.motion.overlapping import are_hidden, are_parts, around, shows_both, stretched
+from vdet.track.motion.overlapping import (
+    HIDDEN,
+    PART,
+    are_hidden,
+    are_parts,
+    around,
+    shows_both,
+    stretched,
+)
 from vdet.track.motion.vehicle import Observation, Vehicle
 from vdet.track.track import Track
 
@@ -65,7 +73,7 @@ class MotionTracker:
         left = [o for number, o in enumerate(observations) if number not in pairs.values()]
         new = [Vehicle.new(o, seconds, self._settings) for o in left if self._adds_evidence(o)]
         self._vehicles = take_over_ids(self._staying() + new)
-        self._vehicles = without_duplicates(self._vehicles, self._size, self._settings)
+        self._vehicles = without_duplicates(self._vehicles, self._size)
         return self._tracks(seconds)
 
     def carry(self, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
@@ -104,7 +112,7 @@ class MotionTracker:
         longest = self._settings.remembered + self._settings.remembered_hidden
         self._vehicles = [v for v in self._vehicles if v.unseen + seconds <= longest]
         for vehicle in self._vehicles:
-            vehicle.predict(seconds, self._settings)
+            vehicle.predict(seconds)
         self._vehicles = self._staying()
 
     def _boxes(self) -> Float64Array:
@@ -142,7 +150,7 @@ class MotionTracker:
         weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
         scores = np.array([observation.score for observation in observations])
-        parts = are_parts(boxes, scores, self._settings.part)
+        parts = are_parts(boxes, scores, PART)
         values[np.ix_(np.flatnonzero(hidden), parts)] = 0  # parts of the vehicle that hides it
         return pair(values, [present, lost, new])
 
@@ -152,7 +160,7 @@ class MotionTracker:
 
     def _hidden(self, boxes: Float64Array) -> list[bool]:
         present = [vehicle.is_present(self._settings) for vehicle in self._vehicles]
-        return are_hidden(boxes, np.array(present, bool), self._settings.hidden)
+        return are_hidden(boxes, np.array(present, bool), HIDDEN)
 
     def _seen_as_one(
         self, expected: Float64Array, hidden: Sequence[bool], found: dict[int, Observation]
@@ -162,7 +170,7 @@ class MotionTracker:
         missed = [row for row in range(len(expected)) if row not in found and not hidden[row]]
         for row, other in product(self._confirmed(found), self._confirmed(missed)):
             observation, both = found[row], expected[[row, other]]
-            if other in shared or not shows_both(observation.box, both, self._settings.part):
+            if other in shared or not shows_both(observation.box, both, PART):
                 continue
             for each in (row, other):
                 box = stretched(expected[each], around(both), observation.box)

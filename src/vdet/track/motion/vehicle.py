@@ -25,6 +25,15 @@ _SLOWING_TIME = 0.8
 _SETTLING_TIME = 0.4
 """The same of the change of its size, from the first miss on: growth soon adds up to a lot."""
 
+_NOISE = 0.1
+"""Standard deviation of the sides of a detection with score 1, as a share of the vehicle's size."""
+
+_ACCELERATION = 1.0
+"""Standard deviation of the change of velocity in a second, sizes of the vehicle a second."""
+
+_VELOCITY = 2.5
+"""Standard deviation of a new vehicle's velocity, sizes of the vehicle a second."""
+
 _LEAST_SCORE = 0.05
 """Below this score the box of a detection is not taken to be any less exact."""
 
@@ -90,9 +99,7 @@ class Vehicle:
         cls, observation: Observation, seconds: float, settings: MotionTrackerSettings
     ) -> "Vehicle":
         """Make a vehicle of its first detection, `seconds` after the frame before."""
-        state = MotionState.at_rest(
-            observation.box, _noise(observation, settings), settings.velocity
-        )
+        state = MotionState.at_rest(observation.box, _noise(observation), _VELOCITY)
         vehicle = cls(state)
         vehicle._add(observation, seconds, settings)
         return vehicle
@@ -112,9 +119,9 @@ class Vehicle:
         """The class with the highest sum of scores."""
         return self._class_scores.best
 
-    def predict(self, seconds: float, settings: MotionTrackerSettings) -> None:
+    def predict(self, seconds: float) -> None:
         """Move on to the next frame, `seconds` later."""
-        self.state = self.state.predicted(seconds, settings.acceleration)
+        self.state = self.state.predicted(seconds, _ACCELERATION)
 
     def see(
         self,
@@ -125,7 +132,7 @@ class Vehicle:
     ) -> None:
         """Take in its detection in this frame of `size`, width and height in pixels."""
         edge = measure(self.state, observation.box, size)
-        noise = _noise(observation, settings)
+        noise = _noise(observation)
         self.state = edge.state.corrected(edge.measured, noise, edge.seen)
         self.unseen = self.hidden = 0.0
         self._add(observation, seconds, settings)
@@ -163,6 +170,6 @@ class Vehicle:
         self._scores.add(score, seconds)
 
 
-def _noise(observation: Observation, settings: MotionTrackerSettings) -> float:
+def _noise(observation: Observation) -> float:
     """Return the deviation of a detection's box: its variance grows as the score falls."""
-    return float(settings.noise / max(observation.score, _LEAST_SCORE) ** 0.5)
+    return float(_NOISE / max(observation.score, _LEAST_SCORE) ** 0.5)

@@ -6,24 +6,15 @@ Source: seed section 3, "Define a Car class".
 from collections import deque
 from dataclasses import InitVar, dataclass, field
 from statistics import fmean, multimode
-from typing import Literal
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from vdet.boxes import Box
 from vdet.config.schema import RulesTrackerSettings
 from vdet.media.images import Image
 
 Point = tuple[float, float]
-MatchMethod = Literal["ccoeff_normed", "ccorr_normed", "sqdiff_normed"]
-
-_METHODS: dict[MatchMethod, int] = {
-    "ccoeff_normed": cv2.TM_CCOEFF_NORMED,
-    "ccorr_normed": cv2.TM_CCORR_NORMED,
-    "sqdiff_normed": cv2.TM_SQDIFF_NORMED,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +150,6 @@ class Car:
             last.image,
             last.box,
             distance=settings.match_distance,
-            method=settings.match_method,
             min_score=settings.match_score,
         )
 
@@ -187,7 +177,6 @@ def find_template(
     near: Box,
     *,
     distance: int,
-    method: MatchMethod,
     min_score: float,
 ) -> Box | None:
     """Return where `template` fits `image` best, if it fits well enough.
@@ -201,10 +190,8 @@ def find_template(
     distance
         How far its top left corner may have moved, pixels, in a straight line. Nothing outside
         `near` grown by this distance is searched.
-    method
-        As `cv2.matchTemplate` names it.
     min_score
-        0 to 1; 1 is a perfect fit by every method (`sqdiff_normed` is inverted).
+        0 to 1; 1 is a perfect fit.
 
     Returns
     -------
@@ -217,7 +204,8 @@ def find_template(
     area = grown.clipped(image.shape[1], image.shape[0])
     if area.width < width or area.height < height or _is_flat(template):
         return None
-    scores = _match_scores(image[area.y : area.bottom, area.x : area.right], template, method)
+    searched = image[area.y : area.bottom, area.x : area.right]
+    scores = np.asarray(cv2.matchTemplate(searched, template, cv2.TM_CCOEFF_NORMED), np.float32)
     dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
     scores[np.hypot(area.x + dx - near.x, area.y + dy - near.y) > distance] = -1
     y, x = np.unravel_index(int(scores.argmax()), scores.shape)
@@ -228,8 +216,3 @@ def find_template(
 
 def _is_flat(image: Image) -> bool:
     return image.size == 0 or bool((image == image[0, 0]).all())
-
-
-def _match_scores(area: Image, template: Image, method: MatchMethod) -> npt.NDArray[np.float32]:
-    scores = np.asarray(cv2.matchTemplate(area, template, _METHODS[method]), np.float32)
-    return 1 - scores if method == "sqdiff_normed" else scores

@@ -1,0 +1,267 @@
+"""The section `detector` of the linear SVM: its features, windows, heatmap and scores."""
+
+import math
+from collections.abc import Hashable
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, model_validator
+
+from vdet.config.detector import DetectorSettings, Foot, Searches
+from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
+
+ColorSpace = Literal["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
+
+
+def _are_distinct(channels: tuple[int, ...]) -> tuple[int, ...]:
+    if len(set(channels)) != len(channels):
+        raise ValueError("channels must differ from one another")
+    return channels
+
+
+ChannelNumbers = Annotated[tuple[Literal[0, 1, 2], ...], AfterValidator(_are_distinct)]
+
+
+class HogSettings(Section):
+    """Histograms of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor gives them."""
+
+    orientations: int = Field(
+        8, ge=2, le=32, description="Number of bins for gradient directions of 0 to 180°."
+    )
+    cell: int = Field(4, ge=2, le=64, description="Side of a cell, in pixels of the patch.")
+    block: int = Field(2, ge=1, le=8, description="Side of a block, in cells.")
+    channels: ChannelNumbers = Field(
+        (0, 1, 2), description="Channels of the colour space that have HOG features."
+    )
+
+
+class HistogramSettings(Section):
+    """Colour histogram of each channel."""
+
+    bins: Literal[8, 16, 32, 64, 128, 256] | None = Field(
+        32, description="Number of equal bins for values of 0 to 255. null: no histogram."
+    )
+
+
+class FeatureSettings(Section):
+    """Features of a patch; they must be those that the model was trained with."""
+
+    patch: int = Field(32, ge=16, le=256, description="Side of a patch, in pixels.")
+    color_space: ColorSpace = Field(
+        "YCrCb", description="Colour space: YCrCb, HSV, LUV, HLS, YUV or RGB."
+    )
+    halved: ChannelNumbers = Field(
+        (1, 2),
+        description="Channels that are described at half their size, with HOG cells of half the "
+        "side. Video has chroma at half size.",
+    )
+    hog: HogSettings = HogSettings()
+    histogram: HistogramSettings = HistogramSettings()
+
+    @model_validator(mode="after")
+    def _cells_fill_the_patch(self) -> "FeatureSettings":
+        if not (self.hog.channels or self.histogram.bins):
+            raise ValueError("at least one of hog and histogram must be on")
+        if self.hog.channels:
+            if self.patch % self.hog.cell:
+                raise ValueError(f"patch must be a multiple of hog.cell ({self.hog.cell})")
+            if self.hog.block * self.hog.cell > self.patch:
+                raise ValueError("hog.block × hog.cell must not exceed patch")
+            if self.halved and (self.hog.cell % 2 or self.hog.cell < 4):
+                raise ValueError("hog.cell must be even, and 4 or more, or halved must be []")
+        if self.halved and self.patch % 2:
+            raise ValueError("patch must be even, or halved must be []")
+        return self
+
+    def shrink(self, channel: int) -> int:
+        """Return how many times smaller than the patch a channel is described: 1 or 2."""
+        return 2 if channel in self.halved else 1
+
+
+class WindowSettings(Section):
+    """A set of square windows over a band of rows and the whole width of the frame."""
+
+    size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH] = Field(
+        description="Side of a window, in pixels."
+    )
+    overlap: float | None = Field(
+        None,
+        ge=0,
+        lt=1,
+        description="Share of a window that the next one covers too. Give either overlap or step.",
+    )
+    step: int | None = Field(
+        None,
+        ge=1,
+        description="Distance to the next window, in cells of the patch. Faster than overlap.",
+    )
+    top: Pixels = Field(description="First row of the band.")
+    bottom: Pixels = Field(description="First row below the band.")
+
+    @model_validator(mode="after")
+    def _fits_its_band(self) -> "WindowSettings":
+        if self.bottom - self.top < self.size:
+            raise ValueError("bottom must be at least top + size")
+        if (self.overlap is None) == (self.step is None):
+            raise ValueError("one of overlap and step must be given, the other left out or null")
+        if self.overlap is not None and int(self.size * (1 - self.overlap)) < 1:
+            raise ValueError("overlap leaves a step of less than a pixel")
+        return self
+
+
+class PerspectiveSettings(Section):
+    """Window sets whose rows follow from their size, because vehicles stand on a flat road."""
+
+    sizes: tuple[Annotated[float, Field(gt=0, le=1)], ...] = Field(
+        (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3),
+        max_length=32,
+        description="Side of the windows of each set, as a share of the frame's width. In frames "
+        "wider than 16:9, as a share of 16/9 of the height.",
+    )
+    zoom: float = Field(
+        1.0, ge=0.1, le=10, description="Factor of all sizes. Above 1 for a longer lens."
+    )
+    horizon: float | None = Field(
+        None,
+        ge=-1,
+        le=1,
+        description="Row of the horizon, as a share of the frame's height. null: where the lines "
+        "of the road meet in the first frames.",
+    )
+    highest: float = Field(
+        0.6,
+        ge=0,
+        le=10,
+        description="Distance from the horizon down to the bottom of a set's highest windows, in "
+        "sides of a window.",
+    )
+    lowest: float = Field(
+        1.1,
+        ge=0,
+        le=10,
+        description="Distance from the horizon down to the bottom of a set's lowest windows, in "
+        "sides of a window.",
+    )
+    beyond: Share = Field(
+        0.7,
+        description="Share of a window that may lie beyond the left or right of the frame.",
+    )
+    step: int = Field(
+        1, ge=1, le=64, description="Distance to the next window, in cells of the patch."
+    )
+
+    @model_validator(mode="after")
+    def _is_in_order(self) -> "PerspectiveSettings":
+        if self.lowest < self.highest:
+            raise ValueError("lowest must be at least highest")
+        return self
+
+
+class SearchSettings(Section):
+    """Which windows of a frame are searched."""
+
+    probability: Share = Field(
+        0.3, description="Least probability of a hit: a window that counts as evidence."
+    )
+    windows: tuple[WindowSettings, ...] = Field(
+        (), max_length=32, description="Window sets over fixed rows."
+    )
+    perspective: PerspectiveSettings = PerspectiveSettings()
+
+    @model_validator(mode="after")
+    def _has_windows(self) -> "SearchSettings":
+        if not (self.windows or self.perspective.sizes):
+            raise ValueError("windows or perspective.sizes must be given")
+        return self
+
+
+class HeatSettings(Section):
+    """How the hits of consecutive frames are summed into a heatmap, and become detections."""
+
+    frames: int = Field(
+        2, ge=1, le=100, description="Number of searched frames whose hits are summed."
+    )
+    weight: Literal["none", "coverage"] = Field(
+        "coverage",
+        description="none: a hit adds its probability. coverage: a hit adds its probability "
+        "divided by the number of windows of its set that cover a pixel, so the threshold does not "
+        "depend on their overlap.",
+    )
+    shrink: Literal[1, 2, 4, 8] = Field(
+        4, description="Pixels across and down that one value of the heatmap covers."
+    )
+    blur: Annotated[int, Field(ge=1, le=100_000), FRAME_LENGTH] = Field(
+        15, description="Side of the Gaussian kernel that blurs the heat, in pixels."
+    )
+    threshold: float = Field(0.075, ge=0, description="A region is hot where the heat is higher.")
+    regions: Literal["outline", "votes"] = Field(
+        "votes",
+        description="outline: each hot region is a detection, with its bounding box. votes: the "
+        "boxes of the hits in a region decide how many vehicles it shows, and where.",
+    )
+    votes: float = Field(
+        0.12, ge=0, description="Least weight of hits that agree on a vehicle, with votes."
+    )
+
+
+class ScoreSettings(Section):
+    """Score of a box: 1 / (1 + (middle / evidence) ** slope).
+
+    It is the share of such boxes that show a vehicle. Fitted on frames that the model has not seen.
+    """
+
+    middle: float = Field(
+        0.5, gt=0, le=1e6, description="Evidence, heat or weight of hits, at which it is 0.5."
+    )
+    slope: float = Field(
+        3.25, gt=0, le=100, description="Steepness of the score as the evidence grows."
+    )
+
+    def of(self, evidence: float) -> float:
+        """Return the score, 0 to 1, of a box with this evidence."""
+        if not evidence:
+            return 0.0
+        relative = math.log(evidence) - math.log(self.middle)
+        return (1 + math.tanh(self.slope * relative / 2)) / 2
+
+
+class StillSettings(Section):
+    """Which detections are shown in a still picture; in video, the tracker decides."""
+
+    strength: float = Field(
+        0.84, ge=0, description="Least evidence: heat, or with votes the weight of the hits."
+    )
+    width: Share = Field(
+        0.028, description="Least width of a box, as a share of the picture's width."
+    )
+    height: Share = Field(
+        0.0, description="Least height of a box, as a share of the picture's height."
+    )
+
+
+class SvmSettings(DetectorSettings):
+    """The detector: a linear SVM on HOG and colour features, sliding windows and a heatmap."""
+
+    model_suffix: ClassVar[str | None] = ".npz"
+
+    kind: Literal["svm"] = Field("svm", description="svm: a linear SVM on HOG and colour features.")
+    searches: Searches = 8.0
+    foot: Foot = 0.04
+    features: FeatureSettings = FeatureSettings()
+    search: SearchSettings = SearchSettings()
+    heat: HeatSettings = HeatSettings()
+    score: ScoreSettings = ScoreSettings()
+    stills: StillSettings = StillSettings()
+
+    @property
+    def search_key(self) -> Hashable:
+        """What the search of a frame depends on: all but heat, score and still pictures."""
+        return self.kind, self.features, self.search
+
+    @property
+    def shown_score(self) -> float:
+        """Least score of a detection that is shown in a still picture."""
+        return self.score.of(self.stills.strength)
+
+    def showing_all(self) -> "SvmSettings":
+        """Return settings without `stills.strength`; the least size stays."""
+        return self.model_copy(update={"stills": self.stills.model_copy(update={"strength": 0.0})})
