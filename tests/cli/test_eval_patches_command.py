@@ -18,8 +18,8 @@ def test_trains_a_model_and_tests_it(run: Run, patches_path: Path, tmp_path: Pat
     for words in ("160 vehicles, 160 non-vehicles", "leak-free", "calibration error", "["):
         assert words in result.out
     found = json.loads(target.read_text())
-    assert found["tested"] == 65
-    assert found["accuracy"]["value"] > 0.9
+    assert found["test"]["patches"] == 65
+    assert found["test"]["accuracy"]["value"] > 0.9
     html = (folder / "page.html").read_text()
     for words in ("ROC curve", "Worst mistakes", "<svg"):
         assert words in html
@@ -32,7 +32,7 @@ def test_measures_a_ready_model_on_everything(
     result = run("eval", "patches", patches_path, *options)
     assert result.code == 0, result.err
     found = json.loads(result.out)
-    assert found["tested"] == 320
+    assert found["test"]["patches"] == 320
     assert "was trained on most of these very patches" in found["meaning"]
     assert "ROC AUC" in result.err, "the table makes room on standard output"
 

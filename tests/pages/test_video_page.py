@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
+from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
@@ -42,9 +43,7 @@ def page(
     for each in passing(50):
         levels.add(each)
     return VideoPage(
-        source=source,
-        width=WIDTH,
-        height=HEIGHT,
+        video=replace(video_info(WIDTH, HEIGHT), path=source),
         frames=52,
         start=0.0,
         end=end,
@@ -53,9 +52,7 @@ def page(
         levels=levels,
         still=STILL,
         player=player,
-        most_vehicles=10,
         settings="output:\n  crf: 25\n",
-        versions={"vdet": "1", "Python": "3"},
     )
 
 
@@ -114,31 +111,32 @@ class TestVideoPage:
         assert "#1–0:000:02" in made.text
         assert "#2truck0:020:02" in made.text
 
-    def test_only_the_vehicles_that_are_shown_longest_are_shown_one_by_one(self) -> None:
-        made = seen(replace(page(), most_vehicles=1))
+    def test_only_the_vehicles_that_are_shown_longest_are_shown_one_by_one(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("vdet.pages.video._MOST_VEHICLES", 1)
+        made = seen(page())
         assert "The 1 of 2 vehicles that are shown longest." in made.text
         assert "#1–0:00" in made.text
         assert "#2truck" not in made.text
         assert "2vehicles" in made.text, "all of them count"
-        nobody = seen(replace(page(), most_vehicles=0))
-        assert "Each vehicle" not in nobody.text
 
     def test_a_long_table_is_closed_at_first(self) -> None:
         many = records(*(frame(n, track(n + 1, Box(5, 5, 30, 30))) for n in range(60)))
-        text = seen(replace(page(), records=many, most_vehicles=100)).text
+        text = seen(replace(page(), records=many)).text
         assert "Show 60 vehicles" in text
 
     def test_vehicles_are_shown_by_minute_where_there_is_more_than_one(self) -> None:
         assert "Vehicles by minute" not in seen(page()).text
         longer = seen(page(end=130))
         assert "Vehicles by minute" in longer.text
-        assert "new vehicles: 2" in longer.text
+        assert "vehicles: 2" in longer.text
 
     def test_counts_are_shown_by_minute_where_there_are_any(self) -> None:
         made = seen(
             replace(page(end=130), counts=[Series("north in", {0: 3}), Series(NASTY, {0: 1})])
         )
-        assert "Counts by minute" in made.text
+        assert "At lines and zones" in made.text
         assert "north in: 3" in made.text
         assert f"{NASTY}: 1" in made.text
 
@@ -154,7 +152,6 @@ class TestVideoPage:
             page(source=Path("clips") / NASTY, player=player_of(NASTY)),
             records=records(frame(0, bus), frame(1, bus)),
             settings=NASTY,
-            versions={NASTY: NASTY},
             thumbnails={1: Thumbnail(0.0, jpeg_uri(STILL))},
         )
         plain, nasty = seen(page()), seen(made)

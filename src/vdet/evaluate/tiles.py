@@ -23,13 +23,8 @@ class Tile:
     caption: str
 
 
-@dataclass(frozen=True, slots=True)
-class Outlines:
-    """Boxes to draw, float64 `(n, 4)`: x, y, width, height; `line` is the width of the outline."""
-
-    boxes: Float64Array
-    color: Color
-    line: int
+Outlines = tuple[Float64Array, Color, int]
+"""Boxes to draw, float64 `(n, 4)`: x, y, width, height; the colour and width of the outlines."""
 
 
 def draw_tile(
@@ -49,10 +44,9 @@ def draw_tile(
     target = width, max(1, round(size[1] * scale))
     kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     tile = np.asarray(cv2.resize(part, target, interpolation=kind), np.uint8)
-    for each in outlines:
-        near = each.boxes[:, :2]
-        corners = np.hstack([near, near + each.boxes[:, 2:]])
+    for boxes, color, line in outlines:
+        corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
         corners = ((corners - (left, top, left, top)) * scale).round().astype(int)
         for x1, y1, x2, y2 in corners.tolist():
-            cv2.rectangle(tile, (x1, y1), (x2, y2), each.color, each.line)
+            cv2.rectangle(tile, (x1, y1), (x2, y2), color, line)
     return tile

@@ -67,15 +67,14 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """Bars and lines on two axes; `what` describes the chart to those who do not see it."""
+    """Bars and lines on two axes."""
 
-    what: str
+    title: str
     x: Axis
     y: Axis
     bars: Sequence[Bar] = ()
     lines: Sequence[Line] = ()
     legend: Sequence[tuple[str, str]] = ()
-    title: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +99,10 @@ class Span:
 class Timeline:
     """Spans in rows, which may have names."""
 
-    what: str
+    title: str
     x: Axis
     spans: Sequence[Span]
     names: Sequence[str] = ()
-    title: str = ""
 
     @property
     def rows(self) -> int:
@@ -180,7 +178,7 @@ def curve(xs: Float64Array, ys: Float64Array, color: str) -> Line:
     return Line(list(zip(xs[rows].tolist(), ys[rows].tolist(), strict=True)), color)
 
 
-def level_plot(levels: Sequence[int], start: float, end: float, what: str) -> Plot:
+def level_plot(levels: Sequence[int], start: float, end: float, title: str) -> Plot:
     """Return a number over time; `levels` are of equal steps from `start` to `end`."""
     step = (end - start) / max(1, len(levels))
     bars = [
@@ -188,25 +186,24 @@ def level_plot(levels: Sequence[int], start: float, end: float, what: str) -> Pl
         for n, level in enumerate(levels)
         if level
     ]
-    return Plot(what, time_axis(start, end), _counts(max(levels, default=0)), bars)
+    return Plot(title, time_axis(start, end), _counts(max(levels, default=0)), bars)
 
 
-def minute_plot(series: Sequence[Series], minutes: range, what: str) -> Plot:
+def minute_plot(series: Sequence[Series], minutes: range, title: str) -> Plot:
     """Return a bar for each minute, in which the series are stacked, with a legend."""
     bars, most = [], 0
     for minute in minutes:
         below = 0
         for number, each in enumerate(series):
             if count := each.by_minute.get(minute, 0):
-                title = f"{clock(60 * minute)}: {count} {each.name}"
+                tip = f"{clock(60 * minute)}: {count} {each.name}"
                 place = 60 * (minute + 0.1), 60 * (minute + 0.9), below, below + count
-                bars.append(Bar(*place, color(number), title))
+                bars.append(Bar(*place, color(number), tip))
                 below += count
         most = max(most, below)
     legend = [(f"{each.name}: {each.total}", color(n)) for n, each in enumerate(series)]
-    return Plot(
-        what, time_axis(60 * minutes.start, 60 * minutes.stop), _counts(most), bars, (), legend
-    )
+    x = time_axis(60 * minutes.start, 60 * minutes.stop)
+    return Plot(title, x, _counts(most), bars, legend=legend)
 
 
 def _counts(most: int) -> Axis:

@@ -7,6 +7,7 @@ from typing import Any
 from urllib.parse import quote
 
 import cv2
+import numpy as np
 
 from vdet.files import escaped
 from vdet.media.images import Image
@@ -15,6 +16,7 @@ from vdet.version import __version__
 
 PAGE_NAME = "page.html"
 """Name of the file of a page in its folder."""
+_QUALITY = 84  # of JPEG pictures
 
 
 def render(template: str, **values: Any) -> str:
@@ -42,9 +44,13 @@ def write_page(html: str, path: Path) -> None:
     path.write_text(html, encoding="utf-8", errors="backslashreplace")
 
 
-def jpeg_uri(image: Image, quality: int = 85) -> str:
-    """Return a BGR uint8 image as a data URI."""
-    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
+def jpeg_uri(image: Image, most: int | None = None) -> str:
+    """Return a BGR uint8 image as a data URI; its longer side gets at most `most` pixels."""
+    if most and (scale := most / max(image.shape[:2])) < 1:
+        height, width = (max(1, round(side * scale)) for side in image.shape[:2])
+        shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        image = np.asarray(shrunk, np.uint8)
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
 
 

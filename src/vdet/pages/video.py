@@ -1,36 +1,31 @@
 """The page of a video: when vehicles were there, where, what they looked like."""
 
 import math
+import platform
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import av
 import cv2
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from vdet.errors import OutputError
+from vdet.media import VideoInfo
 from vdet.media.images import Image
-from vdet.pages.charts import (
-    Plot,
-    Series,
-    Span,
-    Timeline,
-    clock,
-    level_plot,
-    minute_plot,
-    pack,
-    time_axis,
-    vehicle_colors,
-)
+from vdet.pages import charts
+from vdet.pages.charts import Plot, Series, Span, Timeline, clock
 from vdet.pages.render import jpeg_uri, link_to, plural, render
 from vdet.traffic.levels import Levels
 from vdet.traffic.records import VehicleRecord
 
+_MOST_VEHICLES = 300  # that are shown one by one
 _STEPS = 160  # of the chart of levels
 _SMALL = 200  # columns of the still in the pages over many videos
+_NO_PICTURE = "data:image/jpeg;base64,"
 _BLOCK = re.compile(r'<script type="application/json" id="vdet">(.*?)</script>', re.DOTALL)
 
 
@@ -94,27 +89,19 @@ class VideoPage:
 
     Attributes
     ----------
-    width, height
-        Of the frames, pixels.
     start, end
         When the first frame is shown, and when the last one ends, seconds as in the tracks.
     thumbnails
         By id; a vehicle may have none.
     still
         A frame with the heat over it, BGR uint8; None if there was no frame.
-    most_vehicles
-        How many vehicles are shown one by one.
     settings
         As YAML.
-    versions
-        Of each program and library.
     counts
         Crossings and entries by minute, where lines or zones are counted.
     """
 
-    source: Path
-    width: int
-    height: int
+    video: VideoInfo
     frames: int
     start: float
     end: float
@@ -123,27 +110,25 @@ class VideoPage:
     levels: Levels
     still: Image | None
     player: Player | None
-    most_vehicles: int
     settings: str
-    versions: Mapping[str, str]
     counts: Sequence[Series] = ()
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
-        return render("video.html", page=self, facts=self._facts().model_dump(mode="json"))
+        packages = (
+            ("Python", platform.python_version()),
+            *((each.__name__, each.__version__) for each in (cv2, np, av)),
+        )
+        facts = self._facts().model_dump(mode="json")
+        return render("video.html", page=self, facts=facts, packages=packages)
 
     def _facts(self) -> Facts:
-        still = "data:image/jpeg;base64,"
-        if self.still is not None:
-            rows = max(1, round(self.still.shape[0] * _SMALL / self.still.shape[1]))
-            small = cv2.resize(self.still, (_SMALL, rows), interpolation=cv2.INTER_AREA)
-            still = jpeg_uri(np.asarray(small, np.uint8), 80)
         return Facts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=len(self.records),
             most=self.levels.most,
-            still=still,
+            still=_NO_PICTURE if self.still is None else jpeg_uri(self.still, _SMALL),
             counts={each.name: each.total for each in self.counts},
         )
 
@@ -169,22 +154,21 @@ class VideoPage:
     @property
     def shown(self) -> list[VehicleRecord]:
         """The vehicles that are shown one by one, in the order of their first time."""
-        longest = sorted(self.records, key=lambda record: -record.seconds)[: self.most_vehicles]
+        longest = sorted(self.records, key=lambda record: -record.seconds)[:_MOST_VEHICLES]
         return sorted(longest, key=lambda record: (record.first, record.id))
 
     @property
     def level_plot(self) -> Plot:
         """How many vehicles are shown at once."""
         levels = self.levels.steps(_STEPS)
-        return level_plot(levels, self.start, self.end, "number of vehicles at once over time")
+        return charts.level_plot(levels, self.start, self.end, "Number of vehicles at once")
 
     @property
     def timeline(self) -> Timeline:
-        """From when to when each vehicle is shown; those that are not there at once share a row."""
-        rows = pack((record.first, record.last) for record in self.shown)
+        """When each vehicle is shown; those that are not there at once share a row."""
+        rows = charts.pack((record.first, record.last) for record in self.shown)
         spans = [_span(record, row) for record, row in zip(self.shown, rows, strict=True)]
-        what = "from when to when each vehicle is shown"
-        return Timeline(what, time_axis(self.start, self.end), spans)
+        return Timeline("When each vehicle is shown", charts.time_axis(self.start, self.end), spans)
 
     @property
     def minutes(self) -> range:
@@ -193,21 +177,19 @@ class VideoPage:
         return range(first, max(first + 1, math.ceil(self.end / 60)))
 
     @property
-    def count_plot(self) -> Plot:
-        """The counts of lines and zones by minute."""
-        return minute_plot(self.counts, self.minutes, "counts by minute")
-
-    @property
-    def vehicle_plot(self) -> Plot:
-        """The vehicles by the minute in which they came."""
+    def minute_plots(self) -> list[Plot]:
+        """Vehicles, and the counts of lines and zones, by minute."""
         came = Counter(int(record.first // 60) for record in self.records)
-        return minute_plot([Series("new vehicles", came)], self.minutes, "vehicles by minute")
+        series = {"First seen": [Series("vehicles", came)], "At lines and zones": self.counts}
+        return [
+            charts.minute_plot(some, self.minutes, title) for title, some in series.items() if some
+        ]
 
 
 def _span(record: VehicleRecord, row: int) -> Span:
     name = f" ({record.class_name})" if record.class_name else ""
     title = f"vehicle {record.id}{name}: {clock(record.first)} to {clock(record.last)}"
-    fill, ink = vehicle_colors(record.id)
+    fill, ink = charts.vehicle_colors(record.id)
     label = f"#{record.id}"
     return Span(row, record.first, record.last, title, fill, ink, label, record.first)
 

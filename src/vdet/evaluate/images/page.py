@@ -1,18 +1,11 @@
 """The page on detection in labelled pictures."""
 
+from vdet.evaluate.images import text
 from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.scores import SIZE_NAMES, MeasuredImage, Source
-from vdet.evaluate.images.text import (
-    HEADINGS,
-    SIZE_HEADINGS,
-    counting_line,
-    others_lines,
-    rows,
-    size_rows,
-)
 from vdet.evaluate.matching import match
 from vdet.evaluate.output import RunName, run_lines, share
-from vdet.evaluate.tiles import FOUND, IGNORED, TRUE, Outlines, Tile, draw_tile
+from vdet.evaluate.tiles import FOUND, IGNORED, TRUE, Tile, draw_tile
 from vdet.media.images import Image
 from vdet.pages.charts import SOFT, Axis, Bar, Line, Plot, color, curve, number_axis
 from vdet.pages.render import render
@@ -28,29 +21,16 @@ def images_page(result: ImagesResult, run: RunName) -> str:
     sheets = [(labelled.name, worst_tiles(source, score)) for labelled, source in named]
     return render(
         "eval_images.html",
-        subtitle="; ".join([*run_lines(run), counting_line(result)]),
-        figures=_key_figures(result),
-        headings=HEADINGS,
-        rows=rows(result),
-        others=others_lines(result),
+        subtitle="; ".join([*run_lines(run), text.counting_line(result)]),
+        figures=list(zip(text.HEADINGS, text.rows(result)[-1], strict=True))[1:],
+        headings=text.HEADINGS,
+        rows=text.rows(result),
+        others=text.others_lines(result),
         plots=(_f1_plot(result), _size_plot(result)),
-        size_headings=SIZE_HEADINGS,
-        size_rows=size_rows(result),
+        size_headings=text.SIZE_HEADINGS,
+        size_rows=text.size_rows(result),
         sheets=[(name, tiles) for name, tiles in sheets if tiles],
     )
-
-
-def _key_figures(result: ImagesResult) -> list[tuple[str, str]]:
-    mean = result.mean
-    return [
-        ("precision", share(mean.precision)),
-        ("recall", share(mean.recall)),
-        ("F1 at IoU 0.5", share(mean.f1)),
-        ("AP50", share(mean.ap50)),
-        ("AP50:95", share(mean.ap50_95)),
-        ("mean IoU", share(mean.mean_iou)),
-        ("best F1", share(mean.best_f1)),
-    ]
 
 
 def _f1_plot(result: ImagesResult) -> Plot:
@@ -62,7 +42,7 @@ def _f1_plot(result: ImagesResult) -> Plot:
     lines.append(Line([(result.counting.score, 0), (result.counting.score, 1)], SOFT, dashed=True))
     title = "F1 by the lowest score that counts (dashed: here)"
     x = number_axis(0, 1, "score")
-    return Plot("F1 by score", x, number_axis(0, 1), (), lines, _legend(result), title)
+    return Plot(title, x, number_axis(0, 1), (), lines, _legend(result))
 
 
 def _size_plot(result: ImagesResult) -> Plot:
@@ -76,7 +56,7 @@ def _size_plot(result: ImagesResult) -> Plot:
     ticks = [(place + 0.5, name) for place, name in enumerate(SIZE_NAMES)]
     x = Axis(0, len(SIZE_NAMES), ticks, "width of the vehicle")
     title = "Recall by the width of the vehicle"
-    return Plot(title, x, number_axis(0, 1), bars, (), _legend(result), title)
+    return Plot(title, x, number_axis(0, 1), bars, (), _legend(result))
 
 
 def _legend(result: ImagesResult) -> list[tuple[str, str]]:
@@ -113,8 +93,8 @@ def _mistakes(image: MeasuredImage, score: float) -> tuple[int, int]:
 
 def _drawn(image: MeasuredImage, score: float) -> Image:
     picture = image.searched.image.read()
-    outlines = [Outlines(image.truth.boxes[image.truth.ignored], IGNORED, 1)]
+    outlines = [(image.truth.boxes[image.truth.ignored], IGNORED, 1)]
     for frame in image.compare(score).frames:
-        outlines += [Outlines(frame.vehicle_boxes, TRUE, 2), Outlines(frame.track_boxes, FOUND, 1)]
+        outlines += [(frame.vehicle_boxes, TRUE, 2), (frame.track_boxes, FOUND, 1)]
     height, width = picture.shape[:2]
     return draw_tile(picture, (0, 0), (width, height), _WIDTH, *outlines)

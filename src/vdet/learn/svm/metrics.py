@@ -1,50 +1,98 @@
-"""The metrics of a model that `vdet train` trains: numbers, printed and written as JSON."""
+"""How well a linear model classifies patches: the metrics of `vdet train`, printed and as JSON."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from vdet.boxes import BoolArray
-from vdet.evaluate.output import table
+from vdet.evaluate.output import ABSENT, share, table
 from vdet.files import write_json
 
+CONFUSION_HEADINGS = ("", "predicted vehicle", "predicted non-vehicle")
+
 
 @dataclass(frozen=True, slots=True)
-class Confusion:
-    """Test patches by truth and prediction."""
+class Rate:
+    """A share of patches, with its 95 % interval; None of no patches.
 
-    true_positives: int
-    false_positives: int
-    false_negatives: int
-    true_negatives: int
+    Source of the interval: Wilson, "Probable inference", 1927. Patches are taken for independent;
+    with near-duplicates in the test the true interval is wider.
+    """
+
+    value: float | None
+    low: float | None
+    high: float | None
 
     @staticmethod
-    def of(truth: BoolArray, predicted: BoolArray) -> "Confusion":
-        """Count the patches of two bool arrays `(n,)`."""
-        return Confusion(
-            int(np.count_nonzero(truth & predicted)),
-            int(np.count_nonzero(~truth & predicted)),
-            int(np.count_nonzero(truth & ~predicted)),
-            int(np.count_nonzero(~truth & ~predicted)),
-        )
+    def of(right: BoolArray) -> "Rate":
+        """Return the share of the True ones, bool `(n,)`."""
+        from scipy.stats import binomtest  # type: ignore[import-untyped]
 
-    def rows(self) -> list[list[str]]:
-        """Return the rows of a table, with the columns "", predicted vehicle, predicted other."""
-        return [
-            ["is vehicle", str(self.true_positives), str(self.false_negatives)],
-            ["is non-vehicle", str(self.false_positives), str(self.true_negatives)],
-        ]
+        if not len(right):
+            return Rate(None, None, None)
+        count = int(np.count_nonzero(right))
+        interval = binomtest(count, len(right)).proportion_ci(method="wilson")
+        return Rate(count / len(right), float(interval.low), float(interval.high))
+
+    def __str__(self) -> str:
+        if self.value is None:
+            return ABSENT
+        return f"{share(self.value, 4)} [{share(self.low)}, {share(self.high)}]"
 
 
 @dataclass(frozen=True, slots=True)
-class GroupAccuracy:
-    """Share of a group's test patches that are classified correctly."""
+class Classification:
+    """Patches by truth and prediction.
 
-    group: str
+    Attributes
+    ----------
+    confusion
+        Number of patches: found vehicles, missed vehicles; false alarms, other things that were
+        classified as such.
+    groups
+        Accuracy of each group.
+    """
+
     patches: int
-    accuracy: float
+    accuracy: Rate
+    confusion: tuple[tuple[int, int], tuple[int, int]]
+    groups: dict[str, Rate]
+
+    @staticmethod
+    def of(
+        vehicle: BoolArray, predicted: BoolArray, groups: npt.NDArray[np.str_]
+    ) -> "Classification":
+        """Compare the truth, bool `(n,)`, with the prediction, bool `(n,)`; groups are `(n,)`."""
+        right = vehicle == predicted
+        found, missed, alarms, others = (
+            int(np.count_nonzero((vehicle == truth) & (predicted == answer)))
+            for truth in (True, False)
+            for answer in (True, False)
+        )
+        return Classification(
+            len(right),
+            Rate.of(right),
+            ((found, missed), (alarms, others)),
+            {name: Rate.of(right[groups == name]) for name in np.unique(groups).tolist()},
+        )
+
+    def confusion_rows(self) -> list[list[str]]:
+        """Return the rows of text under `CONFUSION_HEADINGS`."""
+        names = ("is vehicle", "is non-vehicle")
+        return [[name, *map(str, row)] for name, row in zip(names, self.confusion, strict=True)]
+
+    def group_rows(self) -> list[list[str]]:
+        """Return the name of each group and its accuracy as text."""
+        return [[name, str(rate)] for name, rate in self.groups.items()]
+
+    def lines(self) -> Iterator[str]:
+        """Yield the tables as lines of text."""
+        yield from table(CONFUSION_HEADINGS, self.confusion_rows())
+        yield ""
+        yield from table(("accuracy by group", "95 % interval"), self.group_rows())
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +117,30 @@ class SplitMetrics:
     split: str
     train_patches: int
     train_augmented: int
-    test_patches: int
     train_accuracy: float
-    test_accuracy: float
-    confusion: Confusion
-    groups: tuple[GroupAccuracy, ...]
+    test: Classification
     boxes: BoxError | None
-    fit_seconds: float
+
+    def lines(self) -> Iterator[str]:
+        """Yield the metrics as lines of text."""
+        yield _SPLITS[self.split]
+        more = f" + {self.train_augmented} augmented" if self.train_augmented else ""
+        yield (
+            f"train accuracy {self.train_accuracy:.4f} ({self.train_patches} patches{more}), "
+            f"test accuracy {self.test.accuracy} ({self.test.patches} patches)"
+        )
+        yield from self.test.lines()
+        if self.boxes is not None:
+            yield (
+                f"sides of vehicles' boxes: mean error {self.boxes.mean:.3f} of a patch's side "
+                f"({self.boxes.patches} patches)"
+            )
+
+
+_SPLITS = {
+    "random": "random split (near-duplicates on both sides)",
+    "tail": "tail split (leak-free: the last patches of each folder)",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,25 +157,19 @@ class TrainingMetrics:
     broken: int
     groups: dict[str, int]
     features: int
-    extract_seconds: float
-    milliseconds_per_prediction: float
-    splits: tuple[SplitMetrics, ...]
+    splits: Sequence[SplitMetrics]
 
     def lines(self) -> Iterator[str]:
         """Yield the metrics as lines of text."""
         broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
         yield (
-            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}; "
-            f"{self.features} features each, described in {self.extract_seconds:.1f} s"
+            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}, "
+            f"{self.boxed} with the box of their vehicle; {self.features} features each"
         )
-        if self.boxed:
-            yield f"patches with the box of their vehicle: {self.boxed}"
-        for group, count in self.groups.items():
-            yield f"  {group:<28}{count:6d} patches"
+        yield from (f"  {group:<28}{count:6d} patches" for group, count in self.groups.items())
         for split in self.splits:
-            yield from _split_lines(split)
-        yield ""
-        yield f"one prediction: {self.milliseconds_per_prediction:.2f} ms, features included"
+            yield ""
+            yield from split.lines()
         if not self.boxed:
             yield ""
             yield (
@@ -121,29 +180,3 @@ class TrainingMetrics:
     def write(self, path: Path, *, overwrite: bool = False) -> None:
         """Write the metrics as JSON. Raises `OutputError`."""
         write_json(asdict(self), str(path), overwrite=overwrite)
-
-
-_SPLITS = {
-    "random": "random split (near-duplicates on both sides)",
-    "tail": "tail split (leak-free: the last patches of each folder)",
-}
-
-
-def _split_lines(metrics: SplitMetrics) -> Iterator[str]:
-    yield ""
-    yield _SPLITS[metrics.split]
-    more = f" + {metrics.train_augmented} augmented" if metrics.train_augmented else ""
-    yield (
-        f"  train accuracy {metrics.train_accuracy:.4f} ({metrics.train_patches} patches{more}), "
-        f"test accuracy {metrics.test_accuracy:.4f} ({metrics.test_patches} patches), "
-        f"fitted in {metrics.fit_seconds:.1f} s"
-    )
-    headings = "", "predicted vehicle", "predicted non-vehicle"
-    yield from (f"  {line}" for line in table(headings, metrics.confusion.rows()))
-    for group in metrics.groups:
-        yield f"  {group.group:<28}{group.patches:6d} patches  accuracy {group.accuracy:.4f}"
-    if metrics.boxes is not None:
-        yield (
-            f"  sides of vehicles' boxes: mean error {metrics.boxes.mean:.3f} of a patch's side "
-            f"({metrics.boxes.patches} patches)"
-        )

@@ -15,13 +15,13 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.evaluate.output import ABSENT, RunName, run_lines, share, table
+from vdet.evaluate.output import RunName, run_lines, share, table
 from vdet.evaluate.tiles import Tile
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
 from vdet.learn.svm.fitting import fit
-from vdet.learn.svm.metrics import Confusion
+from vdet.learn.svm.metrics import CONFUSION_HEADINGS, Classification, Rate
 from vdet.pages.charts import FILL, SOFT, Axis, Line, Plot, curve, number_axis
 from vdet.pages.render import render
 from vdet.progress import Steps, no_steps
@@ -41,44 +41,6 @@ _OTHER = "if the model was trained on some of these patches too, the scores are 
 
 
 @dataclass(frozen=True, slots=True)
-class Rate:
-    """A share of patches, with its 95 % interval; None of no patches.
-
-    Source of the interval: Wilson, "Probable inference", 1927. Patches are taken for independent;
-    with near-duplicates in the test the true interval is wider.
-    """
-
-    value: float | None
-    low: float | None
-    high: float | None
-
-    @staticmethod
-    def of(right: BoolArray) -> "Rate":
-        """Return the share of the True ones, bool `(n,)`."""
-        from scipy.stats import binomtest  # type: ignore[import-untyped]
-
-        if not len(right):
-            return Rate(None, None, None)
-        count = int(np.count_nonzero(right))
-        interval = binomtest(count, len(right)).proportion_ci(method="wilson")
-        return Rate(count / len(right), float(interval.low), float(interval.high))
-
-    def __str__(self) -> str:
-        if self.value is None:
-            return ABSENT
-        return f"{share(self.value, 4)} [{share(self.low)}, {share(self.high)}]"
-
-
-@dataclass(frozen=True, slots=True)
-class CalibrationBin:
-    """Patches of similar probability: their number, mean probability and share of vehicles."""
-
-    patches: int
-    probability: float
-    vehicles: float
-
-
-@dataclass(frozen=True, slots=True)
 class Mistake:
     """A patch that is classified wrongly, and its probability of being a vehicle."""
 
@@ -94,20 +56,16 @@ class PatchScores:
     ----------
     vehicles, non_vehicles, broken
         Number of patches of the data.
-    tested
-        Number of patches that were tested.
     meaning
         How the tested patches are related to those of the training.
-    groups
-        Accuracy of each group.
     roc_auc, log_loss
         None if all tested patches are of one class.
     calibration_error
         Mean distance of probability and share of vehicles in a bin, weighted by patches.
     calibration
-        The bins that are not empty, lowest probabilities first.
+        Mean probability and share of vehicles of each bin that is not empty, float64 `(n,)` each.
     roc
-        Shares of false alarms and of found vehicles at each threshold.
+        Shares of false alarms and of found vehicles at each threshold, float64 `(n,)` each.
     mistakes
         The worst ones of either kind, the worst first.
     """
@@ -115,17 +73,14 @@ class PatchScores:
     vehicles: int
     non_vehicles: int
     broken: int
-    tested: int
     meaning: str
-    accuracy: Rate
+    test: Classification
     precision: Rate
     recall: Rate
     roc_auc: float | None
     log_loss: float | None
     calibration_error: float
-    confusion: Confusion
-    groups: dict[str, Rate]
-    calibration: tuple[CalibrationBin, ...]
+    calibration: tuple[Float64Array, Float64Array]
     roc: tuple[Float64Array, Float64Array]
     mistakes: tuple[Mistake, ...]
 
@@ -200,11 +155,11 @@ def score_patches(
     """
     from sklearn import metrics
 
-    vehicle, groups = data.vehicle[tested], data.groups[tested]
+    vehicle = data.vehicle[tested]
     positive = probabilities >= THRESHOLD
-    right = positive == vehicle
-    calibration = tuple(_calibration(vehicle, probabilities))
-    gaps = (each.patches * abs(each.probability - each.vehicles) for each in calibration)
+    bins = np.minimum((probabilities * BINS).astype(int), BINS - 1)  # the last one includes 1
+    _, places, counts = np.unique(bins, return_inverse=True, return_counts=True)
+    given, true = (np.bincount(places, each) for each in (probabilities, vehicle.astype(float)))
     both = len(np.unique(vehicle)) == 2
     roc = metrics.roc_curve(vehicle, probabilities)[:2] if both else (np.empty(0), np.empty(0))
     rows = np.flatnonzero(tested)
@@ -212,31 +167,20 @@ def score_patches(
         vehicles=int(np.count_nonzero(data.vehicle)),
         non_vehicles=int(np.count_nonzero(~data.vehicle)),
         broken=data.broken,
-        tested=len(vehicle),
         meaning=meaning,
-        accuracy=Rate.of(right),
+        test=Classification.of(vehicle, positive, data.groups[tested]),
         precision=Rate.of(vehicle[positive]),
         recall=Rate.of(positive[vehicle]),
         roc_auc=float(metrics.roc_auc_score(vehicle, probabilities)) if both else None,
         log_loss=float(metrics.log_loss(vehicle, probabilities)) if both else None,
-        calibration_error=sum(gaps) / len(vehicle),
-        confusion=Confusion.of(vehicle, positive),
-        groups={str(name): Rate.of(right[groups == name]) for name in np.unique(groups)},
-        calibration=calibration,
+        calibration_error=float(np.abs(given - true).sum() / len(vehicle)),
+        calibration=(given / counts, true / counts),
         roc=roc,
         mistakes=tuple(
             Mistake(files[rows[row]], float(probabilities[row]))
             for row in _worst(vehicle, probabilities)
         ),
     )
-
-
-def _calibration(vehicle: BoolArray, probabilities: Float64Array) -> Iterator[CalibrationBin]:
-    bins = np.minimum((probabilities * BINS).astype(int), BINS - 1)  # the last one includes 1
-    for number in np.unique(bins):
-        inside = bins == number
-        mean, vehicles = float(probabilities[inside].mean()), float(vehicle[inside].mean())
-        yield CalibrationBin(int(np.count_nonzero(inside)), mean, vehicles)
 
 
 def _worst(vehicle: BoolArray, probabilities: Float64Array) -> list[int]:
@@ -254,18 +198,16 @@ def lines(scores: PatchScores) -> Iterator[str]:
     yield f"patches: {scores.vehicles} vehicles, {scores.non_vehicles} non-vehicles{broken}"
     yield scores.meaning
     yield ""
-    yield from table(("95 % intervals in brackets", ""), metric_rows(scores))
+    yield from table(("metric", "95 % interval"), metric_rows(scores))
     yield ""
-    yield from table(("accuracy by group", ""), group_rows(scores))
-    yield ""
-    yield from table(("", "predicted vehicle", "predicted non-vehicle"), scores.confusion.rows())
+    yield from scores.test.lines()
 
 
 def metric_rows(scores: PatchScores) -> list[list[str]]:
     """Return the name of each metric and its value, as text."""
     return [
-        ["patches tested", str(scores.tested)],
-        ["accuracy", str(scores.accuracy)],
+        ["patches tested", str(scores.test.patches)],
+        ["accuracy", str(scores.test.accuracy)],
         ["precision", str(scores.precision)],
         ["recall", str(scores.recall)],
         ["ROC AUC", share(scores.roc_auc, 4)],
@@ -274,16 +216,11 @@ def metric_rows(scores: PatchScores) -> list[list[str]]:
     ]
 
 
-def group_rows(scores: PatchScores) -> list[list[str]]:
-    """Return the name of each group and its accuracy, as text."""
-    return [[group, str(rate)] for group, rate in scores.groups.items()]
-
-
 def values(scores: PatchScores) -> dict[str, Any]:
-    """Return the scores as values for JSON, without the points of the ROC curve."""
+    """Return the scores as values for JSON, without the points of the curves."""
     mistakes = [asdict(each) | {"file": str(each.file)} for each in scores.mistakes]
     found = asdict(scores) | {"mistakes": mistakes}
-    del found["roc"]
+    del found["roc"], found["calibration"]
     return found
 
 
@@ -295,13 +232,13 @@ def patch_page(scores: PatchScores, run: RunName) -> str:
         subtitle="; ".join([counts, *run_lines(run)]),
         scores=scores,
         figures=[
-            ("accuracy", share(scores.accuracy.value)),
+            ("accuracy", share(scores.test.accuracy.value)),
             ("precision", share(scores.precision.value)),
             ("recall", share(scores.recall.value)),
             ("ROC AUC", share(scores.roc_auc)),
         ],
         metrics=metric_rows(scores),
-        groups=group_rows(scores),
+        confusion_headings=CONFUSION_HEADINGS,
         plots=(_roc_plot(scores), _calibration_plot(scores)),
         missed=_tiles(scores, vehicle=True),
         alarms=_tiles(scores, vehicle=False),
@@ -314,14 +251,14 @@ def _roc_plot(scores: PatchScores) -> Plot:
     x = Axis(np.log10(_LEAST_RATE), 0, ticks, "false alarms / non-vehicles")
     roc = [curve(np.log10(np.maximum(alarms, _LEAST_RATE)), found, FILL)] if len(found) else []
     title = "ROC curve: found vehicles / vehicles"
-    return Plot(title, x, number_axis(0, 1), lines=roc, title=title)
+    return Plot(title, x, number_axis(0, 1), lines=roc)
 
 
 def _calibration_plot(scores: PatchScores) -> Plot:
-    points = [(each.probability, each.vehicles) for each in scores.calibration]
+    points = list(zip(*scores.calibration, strict=True))
     lines = [Line([(0, 0), (1, 1)], SOFT, dashed=True), Line(points, FILL, dots=True)]
     title = "Calibration: share of vehicles"
-    return Plot(title, number_axis(0, 1, "probability"), number_axis(0, 1), (), lines, (), title)
+    return Plot(title, number_axis(0, 1, "probability"), number_axis(0, 1), lines=lines)
 
 
 def _tiles(scores: PatchScores, *, vehicle: bool) -> list[Tile]:

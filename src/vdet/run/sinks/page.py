@@ -1,13 +1,8 @@
 """The sink `page`: a folder with the page of a video."""
 
-import platform
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
-
-import av
-import cv2
-import numpy as np
 
 from vdet.config.rendering import render
 from vdet.files import make_folder
@@ -25,16 +20,9 @@ from vdet.traffic.heat import HeatMap
 from vdet.traffic.levels import Levels
 from vdet.traffic.records import VehicleRecords
 from vdet.traffic.totals import by_minute
-from vdet.version import __version__
 
 _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one that is faded in
-_STILL = 960
-"""Largest width of the still under the heat, pixels."""
-_THUMBNAIL = 200
-"""Longer side of the picture of a vehicle, pixels."""
-_MOST_VEHICLES = 300
-"""Most vehicles that are shown one by one: those that are in view longest."""
-_QUALITY = 80  # of the pictures of vehicles, JPEG
+_THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
 class PageSink:
@@ -75,7 +63,7 @@ class PageSink:
         self._frames += 1
         self._last = frame.time
         if self._still is None or self._is_even:
-            self._still = _at_most(picture.image, _STILL, picture.width)
+            self._still = picture.image.copy()
             self._is_even = float(self._still.std()) < _EVEN
         self._records.add(frame)
         self._levels.add(frame)
@@ -85,14 +73,11 @@ class PageSink:
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:
-            small = _at_most(crop.image, _THUMBNAIL, max(crop.image.shape[:2]))
-            self._thumbnails[crop.id] = Thumbnail(crop.time, jpeg_uri(small, _QUALITY))
+            self._thumbnails[crop.id] = Thumbnail(crop.time, jpeg_uri(crop.image, _THUMBNAIL))
 
     def _page(self) -> VideoPage:
         return VideoPage(
-            source=self._video.path,
-            width=self._video.width,
-            height=self._video.height,
+            video=self._video,
             frames=self._frames,
             start=self._start,
             end=self._last + float(1 / self._video.rate),
@@ -101,9 +86,7 @@ class PageSink:
             levels=self._levels,
             still=None if self._still is None else self._heat.over(self._still),
             player=self._player(),
-            most_vehicles=_MOST_VEHICLES,
             settings=render(self._context.settings),
-            versions=_versions(),
             counts=_series(self._counter.finish()) if self._counter else (),
         )
 
@@ -119,30 +102,12 @@ class PageSink:
         return None
 
 
-def _at_most(image: Image, most: int, side: int) -> Image:
-    """Return a copy that is scaled down so that a side of `side` pixels has at most `most`."""
-    if side <= most:
-        return image.copy()
-    height, width = (max(1, round(each * most / side)) for each in image.shape[:2])
-    return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
-
-
 def _series(events: Sequence[Event]) -> list[Series]:
     """Return the counts of each line or zone and direction by minute."""
     minutes: dict[tuple[str, str], dict[int, int]] = {}
     for each in by_minute(events):
         minutes.setdefault((each.name, each.direction), {})[each.minute] = each.count
     return [Series(": ".join(key), counts) for key, counts in minutes.items()]
-
-
-def _versions() -> dict[str, str]:
-    return {
-        "vdet": __version__,
-        "Python": platform.python_version(),
-        "OpenCV": cv2.__version__,
-        "NumPy": np.__version__,
-        "PyAV": av.__version__,
-    }
 
 
 PAGE = SinkKind(
