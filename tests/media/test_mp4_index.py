@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from vdet.errors import VideoError
 from vdet.media import VideoReader
-from vdet.media.mp4_index import check_mp4_index
+from vdet.media.demux import check_mp4_index
 
 Writer = Callable[..., Path]
 MANY = 90_000_000

@@ -159,7 +159,7 @@ class TestFile:
             corner = next(iter(reader)).image[60:90, 10:70]
         assert np.abs(corner.mean(axis=(0, 1)) - (40, 30, 210)).max() < 5
 
-    TAGS = Tags("2020-01-02T03:04:05.000000Z", "+48.1000-011.5000/", "a drive", "01:02:03:04")
+    TAGS = Tags("2020-01-02T03:04:05.000000Z", "+48.1000-011.5000/", "a drive")
 
     @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
     def test_what_the_source_says_of_the_recording_is_kept(
@@ -172,15 +172,6 @@ class TestFile:
         location = [float(each) for each in re.findall(r"[+-][\d.]+", found.location)]
         assert location == [48.1, -11.5]
         assert replace(found, location=None) == replace(self.TAGS, location=None)
-
-    def test_the_time_code_of_the_first_frame_is_left_out_of_a_part_with_a_warning(
-        self, frames: list[Frame], tmp_path: Path, caplog: pytest.LogCaptureFixture
-    ) -> None:
-        info = replace(INFO, start=Fraction(6), tags=self.TAGS)
-        with VideoReader(write(tmp_path / "out.mp4", frames, info)) as reader:
-            assert reader.info.tags.timecode is None
-            assert reader.info.tags.title == "a drive"
-        assert "its time code is left out: it is that of the first frame" in caplog.text
 
     @pytest.mark.parametrize("name", ["ж视频 é.mp4", "a:b.mp4", "100% %03d.mp4", "-o.mp4"])
     def test_any_file_name_works(self, name: str, frames: list[Frame], tmp_path: Path) -> None:

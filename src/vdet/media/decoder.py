@@ -12,8 +12,8 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 from av.video.stream import VideoStream
 
+from vdet.media.damage import Damage
 from vdet.media.demux import MAX_PIXELS, is_pipe, open_input
-from vdet.media.losses import Losses
 from vdet.media.probe import check_size, period_of, picture_stream
 from vdet.media.restarts import continuous_packets, restarts_clock
 from vdet.media.seek import Entry, find_entry
@@ -70,15 +70,15 @@ class Decoder:
         if entry and entry.target is not None:
             self.container.seek(entry.target, stream=self.stream)
         paired = self._context.name not in _WITH_HIDDEN_PACKETS
-        self.losses = Losses(period_of(self.stream), paired=paired)
+        self.damage = Damage(period_of(self.stream), paired=paired)
 
     def pictures(self) -> Iterator[av.VideoFrame]:
         """Yield the pictures that can be decoded."""
         for packet in chain(self._packets(), [None]):
             for picture in self._decode(packet):
-                if self._is_new(picture) and self.losses.receive(picture):
+                if self._is_new(picture) and self.damage.receive(picture):
                     yield picture
-        self.losses.finish()
+        self.damage.finish()
 
     def find_entry(self, first: av.VideoFrame, time: int) -> Entry | None:
         """Return where a decoder may begin that needs no picture before `time`.
@@ -102,9 +102,9 @@ class Decoder:
             if packet is None:
                 return
             if following is None and packet.is_corrupt:  # the file was cut off within it
-                self.losses.cut_off()
+                self.damage.lost_at_end = 1
             else:
-                self.losses.send(packet)
+                self.damage.send(packet)
                 yield packet
 
     def _read(self) -> "Iterator[Packet[Stream]]":
@@ -114,7 +114,7 @@ class Decoder:
             self.container,
             self.stream,
             *others,
-            on_error=self.losses.fail_to_read,
+            on_error=self.damage.fail_to_read,
             on_restart=self._count_restart,
         ):
             is_picture = packet.stream_index == self.stream.index
@@ -122,7 +122,7 @@ class Decoder:
                 skipped -= is_picture
                 continue
             if self._all_streams and packet.pos is not None:
-                self.losses.pass_bytes(packet.pos, packet.size)
+                self.damage.pass_bytes(packet.pos, packet.size)
             if is_picture and not self._needs_older_ones(packet):
                 yield packet
 
@@ -140,8 +140,8 @@ class Decoder:
             return pictures
         if packet is not None:
             self._recent.append(packet)
-        damaged = self.losses.evident or any(picture.is_corrupt for picture in pictures)
-        if packet is None and self.losses.paired:  # several threads hide errors at the end
+        damaged = self.damage.evident or any(picture.is_corrupt for picture in pictures)
+        if packet is None and self.damage.paired:  # several threads hide errors at the end
             damaged |= len(self._recent) > len(self._shown) + len(pictures)
         if damaged:
             return self._decode_again(self._recent, at_end=packet is None)
@@ -157,7 +157,7 @@ class Decoder:
         container, stream = self._open(1)
         self._opened.append(container)
         self._context = stream.codec_context
-        self.losses.decode_again()
+        self.damage.decode_errors = 0  # those packets are tried again
         for packet in chain(recent, [None] * at_end):
             yield from self._attempt(packet)
 
@@ -165,7 +165,7 @@ class Decoder:
         try:
             return self._context.decode(packet)
         except av.FFmpegError:
-            self.losses.fail_to_decode()
+            self.damage.fail_to_decode()
             return []
 
     def _is_new(self, picture: av.VideoFrame) -> bool:

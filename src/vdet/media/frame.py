@@ -41,15 +41,11 @@ class ColorTags:
 
 @dataclass(frozen=True, slots=True)
 class Tags:
-    """What a file says of the recording, as it says it; None where it says nothing.
-
-    `timecode` is that of the first frame.
-    """
+    """What a file says of the recording, as it says it; None where it says nothing."""
 
     creation_time: str | None = None
     location: str | None = None
     title: str | None = None
-    timecode: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,13 +1,12 @@
 """What a video file declares: its size, rate, length, colours."""
 
 from contextlib import suppress
-from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
 
 import av
 from av.container import InputContainer
-from av.stream import Disposition, Stream
+from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from vdet.errors import ImageError, VideoError
@@ -96,14 +95,13 @@ def describe(
 
 def _tags(container: InputContainer, stream: VideoStream) -> Tags:
     """Return what a file says of the recording, in the words of any container."""
-    found: dict[str, str] = {}
-    streams: list[Stream] = [stream, *container.streams.data]
-    for metadata in (container.metadata, *(each.metadata for each in streams)):
-        for name, value in metadata.items():
-            found.setdefault(name.lower(), value)
-    found.setdefault("location", found.get(_APPLE_LOCATION, ""))
-    names = (field.name for field in fields(Tags))
-    return Tags(**{name: found.get(name) or None for name in names})
+    found = {
+        name.lower(): value
+        for metadata in (stream.metadata, container.metadata)
+        for name, value in metadata.items()
+    }
+    location = found.get("location") or found.get(_APPLE_LOCATION)
+    return Tags(found.get("creation_time"), location, found.get("title"))
 
 
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:

@@ -113,7 +113,7 @@ class VideoReader:
     @property
     def damaged(self) -> int:
         """Frames lost, or shown with errors, so far."""
-        return self._decoder.losses.damaged
+        return self._decoder.damage.damaged
 
     @property
     def length(self) -> Fraction | None:
@@ -173,7 +173,7 @@ class VideoReader:
         decoder: Decoder = open_decoder(entry=entry)
         pictures = decoder.pictures()
         picture = next(pictures, None)
-        if picture is None or picture.pts != entry.pts or decoder.losses.evident:
+        if picture is None or picture.pts != entry.pts or decoder.damage.evident:
             decoder.close()
             return first, 0
         self._decoder.close()
@@ -250,12 +250,12 @@ class VideoReader:
         if stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
             return
         missing = round((stated - duration) * self.info.rate)
-        if not self._decoder.losses.end(missing, self._decoder.container.size):
+        if not self._decoder.damage.end(missing, self._decoder.container.size):
             self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
 
     def _report(self) -> None:
         """Refuse a video that is too damaged; warn of any other fault."""
-        damaged, total = self.damaged, self._decoder.losses.total
+        damaged, total = self.damaged, self._decoder.damage.total
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
         if damaged > self._tolerated * total:
@@ -264,7 +264,7 @@ class VideoReader:
                 f"({self._tolerated:g}) allows; raise it to take what is left"
             )
         restarts = self._decoder.restarts
-        skipped = max(0, self._decoder.losses.skipped - restarts)  # sound may outlast the pictures
+        skipped = max(0, self._decoder.damage.skipped - restarts)  # sound may outlast the pictures
         if not damaged and skipped > _TOLERANCE * total:
             share = f"{skipped} of {total + skipped}"
             self._faults.append(f"times jump as if {share} frames were missing")

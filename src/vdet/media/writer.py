@@ -14,9 +14,8 @@ from av.video.reformatter import ColorRange
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.coding import Coding
-from vdet.media.demux import is_pipe, open_input
+from vdet.media.demux import begins_like_mp4, is_pipe, open_input
 from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
-from vdet.media.mp4_index import begins_like_mp4
 from vdet.media.planes import Picture, Planes
 from vdet.media.sound import SoundCopy
 from vdet.version import __version__
@@ -58,8 +57,7 @@ class VideoWriter:
     by one pixel, the last row or column repeated: 4:2:0 needs even ones. Colours are coded as the
     planes of the source are (`VideoInfo.coding`), and tagged so if the source was tagged at all.
     Planes that were not changed are encoded as they were decoded. Sound packets are copied,
-    not encoded again. Creation time, location, title and time code are kept; the time code only if
-    the first frame of the source is written.
+    not encoded again. Creation time, location and title are kept.
 
     Parameters
     ----------
@@ -169,7 +167,8 @@ class _Encoder:
         )
         self._container.metadata["comment"] = f"{_MARK} {__version__}"
         self._stream = self._add_picture(info, settings, threads)
-        self._container.metadata.update(_tags(info, origin))
+        kept = {name: value for name, value in asdict(info.tags).items() if value}
+        self._container.metadata.update(kept)
         self._sound = None
         if info.has_sound and is_pipe(info.path):
             _log.warning("%s: its sound is left out: a pipe can be read only once", info.path)
@@ -233,12 +232,3 @@ def _to_encode(picture: Picture, coding: Coding) -> av.VideoFrame:
     if planes is None or planes.coding != coding or picture.width % 2 or picture.height % 2:
         planes = Planes.of_image(picture.image, coding)
     return (planes if planes.is_own else planes.copy()).picture
-
-
-def _tags(info: VideoInfo, origin: Fraction) -> dict[str, str]:
-    """Return what the source says of the recording, if that is true of a video from `origin` on."""
-    tags = {name: value for name, value in asdict(info.tags).items() if value}
-    if "timecode" in tags and origin != info.start:
-        del tags["timecode"]
-        _log.warning("%s: its time code is left out: it is that of the first frame", info.path)
-    return tags

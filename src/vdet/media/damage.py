@@ -1,5 +1,6 @@
 """Count the pictures of a stream that are lost or damaged, by what goes in and what comes out."""
 
+from dataclasses import dataclass
 from fractions import Fraction
 
 import av
@@ -11,7 +12,8 @@ _MAX_LATE = 32  # periods; a picture later than that follows a clock that was se
 _REGULAR = Fraction(4, 5)  # share of the steps that must be one period
 
 
-class Losses:
+@dataclass(slots=True)
+class Damage:
     """Counts the pictures of one stream that are lost, or decoded with errors.
 
     Nothing is lost before there is evidence of damage: a whole file may leave pictures out (frames
@@ -19,7 +21,7 @@ class Losses:
     largest of three: errors, packets that gave no picture, and pictures missing between the times
     of others.
 
-    Parameters
+    Attributes
     ----------
     period
         Time from one picture to the next, in units of the stream's time base.
@@ -27,35 +29,42 @@ class Losses:
         Whether every packet makes one picture.
     """
 
-    def __init__(self, period: Fraction, *, paired: bool) -> None:
-        self.evident = False
-        self._period = period
-        self.paired = paired
-        self._packets = self._corrupt_packets = self._unpaired = 0
-        self._pictures = self._corrupt_pictures = 0
-        self._read_errors = self._decode_errors = self._lost_at_end = 0
-        self._last: int | None = None  # time of a picture
-        self._steps = self._regular_steps = self._skipped = self._skipped_in_damage = 0
-        self._read_to: int | None = None  # byte of the file
+    period: Fraction
+    paired: bool
+    evident: bool = False
+    packets: int = 0
+    corrupt_packets: int = 0
+    pictures: int = 0
+    corrupt_pictures: int = 0
+    read_errors: int = 0
+    decode_errors: int = 0
+    without_picture: int = 0  # packets
+    lost_at_end: int = 0
+    _last: int | None = None  # time of a picture
+    _steps: int = 0
+    _regular_steps: int = 0
+    _skipped: int = 0
+    _skipped_in_damage: int = 0
+    _read_to: int | None = None  # byte of the file
 
     @property
     def lost(self) -> int:
         """Pictures that should be there and are not."""
         if not self.evident:
-            return self._lost_at_end
-        errors = self._read_errors + self._decode_errors
+            return self.lost_at_end
+        errors = self.read_errors + self.decode_errors
         skipped = self._if_regular(self._skipped_in_damage)
-        return max(errors, self._unpaired, skipped) + self._lost_at_end
+        return max(errors, self.without_picture, skipped) + self.lost_at_end
 
     @property
     def damaged(self) -> int:
         """Pictures lost, and pictures decoded with errors."""
-        return max(self.lost + self._corrupt_pictures, self._corrupt_packets)
+        return max(self.lost + self.corrupt_pictures, self.corrupt_packets)
 
     @property
     def total(self) -> int:
         """Pictures that came, and those lost."""
-        return self._pictures + self.lost
+        return self.pictures + self.lost
 
     @property
     def skipped(self) -> int:
@@ -64,7 +73,7 @@ class Losses:
 
     def fail_to_read(self) -> None:
         """Count a place in the file that cannot be read."""
-        self._read_errors += 1
+        self.read_errors += 1
         self.evident = True
 
     def pass_bytes(self, position: int, size: int) -> None:
@@ -75,18 +84,14 @@ class Losses:
 
     def send(self, packet: "Packet[Stream]") -> None:
         """Count a packet of the stream."""
-        self._packets += not packet.is_discard  # else the file says that it is not shown
-        self._corrupt_packets += packet.is_corrupt
+        self.packets += not packet.is_discard  # else the file says that it is not shown
+        self.corrupt_packets += packet.is_corrupt
         self.evident |= packet.is_corrupt
 
     def fail_to_decode(self) -> None:
         """Count a packet that cannot be decoded."""
-        self._decode_errors += 1
+        self.decode_errors += 1
         self.evident = True
-
-    def decode_again(self) -> None:
-        """Forget the packets that could not be decoded: they are tried again."""
-        self._decode_errors = 0
 
     def receive(self, picture: av.VideoFrame) -> bool:
         """Count a picture; return whether it is usable.
@@ -95,23 +100,18 @@ class Losses:
         """
         if self.evident and self._is_late(picture.pts):
             return False
-        self._pictures += 1
-        self._corrupt_pictures += picture.is_corrupt
+        self.pictures += 1
+        self.corrupt_pictures += picture.is_corrupt
         self.evident |= picture.is_corrupt
-        if picture.interlaced_frame:  # each of its two fields may have a packet
-            self.paired = False
+        self.paired &= not picture.interlaced_frame  # each of two fields may have a packet
         if picture.pts is not None:
             self._step_to(picture.pts)
         return True
 
-    def cut_off(self) -> None:
-        """Count as lost the picture of the last packet, of which the file has only a part."""
-        self._lost_at_end = 1
-
     def finish(self) -> None:
         """Note that no more pictures will come."""
         if self.paired:
-            self._unpaired = self._packets - self._pictures
+            self.without_picture = self.packets - self.pictures
 
     def end(self, missing: int, file_size: int) -> bool:
         """Count `missing` pictures as lost if the file goes on, unreadable, after the last packet.
@@ -120,13 +120,13 @@ class Losses:
         """
         if self._read_to is None or file_size - self._read_to <= _HOLE:
             return False
-        self._lost_at_end = max(self._lost_at_end, missing)
+        self.lost_at_end = max(self.lost_at_end, missing)
         return True
 
     def _is_late(self, time: int | None) -> bool:
         if time is None or self._last is None:
             return False
-        return time <= self._last <= time + _MAX_LATE * self._period
+        return time <= self._last <= time + _MAX_LATE * self.period
 
     def _step_to(self, time: int) -> None:
         if self._last is None:
@@ -134,15 +134,14 @@ class Losses:
             return
         step = time - self._last
         self._steps += 1
-        self._regular_steps += abs(step - self._period) <= max(Fraction(1), self._period / 20)
+        self._regular_steps += abs(step - self.period) <= max(Fraction(1), self.period / 20)
         if self._is_late(time):  # it was taken for missing
             self._skipped = max(0, self._skipped - 1)
             return
         self._last = time
-        missing = max(0, round(step / self._period) - 1)
+        missing = max(0, round(step / self.period) - 1)
         self._skipped += missing
-        if self.evident:
-            self._skipped_in_damage += missing
+        self._skipped_in_damage += missing * self.evident
 
     def _if_regular(self, pictures: int) -> int:
         return pictures if self._regular_steps >= _REGULAR * self._steps else 0
