@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 from tqdm import tqdm
 
@@ -11,6 +12,7 @@ from conftest import Run
 from running import until, write_drive
 from vdet.batch.plan import Plan
 from vdet.cli.batch import batch_bar
+from vdet.cli.main import cli
 from vdet.cli.messages import counted, progress_steps
 from vdet.run.video import VideoJob
 
@@ -40,7 +42,7 @@ def plan_of(*names: str) -> Plan:
 
 
 def test_the_bar_of_a_batch_names_the_running_files_and_counts_frames(terminal: Terminal) -> None:
-    with batch_bar(plan_of("a.mp4", "b\x1b.mp4", "c.mp4"), quiet=False) as counts:
+    with batch_bar(plan_of("a.mp4", "b\x1b.mp4", "c.mp4")) as counts:
         assert counts is not None
         counts.progress_of(0)(100)(100)
         counts.end(0, 100)
@@ -54,13 +56,13 @@ def test_a_bar_shows_that_the_program_is_at_work(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("vdet.cli.messages.REFRESH_INTERVAL", 0.01)
-    with progress_steps("", quiet=False) as steps:
+    with progress_steps("") as steps:
         steps("fitting", None)
         until(lambda: terminal.getvalue().count("fitting [00:0") >= 3)
 
 
 def test_each_step_ends_the_bar_of_the_one_before(terminal: Terminal) -> None:
-    with progress_steps(" patches", quiet=False) as steps:
+    with progress_steps(" patches") as steps:
         steps("fitting", None)
         steps("describing", 3)(3)
     assert "fitting" not in terminal.getvalue().rpartition("\r")[2]
@@ -111,10 +113,11 @@ class TestNamesThatControlATerminal:
 
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
-    with batch_bar(plan_of("a.mp4"), quiet=True) as counts:
-        assert counts is None
-    with progress_steps("", quiet=True) as steps:
-        steps("fitting", None)
+    with click.Context(cli, obj=True).scope():
+        with batch_bar(plan_of("a.mp4")) as counts:
+            assert counts is None
+        with progress_steps("") as steps:
+            steps("fitting", None)
     assert terminal.getvalue() == ""
 
 

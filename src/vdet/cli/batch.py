@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vdet.cli.messages import counted, live_bar, print_lines, print_message
-from vdet.cli.options import PATH, Wanted, bundle, jobs_option, scheduler_option
+from vdet.cli.messages import counted, is_quiet, live_bar, print_lines, print_message
+from vdet.cli.options import Wanted, bundle, jobs_option, option, scheduler_option
 from vdet.errors import failure_code
 from vdet.files import escaped
 
@@ -62,21 +62,12 @@ class BatchOptions:
 batch_options = bundle(
     "batch",
     BatchOptions,
-    click.option(
-        "-d",
-        "--directory",
-        "folder",
-        type=PATH,
-        metavar="DIR",
-        help="Process every CLIP, and write the outputs into DIR.",
+    option(
+        "-d, --directory DIR", "Process every CLIP, and write the outputs into DIR.", name="folder"
     ),
     jobs_option("With -d: process N videos at once, each in its own process."),
-    click.option(
-        "--skip-existing",
-        is_flag=True,
-        help="With -d: skip videos whose outputs are all there and up to date.",
-    ),
-    click.option("--dry-run", is_flag=True, help="With -d: list what would be written, and stop."),
+    option("--skip-existing", "With -d: skip videos whose outputs are all there and up to date."),
+    option("--dry-run", "With -d: list what would be written, and stop."),
     scheduler_option,
 )
 
@@ -115,8 +106,6 @@ def process_batch(
     outputs: "OutputOptions",
     work: "Work",
     options: BatchOptions,
-    *,
-    quiet: bool,
 ) -> int:
     """Process a batch, or list what would be written, and return the exit code."""
     from vdet.batch.plan import make_plan
@@ -135,7 +124,7 @@ def process_batch(
         print_message(f"{plan.folder}: {counted(len(plan.skipped), 'file')} there already")
         return 0
     workers, threads = _workers(options, len(plan.jobs))
-    failed = _run(plan, replace(work, threads=work.threads or threads), workers, quiet=quiet)
+    failed = _run(plan, replace(work, threads=work.threads or threads), workers)
     return failure_code(failed, len(plan.jobs) + len(plan.skipped))
 
 
@@ -162,37 +151,37 @@ def _workers(options: BatchOptions, files: int) -> "tuple[Workers, int]":
     return LocalProcesses(jobs), max(1, cores // jobs)
 
 
-def _run(plan: "Plan", work: "Work", workers: "Workers", *, quiet: bool) -> int:
+def _run(plan: "Plan", work: "Work", workers: "Workers") -> int:
     """Run the batch, print the result of each file, and return how many failed."""
     from vdet.batch.run import run_batch
 
     failed = 0
     with (
-        batch_bar(plan, quiet=quiet) as counts,
+        batch_bar(plan) as counts,
         closing(run_batch(plan, work, workers=workers, counts=counts)) as results,
     ):
         for job, record in results:
-            _print_result(job, record, quiet=quiet)
+            _print_result(job, record)
             failed += record.error is not None
-    if not quiet:
+    if not is_quiet():
         skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
         done = counted(len(plan.jobs) - failed, "file")
         print_message(f"{plan.manifest}: {done} done, {skipped}{failed} failed")
     return failed
 
 
-def _print_result(job: "VideoJob", record: "Record", *, quiet: bool) -> None:
+def _print_result(job: "VideoJob", record: "Record") -> None:
     for warning in record.warnings:
         log.warning("%s", warning)
     if record.error:
         log.error("%s", record.error)
-    elif not quiet:
+    elif not is_quiet():
         found = f"{counted(record.frames, 'frame')}, {counted(record.tracks, 'track')}"
         print_message(f"{job.source}: {found}, {record.seconds:.1f} s")
 
 
 @contextmanager
-def batch_bar(plan: "Plan", *, quiet: bool) -> "Iterator[FrameCounts | None]":
+def batch_bar(plan: "Plan") -> "Iterator[FrameCounts | None]":
     """Give counts of frames to the files of a plan, and show them in a bar.
 
     Gives None where there is no bar, or no temporary file for the counts can be made.
@@ -212,7 +201,7 @@ def batch_bar(plan: "Plan", *, quiet: bool) -> "Iterator[FrameCounts | None]":
 
     with (
         frame_counts(plan.jobs) as made,
-        live_bar(quiet=quiet, refresh=show, bar_format=_BAR, unit=" frames") as bar,
+        live_bar(refresh=show, bar_format=_BAR, unit=" frames") as bar,
     ):
         counts = None if bar.disable else made
         yield counts

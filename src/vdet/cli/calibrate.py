@@ -5,15 +5,10 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import counted, print_lines, progress_steps
-from vdet.cli.options import (
-    PATH,
-    check_suffix,
-    output_file_option,
-    overwrite_option,
-    parse_pair,
-)
+from vdet.cli.options import option
 from vdet.files import check_output
 
 log = logging.getLogger("vdet")
@@ -21,7 +16,7 @@ log = logging.getLogger("vdet")
 
 def parse_corners(text: str) -> tuple[int, int]:
     """Return the inner corners of a board, along and across."""
-    along, across = parse_pair(text, "9x6")
+    along, across = options.parse_pair(text, "9x6")
     if not (3 <= along <= 999 and 3 <= across <= 999):
         raise click.BadParameter(
             f"{text!r}: give 3 to 999 inner corners of the board along and across, as in 9x6"
@@ -29,34 +24,18 @@ def parse_corners(text: str) -> tuple[int, int]:
     return along, across
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet calibrate chessboards/ -o camera.yaml",
-        "vdet calibrate chessboards/ -o camera.yaml --pattern 9x6 --preview previews",
-    ),
+@command(
+    "vdet calibrate chessboards/ -o camera.yaml",
+    "vdet calibrate chessboards/ -o camera.yaml --pattern 9x6 --preview previews",
 )
-@click.argument("photos", nargs=-1, required=True, type=PATH, metavar="PHOTO...")
-@output_file_option("Camera file to write, .yaml.")
-@click.option(
-    "--pattern",
-    default="9x6",
-    show_default=True,
-    type=parse_corners,
-    metavar="NxM",
-    help="Inner corners of the board, along and across.",
+@click.argument("photos", nargs=-1, required=True, type=options.PATH, metavar="PHOTO...")
+@options.output_file_option("Camera file to write, .yaml.")
+@option(
+    "--pattern NxM", "Inner corners of the board, along and across.", parse_corners, default="9x6"
 )
-@click.option(
-    "--preview",
-    type=PATH,
-    metavar="DIR",
-    help="Write every photograph into DIR, with its corners, and undistorted.",
-)
-@overwrite_option
-@click.pass_obj
+@option("--preview DIR", "Write every photograph into DIR, with its corners, and undistorted.")
+@options.overwrite_option
 def calibrate(
-    quiet: bool,
-    *,
     photos: tuple[Path, ...],
     output: Path,
     pattern: tuple[int, int],
@@ -72,12 +51,12 @@ def calibrate(
     from vdet.lanes.camera_file import save_camera
     from vdet.run.pictures import find_images
 
-    check_suffix(output, ".yaml", ".yml", what="cameras")
+    options.check_suffix(output, ".yaml", ".yml", what="cameras")
     found = find_images(photos)
     check_output(output, overwrite=overwrite, inputs=found)
     if preview:
         calibration.check_previews(preview, found, overwrite=overwrite)
-    with progress_steps("", quiet=quiet) as steps:
+    with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)
         result = calibration.calibrate(found, pattern)
     for skip in result.skipped:

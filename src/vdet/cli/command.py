@@ -1,7 +1,7 @@
 """Commands whose help groups its options, and groups that import a command when it is called."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from importlib import import_module
 from typing import Any
@@ -29,18 +29,13 @@ HEADINGS: Mapping[str, Sequence[str]] = {
 
 
 class Command(click.Command):
-    """A command of the program; its help ends with examples, and it takes `-q` and `-v`.
+    """A command of the program; its help ends with examples, and it takes `-q` and `-v`."""
 
-    Parameters
-    ----------
-    examples
-        Command lines that the help shows.
-    """
+    examples: Sequence[str] = ()
 
-    def __init__(self, *arguments: Any, examples: Sequence[str] = (), **options: Any) -> None:
+    def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self.examples = examples
-        self.params += [_verbosity_option("quiet"), _verbosity_option("verbose")]
+        self.params += verbosity_options()
         # click cuts only summaries that are not given.
         self.short_help = re.split(r"(?<=\.)\s", (self.help or "").strip())[0]
 
@@ -63,6 +58,17 @@ class Command(click.Command):
             with formatter.section("Examples"):
                 for line in self.examples:
                     formatter.write(f"{'':{formatter.current_indent}}{line}\n")
+
+
+def command(*examples: str) -> Callable[[Callable[..., Any]], Command]:
+    """Return a decorator that makes a command, with command lines that its help shows."""
+
+    def make(function: Callable[..., Any]) -> Command:
+        made = click.command(cls=Command)(function)
+        made.examples = examples
+        return made
+
+    return make
 
 
 class LazyGroup(click.Group):
@@ -149,23 +155,23 @@ class LazyGroup(click.Group):
         return command
 
 
-def _verbosity_option(name: str) -> click.Option:
-    """Return `--quiet` or `--verbose`, which mean the same as before the command."""
+def verbosity_options() -> list[click.Parameter]:
+    """Return `--quiet` and `--verbose`, which mean the same before and after the command."""
+    quiet = "Print no progress and no warnings, only errors."
+    verbose = "Print more about what is done."
+    return [
+        click.Option(
+            [f"-{name[0]}", f"--{name}"],
+            is_flag=True,
+            expose_value=False,
+            callback=_apply_verbosity,
+            help=text,
+        )
+        for name, text in (("quiet", quiet), ("verbose", verbose))
+    ]
 
-    def apply(context: click.Context, _: click.Parameter, given: bool) -> None:
-        if given and name == "quiet":
-            context.obj = True
-        if given:
-            set_up_logs(verbose=name == "verbose", quiet=bool(context.obj))
 
-    helps = {
-        "quiet": "Print no progress and no warnings, only errors.",
-        "verbose": "Print more about what is done.",
-    }
-    return click.Option(
-        [f"-{name[0]}", f"--{name}"],
-        is_flag=True,
-        expose_value=False,
-        callback=apply,
-        help=helps[name],
-    )
+def _apply_verbosity(context: click.Context, option: click.Parameter, given: bool) -> None:
+    if given:
+        context.obj = context.obj or option.name == "quiet"
+        set_up_logs(verbose=option.name == "verbose", quiet=bool(context.obj))

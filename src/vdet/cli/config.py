@@ -1,19 +1,11 @@
 """`vdet config`: the effective settings."""
 
-import click
-
-from vdet.cli.command import Command
+from vdet.cli.command import command
 from vdet.cli.messages import print_lines
 from vdet.cli.options import SettingsChoice, settings_options
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet config > my.yaml",
-        "vdet config -c seed --set output.crf=18",
-    ),
-)
+@command("vdet config > my.yaml", "vdet config -c seed --set output.crf=18")
 @settings_options("tracker.kind=rules")
 def config(choice: SettingsChoice) -> None:
     """Print the effective settings as commented YAML.

@@ -6,64 +6,47 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.cli.options import (
-    PATH,
-    RATE,
-    SettingsChoice,
-    lines_option,
-    overwrite_option,
-    parse_pair,
-    settings_options,
-)
+from vdet.cli.options import option
 from vdet.files import check_output, printable, staged
 
 if TYPE_CHECKING:
     from vdet.traffic.totals import Counts
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet count tracks.jsonl --lines lines.yaml",
-        "vdet count found/*.csv --lines lines.yaml --counts counts.json",
-    ),
+@command(
+    "vdet count tracks.jsonl --lines lines.yaml",
+    "vdet count found/*.csv --lines lines.yaml --counts counts.json",
 )
-@click.argument("tracks", nargs=-1, required=True, type=PATH, metavar="TRACKS...")
-@click.option(
-    "--counts",
-    "target",
-    type=PATH,
-    metavar="FILE",
-    help="Write the counts: .csv has the events, .json also all totals. Those of several TRACKS go "
+@click.argument("tracks", nargs=-1, required=True, type=options.PATH, metavar="TRACKS...")
+@option(
+    "--counts FILE",
+    "Write the counts: .csv has the events, .json also all totals. Those of several TRACKS go "
     "into one file.",
+    name="target",
 )
-@click.option(
-    "--size",
-    type=parse_pair,
-    metavar="WIDTHxHEIGHT",
+@option(
+    "--size WIDTHxHEIGHT",
+    "Size of the frames of the video, pixels.",
+    options.parse_pair,
     show_default="as TRACKS say, else the size that the lines are given for",
-    help="Size of the frames of the video, pixels.",
 )
-@click.option(
-    "--rate",
-    type=RATE,
-    metavar="FPS",
+@option(
+    "--rate FPS",
+    "Frames per second of the video, for TRACKS without times.",
+    options.RATE,
     show_default="from the times in TRACKS",
-    help="Frames per second of the video, for TRACKS without times.",
 )
-@settings_options("counts.confirmed=0.5", lines_option)
-@overwrite_option
-@click.pass_obj
+@options.settings_options("counts.confirmed=0.5", options.lines_option)
+@options.overwrite_option
 def count(
-    quiet: bool,
-    *,
     tracks: tuple[Path, ...],
     target: Path | None,
     size: tuple[int, int] | None,
     rate: float | None,
-    choice: SettingsChoice,
+    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Count the vehicles of track files at lines and in zones.
@@ -81,7 +64,7 @@ def count(
             raise click.UsageError(f"--counts: counts are written as {', '.join(SUFFIXES)}")
         check_output(target, overwrite=overwrite, inputs=tracks)
     videos = {}
-    with progress_steps(" files", quiet=quiet) as steps:
+    with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         for path in tracks:
             videos[str(path)] = count_file(path, settings, size, rate)

@@ -4,30 +4,19 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
-from vdet.cli.messages import print_lines, print_message, progress_steps
-from vdet.cli.options import PATH, overwrite_option
+from vdet.cli.command import command
+from vdet.cli.messages import is_quiet, print_lines, print_message, progress_steps
+from vdet.cli.options import PATH, option, overwrite_option
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet demo",
-        "vdet demo folder --seed 2 --overwrite",
-    ),
+@command(
+    "vdet demo",
+    "vdet demo folder --seed 2 --overwrite",
 )
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
-@click.option(
-    "--seed",
-    default=5,
-    show_default=True,
-    type=click.IntRange(min=0),
-    metavar="N",
-    help="Seed of everything that is drawn.",
-)
+@option("--seed N", "Seed of everything that is drawn.", click.IntRange(min=0), default=5)
 @overwrite_option
-@click.pass_obj
-def demo(quiet: bool, *, folder: Path, seed: int, overwrite: bool) -> None:
+def demo(folder: Path, seed: int, overwrite: bool) -> None:
     """Try the whole program on a drawn road.
 
     A road with vehicles is drawn. The network finds and counts them. Then a linear model is trained
@@ -38,12 +27,12 @@ def demo(quiet: bool, *, folder: Path, seed: int, overwrite: bool) -> None:
 
     files = DemoFiles(folder)
     check_demo(files, overwrite=overwrite)
-    with progress_steps("", quiet=quiet) as steps:
+    with progress_steps("") as steps:
         result = run_demo(
             files,
             seed=seed,
             overwrite=overwrite,
-            announce=(lambda _: None) if quiet else print_message,
+            announce=(lambda _: None) if is_quiet() else print_message,
             steps=steps,
         )
     print_lines(

@@ -7,22 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import counted, print_message, progress_steps
-from vdet.cli.options import (
-    PATH,
-    LaneChoice,
-    SettingsChoice,
-    as_outputs,
-    lane_options,
-    model_option,
-    output_option,
-    overwrite_option,
-    regions_option,
-    settings_options,
-    sink_option,
-    wanted_outputs,
-)
+from vdet.cli.options import option
 from vdet.errors import failure_code
 
 if TYPE_CHECKING:
@@ -31,38 +19,30 @@ if TYPE_CHECKING:
 log = logging.getLogger("vdet")
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet detect-image road.jpg",
-        "vdet detect-image road.jpg -o found.jpg --json -",
-        "vdet detect-image pictures/ -o found/ --json boxes.json",
-        "vdet detect-image road.jpg --stages stages",
-    ),
+@command(
+    "vdet detect-image road.jpg",
+    "vdet detect-image road.jpg -o found.jpg --json -",
+    "vdet detect-image pictures/ -o found/ --json boxes.json",
+    "vdet detect-image road.jpg --stages stages",
 )
-@click.argument("images", nargs=-1, required=True, type=PATH, metavar="IMAGE...")
-@click.option(
-    "-o",
-    "--output",
-    type=PATH,
-    metavar="PATH",
-    help="Write the picture with its boxes. For several pictures, give a folder.",
+@click.argument("images", nargs=-1, required=True, type=options.PATH, metavar="IMAGE...")
+@option(
+    "-o, --output PATH",
+    "Write the picture with its boxes. For several pictures, give a folder.",
+    options.PATH,
 )
-@click.option("--stages", type=PATH, metavar="DIR", help="Write a picture of every stage into DIR.")
-@output_option("json", "FILE", "Write the boxes to FILE, or with - to standard output.")
-@sink_option
-@lane_options
-@settings_options("detector.still_score=0.5", regions_option, model_option)
-@overwrite_option
-@click.pass_obj
+@option("--stages DIR", "Write a picture of every stage into DIR.")
+@options.output_option("--json FILE", "Write the boxes to FILE, or with - to standard output.")
+@options.sink_option
+@options.lane_options
+@options.settings_options("detector.still_score=0.5", options.regions_option, options.model_option)
+@options.overwrite_option
 def detect_image(
-    quiet: bool,
-    *,
     images: tuple[Path, ...],
     output: Path | None,
     stages: Path | None,
-    lanes: LaneChoice,
-    choice: SettingsChoice,
+    lanes: options.LaneChoice,
+    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> int:
     """Find vehicles in pictures.
@@ -79,11 +59,11 @@ def detect_image(
     check_mask(settings.regions)
     model = choice.load_detector(settings.detector)
     sources = find_images(images)
-    shared = as_outputs(wanted_outputs())
+    shared = options.as_outputs(options.wanted_outputs())
     check_sinks(shared, overwrite=overwrite, inputs=sources)
     jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
     is_printed = not (output or stages or shared)
-    with progress_steps(" pictures", quiet=quiet) as steps:
+    with progress_steps(" pictures") as steps:
         failures = run_pictures(
             jobs,
             shared,

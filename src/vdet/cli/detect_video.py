@@ -10,117 +10,82 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vdet.cli import options
 from vdet.cli.batch import BatchOptions, batch_options, process_batch, read_output_options
-from vdet.cli.command import Command
-from vdet.cli.messages import counted, print_message, progress_steps
-from vdet.cli.options import (
-    PATH,
-    POSITIVE,
-    PROCESSES,
-    TIME_FORM,
-    LaneChoice,
-    SettingsChoice,
-    Wanted,
-    as_outputs,
-    lane_options,
-    lines_option,
-    model_option,
-    output_option,
-    overwrite_option,
-    parse_time,
-    regions_option,
-    settings_options,
-    sink_option,
-    wanted_outputs,
-)
+from vdet.cli.command import command
+from vdet.cli.messages import counted, is_quiet, print_message, progress_steps
+from vdet.cli.options import option
 
 if TYPE_CHECKING:
     from vdet.config.schema import Settings
     from vdet.run.video import VideoJob
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
-        "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
-        "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
-        "vdet detect-video in.mp4 --no-video --lines lines.yaml --counts counts.csv",
-        "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
-    ),
+@command(
+    "vdet detect-video in.mp4 out.mp4 --tracks out.csv",
+    "vdet detect-video in.mp4 --no-video --tracks - --start 1:30 --end 2:00",
+    "vdet detect-video in.mp4 --no-video --stages stages --at 12.5",
+    "vdet detect-video in.mp4 --no-video --lines lines.yaml --counts counts.csv",
+    "vdet detect-video clips/ -d found --tracks .jsonl --skip-existing",
 )
-@click.argument("clips", nargs=-1, required=True, type=PATH, metavar="IN [OUT] | CLIP...")
-@click.option("--no-video", is_flag=True, help="Write no video, only other outputs.")
-@output_option(
-    "tracks",
-    "FILE",
+@click.argument("clips", nargs=-1, required=True, type=options.PATH, metavar="IN [OUT] | CLIP...")
+@option("--no-video", "Write no video, only other outputs.")
+@options.output_option(
+    "--tracks FILE",
     "Write the boxes of every frame: .txt (MOTChallenge), .csv, .jsonl, .coco.json, .xml "
     "(CVAT), .kitti.txt or .yolo.zip. With -, they go to standard output as .jsonl. With -d, "
     "give only the ending. Can be repeated.",
 )
-@output_option(
-    "summary",
-    "FILE",
+@options.output_option(
+    "--summary FILE",
     "Write a record of each vehicle: .csv or .json. With -d, give only the ending. A file over "
     "all videos is then written too.",
 )
-@output_option(
-    "crops",
-    "DIR",
+@options.output_option(
+    "--crops DIR",
     "Write the best picture of each vehicle into DIR. With -d, give an ending such as .crops.",
 )
-@output_option(
-    "page",
-    "DIR",
+@options.output_option(
+    "--page DIR",
     "Write page.html into DIR: a page on the vehicles of the video. With -d, give an ending "
     "such as .page. A page that links all videos is then written too.",
 )
-@output_option(
-    "counts",
-    "FILE",
+@options.output_option(
+    "--counts FILE",
     "Write which vehicles cross the lines and visit the zones of --lines: .csv has the events, "
     ".json also all totals. With -d, give only the ending, as in .counts.csv. Can be repeated.",
 )
-@sink_option
-@click.option(
-    "--start",
-    type=parse_time,
-    metavar=TIME_FORM,
-    help="Begin at this time, as in 90, 1:30 or 0:01:30.5.",
+@options.sink_option
+@option(
+    f"--start {options.TIME_FORM}",
+    "Begin at this time, as in 90, 1:30 or 0:01:30.5.",
+    options.parse_time,
 )
-@click.option("--end", type=parse_time, metavar=TIME_FORM, help="Stop before this time.")
-@click.option("--frames", type=POSITIVE, metavar="N", help="Process at most N frames.")
-@click.option(
-    "--stride",
-    type=click.IntRange(1, 100),
-    metavar="N",
-    help="Search every N-th frame. In the others, the tracker moves the vehicles on. The same as "
+@option(f"--end {options.TIME_FORM}", "Stop before this time.", options.parse_time)
+@option("--frames N", "Process at most N frames.", options.POSITIVE)
+@option(
+    "--stride N",
+    "Search every N-th frame. In the others, the tracker moves the vehicles on. The same as "
     "--set detector.stride=N.",
+    click.IntRange(1, 100),
 )
-@click.option(
-    "--threads",
-    type=PROCESSES,
-    metavar="N",
+@option(
+    "--threads N",
+    "Search one video in N threads.",
+    options.PROCESSES,
     show_default="one for each core, shared by --jobs",
-    help="Search one video in N threads.",
 )
-@click.option(
-    "--stages",
-    type=PATH,
-    metavar="DIR",
-    help="Write a picture of every stage of one frame into DIR. Goes with --at.",
-)
-@click.option(
-    "--at", type=parse_time, metavar=TIME_FORM, help="Show the frame at this time with --stages."
+@option("--stages DIR", "Write a picture of every stage of one frame into DIR. Goes with --at.")
+@option(
+    f"--at {options.TIME_FORM}", "Show the frame at this time with --stages.", options.parse_time
 )
 @batch_options
-@lane_options
-@settings_options("output.crf=18", regions_option, lines_option, model_option)
-@overwrite_option
-@click.pass_obj
+@options.lane_options
+@options.settings_options(
+    "output.crf=18", options.regions_option, options.lines_option, options.model_option
+)
+@options.overwrite_option
 def detect_video(
-    quiet: bool,
-    *,
     clips: tuple[Path, ...],
     no_video: bool,
     start: Fraction | None,
@@ -130,8 +95,8 @@ def detect_video(
     threads: int | None,
     stages: Path | None,
     at: Fraction | None,
-    lanes: LaneChoice,
-    choice: SettingsChoice,
+    lanes: options.LaneChoice,
+    choice: options.SettingsChoice,
     overwrite: bool,
     batch: BatchOptions,
 ) -> int:
@@ -143,7 +108,7 @@ def detect_video(
     or a quoted pattern such as 'day*/*.mp4'. The outputs of each video are written into DIR, and a
     record of each into manifest.jsonl there.
     """
-    wanted = wanted_outputs()
+    wanted = options.wanted_outputs()
     if stages is not None:
         wanted.insert(0, ("stages", stages))
     batch.check(overwrite=overwrite)
@@ -164,13 +129,13 @@ def detect_video(
     check_mask(settings.regions)
     job = VideoJob(source, (), start, end, frames, at or Fraction(0), request, overwrite)
     if batch.folder is None:
-        job = replace(job, outputs=as_outputs(wanted))
-        _process_one(job, settings, choice, threads, quiet=quiet)
+        job = replace(job, outputs=options.as_outputs(wanted))
+        _process_one(job, settings, choice, threads)
         return 0
     outputs = read_output_options(wanted, batch, no_video=no_video, overwrite=overwrite)
     sinks = {each.sink for each in outputs.suffixes}
     work = Work.of(job, sinks, settings, choice.model_path, threads)
-    return process_batch(clips, job, outputs, work, batch, quiet=quiet)
+    return process_batch(clips, job, outputs, work, batch)
 
 
 def _check_times(
@@ -188,7 +153,7 @@ def _check_times(
         raise click.UsageError("--stages and --at go together")
 
 
-def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[Wanted]]:
+def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
     source, *outputs = clips
     if len(outputs) > 1 or (outputs and outputs[0].is_file() and not _is_ours(outputs[0])):
         shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
@@ -207,7 +172,7 @@ def _is_ours(video: Path) -> bool:
     return may_replace_video(video)
 
 
-def _check_counts(wanted: Sequence[Wanted], settings: "Settings") -> None:
+def _check_counts(wanted: Sequence[options.Wanted], settings: "Settings") -> None:
     if not settings.counts and any(sink == "counts" for sink, _ in wanted):
         raise click.UsageError("--counts needs lines or zones; give --lines FILE")
 
@@ -215,19 +180,17 @@ def _check_counts(wanted: Sequence[Wanted], settings: "Settings") -> None:
 def _process_one(
     job: "VideoJob",
     settings: "Settings",
-    choice: SettingsChoice,
+    choice: options.SettingsChoice,
     threads: int | None,
-    *,
-    quiet: bool,
 ) -> None:
     from vdet.run.video import check_job, run_video
 
     model = choice.load_detector(settings.detector)
     check_job(job)
-    with progress_steps(" frames", quiet=quiet) as steps:
+    with progress_steps(" frames") as steps:
         steps("opening", None)
         totals = run_video(job, model, settings, threads=threads, progress=partial(steps, ""))
-    if not quiet:
+    if not is_quiet():
         rate = totals.frames / totals.seconds
         found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"
         print_message(f"{job.source}: {found}, {totals.seconds:.1f} s, {rate:.1f} frames/s")

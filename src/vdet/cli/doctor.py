@@ -6,9 +6,7 @@ from fractions import Fraction
 from importlib.metadata import PackageNotFoundError, version
 from typing import Literal
 
-import click
-
-from vdet.cli.command import Command
+from vdet.cli.command import command
 from vdet.cli.results import Results, facts_options
 from vdet.errors import in_one_line
 from vdet.version import __version__
@@ -35,7 +33,7 @@ class Finding:
     text: str
 
 
-@click.command(cls=Command, examples=("vdet doctor", "vdet doctor --json -"))
+@command("vdet doctor", "vdet doctor --json -")
 @facts_options
 def doctor(results: Results) -> int:
     """Check whether vdet works on this machine.

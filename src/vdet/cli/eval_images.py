@@ -5,41 +5,32 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import PATH, SHARE, SettingsChoice, model_option, settings_options
+from vdet.cli.options import PATH, SHARE, SettingsChoice, model_option, option, settings_options
 from vdet.cli.results import Results, results_options
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet eval images pictures/",
-        "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
-    ),
+@command(
+    "vdet eval images pictures/",
+    "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
 )
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
-@click.option(
-    "--score",
-    type=SHARE,
-    metavar="SCORE",
+@option(
+    "--score SCORE",
+    "Count boxes with at least this score, 0 to 1.",
+    SHARE,
     show_default="what vdet detect-image shows",
-    help="Count boxes with at least this score, 0 to 1.",
 )
-@click.option(
-    "--least-width",
-    type=SHARE,
-    metavar="SHARE",
+@option(
+    "--least-width SHARE",
+    "Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
+    SHARE,
     default=0.0,
-    show_default=True,
-    help="Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
 )
 @settings_options("detector.still_score=0.5", model_option)
 @results_options
-@click.pass_obj
 def images(
-    quiet: bool,
-    *,
     data: tuple[Path, ...],
     score: float | None,
     least_width: float,
@@ -70,7 +61,7 @@ def images(
         least_width=least_width,
         classes=detector.vehicle_classes,
     )
-    with progress_steps(" pictures", quiet=quiet) as steps:
+    with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
     run = run_name(detector, choice.model_path, choice.config_name, choice.assignments)

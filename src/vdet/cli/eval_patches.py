@@ -4,35 +4,27 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import PATH, SettingsChoice, jobs_option, settings_options
+from vdet.cli.options import PATH, SettingsChoice, jobs_option, option, settings_options
 from vdet.cli.results import Results, results_options
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet eval patches vehicles.zip non-vehicles.zip --page page",
-        "vdet eval patches patches/ --model model.npz",
-    ),
+@command(
+    "vdet eval patches vehicles.zip non-vehicles.zip --page page",
+    "vdet eval patches patches/ --model model.npz",
 )
 @click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
-@click.option(
-    "--model",
-    "model_path",
-    type=PATH,
-    metavar="FILE",
+@option(
+    "--model FILE",
+    "Test this model on all of DATA.",
+    name="model_path",
     show_default="a new model, tested on the last patches of each folder",
-    help="Test this model on all of DATA.",
 )
 @settings_options("train.svm.C=1e-4")
 @jobs_option()
 @results_options
-@click.pass_obj
 def patches(
-    quiet: bool,
-    *,
     data: tuple[Path, ...],
     choice: SettingsChoice,
     jobs: int | None,
@@ -53,7 +45,7 @@ def patches(
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     results.check([*data, *([model_path] if model_path else [])])
     files = find_patches(data)
-    with progress_steps("", quiet=quiet) as steps:
+    with progress_steps("") as steps:
         result = evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
     sources = trained_on(model_path) if model_path else ()
     name = RunName("svm", model_path, choice.config_name, choice.assignments, sources)

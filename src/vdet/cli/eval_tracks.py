@@ -4,32 +4,27 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import PATH, RATE, until_option
+from vdet.cli.options import PATH, RATE, option, until_option
 from vdet.cli.results import Results, results_options
 from vdet.version import __version__
 
 
-@click.command(
-    cls=Command,
-    examples=("vdet eval tracks out.txt gt.txt --page page",),
+@command(
+    "vdet eval tracks out.txt gt.txt --page page",
 )
 @click.argument("prediction", type=PATH, metavar="PRED")
 @click.argument("truth", type=PATH, metavar="TRUTH")
 @until_option
-@click.option(
-    "--rate",
-    type=RATE,
-    metavar="FPS",
+@option(
+    "--rate FPS",
+    "Frames per second, for the number of false tracks per minute.",
+    RATE,
     show_default="from the times in PRED",
-    help="Frames per second, for the number of false tracks per minute.",
 )
 @results_options
-@click.pass_obj
 def tracks(
-    quiet: bool,
-    *,
     prediction: Path,
     truth: Path,
     until: int | None,
@@ -46,7 +41,7 @@ def tracks(
     from vdet.evaluate.clips.text import plain_clip, result_lines
 
     results.check([prediction, truth])
-    with progress_steps("", quiet=quiet) as steps:
+    with progress_steps("") as steps:
         steps("comparing", None)
         run = score_files(prediction, truth, until=until, rate=rate)
     results.print(

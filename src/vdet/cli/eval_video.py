@@ -5,52 +5,36 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import (
-    PATH,
-    SettingsChoice,
-    as_outputs,
-    model_option,
-    settings_options,
-    sink_option,
-    truth_option,
-    until_option,
-    wanted_outputs,
-)
+from vdet.cli.options import option
 from vdet.cli.results import Results, results_options
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet eval video in.mp4 --truth gt.txt --page page",
-        "vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3",
-    ),
+@command(
+    "vdet eval video in.mp4 --truth gt.txt --page page",
+    "vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3",
 )
-@click.argument("videos", nargs=-1, required=True, type=PATH, metavar="IN...")
-@truth_option
-@until_option
-@click.option(
-    "--sweep",
-    "sweeps",
-    multiple=True,
-    metavar="KEY=VALUE,VALUE",
-    help="Compare values of one setting, for example tracker.needed=0.1,0.3. Repeated, all "
+@click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN...")
+@options.truth_option
+@options.until_option
+@option(
+    "--sweep KEY=VALUE,VALUE",
+    "Compare values of one setting, for example tracker.needed=0.1,0.3. Repeated, all "
     "combinations are compared.",
+    name="sweeps",
+    multiple=True,
 )
-@sink_option
-@settings_options("tracker.needed=0.3", model_option)
+@options.sink_option
+@options.settings_options("tracker.needed=0.3", options.model_option)
 @results_options
-@click.pass_obj
 def video(
-    quiet: bool,
-    *,
     videos: tuple[Path, ...],
     truths: tuple[Path, ...],
     until: int | None,
     sweeps: tuple[str, ...],
-    choice: SettingsChoice,
+    choice: options.SettingsChoice,
     results: Results,
 ) -> None:
     """Measure detection and tracking in labelled video.
@@ -70,7 +54,7 @@ def video(
     from vdet.run.sinks.protocol import check_sinks
 
     swept = grid(with_values_in_force(sweeps, base))
-    outputs = as_outputs(wanted_outputs())
+    outputs = options.as_outputs(options.wanted_outputs())
     if outputs and (len(swept) > 1 or len(videos) > 1):
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
     variants = []
@@ -84,7 +68,7 @@ def video(
     results.check(inputs)
     check_sinks(outputs, overwrite=results.overwrite, inputs=inputs)
     clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
-    with progress_steps(" frames", quiet=quiet) as steps:
+    with progress_steps(" frames") as steps:
         runs = evaluate_clips(
             clips, variants, partial(steps, ""), outputs=outputs, overwrite=results.overwrite
         )

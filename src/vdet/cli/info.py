@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli.command import command
 from vdet.cli.options import PATH
 from vdet.cli.results import Results, facts_options
 from vdet.files import printable
@@ -15,9 +15,10 @@ Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
 
 
-@click.command(
-    cls=Command,
-    examples=("vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz"),
+@command(
+    "vdet info in.mp4",
+    "vdet info in.mp4 --json -",
+    "vdet info model.npz",
 )
 @click.argument("path", type=PATH, metavar="FILE")
 @facts_options

@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import click
 
-from vdet.cli.command import LazyGroup
+from vdet.cli.command import LazyGroup, verbosity_options
 from vdet.cli.messages import print_lines, set_up_logs
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
@@ -45,13 +45,11 @@ _EVALUATIONS = {
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(__version__, prog_name="vdet")
-@click.option("-v", "--verbose", is_flag=True, help="Print more about what is done.")
-@click.option("-q", "--quiet", is_flag=True, help="Print no progress and no warnings, only errors.")
-@click.pass_context
-def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
+def cli() -> None:
     """Find and follow vehicles in road video on an ordinary CPU."""
-    set_up_logs(verbose=verbose, quiet=quiet)
-    context.obj = quiet
+
+
+cli.params += verbosity_options()
 
 
 @cli.group(
@@ -72,6 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     interrupted. An error is one line on standard error; with `VDET_DEBUG=1` in the environment a
     traceback follows.
     """
+    set_up_logs(verbose=False, quiet=False)
     try:
         code = cli.main(arguments, prog_name="vdet", standalone_mode=False)
     except click.ClickException as error:

@@ -35,6 +35,12 @@ def print_lines(*lines: str, err: bool = False) -> None:
         click.echo("\n".join(map(escaped, lines)), err=err)
 
 
+def is_quiet() -> bool:
+    """Return whether the running command was given `--quiet`."""
+    context = click.get_current_context(silent=True)
+    return bool(context and context.obj)
+
+
 def print_message(*lines: str, err: bool = True) -> None:
     """Print lines, by default on standard error; a progress bar moves below them."""
     from tqdm import tqdm
@@ -68,11 +74,11 @@ def set_up_logs(*, verbose: bool, quiet: bool) -> None:
 
 
 @contextmanager
-def progress_steps(unit: str, *, quiet: bool) -> Iterator[Steps]:
+def progress_steps(unit: str) -> Iterator[Steps]:
     """Give a function that ends the bar of the step before and starts one.
 
     It takes the name of the step and its total. A step that has a name and no total shows how long
-    it has taken, and disappears at its end. There is no bar where standard error is no terminal.
+    it has taken, and disappears at its end. See `live_bar` for where there is no bar.
     """
     with ExitStack() as stack:
 
@@ -84,7 +90,6 @@ def progress_steps(unit: str, *, quiet: bool) -> Iterator[Steps]:
                     total=total,
                     desc=what or None,
                     unit=unit,
-                    quiet=quiet,
                     leave=not timed,
                     bar_format="{desc} [{elapsed}]" if timed else None,
                 )
@@ -96,16 +101,16 @@ def progress_steps(unit: str, *, quiet: bool) -> Iterator[Steps]:
 
 @contextmanager
 def live_bar(
-    *, quiet: bool, refresh: "Callable[[tqdm[Any]], object]" = lambda _: None, **options: Any
+    *, refresh: "Callable[[tqdm[Any]], object]" = lambda _: None, **options: Any
 ) -> "Iterator[tqdm[Any]]":
     """Give a bar that is drawn at least every `REFRESH_INTERVAL`: the program is at work.
 
     Before each time, and at the end, `refresh` is called with the bar. There is no bar with
-    `quiet`, and where standard error is no terminal: its `disable` is then true.
+    `--quiet`, and where standard error is no terminal: its `disable` is then true.
     """
     from tqdm import tqdm
 
-    disable = True if quiet else None  # None: unless standard error is a terminal
+    disable = True if is_quiet() else None  # None: unless standard error is a terminal
     ended = threading.Event()
     with tqdm(disable=disable, dynamic_ncols=True, **options) as bar:
 

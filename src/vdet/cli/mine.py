@@ -4,64 +4,39 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import counted, print_lines, progress_steps
-from vdet.cli.options import (
-    PATH,
-    POSITIVE,
-    SettingsChoice,
-    check_suffix,
-    model_option,
-    output_file_option,
-    overwrite_option,
-    settings_options,
-    truth_option,
-    until_option,
-)
+from vdet.cli.options import option
 from vdet.files import check_output
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet mine in.mp4 --truth gt.txt -o mined.zip",
-        "vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt pictures/ -o mined.zip",
-    ),
+@command(
+    "vdet mine in.mp4 --truth gt.txt -o mined.zip",
+    "vdet mine a.mp4 b.mp4 --truth a.txt --truth b.txt pictures/ -o mined.zip",
 )
-@click.argument("sources", nargs=-1, required=True, type=PATH, metavar="SOURCE...")
-@truth_option
-@output_file_option("Zip file to write.")
-@click.option(
-    "--every",
-    type=POSITIVE,
-    default=4,
-    show_default=True,
-    metavar="N",
-    help="Use every N-th frame of a video.",
-)
-@click.option(
-    "--from",
-    "first",
-    type=POSITIVE,
+@click.argument("sources", nargs=-1, required=True, type=options.PATH, metavar="SOURCE...")
+@options.truth_option
+@options.output_file_option("Zip file to write.")
+@option("--every N", "Use every N-th frame of a video.", options.POSITIVE, default=4)
+@option(
+    "--from FRAME",
+    "Begin at this frame, counted from 1.",
+    options.POSITIVE,
+    name="first",
     default=1,
-    show_default=True,
-    metavar="FRAME",
-    help="Begin at this frame, counted from 1.",
 )
-@until_option
-@settings_options("train.mine.parts=0", model_option)
-@overwrite_option
-@click.pass_obj
+@options.until_option
+@options.settings_options("train.mine.parts=0", options.model_option)
+@options.overwrite_option
 def mine(
-    quiet: bool,
-    *,
     sources: tuple[Path, ...],
     truths: tuple[Path, ...],
     output: Path,
     every: int,
     first: int,
     until: int | None,
-    choice: SettingsChoice,
+    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Cut patches for vdet train out of labelled videos and pictures.
@@ -75,7 +50,7 @@ def mine(
     """
     if until is not None and until < first:
         raise click.UsageError("--until must not be before --from")
-    check_suffix(output, ".zip", what="patches")
+    options.check_suffix(output, ".zip", what="patches")
     settings = choice.read_for_whole_frames(detector="svm")
     from vdet.detect.factory import model_file
     from vdet.labels.pictures.reading import holds_labelled_images
@@ -99,7 +74,7 @@ def mine(
         overwrite,
     )
     detector = choice.load_detector(settings.detector)
-    with progress_steps(" frames", quiet=quiet) as steps:
+    with progress_steps(" frames") as steps:
         mined = mining.mine(job, settings, detector, steps=steps)
     print_lines(
         f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "

@@ -83,70 +83,80 @@ def bundle(name: str, make: type[Any], *options: Callable[..., Any]) -> Callable
     return add
 
 
-overwrite_option = click.option(
-    "--overwrite", is_flag=True, help="Replace outputs that are there already."
-)
+def option(
+    shown: str, text: str, kind: Any = None, *, name: str = "", **more: Any
+) -> Callable[[F], F]:
+    """Return a decorator that adds an option to a command.
 
-scheduler_option = click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Work on the Dask cluster of this scheduler, for example tcp://host:8786. All its workers "
-    "must find the files under the same names.",
-)
+    Parameters
+    ----------
+    shown
+        Flags and placeholder of the value as the help shows them, as in "-o, --output FILE". An
+        option without a value has no placeholder.
+    text
+        Its help.
+    kind
+        Type of the value; None for text, and for a path where the placeholder is FILE or DIR.
+    name
+        The argument of the command; by default called as the option.
+    more
+        Further arguments of `click.option`.
+    """
+    words = shown.replace(",", "").split()
+    flags = [word for word in words if word.startswith("-")]
+    metavar = " ".join(words[len(flags) :])
+    if not metavar:
+        more["is_flag"] = True
+    elif kind is None and metavar in ("FILE", "DIR"):
+        kind = PATH
+    if "default" in more:
+        more["show_default"] = True
+    names = [*flags, *([name] if name else [])]
+    return click.option(*names, help=text, type=kind, metavar=metavar or None, **more)
 
-until_option = click.option(
-    "--until",
-    type=POSITIVE,
-    metavar="FRAME",
+
+overwrite_option = option("--overwrite", "Replace outputs that are there already.")
+scheduler_option = option(
+    "--scheduler ADDRESS",
+    "Work on the Dask cluster of this scheduler, for example tcp://host:8786. All its workers must "
+    "find the files under the same names.",
+)
+until_option = option(
+    "--until FRAME",
+    "End with this frame, counted from 1.",
+    POSITIVE,
     show_default="the last one in the truth",
-    help="End with this frame, counted from 1.",
 )
-
-truth_option = click.option(
-    "--truth",
-    "truths",
+truth_option = option(
+    "--truth FILE",
+    "True boxes of a video: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat it for "
+    "each video, in the same order.",
+    name="truths",
     multiple=True,
-    type=PATH,
-    metavar="FILE",
-    help="True boxes of a video: MOTChallenge, KITTI, CVAT, COCO, YOLO, .csv or .jsonl. Repeat it "
-    "for each video, in the same order.",
 )
-
-model_option = click.option(
-    "--model",
-    "model_path",
-    type=PATH,
-    metavar="FILE",
-    show_default="the shipped one that fits the settings",
-    help="Model file of the detector: .npz from vdet train, or .onnx, a network. It decides which "
+model_option = option(
+    "--model FILE",
+    "Model file of the detector: .npz from vdet train, or .onnx, a network. It decides which "
     "detector runs.",
+    name="model_path",
+    show_default="the shipped one that fits the settings",
 )
-
-regions_option = click.option(
-    "--regions",
-    type=PATH,
-    metavar="FILE",
-    help="Search only these regions of the frame: polygons (.yaml), or a mask, which is a picture "
-    "with the regions in white.",
+regions_option = option(
+    "--regions FILE",
+    "Search only these regions of the frame: polygons (.yaml), or a mask, which is a picture with "
+    "the regions in white.",
 )
-
-lines_option = click.option(
-    "--lines",
-    type=PATH,
-    metavar="FILE",
-    help="Count at the lines and zones of this file (.yaml).",
-)
+lines_option = option("--lines FILE", "Count at the lines and zones of this file (.yaml).")
 
 
 def jobs_option(text: str = "Work in N processes.") -> Callable[[F], F]:
     """Add `--jobs N`."""
-    default = "one for each core"
-    return click.option("--jobs", type=PROCESSES, metavar="N", show_default=default, help=text)
+    return option("--jobs N", text, PROCESSES, show_default="one for each core")
 
 
 def output_file_option(text: str) -> Callable[[F], F]:
     """Add `-o FILE`, which is required."""
-    return click.option("-o", "--output", required=True, type=PATH, metavar="FILE", help=text)
+    return option("-o, --output FILE", text, required=True)
 
 
 def check_suffix(output: Path, *suffixes: str, what: str) -> None:
@@ -206,21 +216,19 @@ def settings_options(example: str, *more: Callable[..., Any]) -> Callable[[F], F
 
     `example` is an assignment for the help text that changes what the command does.
     """
-    config = click.option(
-        "-c",
-        "--config",
-        "config_name",
-        metavar="FILE",
+    config = option(
+        "-c, --config FILE",
+        "Read settings from a YAML file, or from a shipped one: default, svm or seed.",
+        str,
+        name="config_name",
         shell_complete=_complete_configs,
-        help="Read settings from a YAML file, or from a shipped one: default, svm or seed.",
     )
-    assign = click.option(
-        "--set",
-        "assignments",
+    assign = option(
+        "--set KEY=VALUE",
+        f"Change one setting, for example {example}. Can be repeated.",
+        name="assignments",
         multiple=True,
-        metavar="KEY=VALUE",
         shell_complete=_complete_keys,
-        help=f"Change one setting, for example {example}. Can be repeated.",
     )
     return bundle("choice", SettingsChoice, *more, config, assign)
 
@@ -255,17 +263,9 @@ Wanted = tuple[str, Path]
 _WANTED = f"{__name__}.wanted"
 
 
-def output_option(sink: str, metavar: str, text: str) -> Callable[[F], F]:
-    """Add `--SINK PATH`, which asks for an output of this sink: see `wanted_outputs`."""
-    return click.option(
-        f"--{sink}",
-        type=PATH,
-        multiple=True,
-        metavar=metavar,
-        expose_value=False,
-        callback=_want,
-        help=text,
-    )
+def output_option(shown: str, text: str) -> Callable[[F], F]:
+    """Add the option of a sink, which asks for an output: see `wanted_outputs`."""
+    return option(shown, text, PATH, multiple=True, expose_value=False, callback=_want)
 
 
 def _want(context: click.Context, option: click.Parameter, paths: tuple[Path, ...]) -> None:
@@ -281,13 +281,12 @@ def _want_named(context: click.Context, _: click.Parameter, texts: tuple[str, ..
         context.meta.setdefault(_WANTED, []).append((name, Path(path)))
 
 
-sink_option = click.option(
-    "--sink",
+sink_option = option(
+    "--sink NAME=FILE",
+    "Write another output: the name of a sink, and a file. Can be repeated.",
     multiple=True,
-    metavar="NAME=FILE",
     expose_value=False,
     callback=_want_named,
-    help="Write another output: the name of a sink, and a file. Can be repeated.",
 )
 
 
@@ -328,14 +327,10 @@ class LaneChoice:
 lane_options = bundle(
     "lanes",
     LaneChoice,
-    click.option(
-        "--lanes", is_flag=True, help="Find the lane too, and draw it into undistorted frames."
-    ),
-    click.option(
-        "--camera",
-        "camera_path",
-        type=PATH,
-        metavar="FILE",
-        help="Undistort for --lanes with this file, which vdet calibrate wrote.",
+    option("--lanes", "Find the lane too, and draw it into undistorted frames."),
+    option(
+        "--camera FILE",
+        "Undistort for --lanes with this file, which vdet calibrate wrote.",
+        name="camera_path",
     ),
 )

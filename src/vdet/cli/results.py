@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import click
-
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.cli.options import PATH, bundle, overwrite_option
+from vdet.cli.options import bundle, option, overwrite_option
 from vdet.files import check_output, make_folder, staged, write_json
 
 
@@ -50,31 +48,24 @@ class Results:
         if self.page is not None:
             from vdet.pages.render import PAGE_NAME, write_page
 
-            with progress_steps("", quiet=click.get_current_context().obj) as steps:
+            with progress_steps("") as steps:
                 steps("writing the page", None)
                 with staged(self.page / PAGE_NAME, overwrite=self.overwrite) as temporary:
                     write_page(make_page(), temporary)
             print_lines("", f"{self.page / PAGE_NAME}: the page", err=to_stderr)
 
 
-_json_option = click.option(
-    "--json",
-    "json_target",
-    metavar="FILE",
-    help="Write the results to FILE. With -, they go to standard output, and the text to standard "
+_json_option = option(
+    "--json FILE",
+    "Write the results to FILE. With -, they go to standard output, and the text to standard "
     "error.",
+    str,
+    name="json_target",
 )
+_page_option = option("--page DIR", "Write page.html, with charts, into DIR.")
 
 facts_options = bundle("results", Results, _json_option, overwrite_option)
 """`--json FILE` and `--overwrite`."""
 
-results_options = bundle(
-    "results",
-    Results,
-    _json_option,
-    click.option(
-        "--page", type=PATH, metavar="DIR", help="Write page.html, with charts, into DIR."
-    ),
-    overwrite_option,
-)
+results_options = bundle("results", Results, _json_option, _page_option, overwrite_option)
 """`--json FILE`, `--page DIR` and `--overwrite`."""

@@ -5,41 +5,26 @@ from pathlib import Path
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
-from vdet.cli.options import (
-    PATH,
-    SettingsChoice,
-    check_suffix,
-    jobs_option,
-    output_file_option,
-    overwrite_option,
-    scheduler_option,
-    settings_options,
-)
 from vdet.files import check_output
 
 
-@click.command(
-    cls=Command,
-    examples=(
-        "vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz",
-        "vdet train patches/ -o model.npz --set train.svm.C=1e-3",
-    ),
+@command(
+    "vdet train vehicles.zip non-vehicles.zip mined.zip -o model.npz",
+    "vdet train patches/ -o model.npz --set train.svm.C=1e-3",
 )
-@click.argument("data", nargs=-1, required=True, type=PATH, metavar="DATA...")
-@output_file_option("Model file to write, .npz.")
-@settings_options("train.svm.C=1e-4")
-@jobs_option()
-@scheduler_option
-@overwrite_option
-@click.pass_obj
+@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
+@options.output_file_option("Model file to write, .npz.")
+@options.settings_options("train.svm.C=1e-4")
+@options.jobs_option()
+@options.scheduler_option
+@options.overwrite_option
 def train(
-    quiet: bool,
-    *,
     data: tuple[Path, ...],
     output: Path,
-    choice: SettingsChoice,
+    choice: options.SettingsChoice,
     jobs: int | None,
     scheduler: str | None,
     overwrite: bool,
@@ -55,7 +40,7 @@ def train(
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
     settings = choice.read(detector="svm")
-    check_suffix(output, ".npz", what="models")
+    options.check_suffix(output, ".npz", what="models")
     metrics_path = output.with_suffix(".json")
     for path in (output, metrics_path):
         check_output(path, overwrite=overwrite, inputs=data)
@@ -71,7 +56,7 @@ def train(
     patches = [path for path in data if path not in pictures]
     with (
         tempfile.TemporaryDirectory(prefix="vdet-") as folder,
-        progress_steps("", quiet=quiet) as steps,
+        progress_steps("") as steps,
     ):
         if pictures:
             archive = Path(folder) / "pictures.zip"

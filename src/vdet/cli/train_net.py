@@ -5,16 +5,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.command import Command
+from vdet.cli import options
+from vdet.cli.command import command
 from vdet.cli.messages import live_bar, print_lines
-from vdet.cli.options import (
-    PATH,
-    SettingsChoice,
-    check_suffix,
-    output_file_option,
-    overwrite_option,
-    settings_options,
-)
+from vdet.cli.options import option
 from vdet.errors import DataError
 from vdet.files import check_output
 
@@ -22,42 +16,29 @@ if TYPE_CHECKING:
     from vdet.learn.net.training import TrainingState
 
 
-@click.command(
-    "train-net",
-    cls=Command,
-    examples=(
-        "vdet train-net pictures/city pictures/motorway -o mine.onnx",
-        "vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt",
-    ),
+@command(
+    "vdet train-net pictures/city pictures/motorway -o mine.onnx",
+    "vdet train-net pictures/ -o mine.onnx --video drive.mp4 drive-truth.txt",
 )
-@click.argument("data", nargs=-1, type=PATH, metavar="[DATA]...")
-@output_file_option("Network to write, .onnx.")
-@click.option(
-    "--video",
-    "clips",
+@click.argument("data", nargs=-1, type=options.PATH, metavar="[DATA]...")
+@options.output_file_option("Network to write, .onnx.")
+@option(
+    "--video CLIP TRUTH",
+    "Learn from every N-th frame of a labelled video too (train.net.every). Can be repeated.",
+    options.PATH,
+    name="clips",
     nargs=2,
     multiple=True,
-    type=PATH,
-    metavar="CLIP TRUTH",
-    help="Learn from every N-th frame of a labelled video too (train.net.every). Can be repeated.",
 )
-@click.option(
-    "--base",
-    type=PATH,
-    metavar="FILE",
-    help="Start from the weights of this network, which vdet train-net has written.",
-)
-@settings_options("train.net.steps=4000")
-@overwrite_option
-@click.pass_obj
+@option("--base FILE", "Start from the weights of this network, which vdet train-net has written.")
+@options.settings_options("train.net.steps=4000")
+@options.overwrite_option
 def train_net(
-    quiet: bool,
-    *,
     data: tuple[Path, ...],
     output: Path,
     clips: tuple[tuple[Path, Path], ...],
     base: Path | None,
-    choice: SettingsChoice,
+    choice: options.SettingsChoice,
     overwrite: bool,
 ) -> None:
     """Train a network on labelled pictures.
@@ -69,7 +50,7 @@ def train_net(
     """
     if not data and not clips:
         raise click.UsageError("nothing to learn from; give DATA or --video")
-    check_suffix(output, ".onnx", what="networks")
+    options.check_suffix(output, ".onnx", what="networks")
     settings = choice.read().train.net
     try:
         import onnx  # noqa: F401
@@ -86,7 +67,7 @@ def train_net(
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
-    with live_bar(quiet=quiet, total=settings.steps, unit=" steps") as bar:
+    with live_bar(total=settings.steps, unit=" steps") as bar:
 
         def advance(state: "TrainingState") -> None:
             if bar.n == 0:  # a training that continues is not as fast as its first step seems
