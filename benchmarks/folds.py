@@ -24,8 +24,8 @@ from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
-from vdet.labels.rows import Row
-from vdet.labels.truth import read_truth
+from vdet.labels.label import Label
+from vdet.labels.reading import read_truth
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.box_regression import extract_box_patches, fit_boxes
@@ -219,13 +219,18 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     frames = (Frame(n, n / searched.rate, unseen) for n in range(searched.frames))
     found = Searched(detector, searched.windows)
     rows = [
-        Row(0, result.frame.index + 1, track.id, box.x, box.y, box.width, box.height)
+        Label(
+            0,
+            (box.x, box.y, box.right, box.bottom),
+            frame=result.frame.index + 1,
+            id=track.id,
+        )
         for result in follow(frames, found, tracker, stride=searched.stride)
         for track in result.tracks
         for box in [track.box]
     ]
     rate = float(searched.rate)
-    return LabelledVideo.from_rows(rows, frame_count=searched.frames, rate=rate)
+    return LabelledVideo.of(rows, frame_count=searched.frames, rate=rate)
 
 
 def _f1_by_block(found: LabelledVideo, truth: LabelledVideo) -> list[float]:

@@ -30,7 +30,7 @@ from vdet.evaluate.comparison import pool
 from vdet.evaluate.detection_metrics import rank_predictions
 from vdet.evaluate.images.evaluate import ImagesResult, evaluate_images
 from vdet.evaluate.images.scores import Counting, Source
-from vdet.labels.pictures.reading import read_labelled_images
+from vdet.labels.reading import read_labelled_pictures
 from vdet.learn.net.run import NetworkJob, train_to_file
 from vdet.learn.net.sources import LabelledClip
 from vdet.workers import core_count
@@ -117,8 +117,8 @@ def train(job: NetworkJob, settings: Settings) -> Path:
 def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
     """Search sets of pictures."""
     detector = NetworkSettings(least=_LEAST_SCORE).showing_all()
-    counting = Counting(detector.shown_score, LEAST_WIDTH, detector.classes)
-    labelled = [read_labelled_images(path) for path in sets]
+    counting = Counting(detector.shown_score, LEAST_WIDTH)
+    labelled = [read_labelled_pictures(path) for path in sets]
     model = load_detector(detector, network)
     return evaluate_images(labelled, model, counting, threads=core_count())
 

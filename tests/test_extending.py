@@ -123,6 +123,23 @@ def test_all_three_run_through_eval_video(package: Path, clip: Path, tmp_path: P
     assert len(tally.read_text().splitlines()) == FRAMES
 
 
+def test_the_format_is_written_counted_and_compared(
+    package: Path, clip: Path, tmp_path: Path
+) -> None:
+    tracks, lines, truth = (tmp_path / name for name in ("a.boxes.txt", "lines.yaml", "gt.csv"))
+    wanted = ("--tracks", tracks, "--tracks", truth)
+    done = vdet(package, "detect-video", clip, "--no-video", *wanted, *CHOSEN)
+    assert done.returncode == 0, done.stderr
+    assert len(tracks.read_text().splitlines()) == FRAMES
+    lines.write_text("lines: [{name: a, start: [0.5, 0], end: [0.5, 1]}]")
+    size = ("--size", f"{WIDTH}x{HEIGHT}", "--rate", "25")
+    counted = vdet(package, "count", tracks, "--lines", lines, *size)
+    assert counted.returncode == 0, counted.stderr
+    compared = vdet(package, "eval", "tracks", tracks, truth, "--json", "-")
+    assert compared.returncode == 0, compared.stderr
+    assert json.loads(compared.stdout)["f1"] == 1
+
+
 def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) -> None:
     car = car_at(0)
     boxes = (Boxed("car", (car.x, car.y, car.width, car.height)),)

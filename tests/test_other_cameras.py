@@ -23,7 +23,7 @@ from vdet.detect.svm.detector import horizon_of
 from vdet.evaluate.comparison import Comparison, compare
 from vdet.evaluate.matching import match
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.rows import Row
+from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.coding import Coding
@@ -79,7 +79,7 @@ def shown(model: DetectorModel, camera: PinholeCamera, clip: Iterable[Frame]) ->
     rate, clip = Fraction(25), map(as_planes, clip)
     video = VideoInfo(Path("clip.mp4"), camera.width, camera.height, rate, 1 / rate)
     images, clip = peek(clip)
-    return LabelledVideo.from_rows(
+    return LabelledVideo.of(
         row(result.frame.index, track.id, track.box)
         for result in build(model, LINEAR, video, images).follow(clip)
         for track in result.tracks
@@ -94,20 +94,21 @@ def as_planes(frame: Frame) -> Frame:
 
 def to_be_shown(scene: Scene) -> LabelledVideo:
     """Give the true boxes of the scored frames; vehicles that do not count are to be ignored."""
-    return LabelledVideo.from_rows(
+    return LabelledVideo.of(
         row(index, each.id, each.box, ignored=not must_be_found(each, scene.camera.height))
         for index in SCORED
         for each in true_boxes(scene, index)
     )
 
 
-def row(index: int, number: int, box: Box, *, ignored: bool = False) -> Row:
-    return Row(0, index + 1, number, box.x, box.y, box.width, box.height, ignored=ignored)
+def row(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
+    corners = box.x, box.y, box.right, box.bottom
+    return Label(0, corners, frame=index + 1, id=number, ignored=ignored)
 
 
 def mirrored(video: LabelledVideo, width: int) -> LabelledVideo:
     boxes = video.boxes.copy()
-    boxes[:, 0] = width - boxes[:, 0] - boxes[:, 2]
+    boxes[:, [2, 0]] = width - boxes[:, [0, 2]]
     return replace(video, boxes=boxes)
 
 

@@ -11,9 +11,7 @@ from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.evaluate.scores import Scores, score
 from vdet.files import check_output, make_folder, staged
-from vdet.labels.predictions import read_predictions
-from vdet.labels.registry import read_tracks
-from vdet.labels.truth import read_truth
+from vdet.labels.reading import read_predictions, read_tracks, read_truth
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.metrics import TrainingMetrics
 from vdet.learn.svm.training import train

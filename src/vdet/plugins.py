@@ -16,6 +16,7 @@ TRACKERS = "vdet.trackers"
 STEPS = "vdet.steps"
 SINKS = "vdet.sinks"
 FORMATS = "vdet.formats"
+PICTURE_FORMATS = "vdet.picture_formats"
 COMMANDS = "vdet.commands"
 
 _NOUNS = {
@@ -23,7 +24,8 @@ _NOUNS = {
     TRACKERS: "tracker",
     STEPS: "step",
     SINKS: "sink",
-    FORMATS: "format",
+    FORMATS: "format of tracks",
+    PICTURE_FORMATS: "form of labelled pictures",
     COMMANDS: "command",
 }
 _BUILT_IN: dict[str, dict[str, str]] = {
@@ -45,7 +47,20 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "regions": "vdet.run.steps:region_step",
         "counts": "vdet.run.steps:count_step",
     },
-    FORMATS: {},
+    FORMATS: {
+        "mot": "vdet.labels.mot:MOT",
+        "csv": "vdet.labels.csv_table:CSV",
+        "jsonl": "vdet.labels.json_lines:JSON_LINES",
+        "coco": "vdet.labels.coco:COCO",
+        "cvat": "vdet.labels.cvat:CVAT",
+        "kitti": "vdet.labels.kitti:KITTI",
+        "yolo": "vdet.labels.yolo:YOLO",
+    },
+    PICTURE_FORMATS: {
+        "kitti": "vdet.labels.kitti:KITTI_PICTURES",
+        "yolo": "vdet.labels.yolo:YOLO_PICTURES",
+        "voc": "vdet.labels.voc:VOC_PICTURES",
+    },
     COMMANDS: {},
 }
 """The names of vdet itself: where each is defined."""

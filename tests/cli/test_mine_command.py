@@ -17,8 +17,9 @@ from vdet.boxes import Box
 from vdet.config.schema import InputSettings
 from vdet.detect.svm.model import load_model
 from vdet.labels.coco import COCO
+from vdet.labels.label import Corners
 from vdet.labels.mot import read_mot
-from vdet.labels.truth import read_truth
+from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
 from vdet.media import VideoReader
 from vdet.synthetic import write_truth
@@ -88,10 +89,15 @@ def test_mines_patches_that_train_learns_from(
     assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
 
 
+def box_of(corners: Corners) -> Box:
+    x, y, right, bottom = map(int, corners)
+    return Box(x, y, right - x, bottom - y)
+
+
 def test_the_same_truth_in_another_format_gives_the_same_patches(
     run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
-    rows = read_mot(truth_path, truth_path.read_bytes()).rows
+    rows = read_mot(truth_path, truth_path.read_bytes()).labels
     frames = [
         FrameTracks(
             row.frame - 1,
@@ -99,7 +105,7 @@ def test_the_same_truth_in_another_format_gives_the_same_patches(
             tuple(
                 car(
                     each.id,
-                    Box(int(each.x), int(each.y), int(each.width), int(each.height)),
+                    box_of(each.box),
                     class_name="ignore" if each.ignored else "car",
                 )
                 for each in rows
@@ -136,8 +142,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
         np.testing.assert_array_equal(patch.image, expected)
         if patch.file.sides is not None:
             here = truth.frame(number)
-            vehicles = here.boxes[~here.ignored]
-            corners = np.concatenate([vehicles[:, :2], vehicles[:, :2] + vehicles[:, 2:]], axis=1)
+            corners = here.boxes[~here.ignored]
             middle = np.array([x, y, x, y]) + side / 2
             told = np.array(patch.file.sides, float) * side + middle
             misses = np.nanmax(abs(corners - told), axis=1)

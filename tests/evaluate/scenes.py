@@ -1,18 +1,17 @@
 """Small scenes of boxes for the tests of the metrics."""
 
-from pathlib import Path
-
-from vdet.labels.rows import Row
-from vdet.labels.video import LabelledVideo, checked_video
+from labels.saving import checked_video, row
+from vdet.labels.label import Label
+from vdet.labels.video import LabelledVideo
 
 TEN = range(1, 11)
 
 
-def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Row]:
+def drive(id_: int, frames: range, x: float = 0, width: float = 100) -> list[Label]:
     """Return a box of 100 pixels height that stands at `x` in these frames."""
-    return [Row(0, frame, id_, x, 0, width, 100) for frame in frames]
+    return [row(0, frame, id_, x, 0, width, 100) for frame in frames]
 
 
-def video(*tracks: list[Row], rate: float | None = None) -> LabelledVideo:
+def video(*tracks: list[Label], rate: float | None = None) -> LabelledVideo:
     """Return the rows of all tracks as a video."""
-    return checked_video(Path("scene"), [row for track in tracks for row in track], rate=rate)
+    return checked_video([row for track in tracks for row in track], rate=rate)

@@ -3,18 +3,19 @@ from dataclasses import asdict, replace
 import pytest
 
 from evaluate.scenes import TEN, drive, video
+from labels.saving import row
 from vdet.evaluate.comparison import compare, pool
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.rows import NO_ID, Row
+from vdet.labels.label import NO_ID, Label
 from vdet.labels.video import LabelledVideo
 
 
-def box(id_: int, x: float, width: float = 100, frame: int = 1) -> Row:
-    return Row(0, frame, id_, x, 0, width, 100)
+def box(id_: int, x: float, width: float = 100, frame: int = 1) -> Label:
+    return row(0, frame, id_, x, 0, width, 100)
 
 
-def region(x: float, width: float, id_: int = NO_ID) -> Row:
-    return Row(0, 1, id_, x, 0, width, 100, ignored=True)
+def region(x: float, width: float, id_: int = NO_ID) -> Label:
+    return row(0, 1, id_, x, 0, width, 100, ignored=True)
 
 
 def kept_tracks(prediction: LabelledVideo, truth: LabelledVideo) -> list[int]:

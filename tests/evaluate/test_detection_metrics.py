@@ -1,14 +1,15 @@
 import pytest
 
 from evaluate.scenes import video
+from labels.saving import row
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.detection_metrics import average_precisions
-from vdet.labels.rows import Row
+from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo
 
 
-def box(id_: int, x: float, score: float = 1, width: float = 100, frame: int = 1) -> Row:
-    return Row(0, frame, id_, x, 0, width, 100, score)
+def box(id_: int, x: float, score: float = 1, width: float = 100, frame: int = 1) -> Label:
+    return row(0, frame, id_, x, 0, width, 100, score)
 
 
 def ap(prediction: LabelledVideo, truth: LabelledVideo) -> list[float]:

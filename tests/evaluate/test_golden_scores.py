@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from labels.saving import checked_video, row
 from vdet.evaluate.comparison import compare, pool
 from vdet.evaluate.scores import score, score_comparison
-from vdet.labels.rows import Row
-from vdet.labels.video import LabelledVideo, checked_video
+from vdet.labels.video import LabelledVideo
 
 CASES = sorted(Path(__file__).parent.glob("golden/*.json"))
 
@@ -22,14 +22,14 @@ def load(path: Path) -> dict[str, Any]:
 
 def truth_of(case: dict[str, Any]) -> LabelledVideo:
     rows = [
-        Row(0, frame, id_, x, y, width, height, ignored=ignored == 1)
+        row(0, frame, id_, x, y, width, height, ignored=ignored == 1)
         for frame, id_, x, y, width, height, ignored in case["truth"]
     ]
-    return checked_video(Path(case["name"]), rows)
+    return checked_video(rows)
 
 
 def prediction_of(case: dict[str, Any]) -> LabelledVideo:
-    return checked_video(Path(case["name"]), [Row(0, *row) for row in case["prediction"]])
+    return checked_video([row(0, *values) for values in case["prediction"]])
 
 
 def test_all_the_cases_are_there() -> None:

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluate.scenes import TEN, drive, video
+from labels.saving import row
 from vdet.evaluate.scores import score
-from vdet.labels.rows import Row
 from vdet.labels.video import LabelledVideo
 
 
@@ -116,7 +116,7 @@ def test_two_empty_videos_have_scores_too() -> None:
 
 
 def test_with_ignore_regions_alone_nothing_counts() -> None:
-    truth = video([Row(0, f, 9, 0, 0, 999, 999, ignored=True) for f in TEN])
+    truth = video([row(0, f, 9, 0, 0, 999, 999, ignored=True) for f in TEN])
     scores = score(video(drive(1, TEN)), truth)
     counted = (scores.vehicles, scores.tracks, scores.false_positives, scores.misses)
     assert counted == (0, 0, 0, 0)

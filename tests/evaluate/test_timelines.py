@@ -1,11 +1,11 @@
 import pytest
 
 from evaluate.scenes import drive, video
+from labels.saving import row
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.matching import match
 from vdet.evaluate.scores import score
 from vdet.evaluate.timelines import FirstDetection, Stretch, Timeline, timelines
-from vdet.labels.rows import Row
 from vdet.labels.video import LabelledVideo
 
 
@@ -56,7 +56,7 @@ def test_a_vehicle_never_found_has_no_delay() -> None:
 
 
 def test_frames_in_which_the_vehicle_is_ignored_are_no_delay() -> None:
-    small = [Row(0, frame, 8, 0, 0, 100, 100, ignored=True) for frame in range(1, 5)]
+    small = [row(0, frame, 8, 0, 0, 100, 100, ignored=True) for frame in range(1, 5)]
     truth = video(small + drive(8, range(5, 10)))
     (first,) = score(video(drive(1, range(6, 10))), truth).first_detections
     assert (first.appears, first.found) == (5, 6)

@@ -11,10 +11,9 @@ from hostile.mutations import mutated, with_other_words
 from hostile.trials import broken_promises, files_in, try_all
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import MAX_IDS, compare
-from vdet.labels import rows
-from vdet.labels.predictions import read_predictions
-from vdet.labels.rows import MAX_IN_FRAME
-from vdet.labels.truth import read_truth
+from vdet.labels import label
+from vdet.labels.label import MAX_IN_FRAME
+from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.xml_reader import MAX_DEPTH
 
 BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
@@ -154,7 +153,7 @@ WICKED = {
     "no number, KITTI": ("t.txt", "9" * 200_000 + "x " * 17, "is not a number"),
     "NUL": ("t.txt", GT + "\0", "is not text"),
     "a long line": ("t.txt", "1," * 3_000_000, "has 3000001|columns between commas"),
-    "a long label": ("t.txt", "1 1 " + "x" * 1_000_000 + " 0" * 14, "is unknown; use one of"),
+    "a long label": ("t.txt", "1 1 " + "x" * 1_000_000 + " 0" * 14, "is unknown; give it a role"),
 }
 
 
@@ -214,7 +213,7 @@ def test_a_file_without_an_end_is_not_read_to_its_end() -> None:
 
 
 def test_too_many_boxes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rows, "MAX_ROWS", 10)
+    monkeypatch.setattr(label, "MAX_LABELS", 10)
     path = tmp_path / "t.txt"
     path.write_text("".join(f"{n},1,1,1,1,1,1,1,1\n" for n in range(1, 11)))
     assert len(read_truth(path)) == 10

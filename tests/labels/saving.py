@@ -1,17 +1,47 @@
-"""Tracks written in a format, and read again."""
+"""Labels by frame and size, and tracks written in a format and read again."""
 
 import io
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from vdet.boxes import Box
-from vdet.labels.protocol import Format, SourceVideo
-from vdet.labels.registry import read_tracks
-from vdet.labels.saved import SavedTracks
+from vdet.labels.formats import Format, SourceVideo
+from vdet.labels.label import Label, checked_labels, from_size
+from vdet.labels.reading import read_tracks
+from vdet.labels.video import LabelledVideo, SavedTracks
 from vdet.track.track import FrameTracks, Track
 
 VIDEO = SourceVideo("road & rail.mp4", 1280, 720)
 PLACE = Box(10, 20, 30, 40)
+
+
+def row(
+    place: int | str,
+    number: int,
+    id_: int,
+    x: float,
+    y: float,
+    width: float,
+    height: float,
+    score: float = 1.0,
+    **known: Any,
+) -> Label:
+    """Return a label by the number of its frame, its id and its size."""
+    box = from_size(x, y, width, height)
+    return Label(place, box, frame=number, id=id_, score=score, **known)
+
+
+def checked_video(
+    rows: Iterable[Label],
+    path: Path = Path("scene"),
+    *,
+    frame_count: int | None = None,
+    rate: float | None = None,
+) -> LabelledVideo:
+    """Return checked labels as a video."""
+    checked = checked_labels(path, rows, frame_count=frame_count)
+    return LabelledVideo.of(checked, frame_count=frame_count, rate=rate)
 
 
 def frame(index: int, *tracks: Track) -> FrameTracks:
@@ -28,7 +58,7 @@ def car(number: int = 1, box: Box = PLACE, **known: object) -> Track:
 def written(form: Format, frames: Iterable[FrameTracks], video: SourceVideo = VIDEO) -> bytes:
     """Return the content of a file with these frames."""
     file = io.BytesIO()
-    writer = form.open(file, video)
+    writer = form.write(file, video)
     for each in frames:
         writer.write(each)
     writer.end()
@@ -37,6 +67,6 @@ def written(form: Format, frames: Iterable[FrameTracks], video: SourceVideo = VI
 
 def read_back(form: Format, folder: Path, data: bytes) -> SavedTracks:
     """Read the content of a file of a format."""
-    path = folder / f"tracks{form.ending}"
+    path = folder / f"tracks{form.suffix}"
     path.write_bytes(data)
     return read_tracks(path)

@@ -39,7 +39,7 @@ def test_boxes_are_x_y_width_height_with_their_area() -> None:
 
 def test_a_video_without_boxes_is_read(tmp_path: Path) -> None:
     saved = read_coco(tmp_path, written(COCO, [frame(0), frame(1)]))
-    assert (saved.rows, saved.listed, saved.size) == ((), (0, 1), (1280, 720))
+    assert (saved.labels, saved.listed, saved.size) == ((), (0, 1), (1280, 720))
 
 
 def changed(name: str, number: int, **values: object) -> bytes:
@@ -78,4 +78,4 @@ def test_what_does_not_fit_is_refused_with_its_place(data: bytes, message: str) 
 
 def test_a_crowd_is_an_ignore_region() -> None:
     saved = read_coco(Path("a.json"), changed("annotations", 0, iscrowd=1))
-    assert [row.ignored for row in saved.rows] == [True, False, False]
+    assert [row.ignored for row in saved.labels] == [True, False, False]

@@ -2,11 +2,11 @@ from pathlib import Path
 
 import pytest
 
-from labels.saving import car, frame, written
+from labels.saving import car, frame, row, written
 from vdet.errors import TruthError
 from vdet.labels.kitti import KITTI, read_kitti
-from vdet.labels.registry import read_tracks
-from vdet.labels.rows import Row
+from vdet.labels.label import Label
+from vdet.labels.reading import read_tracks
 
 FILE = Path("0000.txt")
 REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
@@ -16,12 +16,12 @@ def kitti_line(frame: int, track: int, name: str, box: str = "10.5 20 40.5 60") 
     return f"{frame} {track} {name} 0 2 -1.57 {box} {REST}"
 
 
-def rows(text: str) -> tuple[Row, ...]:
-    return read_kitti(FILE, text.encode()).rows
+def rows(text: str) -> tuple[Label, ...]:
+    return read_kitti(FILE, text.encode()).labels
 
 
 def test_frames_count_from_0_and_boxes_are_corners() -> None:
-    assert rows(kitti_line(0, 3, "Car")) == (Row(1, 1, 3, 10.5, 20, 30, 40, label="Car"),)
+    assert rows(kitti_line(0, 3, "Car")) == (row(1, 1, 3, 10.5, 20, 30, 40, name="Car"),)
 
 
 def test_results_have_a_score() -> None:

@@ -2,21 +2,21 @@ from pathlib import Path
 
 import pytest
 
-from labels.saving import car, frame, written
+from labels.saving import car, frame, row, written
 from vdet.errors import TruthError
+from vdet.labels.label import Label
 from vdet.labels.mot import MOT, flagged, read_mot
-from vdet.labels.registry import read_tracks
-from vdet.labels.rows import Row
+from vdet.labels.reading import read_tracks
 
 FILE = Path("gt.txt")
 
 
-def rows(text: str) -> tuple[Row, ...]:
-    return read_mot(FILE, text.encode()).rows
+def rows(text: str) -> tuple[Label, ...]:
+    return read_mot(FILE, text.encode()).labels
 
 
 def test_pixels_count_from_1_in_the_file_and_from_0_in_memory() -> None:
-    assert rows("1,7,1,1,20,10,1,3,1") == (Row(1, 1, 7, 0, 0, 20, 10),)
+    assert rows("1,7,1,1,20,10,1,3,1") == (row(1, 1, 7, 0, 0, 20, 10),)
 
 
 def test_flag_0_marks_an_ignore_region() -> None:
@@ -27,8 +27,8 @@ def test_flag_0_marks_an_ignore_region() -> None:
 def test_truth_of_the_older_form_has_ten_columns_and_a_flag() -> None:
     found = rows("4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1\n4,8,1,1,9,9,0,-1,-1,-1")
     assert [flagged(FILE, row) for row in found] == [
-        Row(1, 4, 7, 10.5, 20, 20, 10),
-        Row(2, 4, 8, 0, 0, 9, 9, ignored=True),
+        row(1, 4, 7, 10.5, 20, 20, 10),
+        row(2, 4, 8, 0, 0, 9, 9, ignored=True),
     ]
 
 
@@ -40,7 +40,7 @@ def test_tracks_are_no_truth() -> None:
 
 def test_tracks_have_a_confidence() -> None:
     (row,) = rows("3,1,11,21,30,40,0.5,-1,-1,-1")
-    assert (row.score, row.frame, row.x, row.y) == (0.5, 3, 10, 20)
+    assert (row.score, row.frame, row.box) == (0.5, 3, (10, 20, 40, 60))
 
 
 def test_tracks_are_written_without_a_heading() -> None:
@@ -50,7 +50,7 @@ def test_tracks_are_written_without_a_heading() -> None:
 def test_truth_can_be_read_as_tracks_without_its_ignore_regions(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1,7,1,1,20,10,0,3,1\n1,8,1,1,20,10,1,3,1\n")
-    assert [row.id for row in read_tracks(path).rows] == [8]
+    assert [row.id for row in read_tracks(path).labels] == [8]
 
 
 @pytest.mark.parametrize(

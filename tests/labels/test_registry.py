@@ -6,16 +6,16 @@ from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO
 from vdet.labels.cvat import CVAT
+from vdet.labels.formats import Format, format_for, track_formats, track_suffixes
 from vdet.labels.kitti import KITTI
 from vdet.labels.mot import MOT
-from vdet.labels.protocol import Format
-from vdet.labels.registry import ENDINGS, FORMATS, format_for, read_tracks
+from vdet.labels.reading import read_tracks
 from vdet.labels.yolo import YOLO
 
 
 def test_every_format_has_an_ending_of_its_own() -> None:
-    assert len(set(ENDINGS)) == len(FORMATS)
-    assert [format_for(Path(f"a.b{ending.upper()}")) for ending in ENDINGS] == list(FORMATS)
+    suffixes = track_suffixes()
+    assert [format_for(Path(f"a.b{each.upper()}")) for each in suffixes] == track_formats()
 
 
 def test_a_name_that_ends_otherwise_has_no_format() -> None:
@@ -39,7 +39,7 @@ def test_the_content_tells_the_format_where_the_name_leaves_it_open(
 ) -> None:
     path = tmp_path / name
     path.write_bytes(written(form, [frame(2, car(5))]))
-    (row,) = read_tracks(path).rows
+    (row,) = read_tracks(path).labels
     assert (row.frame, row.id) == (3, 5)
 
 

@@ -1,57 +1,58 @@
-"""The words of label files."""
+"""What labels mean."""
 
 import pytest
 
+from vdet.config.loading import load_settings
 from vdet.detect.classes import OUR_NAMES, our_name
-from vdet.labels.roles import Role, class_of, role_of
-
-
-@pytest.mark.parametrize("label", ["Car", "van", "TRUCK", "bus", "vehicle"])
-def test_labels_of_vehicles(label: str) -> None:
-    assert role_of(label) is Role.VEHICLE
-
-
-@pytest.mark.parametrize("label", ["DontCare", "dont_care", "ignore", "Ignore region", "Misc"])
-def test_labels_of_ignore_regions_in_any_spelling(label: str) -> None:
-    assert role_of(label) is Role.IGNORED
-
-
-@pytest.mark.parametrize("label", ["Pedestrian", "Person_sitting", "Cyclist"])
-def test_labels_of_people(label: str) -> None:
-    assert role_of(label) is Role.OTHER
-
-
-def test_an_unknown_label_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"label 'cow' is unknown; use one of: car, van, .*rider"):
-        role_of("cow")
+from vdet.labels.roles import DEFAULT_ROLES, Roles
 
 
 @pytest.mark.parametrize(
-    ("label", "meaning"),
+    ("labels", "role"),
     [
-        ("Car", ("car", False)),
-        ("Van", ("car", False)),
-        ("lorry", ("truck", False)),
-        ("Pick-up", ("truck", False)),
-        ("motorbike", ("motorcycle", False)),
-        ("Tram", ("vehicle", True)),
-        ("trailer", ("vehicle", True)),
-        ("dont_care", ("vehicle", True)),
-        ("person", None),
-        ("traffic sign", None),
-        ("", None),
+        (("Car", "van", "TRUCK", "lorry", "bus", "vehicle", "Pick-up"), "vehicle"),
+        (("DontCare", "dont_care", "Ignore region", "Misc", "trailer", "Motorbike"), "ignored"),
+        (("Pedestrian", "Person_sitting", "Cyclist"), "other"),
+        (("cow", "traffic sign", ""), None),
     ],
 )
-def test_what_a_label_of_a_picture_means(label: str, meaning: tuple[str, bool] | None) -> None:
-    assert class_of(label) == meaning
+def test_labels_mean_the_same_in_any_spelling(labels: tuple[str, ...], role: str | None) -> None:
+    assert {DEFAULT_ROLES.role_of(label) for label in labels} == {role}
+
+
+def test_settings_give_words_another_role_and_add_new_ones() -> None:
+    changes = ("motorbike=vehicle", "tram=other", "cow=ignored")
+    roles = Roles.from_settings(load_settings(None, [f"labels.roles.{each}" for each in changes]))
+    names = ("motorcycle", "Tram", "cow", "misc", "car", "dont care")
+    assert list(map(roles.role_of, names)) == [
+        *("vehicle", "other", "ignored"),
+        *("ignored", "vehicle", "ignored"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("classes", "vehicles"),
+    [
+        (("car", "truck", "bus", "vehicle", "motorcycle"), OUR_NAMES),
+        (("vehicle",), ("car", "truck", "bus", "vehicle")),
+        (("car",), ("car",)),
+        (("truck", "tractor"), ("truck",)),
+    ],
+)
+def test_classes_that_the_detector_does_not_look_for_are_ignored(
+    classes: tuple[str, ...], vehicles: tuple[str, ...]
+) -> None:
+    roles = Roles.of({}, classes)
+    assert {name: roles.role_of(name) for name in OUR_NAMES} == {
+        name: "vehicle" if name in vehicles else "ignored" for name in OUR_NAMES
+    }
+    assert all(roles.role_of(name) == "vehicle" for name in classes)
+
+
+def test_an_unknown_label_is_refused_with_the_known_ones() -> None:
+    with pytest.raises(ValueError, match=r"label 'cow' is unknown; give it a role .* car, van, .*"):
+        DEFAULT_ROLES.known_role_of("cow")
 
 
 def test_our_names_mean_themselves() -> None:
     assert [our_name(name) for name in OUR_NAMES] == list(OUR_NAMES)
-
-
-def test_video_and_pictures_take_the_same_labels_for_vehicles() -> None:
-    """Motorcycles are the exception: a detector of pictures may look for them."""
-    for word in ("car", "van", "truck", "lorry", "bus", "vehicle", "taxi", "suv", "pickup"):
-        assert role_of(word) is Role.VEHICLE
-        assert class_of(word) in [(name, False) for name in OUR_NAMES]

@@ -15,12 +15,11 @@ from vdet.errors import TruthError
 from vdet.labels.coco import COCO
 from vdet.labels.csv_table import CSV
 from vdet.labels.cvat import CVAT
+from vdet.labels.formats import Format, SourceVideo, track_formats
 from vdet.labels.json_lines import JSON_LINES
 from vdet.labels.kitti import KITTI
 from vdet.labels.mot import MOT
-from vdet.labels.protocol import Format, SourceVideo
-from vdet.labels.registry import FORMATS
-from vdet.labels.saved import SavedTracks
+from vdet.labels.video import SavedTracks
 from vdet.labels.yolo import YOLO
 from vdet.track.track import FrameTracks, Track
 
@@ -33,6 +32,7 @@ SIZED = {COCO, CVAT, YOLO}
 MARKING = WHOLE | {COCO, CVAT}
 """Formats that tell which boxes are predicted."""
 
+FORMATS = track_formats()
 every_format = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
 
 

@@ -2,13 +2,13 @@ import math
 
 import pytest
 
+from labels.saving import row
 from vdet.boxes import Box
-from vdet.labels.rows import Row
-from vdet.labels.saved import SavedTracks
+from vdet.labels.video import SavedTracks
 
 
 def test_frames_are_those_with_a_box_and_those_that_are_listed() -> None:
-    saved = SavedTracks((Row(1, 6, 2, 0, 0, 9, 9), Row(2, 6, 1, 0, 0, 9, 9)), listed=(4, 5, 7))
+    saved = SavedTracks((row(1, 6, 2, 0, 0, 9, 9), row(2, 6, 1, 0, 0, 9, 9)), listed=(4, 5, 7))
     frames = saved.frames
     assert [frame.index for frame in frames] == [4, 5, 7]
     assert [[track.id for track in frame.tracks] for frame in frames] == [[], [1, 2], []]
@@ -16,7 +16,7 @@ def test_frames_are_those_with_a_box_and_those_that_are_listed() -> None:
 
 
 def test_boxes_are_rounded_side_by_side_and_scores_are_cut() -> None:
-    saved = SavedTracks((Row(1, 1, 1, 10.4, 20.6, 30.4, 0.2, score=7.0),))
+    saved = SavedTracks((row(1, 1, 1, 10.4, 20.6, 30.4, 0.2, score=7.0),))
     (track,) = saved.frames[0].tracks
     assert track.box == Box(10, 21, 31, 1)
     assert track.score == 1
@@ -24,13 +24,13 @@ def test_boxes_are_rounded_side_by_side_and_scores_are_cut() -> None:
 
 def test_words_for_a_class_become_ours_and_others_stay() -> None:
     labels = ("Van", "lorry", "tractor", None)
-    rows = [Row(1, 1, number, 0, 0, 9, 9, label=each) for number, each in enumerate(labels)]
+    rows = [row(1, 1, number, 0, 0, 9, 9, name=each) for number, each in enumerate(labels)]
     names = [track.class_name for track in SavedTracks(tuple(rows)).frames[0].tracks]
     assert names == ["car", "truck", "tractor", None]
 
 
 def test_a_rate_gives_times_to_frames_without() -> None:
-    saved = SavedTracks((Row(1, 6, 1, 0, 0, 9, 9), Row(1, 7, 1, 0, 0, 9, 9)), times={6: 0.5})
+    saved = SavedTracks((row(1, 6, 1, 0, 0, 9, 9), row(1, 7, 1, 0, 0, 9, 9)), times={6: 0.5})
     assert not saved.has_times
     assert math.isnan(saved.frames[0].time)
     timed = saved.at_rate(10)

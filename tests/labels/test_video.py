@@ -2,20 +2,21 @@ from pathlib import Path
 
 import pytest
 
+from labels.saving import checked_video, row
 from vdet.errors import TruthError
-from vdet.labels.rows import NO_ID, Row
-from vdet.labels.video import LabelledVideo, checked_video
+from vdet.labels.label import NO_ID, Label
+from vdet.labels.video import LabelledVideo
 
 
 def scene(frame_count: int | None = None) -> LabelledVideo:
-    rows = [Row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (2, 3, 5) for id_ in (1, 2)]
-    return checked_video(Path("scene"), rows, frame_count=frame_count, rate=25)
+    rows = [row(0, frame, id_, 10 * id_, 0, 5, 5) for frame in (2, 3, 5) for id_ in (1, 2)]
+    return checked_video(rows, Path("scene"), frame_count=frame_count, rate=25)
 
 
 def test_a_frame_consists_of_its_rows() -> None:
     frame = scene().frame(3)
     assert frame.ids.tolist() == [1, 2]
-    assert frame.boxes.tolist() == [[10, 0, 5, 5], [20, 0, 5, 5]]
+    assert frame.boxes.tolist() == [[10, 0, 15, 5], [20, 0, 25, 5]]
 
 
 def test_a_frame_without_rows_is_empty() -> None:
@@ -25,7 +26,7 @@ def test_a_frame_without_rows_is_empty() -> None:
 def test_the_last_frame_is_that_of_the_video_or_else_of_the_rows() -> None:
     assert scene().last_frame == 5
     assert scene(frame_count=9).last_frame == 9
-    assert checked_video(Path("scene"), []).last_frame == 0
+    assert checked_video([], Path("scene")).last_frame == 0
 
 
 def test_until_keeps_the_frames_up_to_the_last() -> None:
@@ -47,14 +48,14 @@ FILE = Path("gt.txt")
 
 
 def test_rows_are_ordered_by_frame_and_keep_their_order_within_one() -> None:
-    rows = [Row(1, 2, 5, 0, 0, 1, 1), Row(2, 1, 9, 0, 0, 1, 1), Row(3, 1, 4, 0, 0, 1, 1)]
-    video = checked_video(FILE, rows)
+    rows = [row(1, 2, 5, 0, 0, 1, 1), row(2, 1, 9, 0, 0, 1, 1), row(3, 1, 4, 0, 0, 1, 1)]
+    video = checked_video(rows, FILE)
     assert video.frames.tolist() == [1, 1, 2]
     assert video.ids.tolist() == [9, 4, 5]
 
 
 def test_no_rows_make_a_video_without_boxes() -> None:
-    video = checked_video(FILE, [])
+    video = checked_video([], FILE)
     assert len(video) == 0
     assert video.boxes.shape == (0, 4)
 
@@ -62,33 +63,33 @@ def test_no_rows_make_a_video_without_boxes() -> None:
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        (Row(7, 0, 1, 0, 0, 5, 5), "gt.txt:7: the frame comes before the video's first"),
-        (Row(7, 11, 1, 0, 0, 5, 5), "gt.txt:7: the frame is number 11 of a video of 10"),
-        (Row(7, 1, -1, 0, 0, 5, 5), "gt.txt:7: id -1 is negative"),
-        (Row(7, 1, -2, 0, 0, 5, 5, ignored=True), "gt.txt:7: id -2 is negative"),
-        (Row(7, 1, 1, 0, 0, 0, 5), "gt.txt:7: the box has no area: 0 wide, 5 high"),
-        (Row(7, 1, 1, 0, 0, -5, -5), "gt.txt:7: the box has no area: -5 wide, -5 high"),
-        (Row(7, 1, 1, 0, 0, 1e-200, 1e-200), "gt.txt:7: the box has no area"),
+        (row(7, 0, 1, 0, 0, 5, 5), "gt.txt:7: the frame comes before the video's first"),
+        (row(7, 11, 1, 0, 0, 5, 5), "gt.txt:7: the frame is number 11 of a video of 10"),
+        (row(7, 1, -1, 0, 0, 5, 5), "gt.txt:7: id -1 is negative"),
+        (row(7, 1, -2, 0, 0, 5, 5, ignored=True), "gt.txt:7: id -2 is negative"),
+        (row(7, 1, 1, 0, 0, 0, 5), "gt.txt:7: the box has no area: 0 wide, 5 high"),
+        (row(7, 1, 1, 0, 0, -5, -5), "gt.txt:7: the box has no area: -5 wide, -5 high"),
+        (row(7, 1, 1, 0, 0, 1e-200, 1e-200), "gt.txt:7: the box has no area"),
     ],
 )
-def test_an_impossible_row_is_refused_with_its_line(row: Row, message: str) -> None:
+def test_an_impossible_row_is_refused_with_its_line(row: Label, message: str) -> None:
     with pytest.raises(TruthError) as caught:
-        checked_video(FILE, [row], frame_count=10)
+        checked_video([row], FILE, frame_count=10)
     assert str(caught.value).startswith(message)
 
 
 def test_an_id_twice_in_a_frame_is_refused_with_both_lines() -> None:
-    rows = [Row(1, 1, 3, 0, 0, 5, 5), Row(2, 2, 3, 0, 0, 5, 5), Row(3, 1, 3, 9, 9, 5, 5)]
+    rows = [row(1, 1, 3, 0, 0, 5, 5), row(2, 2, 3, 0, 0, 5, 5), row(3, 1, 3, 9, 9, 5, 5)]
     with pytest.raises(
         TruthError, match=r"gt\.txt:3: id 3 is in the same frame already \(line 1\)"
     ):
-        checked_video(FILE, rows)
+        checked_video(rows, FILE)
 
 
 def test_a_frame_may_have_many_ignore_regions_without_an_id() -> None:
-    rows = [Row(line, 1, NO_ID, 0, 0, 5, 5, ignored=True) for line in (1, 2, 3)]
-    assert checked_video(FILE, rows).ignored.tolist() == [True] * 3
+    rows = [row(line, 1, NO_ID, 0, 0, 5, 5, ignored=True) for line in (1, 2, 3)]
+    assert checked_video(rows, FILE).ignored.tolist() == [True] * 3
 
 
 def test_the_last_frame_of_the_video_is_not_beyond_it() -> None:
-    assert checked_video(FILE, [Row(1, 10, 1, 0, 0, 5, 5)], frame_count=10).last_frame == 10
+    assert checked_video([row(1, 10, 1, 0, 0, 5, 5)], FILE, frame_count=10).last_frame == 10

@@ -61,16 +61,16 @@ class TestReading:
     def test_the_frame_is_the_number_at_the_end_of_the_name(self) -> None:
         saved = read_yolo(FILE, archive(labels__road_7="1 0.5 0.5 0.1 0.2 4", labels__road_3=""))
         assert saved.listed == (3, 7)
-        (row,) = saved.rows
-        assert (row.frame, row.id, row.label) == (8, 4, "truck")
-        assert (row.x, row.y, row.width, row.height) == pytest.approx((90, 40, 20, 20))
+        (row,) = saved.labels
+        assert (row.frame, row.id, row.name) == (8, 4, "truck")
+        assert row.box == pytest.approx((90, 40, 110, 60))
 
     def test_files_may_lie_in_a_folder(self) -> None:
         data = archive_of({"a/data.yaml": DATA, "a/labels/x1": "0 0.5 0.5 0.1 0.1 4"})
-        assert len(read_yolo(FILE, data).rows) == 1
+        assert len(read_yolo(FILE, data).labels) == 1
 
     def test_a_score_before_the_id_is_read(self) -> None:
-        (row,) = read_yolo(FILE, archive(labels__f0="1 0.5 0.5 0.1 0.2 0.75 4")).rows
+        (row,) = read_yolo(FILE, archive(labels__f0="1 0.5 0.5 0.1 0.2 0.75 4")).labels
         assert (row.score, row.id) == (0.75, 4)
 
 
@@ -97,7 +97,10 @@ class TestReading:
         ),
         (archive(labels__road=""), ": labels/road.txt has no number of a frame at its end"),
         (archive(labels__a1="", labels__b01=""), ": labels/a1.txt and labels/b01.txt are of one"),
-        (archive(labels__f0="\n0 0.5 0.5 0.1 0.1"), ":labels/f0.txt:2: a label of a track has 6"),
+        (
+            archive(labels__f0="\n0 0.5 0.5 0.1 0.1"),
+            ":labels/f0.txt:2: YOLO with tracks has 6 or 7",
+        ),
         (archive(labels__f0="5 0.5 0.5 0.1 0.1 1"), ":labels/f0.txt:1: class 5 has no name"),
         (archive(labels__f0="0 1.5 0.5 0.1 0.1 1"), ":labels/f0.txt:1: a number is not between 0"),
         (archive(labels__f0="0 0.5 0.5 0.1 0.1 0.9"), ":labels/f0.txt:1: '0.9' is not a whole"),

@@ -161,7 +161,7 @@ def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions)
 def _path(place: Path, output: OutputSuffix) -> Path:
     if output.suffix is not None:
         return place.with_suffix(output.suffix)
-    writable = sink_kind(output.sink).suffixes
+    writable = sink_kind(output.sink).endings
     if not writable or place.suffix.lower() in writable:
         return place
     return place.with_suffix(writable[0])

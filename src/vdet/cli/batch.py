@@ -95,7 +95,7 @@ def _suffix(sink: str, path: Path) -> str:
     if kind.takes == "pictures" or kind.one_frame:
         raise click.UsageError(f"{sink}: cannot be written with -d; leave one of them out")
     if not _SUFFIX.fullmatch(suffix) or not kind.takes_name(f"video{suffix}"):
-        known = ", ".join(kind.suffixes) or f"as in .{sink if kind.marker else 'txt'}"
+        known = ", ".join(kind.endings) or f"as in .{sink if kind.marker else 'txt'}"
         raise click.UsageError(f"{sink}: with -d give only the ending of the names: {known}")
     return suffix
 

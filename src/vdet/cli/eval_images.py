@@ -42,24 +42,26 @@ def images(
     Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC form, or a COCO file. Each picture is
     searched on its own, and compared with its labels.
     """
-    detector = choice.read_for_whole_frames().detector
+    settings = choice.read_for_whole_frames()
+    detector = settings.detector
     from vdet.detect.factory import model_file
     from vdet.evaluate.images.evaluate import evaluate_images
     from vdet.evaluate.images.page import images_page
     from vdet.evaluate.images.scores import Counting
     from vdet.evaluate.images.text import lines, plain
     from vdet.evaluate.output import run_name
-    from vdet.labels.pictures.reading import read_labelled_images
+    from vdet.labels.reading import read_labelled_pictures
+    from vdet.labels.roles import Roles
     from vdet.workers import core_count
 
     model = choice.load_detector(detector.showing_all())
     file = model_file(detector, choice.model_path)
     results.check([*data, *([file] if file else [])])
-    sets = [read_labelled_images(path) for path in data]
+    roles = Roles.from_settings(settings)
+    sets = [read_labelled_pictures(path, roles) for path in data]
     counting = Counting(
         score=detector.shown_score if score is None else score,
         least_width=least_width,
-        classes=detector.vehicle_classes,
     )
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")

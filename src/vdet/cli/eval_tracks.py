@@ -6,7 +6,7 @@ import click
 
 from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
-from vdet.cli.options import PATH, RATE, option, until_option
+from vdet.cli.options import PATH, RATE, SettingsChoice, option, settings_options, until_option
 from vdet.cli.results import Results, results_options
 from vdet.version import __version__
 
@@ -23,12 +23,14 @@ from vdet.version import __version__
     RATE,
     show_default="from the times in PRED",
 )
+@settings_options("labels.roles.motorcycle=vehicle")
 @results_options
 def tracks(
     prediction: Path,
     truth: Path,
     until: int | None,
     rate: float | None,
+    choice: SettingsChoice,
     results: Results,
 ) -> None:
     """Compare a file of tracks with the truth.
@@ -39,11 +41,13 @@ def tracks(
     from vdet.evaluate.clips.evaluate import score_files
     from vdet.evaluate.clips.page import video_page
     from vdet.evaluate.clips.text import plain_clip, result_lines
+    from vdet.labels.roles import Roles
 
+    roles = Roles.from_settings(choice.read())
     results.check([prediction, truth])
     with progress_steps("") as steps:
         steps("comparing", None)
-        run = score_files(prediction, truth, until=until, rate=rate)
+        run = score_files(prediction, truth, roles, until=until, rate=rate)
     results.print(
         result_lines([run]),
         plain_clip(run.clips[0]),

@@ -51,6 +51,7 @@ def video(
     from vdet.evaluate.clips.sweep import grid, with_values_in_force
     from vdet.evaluate.clips.text import plain, result_lines
     from vdet.evaluate.output import run_lines, run_name
+    from vdet.labels.roles import Roles
     from vdet.run.sinks.protocol import check_sinks
 
     swept = grid(with_values_in_force(sweeps, base))
@@ -67,7 +68,8 @@ def video(
     inputs = [*videos, *truths, *files]
     results.check(inputs)
     check_sinks(outputs, overwrite=results.overwrite, inputs=inputs)
-    clips = [open_clip(*pair, until) for pair in zip(videos, truths, strict=True)]
+    roles = Roles.from_settings(base)
+    clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(
             clips, variants, partial(steps, ""), outputs=outputs, overwrite=results.overwrite

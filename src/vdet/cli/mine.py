@@ -53,13 +53,13 @@ def mine(
     options.check_suffix(output, ".zip", what="patches")
     settings = choice.read_for_whole_frames(detector="svm")
     from vdet.detect.factory import model_file
-    from vdet.labels.pictures.reading import holds_labelled_images
+    from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
 
     file = model_file(settings.detector, choice.model_path)
     inputs = [*sources, *truths, *([file] if file else [])]
     check_output(output, overwrite=overwrite, inputs=inputs)
-    videos = [path for path in sources if not holds_labelled_images(path)]
+    videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     labels = dict(zip(videos, truths, strict=True))

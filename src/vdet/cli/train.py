@@ -45,14 +45,14 @@ def train(
     for path in (output, metrics_path):
         check_output(path, overwrite=overwrite, inputs=data)
     from vdet.detect.svm.model import save_model
-    from vdet.labels.pictures.reading import holds_labelled_images
+    from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm.dataset import find_boxed, find_patches
     from vdet.learn.svm.mining import MiningJob, PictureSource, mine
     from vdet.learn.svm.training import train as fit_model
 
     if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
-    pictures = [path for path in data if holds_labelled_images(path)]
+    pictures = [path for path in data if holds_labelled_pictures(path)]
     patches = [path for path in data if path not in pictures]
     with (
         tempfile.TemporaryDirectory(prefix="vdet-") as folder,

@@ -51,19 +51,21 @@ def train_net(
     if not data and not clips:
         raise click.UsageError("nothing to learn from; give DATA or --video")
     options.check_suffix(output, ".onnx", what="networks")
-    settings = choice.read().train.net
+    base_settings = choice.read()
+    settings = base_settings.train.net
     try:
         import onnx  # noqa: F401
         import torch  # noqa: F401
     except ImportError as error:
         raise DataError("torch or onnx is not installed; pip install torch onnx") from error
+    from vdet.labels.roles import Roles
     from vdet.learn.net.run import NetworkJob, train_to_file
     from vdet.learn.net.sources import LabelledClip
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
     labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
-    job = NetworkJob(data, labelled, output, base, overwrite)
+    job = NetworkJob(data, labelled, output, base, overwrite, Roles.from_settings(base_settings))
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)

@@ -33,6 +33,10 @@ def _section(section: Section, indent: str, *, comments: bool = True) -> Iterato
             yield from _comment(_first_line(type(value)), indent)
             yield f"{indent}{name}:"
             yield from _section(value, indent + "  ")
+        elif isinstance(value, dict) and value:
+            yield from _comment(field.description or "", indent)
+            yield f"{indent}{name}:"
+            yield from (f"{indent}  {_scalar(key)}: {_scalar(each)}" for key, each in value.items())
         elif item := _item_section(field):
             yield from _comment(field.description or "", indent)
             yield from _item_keys(item, indent)

@@ -6,6 +6,7 @@ The defaults are those of `configs/default.yaml`, which is their printed form.
 from pydantic import Field, SerializeAsAny
 
 from vdet.config.detector import DetectorSettings, NetworkSettings
+from vdet.config.labels import LabelSettings
 from vdet.config.lanes import LaneSettings
 from vdet.config.mining import MiningSettings
 from vdet.config.network import NetworkTrainingSettings
@@ -55,6 +56,7 @@ __all__ = [
     "HistogramSettings",
     "HogSettings",
     "InputSettings",
+    "LabelSettings",
     "LaneSettings",
     "LineSettings",
     "MiningSettings",
@@ -96,6 +98,7 @@ class Settings(Section):
     counts: CountSettings = CountSettings()
     lanes: LaneSettings = LaneSettings()
     train: TrainSettings = TrainSettings()
+    labels: LabelSettings = LabelSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
     crops: CropSettings = CropSettings()

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
+from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix, to_sides
 from vdet.errors import TruthError
-from vdet.labels.rows import MAX_IN_FRAME
+from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.video import LabelledVideo
 
 MATCH_IOU = 0.5
@@ -43,7 +43,7 @@ class ComparedFrame:
         int64 `(n,)` and `(m,)`: the true vehicle and the predicted track of each box, as indices
         into `vehicle_ids` and `track_ids` of the `Comparison`.
     vehicle_boxes, track_boxes
-        float64 `(n, 4)` and `(m, 4)`: x, y, width, height in full-frame pixels.
+        float64 `(n, 4)` and `(m, 4)`: x1, y1, x2, y2 in full-frame pixels.
     scores
         float64 `(m,)`: confidence of the predictions.
     iou
@@ -119,7 +119,7 @@ def compare(
             vehicles.boxes,
             tracks.boxes,
             tracks.scores,
-            iou_matrix(vehicles.boxes, tracks.boxes),
+            iou_matrix(to_sides(vehicles.boxes), to_sides(tracks.boxes)),
         )
         for number, (vehicles, tracks) in zip(numbers, kept, strict=True)
         if len(vehicles) or len(tracks)
@@ -212,9 +212,9 @@ def _apply_regions(
 ) -> tuple[LabelledVideo, LabelledVideo]:
     """Return the vehicles and the predictions of a frame that count."""
     vehicles, regions = truth.where(~truth.ignored), truth.where(truth.ignored)
-    iou = iou_matrix(vehicles.boxes, tracks.boxes)
+    iou = iou_matrix(to_sides(vehicles.boxes), to_sides(tracks.boxes))
     _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
-    covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_SHARE)
+    covered = at_least(coverage(to_sides(tracks.boxes), to_sides(regions.boxes)), _IGNORED_SHARE)
     dropped = np.asarray(covered.any(axis=1) | tracks.ignored)
     dropped[paired] = False
     return vehicles, tracks.where(~dropped)

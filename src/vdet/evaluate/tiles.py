@@ -24,7 +24,7 @@ class Tile:
 
 
 Outlines = tuple[Float64Array, Color, int]
-"""Boxes to draw, float64 `(n, 4)`: x, y, width, height; the colour and width of the outlines."""
+"""Boxes to draw, float64 `(n, 4)`: x1, y1, x2, y2; the colour and width of the outlines."""
 
 
 def draw_tile(
@@ -45,8 +45,7 @@ def draw_tile(
     kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
     tile = np.asarray(cv2.resize(part, target, interpolation=kind), np.uint8)
     for boxes, color, line in outlines:
-        corners = np.hstack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]])
-        corners = ((corners - (left, top, left, top)) * scale).round().astype(int)
+        corners = ((boxes - (left, top, left, top)) * scale).round().astype(int)
         for x1, y1, x2, y2 in corners.tolist():
             cv2.rectangle(tile, (x1, y1), (x2, y2), color, line)
     return tile

@@ -1,24 +1,28 @@
-"""COCO with tracks: one JSON document; all ids count from 1, frames and pixels from 0.
+"""COCO: one JSON document, of the tracks of a video or of a set of pictures.
 
-Beside the `images`, `annotations` and `categories` of COCO there are `videos` and `tracks`. An
-image names its `video_id` and `frame_index`, an annotation its `track_id`.
-Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; Dave et al., "TAO: A
-Large-Scale Benchmark for Tracking Any Object", 2020.
+For tracks there are `videos` and `tracks` beside the `images`, `annotations` and `categories` of
+COCO. An image names its `video_id` and `frame_index`, an annotation its `track_id`. All ids count
+from 1, frames and pixels from 0.
+Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; cocodataset.org, "Data
+format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020.
 """
 
 import json
-from collections.abc import Iterator
-from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from collections import defaultdict
+from collections.abc import Container, Iterator, Sequence
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, BinaryIO, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
+from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
-from vdet.labels.parsing import LIMIT, JsonNumber, first_mistake, text_of
-from vdet.labels.protocol import UNKNOWN, Format, SourceVideo, TrackLabels
-from vdet.labels.rows import Row, limited, line_error
-from vdet.labels.saved import SavedTracks
-from vdet.lanes.road import Road
+from vdet.files import printable
+from vdet.labels.formats import UNKNOWN, Format, SourceVideo
+from vdet.labels.label import Label, from_size, limited, line_error, whole_pixels
+from vdet.labels.parsing import LIMIT, JsonNumber, first_mistake, read_text, text_of
+from vdet.labels.pictures import LabelledPicture
+from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
 
 _VIDEO = 1
@@ -28,46 +32,44 @@ _VIDEO = 1
 class CocoWriter:
     """Keeps images and annotations, each as its text, and writes all at the end.
 
-    An annotation has a `score`, and an image its `time` in seconds, which other programs pass over.
+    An annotation has a `score`, and an image its `time` in seconds, which other programs ignore.
     `attributes.occluded` says that the box is predicted.
     """
 
     def __init__(self, file: BinaryIO, video: SourceVideo | None) -> None:
         assert video is not None  # `needs_video` says so
         self._file = file
-        self._video = video
+        self._name = video.name
+        self._size = {"width": video.width, "height": video.height}
         self._images: list[str] = []
         self._annotations: list[str] = []
         self._categories: dict[str, int] = {}  # name: id, in the order of their ids
-        self._labels = TrackLabels()
-        self._tracks: set[int] = set()
+        self._classes: dict[int, ClassScores] = defaultdict(ClassScores)
 
-    def write(self, frame: FrameTracks, road: Road | None = None) -> None:  # noqa: ARG002
+    def write(self, frame: FrameTracks) -> None:
         """Keep a frame and its boxes."""
         image = {
             "id": len(self._images) + 1,
             "video_id": _VIDEO,
             "frame_index": frame.index,
             "file_name": f"frame_{frame.index:06}.png",
-            "width": self._video.width,
-            "height": self._video.height,
+            **self._size,
             "time": round(frame.time, 6),
         }
         self._images.append(json.dumps(image))
         for track in frame.tracks:
-            self._tracks.add(track.id)
-            self._labels.add(track)
+            self._classes[track.id].add(track.class_name or UNKNOWN, track.score)
             self._annotations.append(json.dumps(self._annotation(track)))
 
     def _annotation(self, track: Track) -> dict[str, Any]:
-        box = track.box
+        x, y, width, height = whole_pixels(track.box)
         return {
             "id": len(self._annotations) + 1,
             "image_id": len(self._images),
             "category_id": self._category(track.class_name or UNKNOWN),
             "track_id": track.id,
-            "bbox": [box.x, box.y, box.width, box.height],
-            "area": box.area,
+            "bbox": [x, y, width, height],
+            "area": width * height,
             "iscrowd": 0,
             "score": round(track.score, 4),
             "attributes": {"occluded": track.predicted},
@@ -78,59 +80,57 @@ class CocoWriter:
 
     def end(self) -> None:
         """Write the whole file."""
-        video = {
-            "id": _VIDEO,
-            "name": self._video.name,
-            "width": self._video.width,
-            "height": self._video.height,
-        }
         tracks = [
-            {
-                "id": number,
-                "video_id": _VIDEO,
-                "category_id": self._category(self._labels.label(number)),
-            }
-            for number in sorted(self._tracks)
+            {"id": id_, "video_id": _VIDEO, "category_id": self._category(classes.best or UNKNOWN)}
+            for id_, classes in sorted(self._classes.items())
         ]
         categories = [{"id": number, "name": name} for name, number in self._categories.items()]
         lists = {
-            "videos": [json.dumps(video)],
+            "videos": [json.dumps({"id": _VIDEO, "name": self._name, **self._size})],
             "images": self._images,
-            "tracks": list(map(json.dumps, tracks)),
+            "tracks": map(json.dumps, tracks),
             "annotations": self._annotations,
-            "categories": list(map(json.dumps, categories)),
+            "categories": map(json.dumps, categories),
         }
         parts = (f'"{name}": [\n' + ",\n".join(items) + "\n]" for name, items in lists.items())
         self._file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
 
 _Id = Annotated[int, Field(ge=-LIMIT, le=LIMIT, strict=True)]
+_AnyId = Annotated[int, Field(strict=True)]
 _Index = Annotated[int, Field(ge=0, le=LIMIT, strict=True)]
 _Side = Annotated[int, Field(ge=1, le=LIMIT, strict=True)]
 
 
-class CocoCategory(BaseModel, frozen=True):
-    """A class, as it is called in the file."""
-
-    id: _Id
+class _Category(BaseModel, frozen=True):
+    id: _AnyId
     name: str = Field(max_length=1000)
 
 
-class CocoAnnotation(BaseModel, frozen=True):
-    """A box, as x, y, width, height in pixels from 0; `iscrowd: 1` marks an ignore region."""
-
-    image_id: _Id
-    category_id: _Id
+class _Annotation(BaseModel, frozen=True):
+    image_id: _AnyId
+    category_id: _AnyId
     bbox: tuple[JsonNumber, JsonNumber, JsonNumber, JsonNumber]
     iscrowd: int = Field(0, ge=0, le=1)
 
 
 class _Image(BaseModel, frozen=True):
-    id: _Id
-    frame_index: _Index
-    video_id: _Id = _VIDEO
+    id: _AnyId
     width: _Side | None = None
     height: _Side | None = None
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        return (self.width, self.height) if self.width and self.height else None
+
+
+class _Picture(_Image, frozen=True):
+    file_name: str = Field(min_length=1, max_length=1000)
+
+
+class _Frame(_Image, frozen=True):
+    frame_index: _Index
+    video_id: _Id = _VIDEO
     time: JsonNumber | None = None
 
 
@@ -138,20 +138,59 @@ class _Attributes(BaseModel, frozen=True):
     occluded: bool = False
 
 
-class _Annotation(CocoAnnotation, frozen=True):
+class _TrackAnnotation(_Annotation, frozen=True):
     track_id: _Id
     score: JsonNumber = 1.0
     attributes: _Attributes = _Attributes()
 
 
-class _Document(BaseModel, frozen=True):
-    images: tuple[_Image, ...]
+class _Set(BaseModel, frozen=True):
+    images: tuple[_Picture, ...]
     annotations: tuple[_Annotation, ...]
-    categories: tuple[CocoCategory, ...]
+    categories: tuple[_Category, ...]
+
+
+class _Video(BaseModel, frozen=True):
+    images: tuple[_Frame, ...]
+    annotations: tuple[_TrackAnnotation, ...]
+    categories: tuple[_Category, ...]
+
+
+A = TypeVar("A", bound=_Annotation)
+D = TypeVar("D", _Set, _Video)
+E = TypeVar("E", _Category, _Picture, _Frame)
+
+
+def _document(path: Path, text: str, form: type[D], name: str) -> D:
+    try:
+        return form.model_validate_json(text)
+    except ValidationError as error:
+        raise TruthError(f"{path}: is not {name}: {first_mistake(error)}") from error
+
+
+def _by_id(path: Path, what: str, entries: Sequence[E]) -> dict[int, E]:
+    found = {each.id: each for each in entries}
+    if len(found) < len(entries):
+        raise TruthError(f"{path}: an id of {what} comes twice")
+    return found
+
+
+def _named(
+    path: Path, images: Container[int], annotations: Sequence[A], categories: Sequence[_Category]
+) -> Iterator[tuple[str, A, str]]:
+    """Yield the place of each annotation, the annotation, and the name of its category."""
+    names = _by_id(path, "categories", categories)
+    for number, each in enumerate(annotations):
+        place = f"annotations.{number}"
+        if each.image_id not in images:
+            raise line_error(path, place, f"no image has the id {each.image_id}")
+        if each.category_id not in names:
+            raise line_error(path, place, f"no category has the id {each.category_id}")
+        yield place, each, names[each.category_id].name
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
-    """Read the boxes of one video.
+    """Read the boxes of one video; `iscrowd: 1` marks an ignore region.
 
     Raises
     ------
@@ -159,63 +198,93 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         The file is not of this form, has several videos, an id of images or categories or a frame
         comes twice, or an annotation names an image or a category that is not there.
     """
-    try:
-        document = _Document.model_validate_json(text_of(path, data))
-    except ValidationError as error:
-        raise TruthError(f"{path}: is not COCO with tracks: {first_mistake(error)}") from error
-    images = _images_by_id(path, document)
-    names = category_names(path, document.categories)
-    frames = sorted(images.values(), key=lambda image: image.frame_index)
-    first = next(iter(frames), None)
+    video = _document(path, text_of(path, data), _Video, "COCO with tracks")
+    images = _by_id(path, "images", video.images)
+    if len({image.video_id for image in video.images}) > 1:
+        raise TruthError(f"{path}: has images of several videos; give a file for each")
+    frames = {image.frame_index: image for image in video.images}
+    if len(frames) < len(images):
+        raise TruthError(f"{path}: a frame_index of images comes twice")
+    labels = (
+        Label(
+            place,
+            from_size(*each.bbox),
+            name,
+            images[each.image_id].frame_index + 1,
+            each.track_id,
+            each.score,
+            bool(each.iscrowd),
+            each.attributes.occluded,
+        )
+        for place, each, name in _named(path, images, video.annotations, video.categories)
+    )
     return SavedTracks(
-        tuple(limited(path, _rows(path, document.annotations, images, names))),
-        listed=tuple(image.frame_index for image in frames),
-        times={image.frame_index: image.time for image in frames if image.time is not None},
-        size=(first.width, first.height) if first and first.width and first.height else None,
+        tuple(limited(path, labels)),
+        listed=tuple(sorted(frames)),
+        times={index: image.time for index, image in frames.items() if image.time is not None},
+        size=frames[min(frames)].size if frames else None,
     )
 
 
-def category_names(path: Path, categories: tuple[CocoCategory, ...]) -> dict[int, str]:
-    """Return the name of each category by its id. Raises `TruthError` if an id comes twice."""
-    names = {category.id: category.name for category in categories}
-    if len(names) < len(categories):
-        raise TruthError(f"{path}: an id of categories comes twice")
-    return names
+COCO = Format("COCO", ".coco.json", read_coco, CocoWriter, needs_video=True)
 
 
-def _images_by_id(path: Path, document: _Document) -> dict[int, _Image]:
-    images = {image.id: image for image in document.images}
-    if len(images) < len(document.images):
-        raise TruthError(f"{path}: an id of images comes twice")
-    if len({image.video_id for image in document.images}) > 1:
-        raise TruthError(f"{path}: has images of several videos; give a file for each")
-    if len({image.frame_index for image in document.images}) < len(images):
-        raise TruthError(f"{path}: a frame_index of images comes twice")
-    return images
+_ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
+_MAX_NAME = 255  # bytes, as in most file systems
 
 
-def _rows(
-    path: Path,
-    annotations: tuple[_Annotation, ...],
-    images: dict[int, _Image],
-    names: dict[int, str],
-) -> Iterator[Row]:
-    for number, each in enumerate(annotations):
-        place = f"annotations.{number}"
-        if each.image_id not in images:
-            raise line_error(path, place, f"no image has the id {each.image_id}")
-        if each.category_id not in names:
-            raise line_error(path, place, f"no category has the id {each.category_id}")
-        yield Row(
-            place,
-            images[each.image_id].frame_index + 1,
-            each.track_id,
-            *each.bbox,
-            score=each.score,
-            ignored=bool(each.iscrowd),
-            label=names[each.category_id],
-            predicted=each.attributes.occluded,
-        )
+def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
+    """Yield every picture of a COCO file; `iscrowd: 1` marks an ignore region.
+
+    Pictures lie beside the file or in a folder beside it; if the file is in `annotations`, also
+    beside that folder. Only boxes and categories are used.
+
+    Raises
+    ------
+    TruthError
+        The file is not of this form, an annotation names a picture or a category that is not
+        there, an id comes twice, or a picture lies outside.
+    """
+    found = _document(path, read_text(path), _Set, "COCO")
+    labels: dict[int, list[Label]] = {id_: [] for id_ in _by_id(path, "images", found.images)}
+    for place, each, name in _named(path, labels, found.annotations, found.categories):
+        label = Label(place, from_size(*each.bbox), name, ignored=bool(each.iscrowd))
+        labels[each.image_id].append(label)
+    folder = _picture_folder(path, found.images)
+    for number, image in enumerate(found.images):
+        picture = folder / _inside(path, number, image.file_name)
+        yield LabelledPicture(picture, path, tuple(labels[image.id]), image.size)
 
 
-COCO = Format("COCO", ".coco.json", CocoWriter, read_coco, needs_video=True)
+def _inside(path: Path, number: int, name: str) -> PurePosixPath:
+    """Refuse the name of a picture that leads out of the set, or cannot be one."""
+    inside = PurePosixPath(name)
+    place = f"images.{number}"
+    if inside.is_absolute() or ".." in inside.parts:
+        raise line_error(path, place, f"the file_name {printable(name)} leads out of the set")
+    if not name.isprintable() or any(len(part.encode()) > _MAX_NAME for part in inside.parts):
+        raise line_error(path, place, f"{printable(name)} is no name of a file")
+    return inside
+
+
+def _picture_folder(path: Path, images: Sequence[_Picture]) -> Path:
+    """Return the folder that the names of pictures are relative to: that with the first one."""
+    near = path.parent
+    if not images:
+        return near
+    name = _inside(path, 0, images[0].file_name)
+    if (near / name).is_file():
+        return near
+    others = _folders_in(near)
+    if near.name == _ANNOTATIONS:
+        others += [near.parent, *_folders_in(near.parent)]
+    found = [folder for folder in others if (folder / name).is_file()]
+    if len(found) != 1:
+        which = " and ".join(str(folder) for folder in found[:2])
+        what = f"lies in {which}" if found else "is missing: it should lie beside it or below"
+        raise TruthError(f"{path}: its first picture, {printable(str(name))}, {what}")
+    return found[0]
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    return sorted(each for each in folder.iterdir() if each.is_dir())

@@ -2,16 +2,15 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import TypeVar
 
+from vdet.labels.formats import Format, LineWriter
+from vdet.labels.label import Label, from_size, limited, line_error, whole_pixels
 from vdet.labels.parsing import parse_number, parse_whole, text_of
-from vdet.labels.protocol import Format, SourceVideo
-from vdet.labels.rows import Row, limited, line_error
-from vdet.labels.saved import SavedTracks
-from vdet.lanes.road import Road
-from vdet.track.track import FrameTracks, Track
+from vdet.labels.video import SavedTracks
+from vdet.track.track import FrameTracks
 
 _PLACE = ("x", "y", "width", "height")
 _NEEDED = ("frame", "time", "id", *_PLACE)
@@ -21,49 +20,32 @@ _YES, _NO = {"1", "true"}, {"0", "false", ""}
 T = TypeVar("T")
 
 
-class _Encoder:
-    """What `csv.writer` needs of a file: it takes text, and writes UTF-8."""
-
-    def __init__(self, file: BinaryIO) -> None:
-        self._file = file
-
-    def write(self, text: str) -> int:
-        return self._file.write(text.encode())
+def _line(cells: Iterable[object]) -> str:
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerow(cells)
+    return file.getvalue()
 
 
-class CsvWriter:
-    """Writes the heading, and then a row for each box."""
-
-    def __init__(self, file: BinaryIO, _: SourceVideo | None = None) -> None:
-        self._rows = csv.writer(_Encoder(file), lineterminator="\n")
-        self._rows.writerow([*_NEEDED, *_OPTIONAL])
-
-    def write(self, frame: FrameTracks, road: Road | None = None) -> None:  # noqa: ARG002
-        """Add the boxes of a frame."""
-        for track in frame.tracks:
-            self._rows.writerow([frame.index, f"{frame.time:.6f}", track.id, *_cells(track)])
-
-    def end(self) -> None:
-        """Do nothing: all rows are written."""
-
-
-def _cells(track: Track) -> list[object]:
-    """Return what is written of a track, without its id; what is not known is an empty cell."""
-    return [
-        *(getattr(track.box, name) for name in _PLACE),
-        f"{track.score:.4f}",
-        int(track.predicted),
-        track.class_name,
-        *(round(value, 2) for value in track.foot),
-        None if track.distance is None else round(track.distance, 2),
-        track.lane,
-    ]
+def _lines(frame: FrameTracks) -> Iterator[str]:
+    """Yield a row for each box; what is not known is an empty cell."""
+    for track in frame.tracks:
+        yield _line(
+            [
+                *(frame.index, f"{frame.time:.6f}", track.id, *whole_pixels(track.box)),
+                f"{track.score:.4f}",
+                int(track.predicted),
+                track.class_name,
+                *(round(value, 2) for value in track.foot),
+                None if track.distance is None else round(track.distance, 2),
+                track.lane,
+            ]
+        )
 
 
 def read_csv(path: Path, data: bytes) -> SavedTracks:
     """Read a table that has at least the columns frame, time, id, x, y, width and height.
 
-    Other columns that `CsvWriter` does not write are passed over.
+    Columns that vdet does not write are ignored.
 
     Raises
     ------
@@ -72,20 +54,20 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         what its column needs.
     """
     times: dict[int, float] = {}
-    rows = tuple(limited(path, _rows(path, text_of(path, data), times)))
-    return SavedTracks(rows, times=times)
+    labels = tuple(limited(path, _labels(path, text_of(path, data), times)))
+    return SavedTracks(labels, times=times)
 
 
-def _rows(path: Path, text: str, times: dict[int, float]) -> Iterator[Row]:
-    """Yield every row of a table, and put the time of its frame into `times`."""
+def _labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Label]:
+    """Yield the label of every row, and put the time of its frame into `times`."""
     table = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         header = next(table, [])
         _check_header(header)
         for cells in table:
             if cells:
-                row, times[row.frame - 1] = _row(table.line_num, header, cells)
-                yield row
+                label, times[label.frame - 1] = _label(table.line_num, header, cells)
+                yield label
     except (ValueError, csv.Error) as error:
         raise line_error(path, max(1, table.line_num), str(error)) from error
 
@@ -99,8 +81,8 @@ def _check_header(header: list[str]) -> None:
             raise ValueError(f"the header names the column {name} twice")
 
 
-def _row(line: int, header: Sequence[str], cells: Sequence[str]) -> tuple[Row, float]:
-    """Return a row, and the time of its frame in seconds."""
+def _label(line: int, header: Sequence[str], cells: Sequence[str]) -> tuple[Label, float]:
+    """Return a label, and the time of its frame in seconds."""
     if len(cells) != len(header):
         raise ValueError(f"the header has {len(header)} columns; this line has {len(cells)}")
     cell = dict(zip(header, cells, strict=True))
@@ -109,18 +91,19 @@ def _row(line: int, header: Sequence[str], cells: Sequence[str]) -> tuple[Row, f
     if not 0 <= score <= 1:
         raise ValueError(f"the score {score:g} is not between 0 and 1")
     foot = _known(cell, "foot_x", parse_number), _known(cell, "foot_y", parse_number)
-    row = Row(
+    label = Label(
         line,
+        from_size(x, y, width, height),
+        cell.get("class") or None,
         parse_whole(cell["frame"]) + 1,
         parse_whole(cell["id"]),
-        *(x, y, width, height, score),
-        label=cell.get("class") or None,
+        score,
         predicted=_parse_flag(cell.get("predicted", "0")),
         foot=None if foot[0] is None or foot[1] is None else (foot[0], foot[1]),
         distance=_known(cell, "distance", parse_number),
         lane=_known(cell, "lane", parse_whole),
     )
-    return row, parse_number(cell["time"])
+    return label, parse_number(cell["time"])
 
 
 def _known(cell: Mapping[str, str], name: str, parse: Callable[[str], T]) -> T | None:
@@ -135,4 +118,5 @@ def _parse_flag(text: str) -> bool:
     return word in _YES
 
 
-CSV = Format("CSV", ".csv", CsvWriter, read_csv)
+_HEADING = _line([*_NEEDED, *_OPTIONAL])
+CSV = Format("CSV", ".csv", read_csv, lambda file, _: LineWriter(file, _lines, _HEADING))

@@ -1,63 +1,35 @@
 """A record of JSON for each frame, even one without a box; frames and pixels count from 0."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO
+from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, ValidationError
 
 from vdet.errors import TruthError
+from vdet.labels.formats import Format, LineWriter
+from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error, whole_pixels
 from vdet.labels.parsing import LIMIT, JsonNumber, first_mistake, numbered_lines, text_of
-from vdet.labels.protocol import Format, SourceVideo
-from vdet.labels.rows import MAX_ROWS, Row, limited, line_error
-from vdet.labels.saved import SavedTracks
-from vdet.lanes.lane import lane_record
-from vdet.lanes.road import Road
+from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
 
-MAX_RECORDS = MAX_ROWS
-"""Most records in a file."""
 
-
-class JsonLinesWriter:
-    """Writes a record for each frame: `frame`, `time`, `tracks`, and `lane` if it is looked for.
-
-    Parameters
-    ----------
-    write
-        Takes a line of text.
-    """
-
-    def __init__(self, write: Callable[[str], object]) -> None:
-        self._write = write
-
-    def write(self, frame: FrameTracks, road: Road | None = None) -> None:
-        """Add a frame."""
-        record: dict[str, Any] = {
-            "frame": frame.index,
-            "time": round(frame.time, 6),
-            "tracks": [_track_record(track) for track in frame.tracks],
-        }
-        if road:
-            record["lane"] = lane_record(road.lane)
-        self._write(json.dumps(record) + "\n")
-
-    def end(self) -> None:
-        """Do nothing: all records are written."""
-
-
-def _open(file: BinaryIO, _: SourceVideo | None = None) -> JsonLinesWriter:
-    return JsonLinesWriter(lambda text: file.write(text.encode()))
+def _lines(frame: FrameTracks) -> Iterator[str]:
+    """Yield a record: `frame`, `time`, `tracks`, and the facts that are known about the frame."""
+    tracks = [_track_record(track) for track in frame.tracks]
+    record = {"frame": frame.index, "time": round(frame.time, 6), "tracks": tracks}
+    yield json.dumps({**record, **frame.facts}) + "\n"
 
 
 def _track_record(track: Track) -> dict[str, Any]:
+    x, y, width, height = whole_pixels(track.box)
     return {
         "id": track.id,
-        "x": track.box.x,
-        "y": track.box.y,
-        "width": track.box.width,
-        "height": track.box.height,
+        "x": x,
+        "y": y,
+        "width": width,
+        "height": height,
         "score": round(track.score, 4),
         "predicted": track.predicted,
         "class": track.class_name,
@@ -92,7 +64,7 @@ class _FrameRecord(BaseModel, frozen=True):
 
 
 def read_json_lines(path: Path, data: bytes) -> SavedTracks:
-    """Read a record for every frame; keys that `JsonLinesWriter` does not write are passed over.
+    """Read a record for every frame; keys that vdet does not know are ignored.
 
     Raises
     ------
@@ -100,36 +72,18 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, or frames do not ascend.
     """
     times: dict[int, float] = {}
-    rows = tuple(limited(path, _rows(path, text_of(path, data), times)))
+    labels = tuple(limited(path, _labels(path, text_of(path, data), times)))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(rows, listed=tuple(times), times=times)
+    return SavedTracks(labels, listed=tuple(times), times=times)
 
 
-def _rows(path: Path, text: str, times: dict[int, float]) -> Iterator[Row]:
+def _labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Label]:
     """Yield the boxes of every record, and put the time of every frame into `times`."""
-    for line, record in _records(path, text):
-        times[record.frame] = record.time
-        for each in record.tracks:
-            yield Row(
-                line,
-                record.frame + 1,
-                each.id,
-                *(each.x, each.y, each.width, each.height, each.score),
-                label=each.label or None,
-                predicted=each.predicted,
-                foot=each.foot,
-                distance=each.distance,
-                lane=each.lane,
-            )
-
-
-def _records(path: Path, text: str) -> Iterator[tuple[int, _FrameRecord]]:
-    """Yield the line number and the record of every line; frames must ascend."""
     last = -1
     for count, (line, content) in enumerate(numbered_lines(text)):
-        if count == MAX_RECORDS:
-            raise line_error(path, line, f"has more than {MAX_RECORDS:,} frames; cut it into parts")
+        if count == MAX_LABELS:
+            raise line_error(path, line, f"has more than {MAX_LABELS:,} frames; cut it into parts")
         try:
             record = _FrameRecord.model_validate_json(content)
         except ValidationError as error:
@@ -137,7 +91,22 @@ def _records(path: Path, text: str) -> Iterator[tuple[int, _FrameRecord]]:
         if record.frame <= last:
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         last = record.frame
-        yield line, record
+        times[record.frame] = record.time
+        for each in record.tracks:
+            yield Label(
+                line,
+                from_size(each.x, each.y, each.width, each.height),
+                each.label or None,
+                record.frame + 1,
+                each.id,
+                each.score,
+                predicted=each.predicted,
+                foot=each.foot,
+                distance=each.distance,
+                lane=each.lane,
+            )
 
 
-JSON_LINES = Format("JSON lines", ".jsonl", _open, read_json_lines)
+JSON_LINES = Format(
+    "JSON lines", ".jsonl", read_json_lines, lambda file, _: LineWriter(file, _lines)
+)

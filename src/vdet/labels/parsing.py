@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.files import read_whole
+from vdet.labels.label import Label, line_error
 
 LIMIT = 10_000_000
 """Largest frame number, id or pixel. A larger number is damage, and would overflow later."""
@@ -55,6 +56,53 @@ def numbered_lines(text: str) -> Iterator[tuple[int, str]]:
     for number, line in enumerate(io.StringIO(text, newline=None), start=1):
         if stripped := line.strip():
             yield number, stripped
+
+
+def label_lines(
+    path: Path,
+    text: str,
+    parse: Callable[[int | str, list[str]], Label],
+    *,
+    form: str,
+    counts: Sequence[int],
+    separator: str | None = None,
+    member: str = "",
+) -> Iterator[Label]:
+    """Yield the label of every line that is not blank.
+
+    Parameters
+    ----------
+    parse
+        Function that takes the place of a line and its columns and returns the label. It raises a
+        ValueError that says what is wrong.
+    form
+        Name of the format, for messages.
+    counts
+        How many columns a line may have; all lines have as many as the first.
+    separator
+        What stands between columns; None for spaces.
+    member
+        Name of the file in the archive `path`; empty if the text is that of `path`.
+
+    Raises
+    ------
+    TruthError
+        A line has another number of columns, or cannot be parsed.
+    """
+    for line, content in numbered_lines(text):
+        columns = content.split(separator)
+        place: int | str = f"{member}:{line}" if member else line
+        if len(columns) not in counts:
+            wanted = " or ".join(map(str, counts))
+            between = "commas" if separator else "spaces"
+            what = f"{form} has {wanted} columns between {between}; this line has {len(columns)}"
+            raise line_error(path, place, what)
+        counts = (len(columns),)
+        try:
+            label = parse(place, columns)
+        except ValueError as error:
+            raise line_error(path, place, str(error)) from error
+        yield label
 
 
 def parse_number(text: str) -> float:

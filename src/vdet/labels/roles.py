@@ -1,60 +1,74 @@
-"""The words of label files: which are vehicles, which are ignore regions."""
+"""The role of a labelled box in evaluation and training: vehicle, ignore region, or neither."""
 
-from enum import Enum
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
 
-from vdet.detect.classes import WORDS, letters, our_name
-
-
-class Role(Enum):
-    """How a labelled box is scored."""
-
-    VEHICLE = "a vehicle to be found"
-    IGNORED = "an ignore region: a prediction in it is neither right nor wrong"
-    OTHER = "not a vehicle: the box is skipped, and a prediction on it is wrong"
-
+from vdet.config.labels import Role
+from vdet.config.schema import Settings
+from vdet.detect.classes import OUR_NAMES, WORDS, letters, our_name
 
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")
-_WORDS = {
-    Role.VEHICLE: tuple(
-        word for name in ("car", "truck", "bus", "vehicle") for word in WORDS[name]
-    ),
-    Role.IGNORED: (
-        *_REGIONS,
-        *("tram", "train", "misc", "trailer", "caravan", "auto-rickshaw", *WORDS["motorcycle"]),
-    ),
-    Role.OTHER: ("pedestrian", "person", "person sitting", "cyclist", "bicycle", "rider"),
-}
 _REGION_LETTERS = {letters(word) for word in _REGIONS}
-_ROLES = {letters(word): role for role, words in _WORDS.items() for word in words}
+_ANY_KIND = ("car", "truck", "bus")  # what "vehicle" among the classes of a detector includes
 
 
-def role_of(label: str) -> Role:
-    """Return the role of a label of a video; case, spaces and punctuation do not matter.
+def _key(word: str) -> str:
+    """Return the class that a word means, else its letters."""
+    return our_name(word) or letters(word)
 
-    Raises
-    ------
-    ValueError
-        The label is not one of the known words.
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """What labels mean; case, spaces and punctuation do not matter.
+
+    Attributes
+    ----------
+    words
+        The role of each known word.
     """
-    role = _ROLES.get(letters(label))
-    if role is None:
-        known = "; ".join(", ".join(words) for words in _WORDS.values())
-        raise ValueError(f"label {label!r:.40} is unknown; use one of: {known}")
-    return role
+
+    words: Mapping[str, Role]
+
+    @classmethod
+    def of(cls, roles: Mapping[str, Role], classes: Sequence[str]) -> Self:
+        """Return the roles of words; a class without a role is a vehicle if it is in `classes`.
+
+        The other classes of vehicles are ignored. "vehicle" in `classes` includes cars, trucks and
+        buses.
+        """
+        words: dict[str, Role] = dict.fromkeys(OUR_NAMES, "ignored")
+        found = (*classes, *(_ANY_KIND if "vehicle" in classes else ()))
+        words.update(dict.fromkeys(map(_key, found), "vehicle"))
+        words.update({_key(word): role for word, role in roles.items()})
+        words.update(dict.fromkeys(_REGION_LETTERS, "ignored"))
+        return cls(words)
+
+    @classmethod
+    def from_settings(cls, settings: Settings) -> Self:
+        """Return the roles of `labels.roles`, and of the classes that the detector finds."""
+        return cls.of(settings.labels.roles, settings.detector.vehicle_classes)
+
+    def role_of(self, label: str) -> Role | None:
+        """Return the role of a label; None if it is unknown."""
+        return self.words.get(_key(label))
+
+    def known_role_of(self, label: str) -> Role:
+        """Return the role of a label. Raises ValueError, with all known words, if it has none."""
+        role = self.role_of(label)
+        if role is None:
+            named = (", ".join(WORDS.get(word, (word,))) for word in self.words)
+            raise ValueError(
+                f"label {label!r:.40} is unknown; give it a role in labels.roles, or use one of: "
+                + ", ".join(named)
+            )
+        return role
+
+
+DEFAULT_ROLES = Roles.from_settings(Settings())
+"""The roles where no setting changes them."""
 
 
 def is_region(label: str | None) -> bool:
     """Return whether a label says that its box is a region, and no single thing."""
     return label is not None and letters(label) in _REGION_LETTERS
-
-
-def class_of(label: str) -> tuple[str, bool] | None:
-    """Return what a label of a picture means: one of `OUR_NAMES`, and whether it is ignored.
-
-    An ignore region is a "vehicle". None where the label means neither, or is unknown: sets of
-    pictures name all kinds of things.
-    """
-    name = our_name(label)
-    if name is not None:
-        return name, False
-    return ("vehicle", True) if _ROLES.get(letters(label)) is Role.IGNORED else None

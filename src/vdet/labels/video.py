@@ -1,13 +1,100 @@
-"""Boxes with ids, frame by frame: truth and predictions in memory."""
+"""The labels of a video: as a file has them, and as columns for metrics."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from pathlib import Path
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array, Int64Array
-from vdet.labels.rows import Row, checked_rows
+from vdet.boxes import BoolArray, Box, Float64Array, Int64Array
+from vdet.detect.classes import our_name
+from vdet.labels.label import Label
+from vdet.track.track import FrameTracks, Track
+
+
+@dataclass(frozen=True, slots=True)
+class SavedTracks:
+    """The tracks of a video, read from a file.
+
+    Attributes
+    ----------
+    labels
+        The boxes, exactly as in the file.
+    listed
+        The frames that the file lists, also those without a box, counted from 0, ascending; empty
+        where it lists only boxes.
+    times
+        Seconds of each frame that the file has a time for; empty where the format has no times.
+    size
+        Width and height of the frames in pixels; None where the file does not say.
+    """
+
+    labels: tuple[Label, ...]
+    listed: tuple[int, ...] = ()
+    times: Mapping[int, float] = field(default_factory=dict)
+    size: tuple[int, int] | None = None
+
+    @property
+    def frame_count(self) -> int | None:
+        """Number of frames of the video up to the last one listed; None if none is."""
+        return self.listed[-1] + 1 if self.listed else None
+
+    @property
+    def rate(self) -> float | None:
+        """Frames per second from the first time to the last; None if the file does not say."""
+        if not self.times:
+            return None
+        first, last = min(self.times), max(self.times)
+        seconds = self.times[last] - self.times[first]
+        return (last - first) / seconds if seconds > 0 else None
+
+    @property
+    def has_times(self) -> bool:
+        """Whether every frame has a time; if not, give a rate to `at_rate`."""
+        return all(index in self.times for index in self._indices())
+
+    def at_rate(self, rate: float) -> "SavedTracks":
+        """Return the same tracks; frames without a time get that of `rate` frames per second."""
+        times = {index: index / rate for index in self._indices()}
+        return replace(self, times=times | dict(self.times))
+
+    @property
+    def frames(self) -> tuple[FrameTracks, ...]:
+        """The frames with a box and those that are listed, in order, made anew at each call.
+
+        Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
+        `OUR_NAMES` where the label means one, else the label. The time of a frame is NaN where it
+        is not known: see `has_times`.
+        """
+        by_frame: dict[int, list[Label]] = defaultdict(list)
+        for label in self.labels:
+            by_frame[label.frame - 1].append(label)
+        return tuple(
+            FrameTracks(
+                index,
+                self.times.get(index, math.nan),
+                tuple(_track(label) for label in sorted(by_frame[index], key=lambda each: each.id)),
+            )
+            for index in self._indices()
+        )
+
+    def _indices(self) -> list[int]:
+        return sorted({label.frame - 1 for label in self.labels}.union(self.listed))
+
+
+def _track(label: Label) -> Track:
+    x, y, right, bottom = map(round, label.box)
+    return Track(
+        label.id,
+        Box(x, y, max(1, right - x), max(1, bottom - y)),
+        min(1.0, max(0.0, label.score)),
+        label.predicted,
+        None if label.name is None else our_name(label.name) or label.name,
+        label.foot,
+        label.distance,
+        label.lane,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,7 +108,7 @@ class LabelledVideo:
     ids
         int64 `(n,)`: id of the vehicle. No id occurs twice in a frame, except `NO_ID`.
     boxes
-        float64 `(n, 4)`: x, y, width, height in full-frame pixels from 0, each with an area.
+        float64 `(n, 4)`: x1, y1, x2, y2 in full-frame pixels from 0, each with an area.
     scores
         float64 `(n,)`: confidence of a prediction, higher is better; 1 for truth.
     ignored
@@ -42,18 +129,17 @@ class LabelledVideo:
     rate: float | None = None
 
     @staticmethod
-    def from_rows(
-        rows: Iterable[Row], *, frame_count: int | None = None, rate: float | None = None
+    def of(
+        labels: Iterable[Label], *, frame_count: int | None = None, rate: float | None = None
     ) -> "LabelledVideo":
-        """Order rows by frame, without checks; rows of one frame keep their order."""
-        ordered = sorted(rows, key=lambda row: row.frame)
-        boxes = [(row.x, row.y, row.width, row.height) for row in ordered]
+        """Order labels by frame, without checks; those of one frame keep their order."""
+        ordered = sorted(labels, key=lambda label: label.frame)
         return LabelledVideo(
-            frames=np.array([row.frame for row in ordered], np.int64),
-            ids=np.array([row.id for row in ordered], np.int64),
-            boxes=np.array(boxes, np.float64).reshape(-1, 4),
-            scores=np.array([row.score for row in ordered], np.float64),
-            ignored=np.array([row.ignored for row in ordered], np.bool_),
+            frames=np.array([label.frame for label in ordered], np.int64),
+            ids=np.array([label.id for label in ordered], np.int64),
+            boxes=np.array([label.box for label in ordered], np.float64).reshape(-1, 4),
+            scores=np.array([label.score for label in ordered], np.float64),
+            ignored=np.array([label.ignored for label in ordered], np.bool_),
             frame_count=frame_count,
             rate=rate,
         )
@@ -77,29 +163,5 @@ class LabelledVideo:
 
     def where(self, rows: slice | BoolArray) -> "LabelledVideo":
         """Return only these rows, in their order."""
-        return replace(
-            self,
-            frames=self.frames[rows],
-            ids=self.ids[rows],
-            boxes=self.boxes[rows],
-            scores=self.scores[rows],
-            ignored=self.ignored[rows],
-        )
-
-
-def checked_video(
-    path: Path,
-    rows: Iterable[Row],
-    *,
-    frame_count: int | None = None,
-    rate: float | None = None,
-) -> LabelledVideo:
-    """Check the rows of the file `path` and order them by frame.
-
-    Raises
-    ------
-    TruthError
-        As `checked_rows`.
-    """
-    checked = checked_rows(path, rows, frame_count=frame_count)
-    return LabelledVideo.from_rows(checked, frame_count=frame_count, rate=rate)
+        columns = ("frames", "ids", "boxes", "scores", "ignored")
+        return replace(self, **{name: getattr(self, name)[rows] for name in columns})

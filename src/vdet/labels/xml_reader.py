@@ -1,82 +1,110 @@
-"""XML files of labels, read without what a file from a stranger could do harm with."""
+"""XML files of labels, read so that a file from a stranger can do no harm."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from vdet.labels.rows import line_error
+from vdet.labels.label import line_error
 
 MAX_DEPTH = 32
 """Most nested XML elements; label files have 5."""
 
+_MAX_TEXT = 1000  # characters
 
-class XmlReader:
-    """Reads an XML file from its beginning to its end; a subclass takes what it needs.
 
-    Document types, and with them entities, are refused, so that a small file cannot expand into a
-    large one. A method may raise a ValueError that says what is wrong.
+@dataclass(slots=True)
+class Element:
+    """An element that is open; `text` is complete when it ends.
 
-    Attributes
-    ----------
-    open
-        The names of the elements that are open, from the root on.
+    `values` are the texts of the elements that have ended in it, by their names.
     """
 
-    def __init__(self) -> None:
-        self.open: list[str] = []
-        self._parser = expat.ParserCreate()
-        self._parser.buffer_text = True
-        self._parser.StartDoctypeDeclHandler = self._refuse_doctype
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self.text
+    name: str
+    attributes: dict[str, str]
+    line: int
+    text: str = ""
+    values: dict[str, list[str]] = field(default_factory=dict)
 
-    @property
-    def line(self) -> int:
-        """The line that is read, from 1."""
-        return self._parser.CurrentLineNumber
+    def attribute(self, name: str) -> str:
+        """Return an attribute. Raises ValueError where there is none of that name."""
+        if name not in self.attributes:
+            raise ValueError(f"<{self.name:.40}> without its '{name}'")
+        return self.attributes[name]
 
-    def read(self, path: Path, text: str) -> None:
-        """Read the text of the file `path`.
+    def value(self, name: str) -> str:
+        """Return the text of an element in it. Raises ValueError where there is not exactly one."""
+        texts = self.values.get(name, [])
+        if not texts:
+            raise ValueError(f"<{self.name:.40}> without its <{name}>")
+        if len(texts) > 1:
+            raise ValueError(f"<{name}> is given twice")
+        return texts[0].strip()
 
-        Raises
-        ------
-        TruthError
-            The XML is broken, declares a document type, is nested deeper than `MAX_DEPTH`, or a
-            method has raised a ValueError.
-        """
-        try:
-            self._parser.Parse(text, True)
-        except expat.ExpatError as error:
-            what = f"broken XML: {expat.ErrorString(error.code)}"
-            raise line_error(path, error.lineno, what) from error
-        except ValueError as error:
-            raise line_error(path, self.line, str(error)) from error
 
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        """Take the start of an element, which is the last of `open`."""
+def read_xml(path: Path, text: str, root: str, take: Callable[[list[Element]], None]) -> None:
+    """Read the XML of the file `path`.
 
-    def end(self) -> None:
-        """Take the end of the last element of `open`."""
+    Document types, and with them entities, are refused, so that a small file cannot expand into a
+    large one.
 
-    def text(self, text: str) -> None:
-        """Take text in the last element of `open`; it may come in parts."""
+    Parameters
+    ----------
+    root
+        Name of the first element.
+    take
+        Function that gets the open elements, from the root on, whenever the last of them ends. It
+        raises a ValueError that says what is wrong.
 
-    def _refuse_doctype(self, *_: object) -> None:
+    Raises
+    ------
+    TruthError
+        The XML is broken, declares a document type, is nested deeper than `MAX_DEPTH`, has another
+        root, or `take` has raised a ValueError.
+    """
+    parser = expat.ParserCreate()
+    reader = _Reader(parser, root, take)
+    parser.buffer_text = True
+    parser.StartDoctypeDeclHandler = reader.refuse_doctype
+    parser.StartElementHandler = reader.start
+    parser.EndElementHandler = reader.end
+    parser.CharacterDataHandler = reader.text
+    try:
+        parser.Parse(text, True)
+    except expat.ExpatError as error:
+        what = f"broken XML: {expat.ErrorString(error.code)}"
+        raise line_error(path, error.lineno, what) from error
+    except ValueError as error:
+        raise line_error(path, parser.CurrentLineNumber, str(error)) from error
+
+
+class _Reader:
+    """The handlers of a parser."""
+
+    def __init__(
+        self, parser: expat.XMLParserType, root: str, take: Callable[[list[Element]], None]
+    ) -> None:
+        self._parser = parser
+        self._root = root
+        self._take = take
+        self._open: list[Element] = []
+
+    def refuse_doctype(self, *_: object) -> None:
         raise ValueError("the XML declares a document type, which labels do not need; remove it")
 
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        if len(self.open) == MAX_DEPTH:
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        if not self._open and name != self._root:
+            raise ValueError(f"<{name:.40}> where the format has <{self._root}>")
+        if len(self._open) == MAX_DEPTH:
             raise ValueError(f"more than {MAX_DEPTH} nested elements")
-        self.open.append(name)
-        self.start(name, attributes)
+        self._open.append(Element(name, attributes, self._parser.CurrentLineNumber))
 
-    def _end(self, _: str) -> None:
-        self.end()
-        self.open.pop()
+    def text(self, part: str) -> None:
+        element = self._open[-1]
+        element.text += part[: _MAX_TEXT - len(element.text)]
 
-
-def attribute(element: str, attributes: dict[str, str], name: str) -> str:
-    """Return an attribute of an element; raises ValueError where it has none of that name."""
-    if name not in attributes:
-        raise ValueError(f"<{element}> without its '{name}'")
-    return attributes[name]
+    def end(self, _: str) -> None:
+        self._take(self._open)
+        element = self._open.pop()
+        if self._open:
+            self._open[-1].values.setdefault(element.name, []).append(element.text)

@@ -1,9 +1,10 @@
-"""YOLO with tracks: a zip file with a text file of labels for each frame, and `data.yaml`.
+"""YOLO: a text file of labels for each picture or frame, and `data.yaml` with the classes.
 
-A line is the number of a class, x and y of the middle, width and height of the box as shares of the
-frame, and the id. The standard form has no id; Ultralytics writes it at the end of the line when it
-tracks, and so does CVAT ("Ultralytics YOLO Detection Track"). `data.yaml` has the names of the
-classes, and here also `width` and `height` of the frames in pixels, which others pass over.
+A line is the number of a class, and x and y of the middle, width and height of the box as shares of
+the frame. Tracks lie in a zip file, and their lines end with the id: the standard form has none,
+but Ultralytics writes it when it tracks, and so does CVAT ("Ultralytics YOLO Detection Track").
+`data.yaml` has the names of the classes, and for tracks also `width` and `height` of the frames in
+pixels, which others ignore.
 Source: docs.ultralytics.com, "Object detection datasets overview"; the CVAT manual, "Ultralytics
 YOLO".
 """
@@ -12,34 +13,38 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.config import document
-from vdet.errors import ConfigError, TruthError
+from vdet.errors import ConfigError, ImageError, TruthError
 from vdet.files import escaped, printable
+from vdet.labels.formats import UNKNOWN, Format, PictureFormat, SourceVideo
+from vdet.labels.label import NO_ID, Label, limited
 from vdet.labels.parsing import (
     LIMIT,
     MAX_BYTES,
-    numbered_lines,
+    label_lines,
     parse_number,
     parse_whole,
+    read_text,
     text_of,
 )
-from vdet.labels.protocol import UNKNOWN, Format, SourceVideo
-from vdet.labels.rows import Row, limited, line_error
-from vdet.labels.saved import SavedTracks
-from vdet.lanes.road import Road
+from vdet.labels.pictures import LabelledPicture, pictures_below
+from vdet.labels.video import SavedTracks
+from vdet.media.images import read_header
 from vdet.track.track import FrameTracks, Track
 
-DATA = "data.yaml"
-"""The file with the names of the classes."""
-
+_DATA = "data.yaml"
+_NO_LABELS = "classes.txt"  # label tools write it beside the labels
 _NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
-_COLUMNS = 6
+_COLUMNS = 5
+
+Size = tuple[int, int]
+"""Width and height in pixels."""
 
 
 class YoloWriter:
@@ -51,16 +56,16 @@ class YoloWriter:
     def __init__(self, file: BinaryIO, video: SourceVideo | None) -> None:
         assert video is not None  # `needs_video` says so
         self._file = file
-        self._video = video
+        self._size = video.width, video.height
         self._classes: dict[str, int] = {}  # name: number, in the order of their numbers
         self._labels: dict[int, str] = {}  # by frame
 
-    def write(self, frame: FrameTracks, road: Road | None = None) -> None:  # noqa: ARG002
+    def write(self, frame: FrameTracks) -> None:
         """Keep the labels of a frame."""
         self._labels[frame.index] = "".join(self._line(track) for track in frame.tracks)
 
     def _line(self, track: Track) -> str:
-        width, height = self._video.width, self._video.height
+        width, height = self._size
         box = track.box.clipped(width, height)
         if not box.area:
             return ""
@@ -71,13 +76,14 @@ class YoloWriter:
 
     def end(self) -> None:
         """Write the whole archive."""
-        lines = ["path: .", "train: train.txt", "names:"]
-        for name, number in (self._classes or {UNKNOWN: 0}).items():
-            lines.append(f"  {number}: {json.dumps(escaped(name), ensure_ascii=False)}")
-        lines += [f"width: {self._video.width}", f"height: {self._video.height}"]
+        classes = "".join(
+            f"  {number}: {json.dumps(escaped(name), ensure_ascii=False)}\n"
+            for name, number in (self._classes or {UNKNOWN: 0}).items()
+        )
+        size = "width: {}\nheight: {}\n".format(*self._size)
         names = {index: f"frame_{index:06}" for index in self._labels}
         with zipfile.ZipFile(self._file, "w", zipfile.ZIP_DEFLATED) as archive:
-            _add(archive, DATA, "".join(f"{line}\n" for line in lines))
+            _add(archive, _DATA, f"path: .\ntrain: train.txt\nnames:\n{classes}{size}")
             pictures = "".join(f"images/train/{name}.png\n" for name in names.values())
             _add(archive, "train.txt", pictures)
             for index, labels in self._labels.items():
@@ -90,14 +96,6 @@ def _add(archive: zipfile.ZipFile, name: str, text: str) -> None:
     info.compress_type = zipfile.ZIP_DEFLATED
     info.external_attr = 0o644 << 16
     archive.writestr(info, text)
-
-
-@dataclass(frozen=True, slots=True)
-class _Frames:
-    """What `data.yaml` says."""
-
-    names: list[str]
-    size: tuple[int, int]
 
 
 def read_yolo(path: Path, data: bytes) -> SavedTracks:
@@ -115,7 +113,7 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
     try:
         members = list_members(io.BytesIO(data))
         with open_archive(io.BytesIO(data)) as archive:
-            frames = _frames(path, archive, members)
+            names, size = _described(path, archive, members)
             files = _label_files(path, archive, members)
             texts = {
                 index: (name, text_of(path, read_member(archive, name, most=MAX_BYTES)))
@@ -123,26 +121,33 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
             }
     except ArchiveError as error:
         raise TruthError(f"{path}: {error}") from error
-    return SavedTracks(
-        tuple(limited(path, _rows(path, texts, frames))), listed=tuple(texts), size=frames.size
+    labels = (
+        label
+        for index, (name, text) in texts.items()
+        for label in label_lines(
+            path,
+            text,
+            partial(_label, names=names, size=size, frame=index + 1),
+            form="YOLO with tracks",
+            counts=(_COLUMNS + 1, _COLUMNS + 2),
+            member=printable(name),
+        )
     )
+    return SavedTracks(tuple(limited(path, labels)), listed=tuple(texts), size=size)
 
 
-def _frames(path: Path, archive: zipfile.ZipFile, members: Sequence[str]) -> _Frames:
-    """Return what `data.yaml`, at the top or in a folder, says."""
-    found = sorted(
-        (name for name in members if PurePosixPath(name).name == DATA),
-        key=lambda name: (name.count("/"), name),
-    )
+def _described(
+    path: Path, archive: zipfile.ZipFile, members: Sequence[str]
+) -> tuple[list[str], Size]:
+    """Return the names and the size of frames in `data.yaml`, at the top or in a folder."""
+    found = [name for name in members if PurePosixPath(name).name == _DATA]
     if not found:
-        raise TruthError(f"{path}: needs {DATA} with the names of the classes")
-    where = f"{path}:{printable(found[0])}"
-    text = text_of(path, read_member(archive, found[0], most=document.MAX_BYTES))
-    try:
-        values = document.parse_document(text, where).values
-    except ConfigError as error:
-        raise TruthError(str(error).splitlines()[0]) from error
-    names = class_names(values, where)
+        raise TruthError(f"{path}: needs {_DATA} with the names of the classes")
+    first = min(found, key=lambda name: (name.count("/"), name))
+    where = f"{path}:{printable(first)}"
+    text = text_of(path, read_member(archive, first, most=document.MAX_BYTES))
+    values = _values(lambda: document.parse_document(text, where))
+    names = _class_names(values, where)
     width, height = values.get("width"), values.get("height")
     if not (isinstance(width, int) and isinstance(height, int)):
         raise TruthError(
@@ -151,11 +156,19 @@ def _frames(path: Path, archive: zipfile.ZipFile, members: Sequence[str]) -> _Fr
         )
     if not (0 < width <= LIMIT and 0 < height <= LIMIT):
         raise TruthError(f"{where}: {width}×{height} pixels is no size of frames")
-    return _Frames(names, (width, height))
+    return names, (width, height)
 
 
-def class_names(values: Mapping[str, Any], where: str) -> list[str]:
-    """Return `names` of the values of `data.yaml`, a list or numbered. Raises `TruthError`."""
+def _values(read: Callable[[], document.Document]) -> Mapping[str, Any]:
+    """Return the values of a YAML document that `read` reads."""
+    try:
+        return read().values
+    except ConfigError as error:
+        raise TruthError(str(error).splitlines()[0]) from error
+
+
+def _class_names(values: Mapping[str, Any], where: str) -> list[str]:
+    """Return `names` of the values of `data.yaml`, a list or numbered."""
     names = values.get("names")
     if isinstance(names, dict):  # number: name
         names = [names.get(str(number)) for number in range(len(names))]
@@ -190,40 +203,10 @@ def _is_label_file(name: PurePosixPath) -> bool:
     return name.suffix.lower() == ".txt" and "labels" in name.parts[:-1]
 
 
-def _rows(path: Path, texts: Mapping[int, tuple[str, str]], frames: _Frames) -> Iterator[Row]:
-    for index, (name, text) in texts.items():
-        for line, content in numbered_lines(text):
-            place = f"{printable(name)}:{line}"
-            try:
-                yield _row(place, index, content.split(), frames)
-            except ValueError as error:
-                raise line_error(path, place, str(error)) from error
-
-
-def _row(place: str, index: int, columns: list[str], frames: _Frames) -> Row:
-    if len(columns) not in {_COLUMNS, _COLUMNS + 1}:
-        raise ValueError(
-            f"a label of a track has {_COLUMNS} columns: class, x, y, width, height, id; this line "
-            f"has {len(columns)}"
-        )
-    score = parse_number(columns[5]) if len(columns) > _COLUMNS else 1.0
-    label, box = yolo_box(columns[:5], frames.names, frames.size)
-    return Row(place, index + 1, parse_whole(columns[-1]), *box, score=score, label=label)
-
-
-def yolo_box(
-    columns: Sequence[str], names: Sequence[str], size: tuple[int, int]
-) -> tuple[str, tuple[float, float, float, float]]:
-    """Return the class of a label, and x, y, width and height of its box in pixels from 0.
-
-    Parameters
-    ----------
-    columns
-        Number of the class, x and y of the middle, width and height as shares of the picture.
-    names
-        Of the classes.
-    size
-        Width and height of the picture in pixels.
+def _label(
+    place: int | str, columns: Sequence[str], names: Sequence[str], size: Size, frame: int = 1
+) -> Label:
+    """Return the label of a line: a box, and with more columns its id, or its score and its id.
 
     Raises
     ------
@@ -232,12 +215,58 @@ def yolo_box(
     """
     number = parse_whole(columns[0])
     if not 0 <= number < len(names):
-        raise ValueError(f"class {number} has no name; {DATA} has {len(names)} names")
-    shares = [parse_number(column) for column in columns[1:]]
+        raise ValueError(f"class {number} has no name; {_DATA} has {len(names)} names")
+    shares = [parse_number(column) for column in columns[1:_COLUMNS]]
     if not all(0 <= share <= 1 for share in shares):
         raise ValueError("a number is not between 0 and 1; YOLO has shares of the picture")
     x, y, width, height = (share * size[i % 2] for i, share in enumerate(shares))
-    return names[number], (x - width / 2, y - height / 2, width, height)
+    return Label(
+        place,
+        (x - width / 2, y - height / 2, x + width / 2, y + height / 2),
+        names[number],
+        frame,
+        parse_whole(columns[-1]) if len(columns) > _COLUMNS else NO_ID,
+        parse_number(columns[_COLUMNS]) if len(columns) > _COLUMNS + 1 else 1.0,
+    )
 
 
-YOLO = Format("YOLO", ".yolo.zip", YoloWriter, read_yolo, needs_video=True)
+def read_yolo_pictures(folder: Path) -> Iterator[LabelledPicture]:
+    """Yield every picture below `images`; one without a file in `labels` shows no vehicle.
+
+    `data.yaml` lies in the folder or above it.
+
+    Raises
+    ------
+    TruthError
+        There are no names, a file of labels has no picture, a line is not of this form, or the
+        size of a labelled picture cannot be read.
+    """
+    data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)
+    if data is None:
+        raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
+    names = _class_names(_values(lambda: document.read_document(data)), str(data))
+    images, labels = folder / "images", folder / "labels"
+    files = {file for file in labels.rglob("*.txt") if file.name != _NO_LABELS}
+    for picture in pictures_below(images):
+        file = labels / picture.relative_to(images).with_suffix(".txt")
+        if file in files:
+            files.remove(file)
+            yield _labelled(picture, file, names)
+        else:
+            yield LabelledPicture(picture, file)
+    if files:
+        raise TruthError(f"{min(files)}: has no picture of its name below {images}")
+
+
+def _labelled(picture: Path, file: Path, names: Sequence[str]) -> LabelledPicture:
+    try:
+        size, _ = read_header(picture)
+    except ImageError as error:
+        raise TruthError(str(error)) from error
+    parse = partial(_label, names=names, size=size)
+    labels = label_lines(file, read_text(file), parse, form="YOLO", counts=[_COLUMNS])
+    return LabelledPicture(picture, file, tuple(labels), size)
+
+
+YOLO = Format("YOLO", ".yolo.zip", read_yolo, YoloWriter, needs_video=True)
+YOLO_PICTURES = PictureFormat("YOLO", ("images", "labels"), read_yolo_pictures)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.detect.detections import Detections
+from vdet.lanes.lane import lane_record
 from vdet.lanes.road import Road
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
@@ -42,5 +43,6 @@ class FrameResult:
 
     @property
     def frame_tracks(self) -> FrameTracks:
-        """The tracks with the number and the time of the frame."""
-        return FrameTracks(self.frame.index, float(self.frame.time), self.tracks)
+        """The tracks with the number and the time of the frame, and its lane if there is one."""
+        facts = {"lane": lane_record(self.road.lane)} if self.road else {}
+        return FrameTracks(self.frame.index, float(self.frame.time), self.tracks, facts)

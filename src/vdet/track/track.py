@@ -1,6 +1,8 @@
 """What a tracker says about a frame: the vehicles that are shown in it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 from vdet.boxes import Box
 
@@ -62,8 +64,11 @@ class FrameTracks:
         When the frame is shown, seconds.
     tracks
         By id.
+    facts
+        More about the frame, as values for JSON: `lane` if lanes are searched for.
     """
 
     index: int
     time: float
     tracks: tuple[Track, ...]
+    facts: Mapping[str, Any] = field(default_factory=dict)

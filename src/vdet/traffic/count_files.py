@@ -13,7 +13,7 @@ from typing import Any
 
 from vdet.config.places import CountSettings
 from vdet.errors import ConfigError, TruthError
-from vdet.labels.registry import read_tracks
+from vdet.labels.reading import read_tracks
 from vdet.track.track import FrameTracks
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.events import Event

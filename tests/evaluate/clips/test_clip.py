@@ -22,7 +22,7 @@ from vdet.evaluate.clips.clip import (
     open_clip,
 )
 from vdet.evaluate.clips.evaluate import evaluate_clips
-from vdet.labels.predictions import read_predictions
+from vdet.labels.reading import read_predictions
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.progress import no_progress
 from vdet.run.loop import build, peek

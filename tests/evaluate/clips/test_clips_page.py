@@ -4,22 +4,23 @@ from pathlib import Path
 
 import numpy as np
 
+from labels.saving import checked_video, row
 from pages.html import Elements
 from vdet.evaluate.clips.evaluate import RunResult, score_video, total
 from vdet.evaluate.clips.page import loss_tiles, video_page
 from vdet.evaluate.tiles import FOUND, TRUE
-from vdet.labels.rows import Row
-from vdet.labels.video import LabelledVideo, checked_video
+from vdet.labels.label import Label
+from vdet.labels.video import LabelledVideo
 
 TEN = range(1, 11)
 
 
-def video(*rows: Row) -> LabelledVideo:
-    return checked_video(Path("scene"), rows)
+def video(*rows: Label) -> LabelledVideo:
+    return checked_video(rows)
 
 
-def drive(id_: int, frames: range, x: float = 0) -> list[Row]:
-    return [Row(0, frame, id_, x, 60, 40, 40) for frame in frames]
+def drive(id_: int, frames: range, x: float = 0) -> list[Label]:
+    return [row(0, frame, id_, x, 60, 40, 40) for frame in frames]
 
 
 def run(assignments: tuple[str, ...], found: range) -> RunResult:

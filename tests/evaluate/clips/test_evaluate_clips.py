@@ -1,18 +1,18 @@
 from pathlib import Path
 
+from labels.saving import checked_video, row
 from vdet.evaluate.clips.evaluate import RunResult, best, score_files, score_video, total
 from vdet.evaluate.clips.page import video_page
 from vdet.evaluate.clips.text import plain, result_lines, sweep_rows
 from vdet.evaluate.output import RunName
-from vdet.labels.rows import Row
-from vdet.labels.video import LabelledVideo, checked_video
+from vdet.labels.video import LabelledVideo
 
 TEN = range(1, 11)
 NAME = RunName("svm", None, None, ("b=1",))
 
 
 def video(frames: range, x: float = 0) -> LabelledVideo:
-    return checked_video(Path("scene"), [Row(0, frame, 1, x, 0, 100, 100) for frame in frames])
+    return checked_video([row(0, frame, 1, x, 0, 100, 100) for frame in frames])
 
 
 def run(assignments: tuple[str, ...], *found: range) -> RunResult:

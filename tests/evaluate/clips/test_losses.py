@@ -1,10 +1,10 @@
 import pytest
 
 from evaluate.scenes import TEN, drive, video
+from labels.saving import row
 from vdet.evaluate.clips.losses import Loss, losses
 from vdet.evaluate.comparison import compare
 from vdet.evaluate.matching import match
-from vdet.labels.rows import Row
 from vdet.labels.video import LabelledVideo
 
 
@@ -38,7 +38,7 @@ def test_a_box_that_fits_badly_is_lost_on_both_sides_with_its_overlap() -> None:
 
 
 def test_frames_in_which_the_vehicle_is_ignored_split_a_loss() -> None:
-    ignored = [Row(0, 5, 7, 0, 0, 100, 100, ignored=True)]
+    ignored = [row(0, 5, 7, 0, 0, 100, 100, ignored=True)]
     truth = video(drive(7, range(1, 5)) + ignored + drive(7, range(6, 11)))
     spans = [(loss.first, loss.last) for loss in found_losses(video(), truth)]
     assert spans == [(6, 10), (1, 4)]

@@ -11,9 +11,10 @@ from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, sc
 from vdet.evaluate.images.search import SearchedImage
 from vdet.evaluate.output import RunName
 from vdet.evaluate.tiles import FOUND, TRUE
-from vdet.labels.pictures.reading import read_labelled_images
+from vdet.labels.label import from_size
+from vdet.labels.reading import read_labelled_pictures
 
-COUNTING = Counting(0.5, 0.0, ("car",))
+COUNTING = Counting(0.5, 0.0)
 CAR = Boxed("car", (20, 10, 40, 30))
 
 
@@ -23,10 +24,10 @@ def result_of(folder: Path, *found: tuple[float, float, float, float]) -> Images
         "a": Labelled(100, 60, (CAR, Boxed("person", (0, 0, 5, 5)))),
         "b": Labelled(100, 60),
     }
-    labelled = read_labelled_images(write_coco(folder, pictures))
-    boxes = np.array(found, np.float64).reshape(-1, 4)
+    labelled = read_labelled_pictures(write_coco(folder, pictures))
+    boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
     searched = [
-        SearchedImage(each, 100, boxes, np.full(len(found), 0.9)) for each in labelled.images
+        SearchedImage(each, 100, boxes, np.full(len(found), 0.9)) for each in labelled.pictures
     ]
     source = score_source([MeasuredImage.of(each, COUNTING) for each in searched], COUNTING)
     return ImagesResult(COUNTING, (labelled,), (source,), mean_scores([source], COUNTING))

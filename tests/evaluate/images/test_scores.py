@@ -16,31 +16,26 @@ from vdet.evaluate.images.scores import (
     score_source,
 )
 from vdet.evaluate.images.search import SearchedImage
-from vdet.labels.pictures.labelled import LabelledImage
+from vdet.labels.label import Label
+from vdet.labels.pictures import LabelledPicture
 
-ALL = ("car", "truck", "bus", "vehicle")
-PLAIN = Counting(score=0.5, least_width=0, classes=ALL)
+PLAIN = Counting(score=0.5, least_width=0)
 WIDTH = 1000
 
 
 def at(x: float, width: float = 100) -> tuple[float, float, float, float]:
-    return x, 0, width, 100
+    return x, 0, x + width, 100
 
 
 def searched(
     true: list[tuple[float, float, float, float]],
     found: list[tuple[float, tuple[float, float, float, float]]],
     *,
-    classes: tuple[str, ...] | None = None,
     ignored: tuple[int, ...] = (),
 ) -> SearchedImage:
     """Return a picture; `found` are scores and boxes, `ignored` the rows of ignore regions."""
-    image = LabelledImage(
-        Path("a.png"),
-        np.array(true, np.float64).reshape(-1, 4),
-        classes or ("car",) * len(true),
-        np.array([row in ignored for row in range(len(true))], np.bool_),
-    )
+    labels = (Label(row, box, "car", ignored=row in ignored) for row, box in enumerate(true))
+    image = LabelledPicture(Path("a.png"), Path("a.txt"), tuple(labels))
     ranked = sorted(found, reverse=True)
     return SearchedImage(
         image,
@@ -84,32 +79,8 @@ def test_a_wrong_box_in_an_ignore_region_does_not_count() -> None:
     assert (result.vehicles, result.matches, result.false_positives) == (1, 1, 1)
 
 
-class TestClasses:
-    @pytest.mark.parametrize(
-        ("classes", "vehicles"),
-        [
-            (ALL, 3),
-            ((*ALL, "motorcycle"), 4),
-            (("car",), 1),
-            (("vehicle",), 3),
-            (("truck", "motorcycle"), 2),
-        ],
-    )
-    def test_vehicles_that_are_not_looked_for_are_ignore_regions(
-        self, classes: tuple[str, ...], vehicles: int
-    ) -> None:
-        boxes = [at(200 * number) for number in range(4)]
-        picture = searched(
-            boxes,
-            [(0.9, box) for box in boxes],
-            classes=("car", "truck", "vehicle", "motorcycle"),
-        )
-        result = scores(picture, counting=Counting(0.5, 0, classes))
-        assert (result.vehicles, result.matches, result.false_positives) == (vehicles, vehicles, 0)
-
-
 class TestLeastWidth:
-    COUNTING = Counting(score=0.5, least_width=0.05, classes=ALL)
+    COUNTING = Counting(score=0.5, least_width=0.05)
 
     def test_a_narrower_vehicle_need_not_be_found(self) -> None:
         result = scores(searched([at(0), at(300, 49)], []), counting=self.COUNTING)
@@ -185,7 +156,7 @@ class TestBestF1:
         if result.best_score is None:
             assert not any(pictures)
             return
-        again = scores(*searched_ones, counting=Counting(result.best_score, 0, ALL))
+        again = scores(*searched_ones, counting=Counting(result.best_score, 0))
         assert again.f1 == pytest.approx(result.best_f1)
         assert result.f1 is not None
         assert result.best_f1 is not None

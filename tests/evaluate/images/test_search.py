@@ -13,11 +13,11 @@ from vdet.errors import ImageError
 from vdet.evaluate.images.evaluate import evaluate_images
 from vdet.evaluate.images.scores import Counting
 from vdet.evaluate.images.search import search_images
-from vdet.labels.pictures.labelled import LabelledImages
-from vdet.labels.pictures.reading import read_labelled_images
+from vdet.labels.pictures import LabelledPictures
+from vdet.labels.reading import read_labelled_pictures
 
 DETECTOR = PERSPECTIVE.svm
-COUNTING = Counting(DETECTOR.shown_score, 0, DETECTOR.vehicle_classes)
+COUNTING = Counting(DETECTOR.shown_score, 0)
 
 
 @pytest.fixture
@@ -26,13 +26,13 @@ def model() -> SvmModel:
 
 
 @pytest.fixture
-def red_set(tmp_path: Path) -> LabelledImages:
+def red_set(tmp_path: Path) -> LabelledPictures:
     """Five pictures with a car in other places, and one without."""
     cars = {f"{n}": CAR.moved_to(30 + 40 * n, CAR.y) for n in range(5)}
     return write_set(tmp_path / "red", cars | {"9": None})
 
 
-def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledImages:
+def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledPictures:
     pictures = {
         name: Labelled(
             WIDTH,
@@ -44,15 +44,15 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledImages:
     path = write_coco(folder, pictures)
     for name, car in cars.items():
         show(folder / f"{name}.png", road(*([car] if car else [])))
-    return read_labelled_images(path)
+    return read_labelled_pictures(path)
 
 
-def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmModel) -> None:
+def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmModel) -> None:
     done: list[int] = []
-    alone = search_images(red_set.images, model, advance=done.append)
-    together = search_images(red_set.images, model, threads=3)
+    alone = search_images(red_set.pictures, model, advance=done.append)
+    together = search_images(red_set.pictures, model, threads=3)
     assert done == [1] * 6
-    for one, other, image in zip(alone, together, red_set.images, strict=True):
+    for one, other, image in zip(alone, together, red_set.pictures, strict=True):
         assert one.image is image is other.image
         assert one.width == WIDTH
         assert np.array_equal(one.boxes, other.boxes)
@@ -61,7 +61,7 @@ def test_results_do_not_depend_on_threads(red_set: LabelledImages, model: SvmMod
 
 
 def test_each_set_is_scored_and_progress_counts_all_pictures(
-    red_set: LabelledImages, model: SvmModel, tmp_path: Path
+    red_set: LabelledPictures, model: SvmModel, tmp_path: Path
 ) -> None:
     empty = write_set(tmp_path / "empty", {"a": None})
     totals: list[int | None] = []
@@ -78,13 +78,13 @@ def test_each_set_is_scored_and_progress_counts_all_pictures(
     assert [name for name, _ in result.named] == [red_set.name, empty.name, "mean of 1"]
 
 
-def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledImages, model: SvmModel) -> None:
-    red_set.images[2].path.write_bytes(b"no picture")
+def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model: SvmModel) -> None:
+    red_set.pictures[2].path.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
-        search_images(red_set.images, model, threads=2)
+        search_images(red_set.pictures, model, threads=2)
 
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path, model: SvmModel) -> None:
     path = write_coco(tmp_path, {"small": Labelled(8, 8)})
     with pytest.raises(ImageError, match=r"small\.png: "):
-        search_images(read_labelled_images(path).images, model)
+        search_images(read_labelled_pictures(path).pictures, model)

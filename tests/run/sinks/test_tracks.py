@@ -13,8 +13,8 @@ from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
-from vdet.labels.predictions import read_predictions
-from vdet.labels.registry import ENDINGS
+from vdet.labels.formats import track_suffixes
+from vdet.labels.reading import read_predictions
 from vdet.lanes.lane import Lane, lane_record
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.run.result import FrameResult
@@ -125,7 +125,7 @@ def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str)
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("suffix", ENDINGS)
+@pytest.mark.parametrize("suffix", track_suffixes())
 def test_an_error_leaves_no_half_written_tracks(tmp_path: Path, suffix: str) -> None:
     def interrupted() -> Iterator[FrameResult]:
         yield RESULTS[0]
@@ -136,14 +136,14 @@ def test_an_error_leaves_no_half_written_tracks(tmp_path: Path, suffix: str) -> 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("suffix", [each for each in ENDINGS if each != ".yolo.zip"])
+@pytest.mark.parametrize("suffix", [each for each in track_suffixes() if each != ".yolo.zip"])
 def test_written_tracks_are_read_back_by_the_evaluation(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"tracks{suffix}"
     written(path)
     video = read_predictions(path)
     assert video.frames.tolist() == [5, 7, 7]
     assert video.ids.tolist() == [1, 1, 2]
-    assert video.boxes.tolist() == [[10, 20, 30, 40], [11, 21, 31, 41], [0, -3, 5, 6]]
+    assert video.boxes.tolist() == [[10, 20, 40, 60], [11, 21, 42, 62], [0, -3, 5, 3]]
     if suffix != ".xml":  # which has no scores
         assert video.scores.tolist() == [0.9877, 0.5, 1]
 

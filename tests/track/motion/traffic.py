@@ -14,7 +14,7 @@ from vdet.boxes import Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.detections import Detections
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.rows import NO_ID, Row
+from vdet.labels.label import NO_ID, Label, from_size
 from vdet.labels.video import LabelledVideo
 from vdet.track.motion.tracker import MotionTracker
 
@@ -153,16 +153,15 @@ def track_scores(
             id_ = vehicle.id if vehicle.counts else NO_ID
             x, y, width, height = vehicle.box.tolist()
             counts = vehicle.counts
-            true.append(Row(0, number, id_, x, y, width, height, ignored=not counts))
+            corners = from_size(x, y, width, height)
+            true.append(Label(0, corners, frame=number, id=id_, ignored=not counts))
         if (number - 1) % stride:
             tracks = tracker.carry(number / rate)
         else:
             tracks = tracker.update(detect(vehicles, noise, rng), number / rate)
         for track in tracks:
             box = track.box
-            row = Row(0, number, track.id, box.x, box.y, box.width, box.height, track.score)
-            shown.append(row)
-    videos = [
-        LabelledVideo.from_rows(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)
-    ]
+            corners = box.x, box.y, box.right, box.bottom
+            shown.append(Label(0, corners, frame=number, id=track.id, score=track.score))
+    videos = [LabelledVideo.of(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)]
     return score(*videos)

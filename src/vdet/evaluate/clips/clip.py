@@ -17,8 +17,9 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.errors import ConfigError, ImageError, VideoError
 from vdet.files import OutputFiles
-from vdet.labels.rows import Row
-from vdet.labels.truth import read_truth
+from vdet.labels.label import Label
+from vdet.labels.reading import read_truth
+from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.media.images import Image
@@ -40,6 +41,7 @@ class Clip:
     truth_path: Path
     truth: LabelledVideo
     until: int | None
+    roles: Roles = DEFAULT_ROLES
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,23 +56,27 @@ class Variant:
     assignments: tuple[str, ...] = ()
 
 
-def open_clip(video: Path, truth_path: Path, until: int | None = None) -> Clip:
+def open_clip(
+    video: Path, truth_path: Path, until: int | None = None, roles: Roles = DEFAULT_ROLES
+) -> Clip:
     """Read the truth of a video.
 
     Parameters
     ----------
     until
         Number of the last frame to use, from 1; None: the last that the truth covers.
+    roles
+        What the labels of the truth mean.
 
     Raises
     ------
     TruthError
         The truth cannot be used.
     """
-    truth = read_truth(truth_path)
+    truth = read_truth(truth_path, roles)
     if until is not None:
         truth = truth.until(until)
-    return Clip(video, truth_path, truth, until or truth.last_frame or None)
+    return Clip(video, truth_path, truth, until or truth.last_frame or None, roles)
 
 
 def find_tracks(
@@ -102,7 +108,7 @@ def find_tracks(
     OutputError
         An output cannot be written.
     """
-    rows: list[list[Row]] = [[] for _ in variants]
+    rows: list[list[Label]] = [[] for _ in variants]
     frames = 0
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles(overwrite=overwrite))
@@ -125,15 +131,17 @@ def find_tracks(
                 for sink in sinks:
                     sink.write(results[0])
                 for row, result in zip(rows, results, strict=True):
-                    row += [_row(result.frame.index + 1, track) for track in result.tracks]
+                    row += [_label(result.frame.index + 1, track) for track in result.tracks]
                 frames = results[0].frame.index + 1
                 advance(1)
         except (ConfigError, ImageError) as error:
             raise VideoError(f"{clip.video}: {error}") from error
         if clip.until is not None and frames < clip.until:
-            read_truth(clip.truth_path, frame_count=frames)  # raises an error with the line
+            read_truth(
+                clip.truth_path, clip.roles, frame_count=frames
+            )  # raises an error with the line
         rate = float(reader.info.rate)
-    return [LabelledVideo.from_rows(each, frame_count=frames, rate=rate) for each in rows]
+    return [LabelledVideo.of(each, frame_count=frames, rate=rate) for each in rows]
 
 
 def build_variants(
@@ -190,6 +198,7 @@ class SharingDetector:
         self.stage_pictures = stage_pictures_of(detector)
 
 
-def _row(number: int, track: Track) -> Row:
+def _label(number: int, track: Track) -> Label:
     box = track.box
-    return Row(0, number, track.id, box.x, box.y, box.width, box.height, score=track.score)
+    corners = box.x, box.y, box.right, box.bottom
+    return Label(0, corners, frame=number, id=track.id, score=track.score)

@@ -10,8 +10,8 @@ from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.matching import match
 from vdet.evaluate.scores import Scores, score_comparison
 from vdet.evaluate.timelines import Timeline, timelines
-from vdet.labels.predictions import read_predictions
-from vdet.labels.truth import read_truth
+from vdet.labels.reading import read_predictions, read_truth
+from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.labels.video import LabelledVideo
 from vdet.progress import Progress, no_progress
 from vdet.run.sinks.protocol import Output
@@ -109,12 +109,19 @@ def _score_clip(clip: Clip, found: LabelledVideo) -> ClipResult:
 
 
 def score_files(
-    prediction: Path, truth: Path, *, until: int | None = None, rate: float | None = None
+    prediction: Path,
+    truth: Path,
+    roles: Roles = DEFAULT_ROLES,
+    *,
+    until: int | None = None,
+    rate: float | None = None,
 ) -> RunResult:
     """Score a file of tracks against a file of truth.
 
     Parameters
     ----------
+    roles
+        What the labels of the truth mean.
     until
         Number of the last frame to use, from 1; None: the last that the truth covers.
     rate
@@ -125,7 +132,7 @@ def score_files(
     TruthError
         A file cannot be used.
     """
-    found, true = read_predictions(prediction), read_truth(truth)
+    found, true = read_predictions(prediction), read_truth(truth, roles)
     last = until or true.last_frame
     compared = found.until(last)
     result = score_video(str(prediction), compared, true.until(last), rate=rate)

@@ -142,7 +142,8 @@ def _cropped(image: Image, loss: Loss, clip: ClipResult) -> Image:
         boxes = frame.vehicle_boxes[comparison.vehicle_ids[frame.vehicles] == loss.id]
     else:
         boxes = frame.track_boxes[comparison.track_ids[frame.tracks] == loss.id]
-    x, y, width, height = boxes[0].tolist()
+    x, y, right, bottom = boxes[0].tolist()
+    width, height = right - x, bottom - y
     rows, columns = image.shape[:2]
     aspect = _SHAPE[0] / _SHAPE[1]
     wanted = max(_CROP_SCALE * width, _CROP_SCALE * height * aspect, columns / 8)

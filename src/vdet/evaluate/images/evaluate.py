@@ -13,7 +13,7 @@ from vdet.evaluate.images.scores import (
     score_source,
 )
 from vdet.evaluate.images.search import search_images
-from vdet.labels.pictures.labelled import LabelledImages
+from vdet.labels.pictures import LabelledPictures
 from vdet.progress import Progress, no_progress
 
 
@@ -22,7 +22,7 @@ class ImagesResult:
     """What counted, the sets of pictures, the scores of each, and their mean."""
 
     counting: Counting
-    sets: tuple[LabelledImages, ...]
+    sets: tuple[LabelledPictures, ...]
     sources: tuple[Source, ...]
     mean: ImageScores
 
@@ -36,7 +36,7 @@ class ImagesResult:
 
 
 def evaluate_images(
-    sets: Sequence[LabelledImages],
+    sets: Sequence[LabelledPictures],
     model: DetectorModel,
     counting: Counting,
     *,
@@ -57,10 +57,10 @@ def evaluate_images(
     ImageError
         A picture cannot be read or searched; the message names it.
     """
-    advance = progress(sum(len(each.images) for each in sets))
+    advance = progress(sum(len(each.pictures) for each in sets))
     sources = []
     for each in sets:
-        searched = search_images(each.images, model, threads=threads, advance=advance)
+        searched = search_images(each.pictures, model, threads=threads, advance=advance)
         measured = [MeasuredImage.of(image, counting) for image in searched]
         sources.append(score_source(measured, counting))
     return ImagesResult(counting, tuple(sets), tuple(sources), mean_scores(sources, counting))

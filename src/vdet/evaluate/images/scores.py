@@ -21,8 +21,6 @@ SIZES = (0.03, 0.06, 0.12)
 """Where the classes of width begin and end, shares of the picture's width."""
 SIZE_NAMES = ("<3 %", "3–6 %", "6–12 %", ">12 %")
 
-_ANY_KIND = ("car", "truck", "bus", "vehicle")  # what "vehicle" among the classes stands for
-
 
 @dataclass(frozen=True, slots=True)
 class Counting:
@@ -35,18 +33,10 @@ class Counting:
     least_width
         Vehicles narrower than this share of the picture's width are ignore regions, and narrower
         detections count only if they find a vehicle.
-    classes
-        Vehicles of other classes are ignore regions. Of unknown kind ("vehicle") stands for cars,
-        trucks and buses too.
     """
 
     score: float
     least_width: float
-    classes: tuple[str, ...]
-
-    def counts(self, name: str) -> bool:
-        """Tell whether a vehicle of this class counts."""
-        return name in self.classes or ("vehicle" in self.classes and name in _ANY_KIND)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,13 +51,12 @@ class MeasuredImage:
     def of(searched: SearchedImage, counting: Counting) -> "MeasuredImage":
         """Mark what is an ignore region, and which detections need not find anything."""
         image = searched.image
-        counts = np.array([counting.counts(name) for name in image.classes], np.bool_)
         least = counting.least_width * searched.width
-        regions = image.ignored | ~counts | (image.boxes[:, 2] < least)
+        regions = image.ignored | (_widths(image.boxes) < least)
         return MeasuredImage(
             searched,
             _one_frame(image.boxes, np.ones(len(regions)), regions),
-            _one_frame(searched.boxes, searched.scores, searched.boxes[:, 2] < least),
+            _one_frame(searched.boxes, searched.scores, _widths(searched.boxes) < least),
         )
 
     def compare(self, score: float) -> Comparison:
@@ -243,6 +232,10 @@ def _one_frame(boxes: Float64Array, scores: Float64Array, ignored: BoolArray) ->
     return LabelledVideo(np.ones(count, np.int64), np.arange(count), boxes, scores, ignored, 1)
 
 
+def _widths(boxes: Float64Array) -> Float64Array:
+    return np.asarray(boxes[:, 2] - boxes[:, 0])
+
+
 def _by_size(
     images: Sequence[MeasuredImage], matched: Sequence[Sequence[MatchedFrame]]
 ) -> tuple[SizeScores, ...]:
@@ -259,7 +252,7 @@ def _by_size(
 
 def _sizes(boxes: Float64Array, width: int) -> Int64Array:
     """Return the index into `SIZE_NAMES` of each box."""
-    return np.searchsorted(SIZES, boxes[:, 2] / width, side="right").astype(np.int64)
+    return np.searchsorted(SIZES, _widths(boxes) / width, side="right").astype(np.int64)
 
 
 def _size_scores(vehicles: int, matches: int, wrong: int) -> SizeScores:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Float64Array, to_sides
+from vdet.boxes import Float64Array
 from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
-from vdet.labels.pictures.labelled import LabelledImage
-from vdet.labels.rows import MAX_IN_FRAME
+from vdet.labels.label import MAX_IN_FRAME
+from vdet.labels.pictures import LabelledPicture
 from vdet.run.pictures import search_picture
 from vdet.run.threads import map_ordered
 
@@ -23,19 +23,19 @@ class SearchedImage:
     width
         Width of the picture, pixels.
     boxes
-        float64 `(n, 4)`: x, y, width, height of the detections, pixels, by descending score.
+        float64 `(n, 4)`: x1, y1, x2, y2 of the detections, pixels, by descending score.
     scores
         float64 `(n,)`: their scores.
     """
 
-    image: LabelledImage
+    image: LabelledPicture
     width: int
     boxes: Float64Array
     scores: Float64Array
 
 
 def search_images(
-    images: Sequence[LabelledImage],
+    images: Sequence[LabelledPicture],
     model: DetectorModel,
     *,
     threads: int = 1,
@@ -54,7 +54,7 @@ def search_images(
         A picture cannot be read or searched; the message names it.
     """
 
-    def search(image: LabelledImage) -> SearchedImage:
+    def search(image: LabelledPicture) -> SearchedImage:
         picture = image.read()
         found = search_picture(image.path, picture, model)
         return _searched(image, picture.shape[1], found)
@@ -67,7 +67,7 @@ def search_images(
     return searched
 
 
-def _searched(image: LabelledImage, width: int, found: Detections) -> SearchedImage:
+def _searched(image: LabelledPicture, width: int, found: Detections) -> SearchedImage:
     best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
-    boxes = to_sides(found.boxes[best])
+    boxes = found.boxes[best].astype(np.float64)
     return SearchedImage(image, width, boxes, found.scores[best].astype(np.float64))

@@ -8,7 +8,7 @@ from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.scores import SIZE_NAMES, ImageScores, SizeScores
 from vdet.evaluate.output import ABSENT, RunName, plain_run, run_lines, share, table
 from vdet.files import printable
-from vdet.labels.pictures.labelled import LabelledImages
+from vdet.labels.pictures import LabelledPictures
 
 HEADINGS = (
     *("source", "pictures", "vehicles", "precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
@@ -56,7 +56,7 @@ def others_lines(result: ImagesResult) -> list[str]:
     return [_others_line(each) for each in result.sets if each.others]
 
 
-def _others_line(labelled: LabelledImages) -> str:
+def _others_line(labelled: LabelledPictures) -> str:
     shown = labelled.others[:_MOST_OTHERS]
     named = ", ".join(f"{printable(name)} ({count})" for name, count in shown)
     more = ", …" if len(labelled.others) > _MOST_OTHERS else ""

@@ -9,6 +9,7 @@ from vdet.config.network import NetworkTrainingSettings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.files import write_json
+from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.learn.net.export import export_network
 from vdet.learn.net.sources import CLASSES, LabelledClip, SourceReport, clip_source, image_source
 from vdet.learn.net.training import TrainingState, train_network
@@ -33,6 +34,8 @@ class NetworkJob:
         An exported network from whose weights the training starts.
     overwrite
         Replace an earlier network and its metrics.
+    roles
+        What the labels mean.
     """
 
     pictures: tuple[Path, ...]
@@ -40,6 +43,7 @@ class NetworkJob:
     output: Path
     base: Path | None = None
     overwrite: bool = False
+    roles: Roles = DEFAULT_ROLES
 
     @property
     def metrics(self) -> Path:
@@ -101,7 +105,8 @@ def train_to_file(
     if job.base:
         header = read_header(Session(job.base), job.base)
         base["base"] = header.provenance if header else {}
-    sources = [*map(image_source, job.pictures), *map(clip_source, job.clips)]
+    sources = [image_source(path, job.roles) for path in job.pictures]
+    sources += [clip_source(clip, job.roles) for clip in job.clips]
     recent: list[float] = []
 
     def note(state: TrainingState) -> None:

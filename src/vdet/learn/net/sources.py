@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array, Int64Array
-from vdet.labels.pictures.reading import read_labelled_images
-from vdet.labels.truth import read_truth
+from vdet.labels.reading import read_labelled_pictures, read_truth
+from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media import VideoReader
 from vdet.media.images import Image
 
@@ -95,7 +95,7 @@ class LabelledClip:
     every: int
 
 
-def image_source(path: Path) -> Source:
+def image_source(path: Path, roles: Roles = DEFAULT_ROLES) -> Source:
     """Read a set of labelled pictures into memory.
 
     Raises
@@ -105,14 +105,14 @@ def image_source(path: Path) -> Source:
     ImageError
         A picture cannot be read.
     """
-    labelled = read_labelled_images(path)
+    labelled = read_labelled_pictures(path, roles)
     samples = [
-        _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.images
+        _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.pictures
     ]
     return Source(Path(labelled.name).resolve().name, samples)
 
 
-def clip_source(clip: LabelledClip) -> Source:
+def clip_source(clip: LabelledClip, roles: Roles = DEFAULT_ROLES) -> Source:
     """Read frames of a labelled video into memory; all its vehicles are cars.
 
     Raises
@@ -122,7 +122,7 @@ def clip_source(clip: LabelledClip) -> Source:
     VideoError
         The video cannot be read.
     """
-    truth = read_truth(clip.truth)
+    truth = read_truth(clip.truth, roles)
     samples = []
     with VideoReader(clip.video, frames=truth.last_frame) as reader:
         for number, frame in enumerate(reader, start=1):
@@ -133,11 +133,10 @@ def clip_source(clip: LabelledClip) -> Source:
 
 
 def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray) -> Sample:
-    corners = np.concatenate([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]], axis=1)
     classes = [CLASSES.index(name) if name in CLASSES else UNKNOWN for name in names]
     is_other = np.array([name not in (*CLASSES, _VEHICLE) for name in names], np.bool_)
     return Sample(
-        image, corners.astype(np.float32), np.array(classes, np.int64), ignored | is_other
+        image, boxes.astype(np.float32), np.array(classes, np.int64), ignored | is_other
     ).shrunk()
 
 

@@ -124,8 +124,8 @@ class SinkKind:
     open
         Function that takes the path of the output and a `SinkContext`, and returns the sink.
     suffixes
-        What the name of the output may end in, lower case, such as ".csv" or ".coco.json"; empty
-        for any.
+        What the name of the output may end in, lower case, such as ".csv" or ".coco.json", or a
+        function that returns it; empty for any.
     what
         Noun for what it writes, for messages: "tracks".
     marker
@@ -146,7 +146,7 @@ class SinkKind:
     """
 
     open: Callable[[Path, SinkContext], Sink]
-    suffixes: Sequence[str] = ()
+    suffixes: Sequence[str] | Callable[[], Sequence[str]] = ()
     what: str = "outputs"
     marker: str = ""
     writes_standard_output: bool = False
@@ -155,10 +155,15 @@ class SinkKind:
     may_replace: MayReplace = any_file
     total: BatchTotal | None = None
 
+    @property
+    def endings(self) -> Sequence[str]:
+        """What the name of the output may end in; empty for any."""
+        return self.suffixes() if callable(self.suffixes) else self.suffixes
+
     def takes_name(self, name: str) -> bool:
         """Return whether an output may have this name, without its folder."""
-        ends = [len(each) for each in self.suffixes if name.lower().endswith(each)]
-        return not self.suffixes or 0 < max(ends, default=0) < len(name)
+        ends = [len(each) for each in self.endings if name.lower().endswith(each)]
+        return not self.endings or 0 < max(ends, default=0) < len(name)
 
 
 def sink_kind(name: str) -> SinkKind:
@@ -275,6 +280,6 @@ def _kind_for(output: Output) -> SinkKind:
     if _is_standard_output(output):
         return kind
     if not kind.takes_name(path.name):
-        names = ", ".join(kind.suffixes)
+        names = ", ".join(kind.endings)
         raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
     return kind

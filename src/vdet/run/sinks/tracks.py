@@ -1,6 +1,6 @@
 """The sink `tracks`: the shown boxes of each frame; the end of the name chooses the format.
 
-The formats are those of `vdet.labels.registry`. The path `-` stands for standard output, as
+The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
 `.jsonl`, frame by frame as they are done.
 
 Boxes are in pixels of the input frame, even if the frame is drawn undistorted, so they can be
@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import BinaryIO, Self
 
 from vdet.errors import OutputError
-from vdet.labels.json_lines import JsonLinesWriter
-from vdet.labels.protocol import Format, SourceVideo, TrackWriter
-from vdet.labels.registry import ENDINGS, format_for
+from vdet.labels.formats import Format, SourceVideo, TrackWriter, format_for, track_suffixes
+from vdet.labels.json_lines import JSON_LINES
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
 
@@ -34,11 +33,11 @@ class TrackSink:
 
     def __enter__(self) -> Self:
         if self._path == STANDARD_OUTPUT:
-            self._writer = JsonLinesWriter(sys.stdout.write)
+            self._writer = JSON_LINES.write(sys.stdout.buffer, None)
             return self
         form = _format_of(self._path, self._context)
         self._file = self._context.files.stage(self._path).open("wb")
-        self._writer = form.open(self._file, _source_video(self._context))
+        self._writer = form.write(self._file, _source_video(self._context))
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -50,13 +49,13 @@ class TrackSink:
                 self._writer.end()
 
     def write(self, result: FrameResult) -> None:
-        """Add the tracks of a frame, and its lane if the format has it."""
-        self._writer.write(result.frame_tracks, result.road)
+        """Add the tracks of a frame."""
+        self._writer.write(result.frame_tracks)
 
 
 def _format_of(path: Path, context: SinkContext) -> Format:
     form = format_for(path)
-    assert form is not None  # the endings of the kind say so
+    assert form is not None  # the suffixes of the kind say so
     if form.needs_video and context.video is None:
         raise OutputError(f"{path}: {form.name} is for videos; give another format for pictures")
     return form
@@ -70,4 +69,4 @@ def _source_video(context: SinkContext) -> SourceVideo | None:
     return SourceVideo(video.path.name, video.width, video.height, frames)
 
 
-TRACKS = SinkKind(TrackSink, ENDINGS, "tracks", writes_standard_output=True)
+TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True)

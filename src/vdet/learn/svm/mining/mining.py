@@ -85,7 +85,7 @@ def mine(
     with patch_archive(job.output, overwrite=job.overwrite) as archive:
         for name, source in zip(names, job.sources, strict=True):
             progress = partial(steps, source.path.name)
-            for frame in source.frames(model, settings.input, progress):
+            for frame in source.frames(model, settings, progress):
                 searched += 1
                 chosen = _choose(frame, settings)
                 _add(archive, frame, chosen, name)

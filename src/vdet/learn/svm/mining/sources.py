@@ -4,13 +4,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.boxes import Float64Array
-from vdet.config.schema import InputSettings
+from vdet.boxes import Float64Array, to_sides
+from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.windows import Windows
 from vdet.errors import ImageError, TruthError, VideoError
-from vdet.labels.pictures.reading import read_labelled_images
-from vdet.labels.truth import read_truth
+from vdet.labels.pictures import LabelledPicture
+from vdet.labels.reading import read_labelled_pictures, read_truth
+from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.mining.choosing import FrameLabels, cut_sides
 from vdet.learn.svm.mining.searching import WindowSearch, search_windows
@@ -56,7 +57,7 @@ class VideoSource:
     numbers: tuple[int, ...] = ()
 
     def frames(
-        self, model: DetectorModel | None, settings: InputSettings, progress: Progress
+        self, model: DetectorModel | None, settings: Settings, progress: Progress
     ) -> Iterator[LabelledFrame]:
         """Yield the frames to use; `progress` gets the number of frames that are read.
 
@@ -67,17 +68,18 @@ class VideoSource:
         VideoError
             The video cannot be read or searched.
         """
-        truth = read_truth(self.truth)
+        roles = Roles.from_settings(settings)
+        truth = read_truth(self.truth, roles)
         last = self._last(truth)
         number = 0
-        with VideoReader(self.path, frames=last, settings=settings) as reader:
+        with VideoReader(self.path, frames=last, settings=settings.input) as reader:
             info, advance = reader.info, progress(last)
             images, frames = peek(reader)
             search = self._search(model, info.width, info.height, images)
             for frame in frames:
                 number = frame.index + 1
                 rows = truth.frame(number)
-                labels = FrameLabels(rows.boxes[~rows.ignored], rows.boxes[rows.ignored])
+                labels = _frame_labels(rows)
                 if self._uses(number, labels.vehicles, info.width):
                     yield LabelledFrame(
                         f"frame{number:06}",
@@ -88,7 +90,7 @@ class VideoSource:
                     )
                 advance(1)
         if number < last:
-            read_truth(self.truth, frame_count=number)  # raises an error with the line
+            read_truth(self.truth, roles, frame_count=number)  # raises an error with the line
 
     def _last(self, truth: LabelledVideo) -> int:
         if self.numbers:
@@ -126,7 +128,7 @@ class PictureSource:
     def frames(
         self,
         model: DetectorModel | None,
-        settings: InputSettings,  # noqa: ARG002 - pictures have none
+        settings: Settings,
         progress: Progress,
     ) -> Iterator[LabelledFrame]:
         """Yield all pictures; `progress` gets their number.
@@ -138,7 +140,7 @@ class PictureSource:
         ImageError
             A picture cannot be read or searched.
         """
-        pictures = read_labelled_images(self.path).images
+        pictures = read_labelled_pictures(self.path, Roles.from_settings(settings)).pictures
         advance = progress(len(pictures))
         for number, labelled in enumerate(pictures):
             image = labelled.read()
@@ -147,7 +149,11 @@ class PictureSource:
                 windows = search_windows(model, width, height, [image])(image)
             except ImageError as error:
                 raise ImageError(f"{labelled.path}: {error}") from error
-            boxes, ignored = labelled.boxes, labelled.ignored
-            labels = FrameLabels(boxes[~ignored], boxes[ignored])
+            labels = _frame_labels(labelled)
             yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labels)
             advance(1)
+
+
+def _frame_labels(labelled: LabelledVideo | LabelledPicture) -> FrameLabels:
+    boxes, ignored = to_sides(labelled.boxes), labelled.ignored
+    return FrameLabels(boxes[~ignored], boxes[ignored])

@@ -24,9 +24,10 @@ from evaluate.images.writers import (
     write_yolo,
 )
 from vdet.errors import ImageError, TruthError
-from vdet.labels.pictures import labelled
-from vdet.labels.pictures.labelled import LabelledImages
-from vdet.labels.pictures.reading import read_labelled_images
+from vdet.labels import pictures as module
+from vdet.labels.label import from_size
+from vdet.labels.pictures import LabelledPictures
+from vdet.labels.reading import read_labelled_pictures
 
 FORMS = list(WRITERS)
 WIDTH, HEIGHT = 64, 32
@@ -70,19 +71,19 @@ def fresh(factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(scene=scenes)
 def test_what_is_written_is_read_back(
     tmp_path_factory: pytest.TempPathFactory, form: str, scene: Pictures
 ) -> None:
     folder = fresh(tmp_path_factory)
     WRITERS[form](folder, scene)
-    found = read_labelled_images(folder)
+    found = read_labelled_pictures(folder)
     assert found.name == str(folder)
-    assert sorted(each.path.stem for each in found.images) == sorted(scene)
-    for image in found.images:
+    assert sorted(each.path.stem for each in found.pictures) == sorted(scene)
+    for image in found.pictures:
         expected = [b for b in scene[image.path.stem].boxes if b.name != "person"]
-        written = np.array([b.box for b in expected]).reshape(-1, 4)
+        written = np.array([from_size(*b.box) for b in expected]).reshape(-1, 4)
         assert np.allclose(image.boxes, written, atol=1e-6)
         assert image.ignored.tolist() == [b.name == "ignore" for b in expected]
         vehicles = [
@@ -95,8 +96,8 @@ def test_what_is_written_is_read_back(
 @pytest.mark.parametrize("form", FORMS)
 def test_labels_of_others_are_left_out_and_named(tmp_path: Path, form: str) -> None:
     WRITERS[form](tmp_path, SCENE)
-    found = read_labelled_images(tmp_path)
-    assert [len(image.boxes) for image in found.images] == [3, 0]
+    found = read_labelled_pictures(tmp_path)
+    assert [len(image.boxes) for image in found.pictures] == [3, 0]
     ((name, times),) = found.others
     assert (name.lower() in ("person", "pedestrian"), times) == (True, 1)
 
@@ -106,7 +107,7 @@ def test_a_missing_picture_is_named(tmp_path: Path, form: str) -> None:
     WRITERS[form](tmp_path, SCENE)
     next(tmp_path.rglob("a.png")).unlink()
     with pytest.raises(TruthError, match=r"\ba\b"):
-        read_labelled_images(tmp_path)
+        read_labelled_pictures(tmp_path)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -114,7 +115,7 @@ def test_a_box_without_an_area_is_refused_with_its_place(tmp_path: Path, form: s
     flat = {"a": Labelled(WIDTH, HEIGHT, (Boxed("car", (1, 2, 20, 0)),))}
     WRITERS[form](tmp_path, flat)
     with pytest.raises(TruthError, match=r"(:\d+|annotations\.0): the box has no area"):
-        read_labelled_images(tmp_path)
+        read_labelled_pictures(tmp_path)
 
 
 @pytest.mark.parametrize("form", ["COCO", "YOLO", "VOC"])
@@ -122,7 +123,7 @@ def test_a_picture_of_another_size_than_its_labels_say_is_refused(
     tmp_path: Path, form: str
 ) -> None:
     WRITERS[form](tmp_path, SCENE)
-    image = read_labelled_images(tmp_path).images[0]
+    image = read_labelled_pictures(tmp_path).pictures[0]
     assert image.read().shape == (HEIGHT, WIDTH, 3)
     write_pictures(image.path.parent, {"a": Labelled(HEIGHT, WIDTH)})
     with pytest.raises(ImageError, match=r"a\.png: has 32×64 pixels, .* labels are for 64×32"):
@@ -133,35 +134,35 @@ def test_too_many_pictures_or_boxes_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_coco(tmp_path, SCENE)
-    for name, most in (("MAX_IMAGES", 1), ("MAX_ROWS", 3)):
+    for name, most in (("MAX_PICTURES", 1), ("MAX_LABELS", 3)):
         with monkeypatch.context() as patch:
-            patch.setattr(labelled, name, most)
+            patch.setattr(module, name, most)
             with pytest.raises(TruthError, match="cut it into parts"):
-                read_labelled_images(tmp_path)
-    monkeypatch.setattr(labelled, "MAX_IN_FRAME", 2)
+                read_labelled_pictures(tmp_path)
+    monkeypatch.setattr(module, "MAX_IN_FRAME", 2)
     with pytest.raises(TruthError, match=r"annotations\.2: the picture has more than 2 boxes"):
-        read_labelled_images(tmp_path)
+        read_labelled_pictures(tmp_path)
 
 
 class TestWhichForm:
     def test_a_coco_file_may_be_given_itself(self, tmp_path: Path) -> None:
         path = write_coco(tmp_path, SCENE)
-        assert len(read_labelled_images(path).images) == 2
+        assert len(read_labelled_pictures(path).pictures) == 2
 
     def test_nothing_known_says_what_was_looked_for(self, tmp_path: Path) -> None:
         with pytest.raises(TruthError, match=r"looked for one \.json file \(COCO\), image_2 and"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
     @pytest.mark.parametrize("name", ["none", "labels.txt"])
     def test_neither_a_folder_nor_json(self, tmp_path: Path, name: str) -> None:
         with pytest.raises(TruthError, match=r"is no folder and no \.json file"):
-            read_labelled_images(tmp_path / name)
+            read_labelled_pictures(tmp_path / name)
 
     def test_of_several_json_files_one_must_be_given(self, tmp_path: Path) -> None:
         path = write_coco(tmp_path, SCENE)
         shutil.copy(path, tmp_path / "other.json")
         with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); give the one"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
     @pytest.mark.parametrize("form", ["KITTI", "VOC"])
     def test_without_a_label_file_there_is_nothing(self, tmp_path: Path, form: str) -> None:
@@ -169,7 +170,7 @@ class TestWhichForm:
         for path in [*tmp_path.rglob("*.txt"), *tmp_path.rglob("*.xml")]:
             path.unlink()
         with pytest.raises(TruthError, match="has no labelled picture"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
 
 class TestCoco:
@@ -189,21 +190,23 @@ class TestCoco:
         path = tmp_path / "set" / place
         path.parent.mkdir(exist_ok=True)
         written.rename(path)
-        assert [each.path.parent.name for each in read_labelled_images(path).images] == ["val"] * 2
-        assert len(read_labelled_images(tmp_path / "set").images) == 2
+        assert [each.path.parent.name for each in read_labelled_pictures(path).pictures] == [
+            "val"
+        ] * 2
+        assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
 
     def test_pictures_of_another_set_are_not_taken(self, tmp_path: Path) -> None:
         path = write_coco(tmp_path / "one", SCENE)
         write_coco(tmp_path / "two", SCENE)
         (path.parent / "a.png").unlink()
         with pytest.raises(TruthError, match=r"first picture, a\.png, is missing"):
-            read_labelled_images(tmp_path / "one")
+            read_labelled_pictures(tmp_path / "one")
 
     def test_two_folders_with_the_first_picture_are_refused(self, tmp_path: Path) -> None:
         path = write_coco(tmp_path / "train", SCENE).rename(tmp_path / "labels.json")
         write_pictures(tmp_path / "val", SCENE)
         with pytest.raises(TruthError, match=r"first picture, a\.png, lies in .*train and .*val"):
-            read_labelled_images(path)
+            read_labelled_pictures(path)
 
     @pytest.mark.parametrize(
         ("key", "index", "values", "words"),
@@ -230,7 +233,7 @@ class TestCoco:
     ) -> None:
         path = self.edited(tmp_path, key, index, **values)
         with pytest.raises(TruthError) as caught:
-            read_labelled_images(path)
+            read_labelled_pictures(path)
         assert words in str(caught.value)
         assert str(caught.value).isprintable()
 
@@ -242,7 +245,7 @@ class TestCoco:
         for each in document["annotations"]:
             del each["iscrowd"]
         path.write_text(json.dumps(document), encoding="utf-8")
-        image = read_labelled_images(path).images[0]
+        image = read_labelled_pictures(path).pictures[0]
         assert image.size is None
         assert not image.ignored.any()
 
@@ -250,7 +253,7 @@ class TestCoco:
     def test_other_json_is_refused(self, tmp_path: Path, text: str) -> None:
         (tmp_path / "x.json").write_text(text, encoding="utf-8")
         with pytest.raises(TruthError, match=r"x\.json: is not COCO: "):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
 
 class TestKitti:
@@ -259,10 +262,10 @@ class TestKitti:
         kinds = ("Car", "Van", "Truck", "Tram", "Misc", "DontCare", "Person_sitting", "Cyclist")
         rest = "0 0 0 1 2 11 22 1 1 4 2 1 20 -1.6\n"
         path.write_text("".join(f"{kind} {rest}" for kind in kinds), encoding="utf-8")
-        image = read_labelled_images(tmp_path).images[0]
+        image = read_labelled_pictures(tmp_path).pictures[0]
         assert image.classes == ("car", "car", "truck", "vehicle", "vehicle", "vehicle")
         assert image.ignored.tolist() == [False, False, False, True, True, True]
-        assert image.boxes[0].tolist() == [1, 2, 10, 20]
+        assert image.boxes[0].tolist() == [1, 2, 11, 22]
 
     @pytest.mark.parametrize(
         ("line", "words"),
@@ -278,21 +281,21 @@ class TestKitti:
         path = write_kitti(tmp_path, SCENE)
         path.write_text(f"\n\n{line}\n", encoding="utf-8")
         with pytest.raises(TruthError, match=rf"a\.txt:3: {words}"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
     def test_a_picture_without_a_label_file_does_not_belong_to_the_set(
         self, tmp_path: Path
     ) -> None:
         write_kitti(tmp_path, SCENE)
         write_pictures(tmp_path / "image_2", {"c": Labelled(WIDTH, HEIGHT)})
-        assert len(read_labelled_images(tmp_path).images) == 2
+        assert len(read_labelled_pictures(tmp_path).pictures) == 2
 
     def test_two_pictures_of_one_name_are_refused(self, tmp_path: Path) -> None:
         write_kitti(tmp_path, SCENE)
         shutil.copy(tmp_path / "image_2" / "a.png", tmp_path / "image_2" / "a.PNG.jpg")
         shutil.copy(tmp_path / "image_2" / "a.png", tmp_path / "image_2" / "a.jpg")
-        with pytest.raises(TruthError, match=r"a\.txt: there is two pictures a in"):
-            read_labelled_images(tmp_path)
+        with pytest.raises(TruthError, match=r"a\.txt: there are two pictures a in"):
+            read_labelled_pictures(tmp_path)
 
 
 class TestYolo:
@@ -301,7 +304,7 @@ class TestYolo:
         (tmp_path / "train" / "data.yaml").unlink()
         names = "".join(f"  {number}: {name}\n" for number, name in enumerate(NAMES))
         (tmp_path / "data.yaml").write_text(f"names:\n{names}", encoding="utf-8")
-        image = read_labelled_images(tmp_path / "train").images[0]
+        image = read_labelled_pictures(tmp_path / "train").pictures[0]
         assert image.classes == ("car", "truck", "vehicle")
 
     def test_folders_below_are_searched(self, tmp_path: Path) -> None:
@@ -310,7 +313,7 @@ class TestYolo:
             (tmp_path / name).rename(tmp_path / "val")
             (tmp_path / name).mkdir()
             (tmp_path / "val").rename(tmp_path / name / "val")
-        assert [len(each.boxes) for each in read_labelled_images(tmp_path).images] == [3, 0]
+        assert [len(each.boxes) for each in read_labelled_pictures(tmp_path).pictures] == [3, 0]
 
     @pytest.mark.parametrize(
         ("line", "words"),
@@ -330,7 +333,7 @@ class TestYolo:
         path = write_yolo(tmp_path, SCENE)
         path.write_text(f"0 0.5 0.5 0.1 0.1\n{line}\n", encoding="utf-8")
         with pytest.raises(TruthError, match=rf"a\.txt:2: {words}"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
     @pytest.mark.parametrize(
         ("text", "words"),
@@ -351,21 +354,21 @@ class TestYolo:
         if text is not None:
             (folder / "data.yaml").write_text(text, encoding="utf-8")
         with pytest.raises(TruthError, match=words):
-            read_labelled_images(folder)
+            read_labelled_pictures(folder)
 
     def test_labels_without_a_picture_are_refused(self, tmp_path: Path) -> None:
         path = write_yolo(tmp_path, SCENE)
         (path.parent / "classes.txt").write_text("car\n", encoding="utf-8")
-        assert len(read_labelled_images(tmp_path).images) == 2
+        assert len(read_labelled_pictures(tmp_path).pictures) == 2
         path.rename(path.with_name("c.txt"))
         with pytest.raises(TruthError, match=r"c\.txt: has no picture of its name below"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
     def test_a_labelled_picture_must_be_one(self, tmp_path: Path) -> None:
         write_yolo(tmp_path, SCENE)
         (tmp_path / "images" / "a.png").write_bytes(b"no picture")
         with pytest.raises(TruthError, match=r"a\.png: is not a picture"):
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
 
 
 class TestVoc:
@@ -376,7 +379,7 @@ class TestVoc:
         path.write_text(
             f"<annotation><object><name>car</name>{self.BOX}</object></annotation>", "utf-8"
         )
-        image = read_labelled_images(tmp_path).images[0]
+        image = read_labelled_pictures(tmp_path).pictures[0]
         assert image.boxes.tolist() == [[0, 0, 9, 9]]
         assert image.size is None
 
@@ -385,13 +388,13 @@ class TestVoc:
         part = f"<part><name>wheel</name>{self.BOX.replace('9', '5')}</part>"
         text = f"<object><name>bus</name>{part}{self.BOX}{part}</object>"
         path.write_text(f"<annotation>{text}</annotation>", encoding="utf-8")
-        image = read_labelled_images(tmp_path).images[0]
+        image = read_labelled_pictures(tmp_path).pictures[0]
         assert (image.classes, image.boxes.tolist()) == (("bus",), [[0, 0, 9, 9]])
 
     @pytest.mark.parametrize(
         ("text", "words"),
         [
-            ("<annotations/>", "1: <annotations> where Pascal VOC has <annotation>"),
+            ("<annotations/>", "1: <annotations> where the format has <annotation>"),
             ("<annotation>", "1: broken XML: no element found"),
             (
                 '<!DOCTYPE a [<!ENTITY b "x">]>\n<annotation>&b;</annotation>',
@@ -414,7 +417,6 @@ class TestVoc:
                 "1: 'x' is not a number",
             ),
             ("<annotation><size><width>3</width></size></annotation>", "without its <height>"),
-            (f"<annotation>{'x' * 2000}</annotation>", "more than 1000 characters"),
             ("<annotation>" + "<a>" * 100, "more than 32 nested elements"),
         ],
     )
@@ -424,7 +426,7 @@ class TestVoc:
         path = write_voc(tmp_path, SCENE)
         path.write_text(text, encoding="utf-8")
         with pytest.raises(TruthError) as caught:
-            read_labelled_images(tmp_path)
+            read_labelled_pictures(tmp_path)
         assert f"a.xml:{words}" in str(caught.value) or words in str(caught.value)
         assert str(caught.value).isprintable()
 
@@ -432,10 +434,10 @@ class TestVoc:
 def read_or_refuse(folder: Path) -> None:
     """Fail on any other exception, and on a message that is not one printable line."""
     try:
-        result: LabelledImages | str = read_labelled_images(folder)
+        result: LabelledPictures | str = read_labelled_pictures(folder)
     except TruthError as error:
         result = str(error)
-    assert isinstance(result, LabelledImages) or result.isprintable()
+    assert isinstance(result, LabelledPictures) or result.isprintable()
 
 
 @pytest.fixture(scope="module")
@@ -446,7 +448,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, b
 
 
 @pytest.mark.parametrize("form", FORMS)
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(content=st.binary(max_size=200))
 def test_any_bytes_are_labels_or_a_truth_error(
     written: dict[str, tuple[Path, bytes]], form: str, content: bytes
@@ -457,7 +459,7 @@ def test_any_bytes_are_labels_or_a_truth_error(
 
 
 @pytest.mark.parametrize("form", FORMS)
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(data=st.data())
 def test_damaged_labels_are_labels_or_a_truth_error(
     written: dict[str, tuple[Path, bytes]], form: str, data: st.DataObject

@@ -1,0 +1,198 @@
+"""What a format of labels is, and which one a file has.
+
+Formats of tracks are registered in the group `vdet.formats`, those of labelled pictures in
+`vdet.picture_formats`: see `vdet.plugins`.
+"""
+
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Protocol
+
+from vdet.archives import ArchiveError, list_members
+from vdet.errors import TruthError
+from vdet.labels.parsing import numbered_lines, text_of
+from vdet.labels.pictures import LabelledPicture
+from vdet.labels.video import SavedTracks
+from vdet.plugins import FORMATS, PICTURE_FORMATS, load_plugin, plugin_names
+from vdet.track.track import FrameTracks
+
+UNKNOWN = "vehicle"
+"""What a vehicle without a class is called where a format needs a name."""
+
+
+@dataclass(frozen=True, slots=True)
+class SourceVideo:
+    """What a file of tracks says about its video.
+
+    Attributes
+    ----------
+    name
+        Of the file, without its folder.
+    width, height
+        Of the upright frames, pixels.
+    frames
+        Number of frames of the video, if only a part of it is read and the number is known.
+    """
+
+    name: str
+    width: int
+    height: int
+    frames: int | None = None
+
+
+class TrackWriter(Protocol):
+    """Writes the tracks of a video into a binary file that another opens and closes."""
+
+    def write(self, frame: FrameTracks) -> None:
+        """Add a frame."""
+
+    def end(self) -> None:
+        """Write what is left. It is not called after an error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format of tracks.
+
+    Attributes
+    ----------
+    name
+        For messages.
+    suffix
+        How the names of its files end, lower case, beginning with a dot.
+    read
+        Function that takes the path of a file, for messages, and its content. It raises
+        `TruthError` with the place of the first mistake; the labels that it returns are not
+        checked otherwise.
+    write
+        Function that takes a binary file and the video and returns the writer. There is no video
+        if the tracks are of still pictures.
+    needs_video
+        Whether it cannot be written without a video.
+    """
+
+    name: str
+    suffix: str
+    read: Callable[[Path, bytes], SavedTracks]
+    write: Callable[[BinaryIO, SourceVideo | None], TrackWriter]
+    needs_video: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PictureFormat:
+    """A form of labelled pictures: a folder with pictures, and a folder with a file for each.
+
+    Attributes
+    ----------
+    name
+        For messages.
+    folders
+        The names of both folders.
+    read
+        Function that takes the folder of the set and returns the pictures with all their labels.
+        It raises `TruthError` with the place of the first mistake.
+    """
+
+    name: str
+    folders: tuple[str, str]
+    read: Callable[[Path], Iterable[LabelledPicture]]
+
+    def is_in(self, folder: Path) -> bool:
+        """Tell whether a folder holds such a set."""
+        return all((folder / name).is_dir() for name in self.folders)
+
+
+class LineWriter:
+    """Writes lines of text for each frame.
+
+    Parameters
+    ----------
+    lines
+        Function that returns the lines of a frame, each with its end.
+    heading
+        The first line of the file, if there is one.
+    """
+
+    def __init__(
+        self, file: BinaryIO, lines: Callable[[FrameTracks], Iterable[str]], heading: str = ""
+    ) -> None:
+        self._file = file
+        self._lines = lines
+        self._file.write(heading.encode())
+
+    def write(self, frame: FrameTracks) -> None:
+        """Add the lines of a frame."""
+        for line in self._lines(frame):
+            self._file.write(line.encode())
+
+    def end(self) -> None:
+        """Do nothing: all lines are written."""
+
+
+def track_formats() -> list[Format]:
+    """Return all formats of tracks, those of vdet first. Raises `ConfigError` as `load_plugin`."""
+    return [load_plugin(FORMATS, name) for name in plugin_names(FORMATS)]
+
+
+def picture_formats() -> list[PictureFormat]:
+    """Return all forms of labelled pictures that lie in folders."""
+    return [load_plugin(PICTURE_FORMATS, name) for name in plugin_names(PICTURE_FORMATS)]
+
+
+def track_suffixes() -> Sequence[str]:
+    """Return how the names of files of tracks may end."""
+    return [each.suffix for each in track_formats()]
+
+
+def format_for(path: Path) -> Format | None:
+    """Return the format that the name of a file ends in; None if it is none of them."""
+    name = path.name.lower()
+    fitting = [each for each in track_formats() if name.endswith(each.suffix)]
+    return max(fitting, key=lambda each: len(each.suffix), default=None)
+
+
+_UNCLEAR = (".txt", ".csv")
+"""Suffixes that files of several formats have: the first line decides."""
+
+
+def recognise(path: Path, data: bytes) -> Format:
+    """Return the format of a file, by its name, or by its content where the name leaves it open.
+
+    Raises
+    ------
+    TruthError
+        The file is empty, and its name does not end as that of a format.
+    """
+    by_name = format_for(path)
+    if by_name and by_name.suffix not in _UNCLEAR:
+        return by_name
+    content = _content(path, data)
+    if content:
+        form: Format = load_plugin(FORMATS, content)
+        return form
+    if by_name is None:
+        suffixes = ", ".join(track_suffixes())
+        raise TruthError(f"{path}: is empty; give tracks or truth, as in {suffixes}")
+    return by_name
+
+
+def _content(path: Path, data: bytes) -> str | None:
+    """Return the name under which the format of a file is registered; None if it is empty."""
+    if data.startswith(b"PK"):
+        try:
+            return "cvat" if "annotations.xml" in list_members(io.BytesIO(data)) else "yolo"
+        except ArchiveError as error:
+            raise TruthError(f"{path}: {error}") from error
+    _, first = next(numbered_lines(text_of(path, data)), (0, ""))
+    match first[:1]:
+        case "":
+            return None
+        case "<":
+            return "cvat"
+        case "{":
+            return "coco"
+        case start if "," in first:
+            return "mot" if start in "0123456789+-." else "csv"
+    return "kitti"

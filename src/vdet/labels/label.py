@@ -1,0 +1,131 @@
+"""A labelled box as it stands in a file, and the checks that hold for every format."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from vdet.boxes import Box
+from vdet.errors import TruthError
+
+MAX_LABELS = 500_000
+"""Most boxes in one file: five hours of video with one vehicle in sight."""
+
+MAX_IN_FRAME = 1000
+"""Most boxes of either kind, true or predicted, in one frame."""
+
+NO_ID = -1
+"""Id of a box without an id; in video, only ignore regions may have it."""
+
+_MAX_NAME = 100  # characters
+
+Corners = tuple[float, float, float, float]
+"""x1, y1, x2, y2 in pixels from 0; the far sides are exclusive."""
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """A box as it stands in a file.
+
+    Attributes
+    ----------
+    place
+        Its line in the file, or other words for its place, such as "annotations.3".
+    box
+        x1, y1, x2, y2 in pixels of the frame from 0; the far sides are exclusive.
+    name
+        What the file calls it; None where the file has no names.
+    frame
+        Number of the frame, from 1; 1 in a picture.
+    score
+        Confidence, higher is better; 1 where the file has none.
+    ignored
+        Whether it is an ignore region, and not a vehicle.
+    predicted, foot, distance, lane
+        As in `vdet.track.track.Track`; None where the file does not say.
+    """
+
+    place: int | str
+    box: Corners
+    name: str | None = None
+    frame: int = 1
+    id: int = NO_ID
+    score: float = 1.0
+    ignored: bool = False
+    predicted: bool = False
+    foot: tuple[float, float] | None = None
+    distance: float | None = None
+    lane: int | None = None
+
+
+def from_size(x: float, y: float, width: float, height: float) -> Corners:
+    """Return the corners of a box that is given by its near corner and its size."""
+    return x, y, x + width, y + height
+
+
+def whole_pixels(box: Box) -> tuple[int, int, int, int]:
+    """Return x, y, width and height of a box, rounded to whole pixels; a side is at least 1."""
+    x, y = round(box.x), round(box.y)
+    return x, y, max(1, round(box.right) - x), max(1, round(box.bottom) - y)
+
+
+def line_error(path: Path | str, place: int | str, what: str) -> TruthError:
+    """Return the error that says what is wrong in a line, or another place, of a file."""
+    return TruthError(f"{path}:{place}: {what}")
+
+
+def limited(path: Path, labels: Iterable[Label]) -> Iterator[Label]:
+    """Yield the labels of a file. Raises `TruthError` if there are more than `MAX_LABELS`."""
+    for count, label in enumerate(labels):
+        if count == MAX_LABELS:
+            what = f"has more than {MAX_LABELS:,} boxes; cut it into parts"
+            raise line_error(path, label.place, what)
+        yield label
+
+
+def checked_labels(
+    path: Path, labels: Iterable[Label], *, frame_count: int | None = None
+) -> tuple[Label, ...]:
+    """Return the labels of the file `path` if they can all be boxes of one video.
+
+    Raises
+    ------
+    TruthError
+        A frame before the first or beyond `frame_count`, a negative id of a vehicle, an id twice
+        in a frame, a box without area, or a name of more than 100 characters.
+    """
+    checked: list[Label] = []
+    places: dict[tuple[int, int], int | str] = {}
+    for label in labels:
+        mistake = _mistake_in_video(label, frame_count) or mistake_in_box(label)
+        key = label.frame, label.id
+        if mistake is None and key in places and label.id != NO_ID:
+            place = places[key]
+            named = f"line {place}" if isinstance(place, int) else place
+            mistake = f"id {label.id} is in the same frame already ({named})"
+        if mistake is not None:
+            raise line_error(path, label.place, mistake)
+        places[key] = label.place
+        checked.append(label)
+    return tuple(checked)
+
+
+def _mistake_in_video(label: Label, frame_count: int | None) -> str | None:
+    if label.frame < 1:
+        return "the frame comes before the video's first"
+    if frame_count is not None and label.frame > frame_count:
+        return (
+            f"the frame is number {label.frame} of a video of {frame_count}; is it another video's?"
+        )
+    if label.id < (NO_ID if label.ignored else 0):
+        return f"id {label.id} is negative; number the vehicles from 0 or 1"
+    return None
+
+
+def mistake_in_box(label: Label) -> str | None:
+    """Say why a label cannot be a box with a name; None if it can."""
+    width, height = label.box[2] - label.box[0], label.box[3] - label.box[1]
+    if width <= 0 or height <= 0 or width * height <= 0:
+        return f"the box has no area: {width:g} wide, {height:g} high"
+    if len(label.name or "") > _MAX_NAME:
+        return f"the label has more than {_MAX_NAME} characters; give a shorter one"
+    return None

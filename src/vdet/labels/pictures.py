@@ -1,0 +1,161 @@
+"""Labelled pictures: the values, and the checks that hold for every form of them."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from vdet.boxes import BoolArray, Float64Array
+from vdet.detect.classes import our_name
+from vdet.errors import ImageError, TruthError
+from vdet.files import printable
+from vdet.labels.label import MAX_IN_FRAME, MAX_LABELS, Label, line_error, mistake_in_box
+from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.media.images import Image, is_picture_name, read_image
+
+MAX_PICTURES = 100_000
+"""Most pictures in one set."""
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledPicture:
+    """A picture with its labels.
+
+    Attributes
+    ----------
+    path, file
+        The file of the picture, and that of the labels.
+    labels
+        From a reader, as they stand in the file. In `LabelledPictures` only vehicles and ignore
+        regions, each with an area; `name` is one of `OUR_NAMES`.
+    size
+        Width and height of the picture in pixels; None if the labels do not say.
+    """
+
+    path: Path
+    file: Path
+    labels: tuple[Label, ...] = ()
+    size: tuple[int, int] | None = None
+
+    @property
+    def boxes(self) -> Float64Array:
+        """float64 `(n, 4)`: x1, y1, x2, y2 of each label, pixels from 0."""
+        return np.array([label.box for label in self.labels], np.float64).reshape(-1, 4)
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The name of each label."""
+        return tuple(label.name or "" for label in self.labels)
+
+    @property
+    def ignored(self) -> BoolArray:
+        """Bool `(n,)`: whether each label is an ignore region, not a vehicle to be found."""
+        return np.array([label.ignored for label in self.labels], np.bool_)
+
+    def read(self) -> Image:
+        """Read the picture, BGR uint8 `(H, W, 3)`.
+
+        Raises
+        ------
+        ImageError
+            It cannot be read, or has not the size that its labels were made for.
+        """
+        image = read_image(self.path)
+        height, width = image.shape[:2]
+        if self.size not in (None, (width, height)):
+            raise ImageError(
+                f"{self.path}: has {width}×{height} pixels, and its labels are for "
+                f"{self.size[0]}×{self.size[1]}; take the picture that was labelled"
+            )
+        return image
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledPictures:
+    """Labelled pictures of one source.
+
+    `name` stands in tables. `others` are the labels that are neither vehicles nor ignore regions,
+    each with the number of its boxes, the most frequent first; these boxes are left out.
+    """
+
+    name: str
+    pictures: tuple[LabelledPicture, ...]
+    others: tuple[tuple[str, int], ...] = ()
+
+
+def checked_pictures(
+    name: str, pictures: Iterable[LabelledPicture], roles: Roles = DEFAULT_ROLES
+) -> LabelledPictures:
+    """Check the labels of a set, and leave out what is no vehicle.
+
+    Raises
+    ------
+    TruthError
+        There is no picture, a picture is missing or comes twice, a box has no area, or there are
+        more than `MAX_PICTURES`, `MAX_LABELS` in all or `MAX_IN_FRAME` in one picture.
+    """
+    checked: dict[Path, LabelledPicture] = {}
+    others: Counter[str] = Counter()
+    boxes = 0
+    for picture in pictures:
+        boxes += len(picture.labels)
+        if len(checked) == MAX_PICTURES or boxes > MAX_LABELS:
+            raise TruthError(
+                f"{name}: has more than {MAX_PICTURES:,} pictures or {MAX_LABELS:,} boxes; cut it "
+                "into parts"
+            )
+        if picture.path in checked:
+            raise TruthError(f"{name}: has the picture {printable(picture.path.name)} twice")
+        checked[picture.path] = replace(picture, labels=tuple(_with_roles(picture, roles, others)))
+    if not checked:
+        raise TruthError(f"{name}: has no labelled picture")
+    return LabelledPictures(name, tuple(checked.values()), tuple(others.most_common()))
+
+
+def _with_roles(picture: LabelledPicture, roles: Roles, others: Counter[str]) -> Iterator[Label]:
+    """Yield the vehicles and ignore regions of a picture, and count the other labels."""
+    if not picture.path.is_file():
+        raise TruthError(f"{picture.path}: is missing; its labels are there")
+    count = 0
+    for label in picture.labels:
+        name = label.name or ""
+        role = roles.role_of(name)
+        if role not in ("vehicle", "ignored"):
+            others[name] += 1
+            continue
+        mistake = mistake_in_box(label)
+        if count == MAX_IN_FRAME:
+            mistake = f"the picture has more than {MAX_IN_FRAME:,} boxes"
+        if mistake:
+            raise line_error(picture.file, label.place, mistake)
+        count += 1
+        ignored = label.ignored or role == "ignored"
+        yield replace(label, name=our_name(name) or "vehicle", ignored=ignored)
+
+
+def pictures_below(folder: Path) -> list[Path]:
+    """Return the pictures in a folder and in those below it, in order, without hidden files."""
+    return sorted(filter(is_picture_name, folder.rglob("*")))
+
+
+def labelled_pairs(labels: Path, suffix: str, pictures: Path) -> Iterator[tuple[Path, Path]]:
+    """Yield each label file in a folder with the picture of its name.
+
+    Raises
+    ------
+    TruthError
+        A label file has no picture, or two.
+    """
+    by_name: dict[str, list[Path]] = {}
+    for picture in pictures_below(pictures):
+        by_name.setdefault(picture.stem, []).append(picture)
+    for file in sorted(labels.glob(f"*{suffix}")):
+        if file.name.startswith("."):
+            continue
+        found = by_name.get(file.stem, [])
+        if len(found) != 1:
+            what = "are two pictures" if found else "is no picture"
+            raise TruthError(f"{file}: there {what} {printable(file.stem)} in {pictures}")
+        yield file, found[0]

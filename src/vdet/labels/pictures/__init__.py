@@ -1,1 +1,0 @@
-"""Labelled pictures: one module a format, and the checks that all share."""

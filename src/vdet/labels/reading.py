@@ -1,0 +1,144 @@
+"""Files of labels, of any format: tracks, predictions, truth, and labelled pictures."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from vdet.errors import TruthError
+from vdet.labels.coco import read_coco_pictures
+from vdet.labels.formats import picture_formats, recognise, track_formats
+from vdet.labels.label import Label, checked_labels, line_error
+from vdet.labels.mot import MOT, flagged
+from vdet.labels.parsing import read_bytes
+from vdet.labels.pictures import LabelledPicture, LabelledPictures, checked_pictures
+from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
+from vdet.labels.video import LabelledVideo, SavedTracks
+
+
+def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
+    """Read the tracks of a video from a file of any format; ignore regions are left out.
+
+    Parameters
+    ----------
+    rate
+        Frames per second, for formats without times; None: their frames have no times.
+
+    Raises
+    ------
+    TruthError
+        The file cannot be read, or has a mistake; the message names its place.
+    """
+    data = read_bytes(path)
+    saved = recognise(path, data).read(path, data)
+    vehicles = (each for each in saved.labels if not (each.ignored or is_region(each.name)))
+    saved = replace(saved, labels=checked_labels(path, vehicles))
+    return saved if rate is None else saved.at_rate(rate)
+
+
+def read_predictions(path: Path) -> LabelledVideo:
+    """Read the tracks of a video as predictions, from any format.
+
+    Tracks without a score have score 1. Two different times give the frame rate, and the last frame
+    that is listed gives the number of frames. An empty `.txt` means that nothing was found.
+
+    Raises
+    ------
+    TruthError
+        As `read_tracks`.
+    """
+    saved = read_tracks(path)
+    return LabelledVideo.of(saved.labels, frame_count=saved.frame_count, rate=saved.rate)
+
+
+def read_truth(
+    path: Path, roles: Roles = DEFAULT_ROLES, *, frame_count: int | None = None
+) -> LabelledVideo:
+    """Read the truth of a video from any format of tracks.
+
+    Boxes without a label are vehicles. In MOTChallenge flag 0 marks an ignore region, also in the
+    older form with ten columns.
+
+    Parameters
+    ----------
+    roles
+        Which labels are vehicles, which are ignore regions, and which are left out.
+    frame_count
+        Number of frames of the video if known; boxes in later frames are refused.
+
+    Raises
+    ------
+    TruthError
+        The file cannot be read, is empty, or has a mistake; the message names its place.
+    """
+    data = read_bytes(path)
+    if not data.strip():
+        names = ", ".join(each.name for each in track_formats())
+        raise TruthError(f"{path}: is empty; give {names}")
+    form = recognise(path, data)
+    labels: Iterable[Label] = form.read(path, data).labels
+    if form is MOT:
+        labels = (flagged(path, label) for label in labels)
+    checked = checked_labels(path, _with_roles(path, labels, roles), frame_count=frame_count)
+    return LabelledVideo.of(checked, frame_count=frame_count)
+
+
+def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
+    """Yield vehicles and ignore regions."""
+    for label in labels:
+        try:
+            role = "vehicle" if label.name is None else roles.known_role_of(label.name)
+        except ValueError as error:
+            raise line_error(path, label.place, str(error)) from error
+        if role != "other":
+            yield replace(label, score=1.0, ignored=label.ignored or role == "ignored")
+
+
+def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledPictures:
+    """Read labelled pictures of any form.
+
+    Parameters
+    ----------
+    path
+        A COCO file, or a folder; what lies in it tells the form.
+    roles
+        Which labels are vehicles, and which are ignore regions; the others are left out.
+
+    Raises
+    ------
+    TruthError
+        There is no labelled set, or it has a mistake; the message names the place of the first.
+    """
+    return checked_pictures(str(path), _pictures(path), roles)
+
+
+def holds_labelled_pictures(path: Path) -> bool:
+    """Tell whether a path looks like labelled pictures, and not like a folder of patches."""
+    if not path.is_dir():
+        return path.suffix.lower() == ".json"
+    return any(form.is_in(path) for form in picture_formats()) or bool(_coco_files(path))
+
+
+def _coco_files(folder: Path) -> list[Path]:
+    return sorted([*folder.glob("*.json"), *folder.glob("annotations/*.json")])
+
+
+def _pictures(path: Path) -> Iterable[LabelledPicture]:
+    if not path.is_dir():
+        if path.suffix.lower() != ".json":
+            raise TruthError(f"{path}: is no folder and no .json file; give labelled pictures")
+        return read_coco_pictures(path)
+    forms = picture_formats()
+    for form in forms:
+        if form.is_in(path):
+            return form.read(path)
+    files = _coco_files(path)
+    if len(files) == 1:
+        return read_coco_pictures(files[0])
+    if files:
+        names = ", ".join(str(file.relative_to(path)) for file in files[:5])
+        raise TruthError(f"{path}: holds several .json files ({names}); give the one with labels")
+    looked_for = (f"{' and '.join(form.folders)} ({form.name})" for form in forms)
+    raise TruthError(
+        f"{path}: holds no labelled pictures; looked for one .json file (COCO), "
+        + ", ".join(looked_for)
+    )
