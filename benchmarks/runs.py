@@ -62,7 +62,7 @@ def run_times(path: Path, folder: Path, rounds: int) -> dict[str, float]:
     """
     out = folder / "out.mp4"
     video = (Output("video", out),)
-    files = Output("counts", folder / "counts.csv"), Output("summary", folder / "cars.csv")
+    files = Output("counts", folder / "counts.csv"), Output("vehicles", folder / "cars.csv")
     default, svm = Settings(), Settings(detector=SvmSettings())
     answering = default.model_copy(update=ANSWERS)
     model, linear = load_detector(default.detector), load_detector(svm.detector)

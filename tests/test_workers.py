@@ -9,6 +9,7 @@ from contextlib import closing
 from functools import partial
 from pathlib import Path
 
+import cv2
 import pytest
 
 from running import until
@@ -67,6 +68,14 @@ def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
     results = list(LocalProcesses(1).map(process_of, range(4)))
     assert [number for number, _ in results] == [0, 1, 2, 3]
     assert os.getpid() not in {process for _, process in results}
+
+
+def test_a_process_calls_opencv_with_one_thread() -> None:
+    assert dict(LocalProcesses(1).map(_threads_of_opencv, [0])) == {0: 1}
+
+
+def _threads_of_opencv(_: int) -> int:
+    return cv2.getNumThreads()
 
 
 def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from vdet.run.sinks.tracks import TrackSink
 from vdet.run.sinks.video import VideoSink
 
 FRAMES = 15
-KNOWN = "known are video, tracks, stages, picture, json, summary, crops, page, counts"
+KNOWN = "known are video, tracks, stages, picture, json, vehicles, crops, page, counts"
 
 
 @pytest.fixture

@@ -65,10 +65,10 @@ def test_a_file_that_shrinks_is_read_as_far_as_it_goes_with_a_warning(
 ) -> None:
     half = job.source.stat().st_size // 2
     shrink = after(5, lambda: os.truncate(job.source, half))
-    summary = run_video(job, red_model(), SETTINGS, progress=shrink)
-    assert COUNT // 4 < summary.frames < COUNT * 3 // 4
-    assert frames_of(job.outputs[0].path) == summary.frames
-    assert f"ends early: {summary.frames} of {COUNT} frames could be read" in caplog.text
+    totals = run_video(job, red_model(), SETTINGS, progress=shrink)
+    assert COUNT // 4 < totals.frames < COUNT * 3 // 4
+    assert frames_of(job.outputs[0].path) == totals.frames
+    assert f"ends early: {totals.frames} of {COUNT} frames could be read" in caplog.text
 
 
 class Pipe:

@@ -243,8 +243,8 @@ class TestFidelity:
     ) -> None:
         source = _remuxed(red_clip, tmp_path / "in.mp4", rotation=rotation)
         job = VideoJob(source, outputs(video=tmp_path / "out.mp4"), frames=5)
-        summary = run_red(job, with_search(SETTINGS, probability=1.0))
-        assert summary.frames == 5
+        totals = run_red(job, with_search(SETTINGS, probability=1.0))
+        assert totals.frames == 5
         with VideoReader(tmp_path / "out.mp4") as reader:
             assert reader.info.orientation == Orientation()
             written = [frame.image for frame in reader]

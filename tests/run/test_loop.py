@@ -236,12 +236,12 @@ class TestRun:
         run_video(job, red_model(), SETTINGS, threads=2)
         assert pools == [3, 2]
 
-    def test_the_summary_counts_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:
+    def test_the_totals_count_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:
         job = VideoJob(red_clip, outputs(video=tmp_path / "out.mp4"), frames=20)
-        summary = run_red(job)
-        assert (summary.frames, summary.tracks) == (20, 1)
-        assert (summary.width, summary.height) == (WIDTH, HEIGHT)
-        assert summary.seconds > 0
+        totals = run_red(job)
+        assert (totals.frames, totals.tracks) == (20, 1)
+        assert (totals.width, totals.height) == (WIDTH, HEIGHT)
+        assert totals.seconds > 0
 
     def test_progress_gets_every_frame(self, red_clip: Path) -> None:
         calls: list[int | None] = []
@@ -262,8 +262,8 @@ class TestRun:
         whole = outputs(stages=tmp_path / "whole", tracks=tmp_path / "t.csv")
         for name, wanted in {"alone": outputs(stages=tmp_path / "alone"), "whole": whole}.items():
             (tmp_path / name).mkdir()
-            summary = run_red(VideoJob(red_clip, wanted, at=at))
-            assert summary.frames == (6 if name == "alone" else COUNT)
+            totals = run_red(VideoJob(red_clip, wanted, at=at))
+            assert totals.frames == (6 if name == "alone" else COUNT)
         one, other = (read_image(tmp_path / name / "3-hits.png") for name in ("alone", "whole"))
         np.testing.assert_array_equal(one, other)
 

@@ -86,10 +86,10 @@ class TestJoined:
 
     @pytest.mark.parametrize("suffix", [".csv", ".json"])
     @pytest.mark.parametrize("text", ["junk", "", "[1]", "id,class\n1,car\n", "\xff"])
-    def test_a_file_that_is_no_summary_is_refused_with_its_name(
+    def test_a_file_that_has_no_records_is_refused_with_its_name(
         self, tmp_path: Path, suffix: str, text: str
     ) -> None:
         path = tmp_path / f"a{suffix}"
         path.write_bytes(text.encode("latin-1"))
-        with pytest.raises(OutputError, match=r"a\.\w+: is no summary of vehicles; remove it"):
+        with pytest.raises(OutputError, match=r"a\.\w+: has no records of vehicles; remove it"):
             join_records({"a": path}, tmp_path / f"all{suffix}")

@@ -24,7 +24,9 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     into DIR, by default into demo.
     """
     from vdet.demo import DemoFiles, check_demo, run_demo
+    from vdet.workers import limit_library_threads
 
+    limit_library_threads()
     files = DemoFiles(folder)
     check_demo(files, overwrite=overwrite)
     with progress_steps("") as steps:

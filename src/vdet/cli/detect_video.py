@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     "give only the ending. Can be repeated.",
 )
 @options.output_option(
-    "--summary FILE",
+    "--vehicles FILE",
     "Write a record of each vehicle: .csv or .json. With -d, give only the ending. A file over "
     "all videos is then written too.",
 )
@@ -125,7 +125,9 @@ def detect_video(
     from vdet.batch.task import Work
     from vdet.regions import check_mask
     from vdet.run.video import VideoJob
+    from vdet.workers import limit_library_threads
 
+    limit_library_threads()
     check_mask(settings.regions)
     job = VideoJob(source, (), start, end, frames, at or Fraction(0), request, overwrite)
     if batch.folder is None:

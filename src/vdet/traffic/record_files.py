@@ -45,7 +45,7 @@ def _items(
                 yield {_VIDEO: name, **item}
         except (ValueError, TypeError, csv.Error) as error:
             raise OutputError(
-                f"{path}: is no summary of vehicles; remove it, and run again"
+                f"{path}: has no records of vehicles; remove it, and run again"
             ) from error
 
 

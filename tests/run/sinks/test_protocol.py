@@ -217,8 +217,8 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
         stages=tmp_path / "stages",
         collects=tmp_path,
     )
-    summary = run_red(VideoJob(source, wanted))
-    assert (summary.frames, summary.tracks) == (5, 0)
+    totals = run_red(VideoJob(source, wanted))
+    assert (totals.frames, totals.tracks) == (5, 0)
     assert f"{source}: gets no boxes: no search window fits into a frame" in caplog.text
     assert [len(result.detections) for result in sink.results] == [0] * 5
     assert len(read(tmp_path / "out.mp4")) == 5

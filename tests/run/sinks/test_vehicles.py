@@ -1,4 +1,4 @@
-"""The sinks `summary` and `crops` in a run."""
+"""The sinks `vehicles` and `crops` in a run."""
 
 import csv
 from fractions import Fraction
@@ -19,7 +19,7 @@ from vdet.run.video import VideoJob
 
 def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_path: Path) -> None:
     wanted = outputs(
-        summary=tmp_path / "a.csv", crops=tmp_path / "crops", tracks=tmp_path / "tracks.csv"
+        vehicles=tmp_path / "a.csv", crops=tmp_path / "crops", tracks=tmp_path / "tracks.csv"
     )
     run_red(VideoJob(red_clip, wanted))
     with (tmp_path / "tracks.csv").open() as file:

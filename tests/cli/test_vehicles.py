@@ -1,4 +1,4 @@
-"""`--summary`, `--crops` and `--page` of `vdet detect-video`, for one video and for many."""
+"""`--vehicles`, `--crops` and `--page` of `vdet detect-video`, for one video and for many."""
 
 import csv
 import json
@@ -10,7 +10,7 @@ from conftest import Run
 from running import names, write_drive
 
 NASTY = "<img src=x onerror=alert(1)>"
-ENDS = ("--summary", ".cars.csv", "--crops", ".crops", "--page", ".page")
+ENDS = ("--vehicles", ".cars.csv", "--crops", ".crops", "--page", ".page")
 
 
 @pytest.fixture
@@ -24,7 +24,7 @@ def clips(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_one_video(run: Run, clips: Path, tmp_path: Path, red: tuple[str, ...]) -> None:
-    options = ("--summary", "a.json", "--crops", "crops", "--page", "page", *red)
+    options = ("--vehicles", "a.json", "--crops", "crops", "--page", "page", *red)
     result = run("detect-video", clips / "day" / "a.mp4", "--no-video", *options)
     assert result.code == 0, result.err
     (vehicle,) = json.loads(Path("a.json").read_text())
@@ -88,7 +88,10 @@ def test_a_video_that_fails_leaves_no_folder(
     [
         (("--crops", "crops"), "crops: with -d give only the ending of the names: as in .crops"),
         (("--page", "page"), "page: with -d give only the ending of the names: as in .page"),
-        (("--summary", ".xml"), "summary: with -d give only the ending of the names: .csv, .json"),
+        (
+            ("--vehicles", ".xml"),
+            "vehicles: with -d give only the ending of the names: .csv, .json",
+        ),
     ],
 )
 def test_an_end_that_is_none_is_wrong_usage(
