@@ -8,7 +8,7 @@ the fifth.
 import argparse
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -17,9 +17,9 @@ import joblib
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
@@ -89,9 +89,9 @@ class Searching:
         candidates = self.detectors[block].search(picture, index)
         return index, candidates.windows.hits(LEAST)
 
-    def detect(self, candidates: tuple[int, Windows]) -> Detections:
+    def detect(self, candidates: tuple[int, Windows]) -> Boxes:
         index, self.windows[index] = candidates
-        return NO_DETECTIONS
+        return NO_BOXES
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Searched:
         assert index is not None
         return Candidates(self.windows[index], is_still=False)
 
-    def detect(self, candidates: Candidates) -> Detections:
+    def detect(self, candidates: Candidates) -> Boxes:
         return self.detector.detect(candidates)
 
 
@@ -221,13 +221,12 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     rows = [
         Label(
             0,
-            (box.x, box.y, box.right, box.bottom),
+            astuple(track.box),
             frame=result.frame.index + 1,
             id=track.id,
         )
         for result in follow(frames, found, tracker, stride=searched.stride)
         for track in result.tracks
-        for box in [track.box]
     ]
     rate = float(searched.rate)
     return LabelledVideo.of(rows, frame_count=searched.frames, rate=rate)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from boxing import moved_to
 from vdet.batch.task import Work
 from vdet.boxes import Box
 from vdet.config.schema import (
@@ -30,7 +31,7 @@ from vdet.media.images import Image
 
 WIDTH, HEIGHT = 320, 240
 SCALE = REFERENCE_HEIGHT / HEIGHT
-CAR = Box(96, 120, 64, 48)
+CAR = Box.sized(96, 120, 64, 48)
 BINS = 8
 COLOUR = FeatureSettings(
     color_space="RGB", hog=HogSettings(channels=()), histogram=HistogramSettings(bins=BINS)
@@ -109,13 +110,13 @@ def road(*boxes: Box) -> Image:
     """Draw red cars on a grey road."""
     image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     for box in boxes:
-        image[box.y : box.bottom, box.x : box.right] = (0, 0, 255)
+        box.cut(image)[:] = (0, 0, 255)
     return image
 
 
 def car_at(index: int) -> Box:
     """Tell where the car of `drive` is: it goes to the right, a pixel a frame."""
-    return CAR.moved_to(40 + index, CAR.y)
+    return moved_to(CAR, 40 + index, CAR.y1)
 
 
 def drive(count: int) -> Iterator[Frame]:

@@ -46,10 +46,10 @@ def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -
         *("found.png", "in.mp4", "lines.yaml", "out.csv", "out.mp4", "road.png")
     ]
     assert frames_of(folder / "out.mp4") == frames_of(folder / "in.mp4")
-    assert isinstance(names["detections"], vdet.Detections)
+    assert isinstance(names["detections"], vdet.Boxes)
     (track,) = names["tracks"]
     assert (track.id, track.predicted) == (1, False)
-    assert abs(track.box.x - 657) <= 10
+    assert abs(track.box.x1 - 657) <= 10
 
 
 def test_every_public_name_is_there_and_documented() -> None:
@@ -112,7 +112,7 @@ def test_follow_searches_the_frames_that_the_settings_ask_for(clip_path: Path) -
 
 def test_a_tracker_is_carried_through_frames_in_which_nobody_looked() -> None:
     tracker = vdet.Tracker(1280, 720)
-    found = vdet.Detections([[600, 400, 700, 480]], [0.9])
+    found = vdet.Boxes([[600, 400, 700, 480]], [0.9])
     for number in range(40):
         looks = number % 4 == 0
         tracks = tracker.update(found, number / 25) if looks else tracker.carry(number / 25)
@@ -128,7 +128,7 @@ def test_follow_can_be_left_early(clip_path: Path) -> None:
 def test_the_tracker_that_looks_at_pixels_asks_for_them() -> None:
     settings = vdet.load_settings(None, ["tracker.kind=rules"])
     tracker = vdet.Tracker(320, 240, settings)
-    found = vdet.Detections([[96, 120, 160, 168]], [0.9])
+    found = vdet.Boxes([[96, 120, 160, 168]], [0.9])
     with pytest.raises(ValueError, match="image"):
         tracker.update(found, 0.0)
     (frame,) = drive(1)
@@ -141,19 +141,19 @@ class Red:
     def __init__(self) -> None:
         self.searched: list[int | None] = []
 
-    def search(self, picture: vdet.Picture, index: int | None) -> vdet.Detections:
+    def search(self, picture: vdet.Picture, index: int | None) -> vdet.Boxes:
         self.searched.append(index)
         return red_boxes(picture.image)
 
-    def detect(self, candidates: vdet.Detections) -> vdet.Detections:
+    def detect(self, candidates: vdet.Boxes) -> vdet.Boxes:
         return candidates
 
 
-def red_boxes(image: Image) -> vdet.Detections:
+def red_boxes(image: Image) -> vdet.Boxes:
     x, y, width, height = cv2.boundingRect(
         (image[..., 2].astype(int) - image[..., 0] > 80).astype(np.uint8)
     )
-    return vdet.Detections([(x, y, x + width, y + height)][: width > 0], [0.9][: width > 0])
+    return vdet.Boxes([(x, y, x + width, y + height)][: width > 0], [0.9][: width > 0])
 
 
 class Latest:
@@ -161,13 +161,13 @@ class Latest:
 
     def update(
         self,
-        detections: vdet.Detections,
+        detections: vdet.Boxes,
         time: float,  # noqa: ARG002
         picture: vdet.Picture | None = None,  # noqa: ARG002
     ) -> list[vdet.Track]:
         return [
-            vdet.Track(number, box, 0.9, predicted=False)
-            for number, box in enumerate(detections.rounded, start=1)
+            vdet.Track(number, each.box, 0.9, predicted=False)
+            for number, each in enumerate(detections, start=1)
         ]
 
 
@@ -189,7 +189,7 @@ def test_follow_takes_objects_and_names(red_clip: Path, detector: Any, tracker: 
     results = list(vdet.follow(red_clip, detector=detector, tracker=tracker))
     assert all(result.searched for result in results)
     (track,) = results[-1].tracks
-    assert abs(track.box.x - car_at(59).x) <= 3
+    assert abs(track.box.x1 - car_at(59).x1) <= 3
 
 
 def test_detect_video_takes_what_the_command_takes(red_clip: Path, tmp_path: Path) -> None:

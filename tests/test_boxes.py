@@ -1,106 +1,91 @@
-import math
+"""One box, columns of boxes, and how much boxes overlap."""
+
+import sys
+import warnings
+from dataclasses import FrozenInstanceError
+from types import ModuleType, SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.boxes import Box, are_nested
+from vdet.boxes import Box, Boxes, Detection, are_nested, coverage, iou_matrix, visible
 
-boxes = st.builds(
-    Box,
-    st.integers(-50, 50),
-    st.integers(-50, 50),
-    st.integers(0, 60),
-    st.integers(0, 60),
-)
+places = st.integers(-50, 50)
+boxes = st.builds(Box.sized, places, places, st.integers(0, 60), st.integers(0, 60))
+solid = st.builds(Box.sized, places, places, st.integers(1, 60), st.integers(1, 60))
 
 
 def pixels(box: Box) -> set[tuple[int, int]]:
-    return {(x, y) for x in range(box.x, box.right) for y in range(box.y, box.bottom)}
+    x1, y1, x2, y2 = box.pixels
+    return {(x, y) for x in range(x1, x2) for y in range(y1, y2)}
 
 
-def test_right_and_bottom_are_the_first_pixels_beyond_the_box() -> None:
-    box = Box(10, 20, 30, 40)
-    assert (box.right, box.bottom) == (40, 60)
+def columns(*each: Box) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    return np.array([(box.x1, box.y1, box.x2, box.y2) for box in each], np.float64).reshape(-1, 4)
 
 
-def test_the_center_of_a_single_pixel_is_half_a_pixel_in() -> None:
-    assert Box(3, 4, 1, 1).center == (3.5, 4.5)
+class TestBox:
+    def test_a_box_has_a_size_a_middle_and_a_foot(self) -> None:
+        box = Box(10, 20, 40.5, 60)
+        assert (box.width, box.height, box.area) == (30.5, 40, 1220)
+        assert (box.center, box.foot) == ((25.25, 40), (25.25, 60))
+        assert Box.sized(0, 0, -3, -4).area == 0
+
+    @pytest.mark.parametrize(
+        ("point", "inside"),
+        [((10, 20), True), ((39.9, 59.9), True), ((40, 30), False), ((20, 60), False)],
+    )
+    def test_near_sides_belong_to_the_box_and_far_sides_do_not(
+        self, point: tuple[float, float], inside: bool
+    ) -> None:
+        assert Box(10, 20, 40, 60).contains(point) is inside
+
+    def test_sides_are_rounded_to_whole_pixels_halves_up(self) -> None:
+        assert Box(0.4, 0.5, 10.5, 9.49).pixels == (0, 1, 11, 9)
+        assert Box(-0.5, -0.6, 1.5, 2).xywh == (0, -1, 2, 3)
+        assert Box(0.6, 0.6, 1.2, 1.2).xywh == (1, 1, 1, 1), "a format needs an area"
+
+    def test_what_is_cut_is_a_view_of_the_part_in_the_image(self) -> None:
+        image = np.zeros((10, 20, 3), np.uint8)
+        Box(-5, 7.6, 2.4, 99).cut(image)[:] = 1
+        assert np.argwhere(image[..., 0]).tolist() == [[8, 0], [8, 1], [9, 0], [9, 1]]
+
+    @given(boxes, boxes)
+    def test_intersection_union_and_iou_are_those_of_the_pixels(self, one: Box, other: Box) -> None:
+        common, total = pixels(one) & pixels(other), pixels(one) | pixels(other)
+        assert pixels(one.intersection(other)) == common
+        assert pixels(one.union(other)) >= total
+        assert one.iou(other) == pytest.approx(len(common) / len(total) if total else 0)
+
+    @given(boxes)
+    def test_a_clipped_box_lies_in_the_image(self, box: Box) -> None:
+        assert pixels(box.clipped(40, 30)) == pixels(box) & pixels(Box(0, 0, 40, 30))
+
+    @pytest.mark.parametrize(
+        ("other", "gap"),
+        [(Box(10, 0, 15, 10), 0), (Box(17, 0, 22, 10), 7), (Box(13, 14, 18, 19), 5)],
+    )
+    def test_gap_is_the_distance_between_outlines(self, other: Box, gap: float) -> None:
+        assert Box(0, 0, 10, 10).gap(other) == other.gap(Box(0, 0, 10, 10)) == gap
 
 
-@pytest.mark.parametrize(
-    ("point", "inside"),
-    [
-        ((10, 20), True),
-        ((39.9, 59.9), True),
-        ((40, 30), False),
-        ((20, 60), False),
-        ((9, 30), False),
-    ],
-)
-def test_near_sides_belong_to_the_box_and_far_sides_do_not(
-    point: tuple[float, float], inside: bool
-) -> None:
-    assert Box(10, 20, 30, 40).contains(point) is inside
+@given(solid, solid)
+def test_the_overlaps_of_columns_are_those_of_single_boxes(one: Box, other: Box) -> None:
+    assert iou_matrix(columns(one), columns(other)).item() == pytest.approx(one.iou(other))
+    covered = coverage(columns(one), columns(other)).item()
+    assert covered == pytest.approx(one.intersection(other).area / one.area)
+    part = one.clipped(20, 30)
+    if part.area:
+        assert visible(columns(one), (20, 30)).tolist() == columns(part).tolist()
 
 
-def test_a_box_of_negative_size_has_no_area() -> None:
-    assert Box(0, 0, -3, -4).area == 0
-
-
-def test_a_moved_box_keeps_its_size() -> None:
-    assert Box(1, 2, 3, 4).moved_to(-5, 6) == Box(-5, 6, 3, 4)
-
-
-@given(boxes, boxes)
-def test_the_intersection_covers_exactly_the_common_pixels(one: Box, other: Box) -> None:
-    assert pixels(one.intersection(other)) == pixels(one) & pixels(other)
-
-
-@given(boxes, boxes)
-def test_the_union_is_the_smallest_box_over_both(one: Box, other: Box) -> None:
-    union = one.union(other)
-    assert pixels(union) >= pixels(one) | pixels(other)
-    assert {union.x, union.right} <= {one.x, other.x, one.right, other.right}
-    assert {union.y, union.bottom} <= {one.y, other.y, one.bottom, other.bottom}
-
-
-@given(boxes, boxes)
-def test_iou_is_the_share_of_common_pixels(one: Box, other: Box) -> None:
-    total = pixels(one) | pixels(other)
-    expected = len(pixels(one) & pixels(other)) / len(total) if total else 0
-    assert one.iou(other) == pytest.approx(expected)
-    assert one.iou(other) == other.iou(one)
-
-
-@given(boxes)
-def test_a_clipped_box_lies_in_the_image(box: Box) -> None:
-    frame = pixels(Box(0, 0, 40, 30))
-    assert pixels(box.clipped(40, 30)) == pixels(box) & frame
-
-
-@pytest.mark.parametrize(
-    ("other", "gap"),
-    [
-        (Box(10, 0, 5, 10), 0),
-        (Box(5, 5, 5, 5), 0),
-        (Box(17, 0, 5, 10), 7),
-        (Box(0, -9, 10, 5), 4),
-        (Box(13, 14, 5, 5), 5),
-        (Box(-8, -16, 5, 12), 5),
-    ],
-)
-def test_gap_is_the_distance_between_outlines(other: Box, gap: float) -> None:
-    assert Box(0, 0, 10, 10).gap(other) == gap
-    assert other.gap(Box(0, 0, 10, 10)) == gap
-
-
-def test_a_diagonal_gap_is_euclidean() -> None:
-    assert Box(0, 0, 1, 1).gap(Box(2, 2, 1, 1)) == pytest.approx(math.sqrt(2))
-
-
-WHOLE, INSIDE, BESIDE = (100, 100, 80, 60), (110, 110, 40, 30), (150, 100, 80, 60)
+def test_no_boxes_have_no_overlaps() -> None:
+    assert iou_matrix(columns(), columns(Box(0, 0, 1, 1))).shape == (0, 1)
+    assert coverage(columns(Box(0, 0, 1, 1)), columns()).shape == (1, 0)
+    assert are_nested(columns(), []).tolist() == []
 
 
 @pytest.mark.parametrize(
@@ -110,11 +95,141 @@ WHOLE, INSIDE, BESIDE = (100, 100, 80, 60), (110, 110, 40, 30), (150, 100, 80, 6
 def test_of_two_boxes_in_one_another_the_one_with_the_lower_score_is_nested(
     scores: tuple[float, float], nested: list[bool]
 ) -> None:
-    boxes = np.array([WHOLE, INSIDE], np.float64)
-    assert are_nested(boxes, scores).tolist() == nested
-    assert are_nested(boxes[::-1], scores[::-1]).tolist() == nested[::-1]
+    whole, inside, beside = Box(0, 0, 80, 60), Box(10, 10, 50, 40), Box(50, 0, 130, 60)
+    assert are_nested(columns(whole, inside), scores).tolist() == nested
+    assert are_nested(columns(inside, whole), scores[::-1]).tolist() == nested[::-1]
+    assert not are_nested(columns(whole, beside), scores).any()
 
 
-def test_boxes_that_only_overlap_are_not_nested() -> None:
-    assert are_nested(np.array([WHOLE, BESIDE], np.float64), (1, 2)).tolist() == [False, False]
-    assert are_nested(np.zeros((0, 4)), []).tolist() == []
+SIDES: list[list[float]] = [[10, 20, 40, 60], [0.5, 1.5, 3.25, 4.75], [-5, -6, 7, 8]]
+SCORES: list[float] = [0.9, 0.5, 0.125]
+FOUND = Boxes(
+    SIDES,
+    SCORES,
+    classes=[1, 0, 1],
+    names=("car", "lorry"),
+    ids=[4, 5, 6],
+    data={"strength": [7, 8, 9], "centroid": [[1, 2], [3, 4], [5, 6]]},
+    trace="trace",
+)
+COLUMNS = ("sides", "scores", "classes", "ids")
+
+
+class TestBoxes:
+    def test_columns_are_arrays_of_fixed_types(self) -> None:
+        kinds = {name: getattr(FOUND, name).dtype for name in COLUMNS}
+        assert kinds == {"sides": float, "scores": float, "classes": "int32", "ids": "int64"}
+        assert FOUND.data["centroid"].shape == (3, 2)
+        assert FOUND.centers.tolist() == [[25, 40], [1.875, 3.125], [1, 1]]
+        assert FOUND.class_names == ["lorry", "car", "lorry"]
+
+    def test_a_row_is_a_detection(self) -> None:
+        rows = list(FOUND)
+        assert rows[0] == FOUND[0] == Detection(Box(10, 20, 40, 60), 0.9, "lorry", 4)
+        assert FOUND[-1] == rows[-1]
+        assert Boxes(SIDES, SCORES)[1] == Detection(Box(0.5, 1.5, 3.25, 4.75), 0.5)
+
+    @pytest.mark.parametrize("empty", [[], np.empty((0, 4)), np.empty(0)])
+    def test_a_table_may_have_no_rows(self, empty: Any) -> None:
+        found = Boxes(empty, [], classes=[], names=("car",), data={"strength": []})
+        assert (len(found), list(found), found.sides.shape) == (0, [], (0, 4))
+
+    @pytest.mark.parametrize(
+        ("rows", "expected"),
+        [
+            (slice(1, None), [1, 2]),
+            (slice(None, None, -1), [2, 1, 0]),
+            ([2, 0], [2, 0]),
+            (np.array([True, False, True]), [0, 2]),
+            ([], []),
+        ],
+    )
+    def test_rows_are_chosen_in_the_order_given(self, rows: Any, expected: list[int]) -> None:
+        chosen = FOUND[rows]
+        for name in COLUMNS:
+            assert getattr(chosen, name).tolist() == getattr(FOUND, name)[expected].tolist()
+        for name, column in FOUND.data.items():
+            assert chosen.data[name].tolist() == column[expected].tolist()
+        assert (chosen.names, chosen.trace) == (("car", "lorry"), "trace")
+
+    @pytest.mark.parametrize("row", [3, [3]])
+    def test_a_row_beyond_the_last_is_refused(self, row: Any) -> None:
+        with pytest.raises(IndexError):
+            FOUND[row]
+
+    @pytest.mark.parametrize(
+        ("changes", "message"),
+        [
+            ({"sides": [[1, 2, 3]] * 3}, r"sides: of shape \(3, 3\)"),
+            ({"scores": [0.5]}, r"scores: of shape \(1,\), expected \(3,\)"),
+            ({"classes": [0, 0]}, r"classes: of shape \(2,\)"),
+            ({"ids": [1]}, r"ids: of shape \(1,\)"),
+            ({"data": {"strength": [1]}}, r"strength: of shape \(1,\)"),
+            ({"scores": [0, 1, np.nan]}, "scores: a value is not a finite number"),
+            ({"sides": [*SIDES[:2], [5, 5, 5, 9]]}, "sides: .* no area; give x1 < x2 and y1 < y2"),
+            ({"scores": [0, 1, 1.01]}, "scores: a score is not in 0 to 1"),
+            ({"classes": [0, 1, 2]}, "classes: an index that `names` does not have"),
+        ],
+    )
+    def test_what_cannot_be_is_refused(self, changes: dict[str, Any], message: str) -> None:
+        given: dict[str, Any] = {
+            "sides": SIDES,
+            "scores": SCORES,
+            "names": ("car", "lorry"),
+        } | changes
+        with pytest.raises(ValueError, match=f"^{message}"):
+            Boxes(**given | changes)
+
+    def test_nothing_can_be_changed(self) -> None:
+        sides = np.array(SIDES)
+        found = Boxes(sides, SCORES)
+        sides[:] = 0
+        assert found.sides.tolist() == SIDES
+        for name in COLUMNS:
+            with pytest.raises(ValueError, match="read-only"):
+                getattr(FOUND[1:], name)[0] = 0
+        with pytest.raises(FrozenInstanceError):
+            found.scores = found.scores  # type: ignore[misc]
+
+
+class TestSupervision:
+    @pytest.fixture
+    def stub(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        module = ModuleType("supervision")
+        vars(module)["Detections"] = SimpleNamespace
+        monkeypatch.setitem(sys.modules, "supervision", module)
+
+    @pytest.mark.usefixtures("stub")
+    def test_supervision_gets_copies_of_the_columns(self) -> None:
+        made: Any = FOUND.to_supervision()
+        assert made.xyxy.tolist() == SIDES
+        assert made.confidence.tolist() == SCORES
+        assert (made.class_id.tolist(), made.tracker_id.tolist()) == ([1, 0, 1], [4, 5, 6])
+        assert made.data["class_name"].tolist() == ["lorry", "car", "lorry"]
+        made.xyxy[:] = 0
+        assert FOUND.sides.tolist() == SIDES
+        plain: Any = Boxes(SIDES, SCORES).to_supervision()
+        assert (plain.class_id, plain.tracker_id, plain.data) == (None, None, {})
+
+    @pytest.mark.usefixtures("stub")
+    def test_what_supervision_got_can_be_taken_back(self) -> None:
+        made: Any = FOUND.to_supervision()
+        assert list(Boxes.from_supervision(made)) == list(FOUND)
+        assert Boxes.from_supervision(made, ("bus", "van")).class_names == ["van", "bus", "van"]
+        bare: Any = SimpleNamespace(
+            xyxy=np.array(SIDES, np.float32),
+            confidence=None,
+            class_id=None,
+            tracker_id=None,
+            data={},
+        )
+        assert [each.score for each in Boxes.from_supervision(bare)] == [1, 1, 1]
+
+    @pytest.mark.parametrize("found", [FOUND, FOUND[:0], Boxes(SIDES, SCORES)])
+    def test_the_real_package_takes_it_and_gives_it_back(self, found: Boxes) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            supervision = pytest.importorskip("supervision")
+            made = found.to_supervision()
+        assert isinstance(made, supervision.Detections)
+        assert list(Boxes.from_supervision(made)) == list(found)

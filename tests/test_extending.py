@@ -75,7 +75,7 @@ def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path:
     for number, record in enumerate(records):
         (track,) = record["tracks"]
         assert (track["id"], track["score"], track["predicted"]) == (1, 0.9, False)
-        assert abs(track["x"] - car_at(number).x) <= 2
+        assert abs(track["x"] - car_at(number).x1) <= 2
     names = sorted(path.name for path in (tmp_path / "stages").iterdir())
     assert names == ["1-red.png", "2-boxes.png"]
 
@@ -94,8 +94,8 @@ def test_the_detector_and_the_sink_run_through_detect_image(package: Path, tmp_p
     (box,) = item["boxes"]
     car = car_at(0)
     assert (box["x"], box["y"], box["width"], box["height"]) == (
-        car.x,
-        car.y,
+        car.x1,
+        car.y1,
         car.width,
         car.height,
     )
@@ -108,7 +108,7 @@ def test_all_three_run_through_eval_video(package: Path, clip: Path, tmp_path: P
     cars = [car_at(number) for number in range(FRAMES)]
     truth.write_text(
         "".join(
-            f"{number},7,{car.x + 1},{car.y + 1},{car.width},{car.height},1,3,1\n"
+            f"{number},7,{car.x1 + 1},{car.y1 + 1},{car.width},{car.height},1,3,1\n"
             for number, car in enumerate(cars, start=1)
         )
     )
@@ -142,7 +142,7 @@ def test_the_format_is_written_counted_and_compared(
 
 def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) -> None:
     car = car_at(0)
-    boxes = (Boxed("car", (car.x, car.y, car.width, car.height)),)
+    boxes = (Boxed("car", (car.x1, car.y1, car.width, car.height)),)
     write_coco(tmp_path, {"a": Labelled(WIDTH, HEIGHT, boxes)})
     (frame,) = drive(1)
     show(tmp_path / "a.png", frame.image)

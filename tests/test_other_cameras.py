@@ -102,7 +102,7 @@ def to_be_shown(scene: Scene) -> LabelledVideo:
 
 
 def row(index: int, number: int, box: Box, *, ignored: bool = False) -> Label:
-    corners = box.x, box.y, box.right, box.bottom
+    corners = box.x1, box.y1, box.x2, box.y2
     return Label(0, corners, frame=index + 1, id=number, ignored=ignored)
 
 

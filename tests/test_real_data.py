@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boxing import rounded
 from conftest import Run
 from seed import SEED
 from vdet.boxes import Box
@@ -42,7 +43,7 @@ class Shipped:
         """Return the boxes shown in a still picture."""
         model = SvmModel(self.model, self.settings)
         detector = model.for_video(picture.width, picture.height, [picture.image])
-        return detector.detect(detector.search(picture, None)).rounded
+        return rounded(detector.detect(detector.search(picture, None)))
 
 
 def with_model(settings: SvmSettings) -> Shipped:
@@ -92,7 +93,7 @@ def test_nothing_is_found_on_an_empty_road(real_data: Path, shipped: Shipped, in
 
 @pytest.mark.parametrize(
     ("index", "car"),
-    [(299, Box(1005, 406, 214, 102)), (499, Box(892, 406, 122, 67))],
+    [(299, Box.sized(1005, 406, 214, 102)), (499, Box.sized(892, 406, 122, 67))],
 )
 def test_the_white_car_is_found(real_data: Path, shipped: Shipped, index: int, car: Box) -> None:
     assert any(is_on(box, car) for box in shipped.find(frame(real_data, index)))
@@ -100,13 +101,13 @@ def test_the_white_car_is_found(real_data: Path, shipped: Shipped, index: int, c
 
 def test_the_white_car_is_found_in_a_photograph(real_data: Path, shipped: Shipped) -> None:
     (box,) = shipped.find(Picture(read_image(real_data / "test_images" / "test3.jpg")))
-    assert is_on(box, Box(873, 416, 88, 53))
+    assert is_on(box, Box.sized(873, 416, 88, 53))
 
 
 def test_the_seed_finds_the_white_and_the_black_car_apart(real_data: Path) -> None:
     boxes = with_model(SEED.svm).find(frame(real_data, 752))
-    white = [box for box in boxes if is_on(box, Box(876, 414, 87, 51))]
-    black = [box for box in boxes if is_on(box, Box(949, 403, 302, 164))]
+    white = [box for box in boxes if is_on(box, Box.sized(876, 414, 87, 51))]
+    black = [box for box in boxes if is_on(box, Box.sized(949, 403, 302, 164))]
     assert (len(white), len(black)) == (1, 1)
     assert white != black
 
@@ -118,10 +119,10 @@ def test_every_photograph_is_searched(run: Run, real_data: Path, config: str) ->
     items = json.loads(result.out)
     assert [Path(item["image"]).name for item in items] == [f"test{i}.jpg" for i in range(1, 7)]
     for item in items:
-        frame_box = Box(0, 0, item["width"], item["height"])
+        frame_box = Box.sized(0, 0, item["width"], item["height"])
         assert (frame_box.width, frame_box.height) == (1280, 720)
         for found_box in item["boxes"]:
-            box = Box(*(found_box[key] for key in ("x", "y", "width", "height")))
+            box = Box.sized(*(found_box[key] for key in ("x", "y", "width", "height")))
             assert frame_box.intersection(box) == box
 
 
@@ -141,11 +142,14 @@ def test_both_cars_are_followed_through_the_video(
     assert result.code == 0, result.err
     records = [json.loads(line) for line in (tmp_path / "tracks.jsonl").read_text().splitlines()]
     assert [record["frame"] for record in records] == list(range(first, first + count))
-    places = {"white": Box(874, 414, 87, 52), "black": Box(950, 403, 309, 168)}  # at the end
+    places = {
+        "white": Box.sized(874, 414, 87, 52),
+        "black": Box.sized(950, 403, 309, 168),
+    }  # at the end
     followed: dict[str, set[int]] = {car: set() for car in places}
     for record in records[-5:]:
         for track in record["tracks"]:
-            box = Box(*(track[key] for key in ("x", "y", "width", "height")))
+            box = Box.sized(*(track[key] for key in ("x", "y", "width", "height")))
             for car, place in places.items():
                 if is_on(box, place):
                     followed[car].add(track["id"])

@@ -109,8 +109,7 @@ def test_every_place_of_a_region_is_searched(
     x = data.draw(st.floats(0, 39.9))
     y = data.draw(st.floats(0, 29.9))
     if regions.contains((x, y)):
-        box = np.array([[int(x), int(y), 1, 1]], np.int32)
-        near = box + np.array([-1, -1, 2, 2], np.int32)
+        near = np.floor([[x - 1, y - 1, x + 2, y + 2]])
         assert regions.area().touches(near)[0]
 
 
@@ -121,5 +120,5 @@ def test_a_box_touches_the_area_where_they_have_a_pixel_in_common(
     pixels = np.zeros((30, 40), bool)
     pixels[10:20, 15:30] = True
     inside = pixels[max(0, y) : max(0, y + height), max(0, x) : max(0, x + width)]
-    boxes = np.array([[x, y, width, height]], np.int32)
+    boxes = np.array([[x, y, x + width, y + height]], np.float64)
     assert SearchArea(pixels).touches(boxes)[0] == inside.any()

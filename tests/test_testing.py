@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
+from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, Settings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.svm.detector import SvmModel
 from vdet.media import Picture
 from vdet.media.images import Image
@@ -65,10 +66,10 @@ class Wrong:
     def search(self, picture: Picture, index: int | None) -> Any:  # noqa: ARG002
         return None
 
-    def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
-        return Detections([[1, 1, 9, 9]], [0.5])
+    def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
+        return Boxes([[1, 1, 9, 9]], [0.5])
 
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
+    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:  # noqa: ARG002
         return {}
 
 
@@ -78,20 +79,20 @@ class Paints(Wrong):
 
 
 class Outside(Wrong):
-    def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
-        return Detections([[-5, 1, 9, 9]], [0.5])
+    def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
+        return Boxes([[-5, 1, 9, 9]], [0.5])
 
 
 class Counts(Wrong):
     def __init__(self) -> None:
         self.calls = count(1)
 
-    def detect(self, candidates: Any) -> Detections:  # noqa: ARG002
-        return Detections([[1, 1, 9 + next(self.calls), 9]], [0.5])
+    def detect(self, candidates: Any) -> Boxes:  # noqa: ARG002
+        return Boxes([[1, 1, 9 + next(self.calls), 9]], [0.5])
 
 
 class FloatPictures(Wrong):
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Any]:  # noqa: ARG002
+    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Any]:  # noqa: ARG002
         return {"gray": image.astype(np.float32)}
 
 
@@ -100,7 +101,7 @@ class FloatPictures(Wrong):
     [
         (Paints(), "changed a frame"),
         (Outside(), "lies outside the frame"),
-        (Counts(), "boxes differ"),
+        (Counts(), "sides differ"),
         (FloatPictures(), "not uint8"),
     ],
 )
@@ -120,20 +121,18 @@ class Shares:
 
     def update(
         self,
-        detections: Detections,
+        detections: Boxes,
         time: float,  # noqa: ARG002
         picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
-        pairs = zip(self.own, detections.rounded, strict=False)
+        pairs = zip(self.own, rounded(detections), strict=False)
         return [Track(number, box, 0.5, predicted=False) for number, box in pairs]
 
 
 class Forgets(Shares):
     """A tracker that gives new ids in every frame."""
 
-    def update(
-        self, detections: Detections, time: float, picture: Picture | None = None
-    ) -> list[Track]:
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
         first = 1 + 2 * round(time * 25)
         tracks = super().update(detections, time, picture)
         return [replace(track, id=first + number) for number, track in enumerate(tracks)]
@@ -187,4 +186,4 @@ def test_a_sink_that_breaks_a_rule_is_found(
 
 
 def test_no_detections_are_none() -> None:
-    assert len(NO_DETECTIONS) == 0
+    assert len(NO_BOXES) == 0

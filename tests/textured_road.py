@@ -11,7 +11,7 @@ def textured_road(width: int, height: int, *boxes: Box | None) -> Image:
     for seed, box in enumerate(boxes):
         if box is not None:
             piece = np.random.default_rng(seed).integers(
-                0, 256, (box.height, box.width, 3), dtype=np.uint8
+                0, 256, box.cut(frame).shape, dtype=np.uint8
             )
-            frame[box.y : box.bottom, box.x : box.right] = piece
+            box.cut(frame)[:] = piece
     return frame

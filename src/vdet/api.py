@@ -8,7 +8,7 @@ linear model with .npz, a network with .onnx. Settings choose a detector too, fo
 
 A detector or a tracker of your own is an object, which is used as it is:
 
-* a detector is a function that takes an image and returns `Detections`, or a `VideoDetector`, or a
+* a detector is a function that takes an image and returns `Boxes`, or a `VideoDetector`, or a
   `DetectorModel`, which makes a detector for each video;
 * a tracker is a `VideoTracker`, for one video.
 
@@ -21,12 +21,11 @@ from fractions import Fraction
 from os import PathLike
 from pathlib import Path
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Boxes
 from vdet.config.kinds import kind_of_model
 from vdet.config.loading import find_config
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
-from vdet.detect.detections import Detections
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError
@@ -50,7 +49,7 @@ from vdet.traffic.events import Event
 from vdet.traffic.totals import Counts
 
 __all__ = (
-    "Box", "Counts", "Detections", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",
+    "Box", "Boxes", "Counts", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",
     "Event", "Frame", "FrameResult", "FrameTracks", "Picture", "RunTotals", "Scores", "Settings",
     "SinkContext", "SinkKind", "Step", "StepContext", "Track", "Tracker", "TrackerKind",
     "TrackerSettings", "VdetError", "VideoDetector", "VideoTracker", "count_tracks", "detect_image",
@@ -102,7 +101,7 @@ class Detector:
         self._settings, self._model, _ = _resolved(settings, model, detector, None)
         self.for_video = self._model.for_video
 
-    def detect(self, image: Image) -> Detections:
+    def detect(self, image: Image) -> Boxes:
         """Find the vehicles in a picture, BGR uint8 `(H, W, 3)`.
 
         Each picture is searched for itself; `follow` uses what consecutive frames have in common.
@@ -134,7 +133,7 @@ class Tracker:
         self._tracker = make_tracker(settings or Settings(), width, height)
 
     def update(
-        self, detections: Detections, time: float, image: Image | Picture | None = None
+        self, detections: Boxes, time: float, image: Image | Picture | None = None
     ) -> list[Track]:
         """Follow the vehicles into the next frame, and return those that are shown, by id.
 
@@ -285,7 +284,7 @@ def detect_image(
     settings: Settings | None = None,
     model: PathName | None = None,
     overwrite: bool = False,
-) -> Detections:
+) -> Boxes:
     """Find the vehicles in a picture file, and write the outputs that are asked for.
 
     Parameters

@@ -1,15 +1,19 @@
-"""Rectangles in an image: x to the right, y down, the far sides exclusive.
+"""Boxes in a picture: x1, y1, x2, y2 in pixels, x to the right, y down, far sides exclusive.
 
-`Box` is one rectangle of whole pixels. The functions take many boxes as float64 arrays of
-`x, y, width, height` in pixels.
+Boxes are rounded only where a format is written or pixels are cut or drawn.
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import supervision
 
 Float32Array = npt.NDArray[np.float32]
 Float64Array = npt.NDArray[np.float64]
@@ -23,64 +27,86 @@ _NESTED = 0.8
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A rectangle of `width` × `height` pixels whose top-left pixel is `(x, y)`.
+    """One box, pixels: from the left side `x1` to the right side `x2`, from top `y1` to `y2`."""
 
-    It covers the columns `x … x + width - 1` and the rows `y … y + height - 1`.
-    """
+    x1: float
+    y1: float
+    x2: float
+    y2: float
 
-    x: int
-    y: int
-    width: int
-    height: int
-
-    @property
-    def right(self) -> int:
-        """First column beyond the box."""
-        return self.x + self.width
+    @classmethod
+    def sized(cls, x: float, y: float, width: float, height: float) -> "Box":
+        """Return the box with this top-left corner and size."""
+        return cls(x, y, x + width, y + height)
 
     @property
-    def bottom(self) -> int:
-        """First row beyond the box."""
-        return self.y + self.height
+    def width(self) -> float:
+        """Pixels across."""
+        return self.x2 - self.x1
 
     @property
-    def area(self) -> int:
-        """Pixels covered; 0 for a box without width or height."""
-        return max(0, self.width) * max(0, self.height)
+    def height(self) -> float:
+        """Pixels down."""
+        return self.y2 - self.y1
+
+    @property
+    def area(self) -> float:
+        """Square pixels; 0 for a box without width or height."""
+        return max(0.0, self.width) * max(0.0, self.height)
 
     @property
     def center(self) -> tuple[float, float]:
-        """The middle, `(x, y)` in pixels."""
-        return self.x + self.width / 2, self.y + self.height / 2
+        """The middle, `(x, y)`."""
+        return (self.x1 + self.x2) / 2, (self.y1 + self.y2) / 2
 
     @property
     def foot(self) -> tuple[float, float]:
-        """The middle of the lower edge, `(x, y)` in pixels."""
-        return self.x + self.width / 2, float(self.bottom)
+        """The middle of the lower edge, `(x, y)`."""
+        return (self.x1 + self.x2) / 2, float(self.y2)
+
+    @property
+    def rounded(self) -> "Box":
+        """The box with its sides at the nearest whole pixels, halves up."""
+        return Box(*self.pixels)
+
+    @property
+    def pixels(self) -> tuple[int, int, int, int]:
+        """x1, y1, x2, y2 as whole pixels, halves up."""
+        x1, y1, x2, y2 = (math.floor(side + 0.5) for side in (self.x1, self.y1, self.x2, self.y2))
+        return x1, y1, x2, y2
+
+    @property
+    def xywh(self) -> tuple[int, int, int, int]:
+        """x, y, width, height for files: the sides as whole pixels, at least one apart."""
+        x1, y1, x2, y2 = self.pixels
+        return x1, y1, max(1, x2 - x1), max(1, y2 - y1)
+
+    def cut(self, image: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return a view of the whole pixels of an image `(H, W, …)` in the box, clipped to it."""
+        x1, y1, x2, y2 = (max(0, side) for side in self.pixels)
+        return image[y1:y2, x1:x2]
 
     def contains(self, point: tuple[float, float]) -> bool:
-        """Tell whether `point`, `(x, y)` in pixels, lies in the box."""
+        """Tell whether `point`, `(x, y)`, lies in the box."""
         x, y = point
-        return self.x <= x < self.right and self.y <= y < self.bottom
-
-    def moved_to(self, x: int, y: int) -> "Box":
-        """Return a box of the same size with its top-left pixel at `(x, y)`."""
-        return Box(x, y, self.width, self.height)
+        return self.x1 <= x < self.x2 and self.y1 <= y < self.y2
 
     def union(self, other: "Box") -> "Box":
         """Return the smallest box that covers both."""
-        x, y = min(self.x, other.x), min(self.y, other.y)
-        return Box(x, y, max(self.right, other.right) - x, max(self.bottom, other.bottom) - y)
+        return Box(
+            min(self.x1, other.x1),
+            min(self.y1, other.y1),
+            max(self.x2, other.x2),
+            max(self.y2, other.y2),
+        )
 
     def intersection(self, other: "Box") -> "Box":
         """Return the part in common; its area is 0 where there is none."""
-        x, y = max(self.x, other.x), max(self.y, other.y)
-        width = min(self.right, other.right) - x
-        height = min(self.bottom, other.bottom) - y
-        return Box(x, y, max(0, width), max(0, height))
+        x1, y1 = max(self.x1, other.x1), max(self.y1, other.y1)
+        return Box(x1, y1, max(x1, min(self.x2, other.x2)), max(y1, min(self.y2, other.y2)))
 
-    def clipped(self, width: int, height: int) -> "Box":
-        """Return the part that lies in an image of `width` × `height` pixels."""
+    def clipped(self, width: float, height: float) -> "Box":
+        """Return the part that lies in a picture of `width` × `height` pixels."""
         return self.intersection(Box(0, 0, width, height))
 
     def iou(self, other: "Box") -> float:
@@ -91,9 +117,203 @@ class Box:
 
     def gap(self, other: "Box") -> float:
         """Return the distance in pixels between the two outlines; 0 where they touch or overlap."""
-        dx = max(self.x - other.right, other.x - self.right, 0)
-        dy = max(self.y - other.bottom, other.y - self.bottom, 0)
+        dx = max(self.x1 - other.x2, other.x1 - self.x2, 0)
+        dy = max(self.y1 - other.y2, other.y1 - self.y2, 0)
         return math.hypot(dx, dy)
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One row of `Boxes`; `class_name` and `id` are None where they are not known."""
+
+    box: Box
+    score: float
+    class_name: str | None = None
+    id: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Boxes:
+    """Scored boxes of one picture in columns of `n` rows, immutable: what detectors return.
+
+    Attributes
+    ----------
+    sides
+        float64 `(n, 4)`: x1, y1, x2, y2 in pixels of the frame; x to the right, y down, `x2` and
+        `y2` are exclusive.
+    scores
+        float64 `(n,)`, 0 to 1: the share of boxes with such a score that are vehicles.
+    classes
+        int32 `(n,)`: indices into `names`; None where classes are not known.
+    names
+        The names of all classes.
+    ids
+        int64 `(n,)`: which vehicle each is; None where that is not known.
+    data
+        Further columns of `n` rows by name, float64. A `centroid` `(n, 2)`, x and y, and a
+        `strength` `(n,)` are used by the rules tracker.
+    trace
+        What the detector needs for its stage pictures; not used by others.
+
+    Raises
+    ------
+    ValueError
+        A column has another shape, a value is not finite, a box has no area, a score is not in
+        0 to 1, a class has no name.
+    """
+
+    sides: Float64Array
+    scores: Float64Array
+    classes: Int32Array | None
+    names: tuple[str, ...]
+    ids: Int64Array | None
+    data: Mapping[str, Float64Array]
+    trace: Any = field(repr=False)
+
+    def __init__(
+        self,
+        sides: npt.ArrayLike,
+        scores: npt.ArrayLike,
+        *,
+        classes: npt.ArrayLike | None = None,
+        names: Sequence[str] = (),
+        ids: npt.ArrayLike | None = None,
+        data: Mapping[str, npt.ArrayLike] = MappingProxyType({}),
+        trace: Any = None,
+    ) -> None:
+        box_column = _column(sides, np.float64, (-1, 4), "sides")
+        rows = (len(box_column),)
+        score_column = _column(scores, np.float64, rows, "scores")
+        class_column = None if classes is None else _column(classes, np.int32, rows, "classes")
+        if ((box_column[:, 2:] - box_column[:, :2]) <= 0).any():
+            raise ValueError("sides: a box has no area; give x1 < x2 and y1 < y2")
+        if ((score_column < 0) | (score_column > 1)).any():
+            raise ValueError("scores: a score is not in 0 to 1")
+        if class_column is not None and ((class_column < 0) | (class_column >= len(names))).any():
+            raise ValueError("classes: an index that `names` does not have")
+        columns = {
+            "sides": box_column,
+            "scores": score_column,
+            "classes": class_column,
+            "names": tuple(names),
+            "ids": None if ids is None else _column(ids, np.int64, rows, "ids"),
+            "data": {name: _data_column(values, *rows, name) for name, values in data.items()},
+            "trace": trace,
+        }
+        for name, column in columns.items():
+            object.__setattr__(self, name, column)
+
+    def __len__(self) -> int:
+        return len(self.sides)
+
+    def __iter__(self) -> Iterator[Detection]:
+        names = self.class_names
+        ids = [None] * len(self) if self.ids is None else self.ids.tolist()
+        for sides, *others in zip(
+            self.sides.tolist(), self.scores.tolist(), names, ids, strict=True
+        ):
+            yield Detection(Box(*sides), *others)
+
+    @overload
+    def __getitem__(self, rows: int) -> Detection: ...
+    @overload
+    def __getitem__(self, rows: slice | Sequence[int] | npt.NDArray[Any]) -> "Boxes": ...
+    def __getitem__(
+        self, rows: int | slice | Sequence[int] | npt.NDArray[Any]
+    ) -> "Detection | Boxes":
+        """Return one row, or these rows in this order with the same `names` and `trace`."""
+        if isinstance(rows, int | np.integer):
+            return next(iter(self[[int(rows)]]))
+        if not isinstance(rows, slice):
+            rows = np.asarray(rows) if len(rows) else slice(0)  # an empty array is one of floats
+        return Boxes(
+            self.sides[rows],
+            self.scores[rows],
+            classes=None if self.classes is None else self.classes[rows],
+            names=self.names,
+            ids=None if self.ids is None else self.ids[rows],
+            data={name: column[rows] for name, column in self.data.items()},
+            trace=self.trace,
+        )
+
+    @property
+    def centers(self) -> Float64Array:
+        """The middles of the boxes, float64 `(n, 2)` of x and y."""
+        return np.asarray((self.sides[:, :2] + self.sides[:, 2:]) / 2)
+
+    @property
+    def class_names(self) -> list[str | None]:
+        """The name of each box's class; None for all where classes are not known."""
+        if self.classes is None:
+            return [None] * len(self)
+        return [self.names[number] for number in self.classes.tolist()]
+
+    def to_supervision(self) -> "supervision.Detections":
+        """Return a `supervision.Detections` with copies; needs the package supervision."""
+        import supervision
+
+        names = {} if self.classes is None else {"class_name": np.array(self.class_names)}
+        return supervision.Detections(
+            xyxy=self.sides.copy(),
+            confidence=self.scores.copy(),
+            class_id=None if self.classes is None else self.classes.astype(int),
+            tracker_id=None if self.ids is None else self.ids.copy(),
+            data=names | {name: column.copy() for name, column in self.data.items()},
+        )
+
+    @classmethod
+    def from_supervision(
+        cls, detections: "supervision.Detections", names: Sequence[str] = ()
+    ) -> "Boxes":
+        """Return boxes with copies of the columns of a `supervision.Detections`.
+
+        `names` are those of the classes that `class_id` counts. Without them the classes are those
+        of the column `class_name`. Without confidences, scores are 1. Errors as of `Boxes`.
+        """
+        scores = detections.confidence
+        classes = detections.class_id if names else None
+        if not names and "class_name" in detections.data:
+            known, classes = np.unique(detections.data["class_name"], return_inverse=True)
+            names = known.tolist()
+        return cls(
+            detections.xyxy,
+            np.ones(len(detections.xyxy)) if scores is None else scores,
+            classes=classes,
+            names=names,
+            ids=detections.tracker_id,
+        )
+
+
+def _column(
+    values: npt.ArrayLike, kind: type[np.generic], shape: tuple[int, ...], name: str
+) -> npt.NDArray[Any]:
+    """Return a read-only copy; -1 in `shape` stands for any length."""
+    column = np.array(values, kind)
+    if column.size == 0 and shape[0] <= 0:
+        column = column.reshape(0, *shape[1:])
+    if column.ndim != len(shape) or any(
+        wanted not in (-1, length) for wanted, length in zip(shape, column.shape, strict=True)
+    ):
+        raise ValueError(f"{name}: of shape {column.shape}, expected {shape}")
+    if not np.isfinite(column).all():
+        raise ValueError(f"{name}: a value is not a finite number")
+    column.flags.writeable = False
+    return column
+
+
+def _data_column(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[Any]:
+    column = np.asarray(values, np.float64)
+    return _column(column, np.float64, (count, *column.shape[1:]), name)
+
+
+NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))
+
+
+def from_sizes(places: npt.NDArray[Any]) -> Float64Array:
+    """Return boxes `(n, 4)` given by x, y, width, height as x1, y1, x2, y2."""
+    boxes = places.astype(np.float64)
+    boxes[:, 2:] += boxes[:, :2]
+    return boxes
 
 
 def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
@@ -102,7 +322,7 @@ def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
     Parameters
     ----------
     a, b
-        Shapes `(n, 4)` and `(m, 4)`, each box with an area.
+        x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`, each box with an area.
 
     Returns
     -------
@@ -114,34 +334,33 @@ def iou_matrix(a: Float64Array, b: Float64Array) -> Float64Array:
 def iou(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return intersection over union of boxes with an area, of shapes `(…, 4)` that broadcast."""
     common = _intersection(a, b)
-    return common / (_area(a) + _area(b) - common)
+    return common / (area(a) + area(b) - common)
 
 
-def coverage(predicted: Float64Array, regions: Float64Array) -> Float64Array:
-    """Return the share, 0 to 1, of every predicted box's own area that lies in every region.
+def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
+    """Return the share, 0 to 1, of every box's own area that lies in each of the others.
 
     Parameters
     ----------
-    predicted, regions
-        Shapes `(n, 4)` and `(m, 4)`, each predicted box with an area.
+    boxes, others
+        x1, y1, x2, y2 of shapes `(n, 4)` and `(m, 4)`, each of `boxes` with an area.
 
     Returns
     -------
     float64 of shape `(n, m)`.
     """
-    return _intersection(predicted[:, np.newaxis], regions) / _area(predicted)[:, np.newaxis]
+    return _intersection(boxes[:, np.newaxis], others) / area(boxes)[:, np.newaxis]
 
 
 def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
     """Tell of each box whether it and a box with a higher score lie in one another.
 
-    So it is where nearly all of the smaller one lies in the larger: at most one of them shows a
-    vehicle.
+    Then nearly all of the smaller one lies in the larger: at most one of them shows a vehicle.
 
     Parameters
     ----------
     boxes
-        Shape `(n, 4)`, each with an area.
+        x1, y1, x2, y2 of shape `(n, 4)`, each with an area.
     scores
         Shape `(n,)`. Of equal scores, that of the larger box counts as higher.
 
@@ -151,23 +370,19 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
     """
     inside = coverage(boxes, boxes) > _NESTED
     rank = np.empty(len(boxes), np.int64)
-    rank[np.lexsort((_area(boxes), np.asarray(scores)))] = np.arange(len(boxes))
+    rank[np.lexsort((area(boxes), np.asarray(scores)))] = np.arange(len(boxes))
     higher = rank > rank[:, np.newaxis]
     return np.asarray(((inside | inside.T) & higher).any(axis=1))
 
 
-def to_sides(corners: npt.NDArray[np.floating[Any]]) -> Float64Array:
-    """Return boxes `(n, 4)` given by x1, y1, x2, y2 as x, y, width, height."""
-    boxes = corners.astype(np.float64)
-    boxes[:, 2:] -= boxes[:, :2]
-    return boxes
-
-
 def visible(boxes: Float64Array, size: tuple[int, int]) -> Float64Array:
-    """Return the parts of boxes `(n, 4)` that lie in a frame of `size`; sides may be 0."""
-    near = np.minimum(np.maximum(boxes[:, :2], 0), size)  # np.clip takes thrice as long
-    far = np.minimum(np.maximum(boxes[:, :2] + boxes[:, 2:], 0), size)
-    return np.concatenate([near, far - near], axis=1)
+    """Return the parts of boxes `(n, 4)` in a frame of `size`; they may have no area."""
+    return np.minimum(np.maximum(boxes, 0), (*size, *size))  # np.clip takes thrice as long
+
+
+def area(boxes: Float64Array) -> Float64Array:
+    """Return the areas of boxes `(…, 4)` in square pixels."""
+    return np.asarray((boxes[..., 2] - boxes[..., 0]) * (boxes[..., 3] - boxes[..., 1]))
 
 
 def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
@@ -176,11 +391,6 @@ def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
 
 
 def _common(a: Float64Array, b: Float64Array) -> Float64Array:
-    """Return the length, at least 0, that spans `(…, 2)` of start and length share."""
-    near = np.maximum(a[..., 0], b[..., 0])
-    shared = np.minimum(a[..., 0] + a[..., 1], b[..., 0] + b[..., 1]) - near
+    """Return the length, at least 0, that spans `(…, 2)` of near and far end share."""
+    shared = np.minimum(a[..., 1], b[..., 1]) - np.maximum(a[..., 0], b[..., 0])
     return np.asarray(np.maximum(shared, 0, out=shared))
-
-
-def _area(boxes: Float64Array) -> Float64Array:
-    return np.asarray(boxes[..., 2] * boxes[..., 3])

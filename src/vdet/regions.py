@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray, Int32Array
+from vdet.boxes import BoolArray, Float64Array, visible
 from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError
 from vdet.media.images import Image, read_header, read_image
@@ -28,10 +28,9 @@ class SearchArea:
         self._size = pixels.shape[1], pixels.shape[0]
         self._sums = np.asarray(cv2.integral(pixels.astype(np.uint8)), np.int32)
 
-    def touches(self, boxes: Int32Array) -> BoolArray:
-        """Tell of each box, int `(n, 4)` of x, y, width, height, whether a pixel lies in it."""
-        left, top = np.clip(boxes[:, :2], 0, self._size).T
-        right, bottom = np.clip(boxes[:, :2] + boxes[:, 2:], 0, self._size).T
+    def touches(self, boxes: Float64Array) -> BoolArray:
+        """Tell of each box `(n, 4)`, x1, y1, x2, y2 in whole pixels, whether a pixel lies in it."""
+        left, top, right, bottom = visible(boxes, self._size).astype(np.int64).T
         sums = self._sums
         inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
         return np.asarray(inside > 0)

@@ -5,15 +5,14 @@ Each check raises `AssertionError` with what is wrong.
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import Box
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import Settings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo
@@ -63,21 +62,21 @@ def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
     _check_detections(blank.detect(blank.search(Picture(plain), 0)), width, height)
 
 
-def _detect_all(detector: VideoDetector, images: Sequence[Image]) -> list[Detections]:
+def _detect_all(detector: VideoDetector, images: Sequence[Image]) -> list[Boxes]:
     return [
         detector.detect(detector.search(Picture(image), index))
         for index, image in enumerate(images)
     ]
 
 
-def _check_detections(found: Detections, width: int, height: int) -> None:
-    assert isinstance(found, Detections), f"detect returned {type(found).__name__}"
-    inside = (found.boxes >= 0).all() and (found.boxes <= [width, height, width, height]).all()
+def _check_detections(found: Boxes, width: int, height: int) -> None:
+    assert isinstance(found, Boxes), f"detect returned {type(found).__name__}"
+    inside = (found.sides >= 0).all() and (found.sides <= [width, height, width, height]).all()
     assert inside, "a box lies outside the frame"
 
 
-def _check_equal(found: Detections, expected: Detections) -> None:
-    for name in ("boxes", "scores", "centroids", "strengths"):
+def _check_equal(found: Boxes, expected: Boxes) -> None:
+    for name in ("sides", "scores"):
         assert np.allclose(getattr(found, name), getattr(expected, name), atol=1e-4), (
             f"{name} differ from those of the first detector for the same frame"
         )
@@ -111,7 +110,7 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     if isinstance(first, CarryingTracker):
         _check_carrying(make(640, 360))
     for index in range(3 * RATE, 30 * RATE):
-        last = list(first.update(NO_DETECTIONS, index / RATE, Picture(_scene(0) // 2)))
+        last = list(first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2)))
     assert last == [], "vehicles are shown long after the last detection"
 
 
@@ -141,20 +140,24 @@ def _check_tracks(tracks: Sequence[Track]) -> None:
 
 def _boxes(index: int) -> list[Box]:
     """Return two vehicles that drive in lanes of their own."""
-    return [Box(60 + 2 * index, 180, 90, 70), Box(500 - 3 * index, 40, 80, 60)]
+    return [
+        Box.sized(60 + 2 * index, 180, 90, 70),
+        Box.sized(500 - 3 * index, 40, 80, 60),
+    ]
 
 
-def _detections(index: int) -> Detections:
-    boxes = [(box.x, box.y, box.right, box.bottom) for box in _boxes(index)]
-    return Detections(np.array(boxes), [0.9, 0.95], strengths=[9.0, 9.5])
+def _detections(index: int) -> Boxes:
+    boxes = [astuple(box) for box in _boxes(index)]
+    return Boxes(boxes, [0.9, 0.95], data={"strength": [9.0, 9.5]})
 
 
 def _scene(index: int) -> Image:
     """Draw the vehicles with a texture of their own on a grey road."""
     image = np.full((360, 640, 3), 90, np.uint8)
     for number, box in enumerate(_boxes(index)):
-        texture = np.random.default_rng(number).integers(0, 256, (box.height, box.width, 3))
-        image[box.y : box.bottom, box.x : box.right] = texture
+        x, y, width, height = box.xywh
+        texture = np.random.default_rng(number).integers(0, 256, (height, width, 3))
+        image[y : y + height, x : x + width] = texture
     return image
 
 

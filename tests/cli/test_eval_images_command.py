@@ -12,7 +12,7 @@ from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.config.rendering import render
 from vdet.detect.svm.model import save_model
 
-CAR_BOX = (CAR.x, CAR.y, CAR.width, CAR.height)
+CAR_BOX = (CAR.x1, CAR.y1, CAR.width, CAR.height)
 
 
 @pytest.fixture

@@ -118,7 +118,7 @@ class TestAnotherPackage:
         from typing import Literal
 
         from vdet.config.detector import DetectorSettings
-        from vdet.detect.detections import Detections
+        from vdet.boxes import Boxes
         from vdet.detect.factory import DetectorKind
 
 
@@ -140,7 +140,7 @@ class TestAnotherPackage:
                 return None
 
             def detect(self, candidates):
-                return Detections([[0, 0, self.settings.side, self.settings.side]], [1])
+                return Boxes([[0, 0, self.settings.side, self.settings.side]], [1])
 
             def stage_pictures(self, image, detections):
                 return {}
@@ -166,7 +166,7 @@ class TestAnotherPackage:
     def test_another_detector_is_found_by_the_name_of_its_kind(self) -> None:
         settings = load_settings(None, ["detector={kind: corner, side: 20}"])
         detector = load_detector(settings.detector).for_video(100, 80, [])
-        assert detector.detect(None).boxes.tolist() == [[0, 0, 20, 20]]
+        assert detector.detect(None).sides.tolist() == [[0, 0, 20, 20]]
         assert model_file(settings.detector) is None
 
     def test_another_detector_gets_the_model_file(self) -> None:

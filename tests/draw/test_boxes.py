@@ -34,12 +34,14 @@ def touched(image: Image) -> npt.NDArray[np.bool_]:
 
 def covered(box: Box, image: Image) -> npt.NDArray[np.bool_]:
     mask = np.zeros(image.shape[:2], bool)
-    mask[max(0, box.y) : max(0, box.bottom), max(0, box.x) : max(0, box.right)] = True
+    mask[max(0, box.y1) : max(0, box.y2), max(0, box.x1) : max(0, box.x2)] = True
     return mask
 
 
 def shrunk(box: Box, margin: int) -> Box:
-    return Box(box.x + margin, box.y + margin, box.width - 2 * margin, box.height - 2 * margin)
+    return Box.sized(
+        box.x1 + margin, box.y1 + margin, box.width - 2 * margin, box.height - 2 * margin
+    )
 
 
 def letters(image: Image) -> int:
@@ -51,11 +53,11 @@ class TestBox:
     @pytest.mark.parametrize("height", HEIGHTS)
     def test_the_outline_lies_just_inside_the_box(self, height: int) -> None:
         image = blank(400, height)
-        box = Box(50, 60, 100, 80)
+        box = Box.sized(50, 60, 100, 80)
         draw_box(image, box, (0, 0, 0))
         rows, columns = np.nonzero(touched(image))
-        assert (columns.min(), rows.min()) == (box.x, box.y)
-        assert (columns.max() + 1, rows.max() + 1) == (box.right, box.bottom)
+        assert (columns.min(), rows.min()) == (box.x1, box.y1)
+        assert (columns.max() + 1, rows.max() + 1) == (box.x2, box.y2)
         assert not (touched(image) & covered(shrunk(box, line_width(image) + 2), image)).any()
 
     @given(
@@ -68,13 +70,13 @@ class TestBox:
     def test_nothing_outside_the_box_is_touched_wherever_it_lies(
         self, x: int, y: int, width: int, height: int, rows: int
     ) -> None:
-        image, box = blank(height=rows), Box(x, y, width, height)
+        image, box = blank(height=rows), Box.sized(x, y, width, height)
         draw_box(image, box, (0, 0, 0))
         assert not (touched(image) & ~covered(box, image)).any()
 
     def test_of_a_box_partly_outside_the_frame_the_sides_inside_are_drawn(self) -> None:
         image = blank()
-        draw_box(image, Box(-20, 100, 60, 50), (0, 0, 0))
+        draw_box(image, Box.sized(-20, 100, 60, 50), (0, 0, 0))
         assert touched(image)[100, :40].all()
         assert touched(image)[149, :40].all()
         assert touched(image)[100:150, 39].all()
@@ -82,7 +84,7 @@ class TestBox:
 
     def test_a_box_as_large_as_the_frame_is_seen_whole(self) -> None:
         image = blank()
-        draw_box(image, Box(0, 0, 320, 240), (0, 0, 0))
+        draw_box(image, Box.sized(0, 0, 320, 240), (0, 0, 0))
         for side in (np.s_[0, :], np.s_[-1, :], np.s_[:, 0], np.s_[:, -1]):
             assert touched(image)[side].all()
 
@@ -108,10 +110,10 @@ class TestDashedBox:
         self, height: int
     ) -> None:
         image = blank(2 * height, height)
-        box = Box(height // 4, height // 4, height // 5, height // 6)
+        box = Box.sized(height // 4, height // 4, height // 5, height // 6)
         draw_box(image, box, BLACK, dashed=True)
-        top = touched(image)[box.y, box.x : box.right]
-        left = touched(image)[box.y : box.bottom, box.x]
+        top = box.cut(touched(image))[0]
+        left = box.cut(touched(image))[:, 0]
         for side in (top, left):
             assert len(runs(side)) >= 3
             assert 0.4 < side.mean() < 0.75
@@ -121,7 +123,7 @@ class TestDashedBox:
     @pytest.mark.parametrize("height", HEIGHTS)
     def test_dashes_and_gaps_are_longer_than_the_line_is_wide(self, height: int) -> None:
         image = blank(height, height)
-        draw_box(image, Box(0, 0, height, height), BLACK, dashed=True)
+        draw_box(image, Box.sized(0, 0, height, height), BLACK, dashed=True)
         line = touched(image)[0]
         width = line_width(image)
         assert min(runs(line)) >= 2 * width
@@ -138,8 +140,8 @@ class TestDashedBox:
         self, x: int, y: int, width: int, height: int, rows: int
     ) -> None:
         solid, dashed = blank(height=rows), blank(height=rows)
-        draw_box(solid, Box(x, y, width, height), BLACK)
-        draw_box(dashed, Box(x, y, width, height), BLACK, dashed=True)
+        draw_box(solid, Box.sized(x, y, width, height), BLACK)
+        draw_box(dashed, Box.sized(x, y, width, height), BLACK, dashed=True)
         assert not (touched(dashed) & ~touched(solid)).any()
 
 
@@ -218,8 +220,8 @@ class TestLabel:
     @pytest.mark.parametrize("y", [-30, 0, 200, 230])
     def test_of_a_box_at_the_edge_is_whole(self, x: int, y: int) -> None:
         middle, image = blank(), blank()
-        draw_box(middle, Box(100, 100, 60, 60), GREEN, "#12")
-        draw_box(image, Box(x, y, 60, 60), GREEN, "#12")
+        draw_box(middle, Box.sized(100, 100, 60, 60), GREEN, "#12")
+        draw_box(image, Box.sized(x, y, 60, 60), GREEN, "#12")
         assert letters(image) == letters(middle) > 5
 
     @pytest.mark.parametrize("corner", CORNERS)
@@ -230,7 +232,7 @@ class TestLabel:
         assert np.array_equal(touched(image), covered(tag, image))
 
     def test_stands_above_its_box_where_there_is_room(self) -> None:
-        image, box = blank(), Box(100, 100, 60, 60)
+        image, box = blank(), Box.sized(100, 100, 60, 60)
         draw_box(image, box, GREEN, "#12")
         above = touched(image) & ~covered(box, image)
         assert above[80:100, 100:160].any()

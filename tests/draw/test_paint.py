@@ -56,10 +56,10 @@ CORNERS = np.array([[11, 21], [151, 61], [90, 200]], np.int32)
 BEYOND = np.array([[-30, 21], [151, 61], [400, 300]], np.int32)
 Draw = Callable[[Surface], object]
 AREAS: dict[str, Draw] = {
-    "fill": lambda surface: fill(surface, Box(30, 40, 120, 76), RED),
-    "fill, odd corners": lambda surface: fill(surface, Box(31, 41, 120, 77), RED),
-    "fill, over the first corner": lambda surface: fill(surface, Box(-31, -41, 120, 77), RED),
-    "fill, over the last corner": lambda surface: fill(surface, Box(251, 201, 120, 77), RED),
+    "fill": lambda surface: fill(surface, Box.sized(30, 40, 120, 76), RED),
+    "fill, odd corners": lambda surface: fill(surface, Box.sized(31, 41, 120, 77), RED),
+    "fill, over the first corner": lambda surface: fill(surface, Box.sized(-31, -41, 120, 77), RED),
+    "fill, over the last corner": lambda surface: fill(surface, Box.sized(251, 201, 120, 77), RED),
     "blend": lambda surface: blend(surface, triangle(), (76, 50), RED),
     "blend, odd corner": lambda surface: blend(surface, triangle(), (77, 51), RED),
     "blend, half": lambda surface: blend(surface, triangle(), (77, 50), RED, 0.5),
@@ -73,11 +73,13 @@ STROKES: dict[str, Draw] = {
     "line between pixels": lambda surface: draw_lines(surface, 16 * CORNERS + 5, RED, 4, shift=4),
     "arrow": lambda surface: draw_arrow(surface, (20.4, 30.2), (200, 133), RED, 3, tip=0.2),
     "text": lambda surface: write_text(
-        surface, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=Box(30, 60, 250, 90)
+        surface, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=Box.sized(30, 60, 250, 90)
     ),
-    "box": lambda surface: draw_box(surface, Box(51, 61, 101, 83), RED, "#1 0.9"),
-    "dashed box": lambda surface: draw_box(surface, Box(50, 60, 100, 80), RED, dashed=True),
-    "box beyond the frame": lambda surface: draw_box(surface, Box(-11, 181, 101, 83), RED, "#1"),
+    "box": lambda surface: draw_box(surface, Box.sized(51, 61, 101, 83), RED, "#1 0.9"),
+    "dashed box": lambda surface: draw_box(surface, Box.sized(50, 60, 100, 80), RED, dashed=True),
+    "box beyond the frame": lambda surface: draw_box(
+        surface, Box.sized(-11, 181, 101, 83), RED, "#1"
+    ),
     "label": lambda surface: draw_label(surface, "0:01:02.500", (0, HEIGHT), RED),
     "trail": lambda surface: draw_trail(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
     "counts": lambda surface: draw_counts(
@@ -165,7 +167,7 @@ class TestFill:
         values = (0, 30, 60, 130, 220, 255)
         for color in product(values, values, values):
             planes = ground(coding, 16, 16)
-            fill(planes, Box(2, 4, 12, 8), color)
+            fill(planes, Box.sized(2, 4, 12, 8), color)
             shown = planes.to_image()[4:12, 2:14].astype(int)
             assert np.abs(shown - color).max() <= 3, color
 
@@ -184,7 +186,7 @@ class TestFill:
         fill(after, box, (0, 0, 0))
         inside = np.zeros((height, width), bool)
         part = box.clipped(width, height)
-        inside[part.y : part.bottom, part.x : part.right] = True
+        part.cut(inside)[:] = True
         np.testing.assert_array_equal(
             after.luma, np.where(inside, 0 if coding.full_range else 16, before.luma)
         )
@@ -197,8 +199,8 @@ class TestBlend:
     @pytest.mark.parametrize("y", [0, 1])
     def test_a_whole_mask_that_is_even_is_a_filled_box(self, x: int, y: int) -> None:
         mixed, filled = ground(Coding(), 33, 25), ground(Coding(), 33, 25)
-        box = Box(2 * x, 2 * y, 20, 16)
-        blend(mixed, np.full((box.height, box.width), 255, np.uint8), (box.x, box.y), RED)
+        box = Box.sized(2 * x, 2 * y, 20, 16)
+        blend(mixed, np.full((16, 20), 255, np.uint8), (2 * x, 2 * y), RED)
         fill(filled, box, RED)
         for ours, theirs in zip(mixed.layers, filled.layers, strict=True):
             np.testing.assert_array_equal(ours, theirs)
@@ -231,24 +233,24 @@ class TestBlend:
 
 
 class TestText:
-    @pytest.mark.parametrize("within", [Box(60, 100, 40, 20), Box(61, 101, 41, 21)])
+    @pytest.mark.parametrize("within", [Box.sized(60, 100, 40, 20), Box.sized(61, 101, 41, 21)])
     def test_no_stroke_lies_outside_its_box(self, within: Box) -> None:
         planes = ground(Coding())
         write_text(planes, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=within)
         changed = planes.luma != ground(Coding()).luma
         rows, columns = np.nonzero(changed)
-        assert within.x <= columns.min() <= columns.max() < within.right
-        assert within.y <= rows.min() <= rows.max() < within.bottom
+        assert within.x1 <= columns.min() <= columns.max() < within.x2
+        assert within.y1 <= rows.min() <= rows.max() < within.y2
 
     @pytest.mark.parametrize("origin", [(-50, 10), (300, 239), (310, 300), (900, 900)])
     def test_may_lie_beyond_the_frame(self, origin: tuple[int, int]) -> None:
         planes = ground(Coding())
-        within = Box(origin[0], origin[1] - 30, 200, 40)
+        within = Box.sized(origin[0], origin[1] - 30, 200, 40)
         write_text(planes, "#12 car", origin, TextStyle(1.2, 2), RED, within=within)
 
 
 def _coded(color: Color) -> list[int]:
     """Return luma, blue and red chroma of a colour in the default coding."""
     planes = ground(Coding(), 2, 2)
-    fill(planes, Box(0, 0, 2, 2), color)
+    fill(planes, Box.sized(0, 0, 2, 2), color)
     return [int(layer[0, 0]) for layer in planes.layers]

@@ -13,7 +13,7 @@ from vdet.labels.video import LabelledVideo, SavedTracks
 from vdet.track.track import FrameTracks, Track
 
 VIDEO = SourceVideo("road & rail.mp4", 1280, 720)
-PLACE = Box(10, 20, 30, 40)
+PLACE = Box.sized(10, 20, 30, 40)
 
 
 def row(

@@ -41,7 +41,7 @@ def boxes(draw: st.DrawFn) -> Box:
     """Give boxes inside the frame."""
     x, y = draw(st.integers(0, VIDEO.width - 1)), draw(st.integers(0, VIDEO.height - 1))
     right, bottom = draw(st.integers(x + 1, VIDEO.width)), draw(st.integers(y + 1, VIDEO.height))
-    return Box(x, y, right - x, bottom - y)
+    return Box.sized(x, y, right - x, bottom - y)
 
 
 CLASSES = st.sampled_from([None, *OUR_NAMES, "tractor", 'a <"b"> & c, d', "Überlandbus 🚌"])
@@ -141,7 +141,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(
 
 @every_format
 def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
-    box = Box(-5, 700, 30, 60)
+    box = Box.sized(-5, 700, 30, 60)
     saved = read_back(form, tmp_path, written(form, [frame(2, car(1, box))]))
     inside = box.clipped(1280, 720)
     assert saved.frames[0].tracks[0].box == (inside if form is YOLO else box)
@@ -150,7 +150,7 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
 @every_format
 @pytest.mark.parametrize("size", [(1, 1), (319, 241), (7680, 4320)])
 def test_frames_may_have_any_size(tmp_path: Path, form: Format, size: tuple[int, int]) -> None:
-    box = Box(size[0] // 3, size[1] // 3, max(1, size[0] // 7), max(1, size[1] // 7))
+    box = Box.sized(size[0] // 3, size[1] // 3, max(1, size[0] // 7), max(1, size[1] // 7))
     video = SourceVideo("in.mp4", *size)
     saved = read_back(form, tmp_path, written(form, [frame(0, car(1, box))], video))
     assert saved.frames[0].tracks[0].box == box

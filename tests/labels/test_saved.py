@@ -18,7 +18,7 @@ def test_frames_are_those_with_a_box_and_those_that_are_listed() -> None:
 def test_boxes_are_rounded_side_by_side_and_scores_are_cut() -> None:
     saved = SavedTracks((row(1, 1, 1, 10.4, 20.6, 30.4, 0.2, score=7.0),))
     (track,) = saved.frames[0].tracks
-    assert track.box == Box(10, 21, 31, 1)
+    assert track.box == Box(10, 21, 41, 22)
     assert track.score == 1
 
 

@@ -38,7 +38,7 @@ def member(data: bytes, name: str) -> str:
 
 class TestWriting:
     def test_a_line_is_class_middle_size_and_id(self) -> None:
-        data = written(YOLO, [frame(12, car(7, Box(0, 0, 640, 360)))])
+        data = written(YOLO, [frame(12, car(7, Box.sized(0, 0, 640, 360)))])
         text = member(data, "labels/train/frame_000012.txt")
         assert text == "0 0.250000 0.250000 0.500000 0.500000 7\n"
 
@@ -53,7 +53,7 @@ class TestWriting:
         assert member(data, "train.txt") == "images/train/frame_000000.png\n"
 
     def test_a_box_outside_the_frame_is_left_out(self) -> None:
-        data = written(YOLO, [frame(0, car(1, Box(1280, 10, 20, 20)))])
+        data = written(YOLO, [frame(0, car(1, Box.sized(1280, 10, 20, 20)))])
         assert member(data, "labels/train/frame_000000.txt") == ""
 
 

@@ -54,14 +54,14 @@ def undistorter() -> Undistorter:
 
 def marked(box: Box) -> Image:
     image = np.zeros((480, 640, 3), np.uint8)
-    image[box.y : box.bottom, box.x : box.right] = 255
+    box.cut(image)[:] = 255
     return image
 
 
 def extent(image: Image) -> Box:
     """Return the box around the pixels that are at least half white."""
     x, y, width, height = cv2.boundingRect((image[..., 0] > 127).astype(np.uint8))
-    return Box(x, y, width, height)
+    return Box.sized(x, y, width, height)
 
 
 def test_lines_bent_by_the_lens_become_straight(undistorter: Undistorter) -> None:
@@ -81,11 +81,14 @@ def test_lines_bent_by_the_lens_become_straight(undistorter: Undistorter) -> Non
 
 
 EDGE_BOXES = [
-    Box(90, 60, 60, 50), Box(480, 40, 80, 60), Box(70, 380, 90, 50), Box(510, 360, 60, 60),
-]  # fmt: skip
+    Box.sized(90, 60, 60, 50),
+    Box.sized(480, 40, 80, 60),
+    Box.sized(70, 380, 90, 50),
+    Box.sized(510, 360, 60, 60),
+]
 
 
-@pytest.mark.parametrize("box", [*EDGE_BOXES, Box(300, 220, 40, 40)])
+@pytest.mark.parametrize("box", [*EDGE_BOXES, Box.sized(300, 220, 40, 40)])
 def test_an_undistorted_box_encloses_the_same_content(undistorter: Undistorter, box: Box) -> None:
     seen = extent(undistorter.image(marked(box)))
     assert undistorter.box(box).iou(seen) > 0.94
@@ -100,12 +103,12 @@ def test_an_unchanged_box_near_the_edge_would_miss_its_content(
 
 
 def test_a_box_is_clipped_to_the_frame(undistorter: Undistorter) -> None:
-    moved = undistorter.box(Box(0, 0, 640, 480))
-    assert moved == Box(0, 0, 640, 480)
+    moved = undistorter.box(Box.sized(0, 0, 640, 480))
+    assert moved == Box.sized(0, 0, 640, 480)
 
 
 def test_a_box_outside_the_undistorted_frame_has_no_area(undistorter: Undistorter) -> None:
-    assert undistorter.box(Box(0, 0, 12, 12)).area == 0
+    assert undistorter.box(Box.sized(0, 0, 12, 12)).area == 0
 
 
 @given(
@@ -118,13 +121,13 @@ def test_an_undistorted_box_holds_all_points_of_the_box(
     x: int, y: int, width: int, height: int
 ) -> None:
     undistorter = Undistorter(CAMERA, 640, 480)
-    box = undistorter.box(Box(x, y, width, height))
+    box = undistorter.box(Box.sized(x, y, width, height))
     columns, rows = np.meshgrid(np.arange(x, x + width), np.arange(y, y + height))
     points = undistorter.points(np.column_stack([columns.ravel(), rows.ravel()]).astype(float))
     inside = ((points >= 0) & (points <= (639, 479))).all(axis=1)
     for point in points[inside]:
-        assert box.x - 1 <= point[0] <= box.right
-        assert box.y - 1 <= point[1] <= box.bottom
+        assert box.x1 - 1 <= point[0] <= box.x2
+        assert box.y1 - 1 <= point[1] <= box.y2
 
 
 def test_without_distortion_nothing_changes() -> None:
@@ -132,7 +135,7 @@ def test_without_distortion_nothing_changes() -> None:
     undistorter = Undistorter(camera, 64, 48)
     image = np.random.default_rng(0).integers(0, 256, (48, 64, 3), dtype=np.uint8)
     assert (undistorter.image(image) == image).all()
-    assert undistorter.box(Box(3, 5, 20, 10)) == Box(3, 5, 20, 10)
+    assert undistorter.box(Box.sized(3, 5, 20, 10)) == Box.sized(3, 5, 20, 10)
 
 
 def test_a_frame_of_another_size_is_undistorted_in_the_same_way(undistorter: Undistorter) -> None:

@@ -58,7 +58,7 @@ def told_of(scene: Scene, index: int, road: Road) -> Iterable[Told]:
         place = places[each.id]
         wanted = must_be_found(each, scene.camera.height) and place.distance <= MOST
         if wanted and not road.cuts(each.box):
-            foot = (each.box.center[0], float(each.box.bottom))
+            foot = (each.box.center[0], float(each.box.y2))
             position = road.position(foot)
             error = position.distance / place.distance - 1 if position else None
             yield Told(error, position is not None and position.lane == place.lane)

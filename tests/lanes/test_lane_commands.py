@@ -30,7 +30,7 @@ from vdet.synthetic.scene import Scene
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
 LENS = CalibratedCamera(WIDTH, HEIGHT, (480, 480), (320, 240), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
-CAR = Box(500, 300, 64, 56)  # in the distorted frame, near its edge
+CAR = Box.sized(500, 300, 64, 56)  # in the distorted frame, near its edge
 CORNER = np.s_[400:, 600:]
 """Pixels without drawings that undistortion moves far."""
 STAGES = [
@@ -109,7 +109,7 @@ def distorted(image: Image, undistorter: Undistorter) -> Image:
 
 
 def with_car(image: Image) -> Image:
-    image[CAR.y : CAR.bottom, CAR.x : CAR.right] = (0, 0, 255)
+    CAR.cut(image)[:] = (0, 0, 255)
     return image
 
 
@@ -140,7 +140,7 @@ def read_records(path: Path) -> list[dict[str, Any]]:
 
 
 def box_of(item: dict[str, Any]) -> Box:
-    return Box(item["x"], item["y"], item["width"], item["height"])
+    return Box.sized(item["x"], item["y"], item["width"], item["height"])
 
 
 def check_lane(lane: dict[str, Any], camera: PinholeCamera) -> None:
@@ -168,12 +168,12 @@ def sits_on(box: Box, car: Box) -> bool:
 def red_in(image: Image) -> Box:
     """Return the box around the pixels that are as red as the car."""
     x, y, width, height = cv2.boundingRect(cv2.inRange(image, (0, 0, 180), (80, 80, 255)))
-    return Box(x, y, width, height)
+    return Box.sized(x, y, width, height)
 
 
 def has_outline(image: Image, box: Box, color: tuple[int, int, int]) -> bool:
     """Tell whether the lower side of a box is drawn; video has half the rows of chroma."""
-    side = image[box.bottom - 1, box.x + 4 : box.right - 4].astype(int)
+    side = Box(box.x1 + 4, box.y2 - 1, box.x2 - 4, box.y2).cut(image)[0].astype(int)
     return bool((np.abs(side - color).max(axis=1) < 90).mean() > 0.8)
 
 
@@ -222,7 +222,7 @@ class TestVideo:
         assert not has_outline(drawn, reported, color_of(track["id"]))
         car = red_in(undistorter.image(video_images(files.clip)[-1]))
         assert sits_on(placed, car)
-        assert reported.right < car.right - 15, "an unchanged box would miss a quarter of the car"
+        assert reported.x2 < car.x2 - 15, "an unchanged box would miss a quarter of the car"
 
     def test_the_video_is_the_undistorted_one(
         self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
@@ -305,9 +305,7 @@ class TestPictures:
         check_lane(item["lane"], road.camera)
         (reported,) = map(box_of, item["boxes"])
         assert sits_on(reported, CAR)
-        [[x, y]] = undistorter.points(
-            np.array([[reported.center[0], reported.bottom]]) - 0.5
-        ).tolist()
+        [[x, y]] = undistorter.points(np.array([[reported.center[0], reported.y2]]) - 0.5).tolist()
         camera = road.camera
         metres = camera.focal * camera.above_ground / (y - camera.horizon)
         assert item["boxes"][0]["distance"] == pytest.approx(metres, rel=0.1)

@@ -180,7 +180,7 @@ class TestHiddenPaint:
         """Return the box of a thing on the road that rises far above the horizon."""
         ends = np.array([left, right]), np.array([distance, distance])
         [[x0, y0], [x1, _]] = self.VIEW.ground_to_frame(*ends)
-        return Box(round(x0), 100, round(x1 - x0), round(y0) - 100)
+        return Box.sized(round(x0), 100, round(x1 - x0), round(y0) - 100)
 
     def mask(self) -> Image:
         mask = np.zeros((len(self.VIEW.distances), len(self.VIEW.laterals)), np.uint8)
@@ -199,7 +199,7 @@ class TestHiddenPaint:
 
     def test_above_the_farthest_row_a_vehicle_hides_nothing(self) -> None:
         box = self.box_from(0.5, 2.5, 20)
-        above = Box(box.x, 0, box.width, int(self.VIEW.outline[:, 1].min()) - 2)
+        above = Box.sized(box.x1, 0, box.width, int(self.VIEW.outline[:, 1].min()) - 2)
         assert (hide(self.mask(), self.VIEW, [above]) == self.mask()).all()
 
     def test_rows_of_which_a_part_is_hidden_are_left_out(self) -> None:

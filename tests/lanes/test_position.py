@@ -183,13 +183,13 @@ class TestRoad:
     @pytest.mark.parametrize(
         ("box", "cut"),
         [
-            (Box(100, 300, 80, 60), False),
-            (Box(100, 0, 80, 60), False),  # above, the lower edge is whole
-            (Box(0, 300, 80, 60), True),
-            (Box(560, 300, 80, 60), True),
-            (Box(100, 420, 80, 60), True),
-            (Box(2, 300, 80, 60), True),
-            (Box(5, 300, 80, 60), False),
+            (Box.sized(100, 300, 80, 60), False),
+            (Box.sized(100, 0, 80, 60), False),  # above, the lower edge is whole
+            (Box.sized(0, 300, 80, 60), True),
+            (Box.sized(560, 300, 80, 60), True),
+            (Box.sized(100, 420, 80, 60), True),
+            (Box.sized(2, 300, 80, 60), True),
+            (Box.sized(5, 300, 80, 60), False),
         ],
     )
     def test_the_edges_beside_and_below_cut_boxes(

@@ -26,7 +26,7 @@ NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
 FOLDER = Path("found/a.page")
 VIDEO = Player.of(Path("found/a.mp4"), FOLDER, is_drawn=True, start=0.0)
-TRUCK = replace(track(2, Box(5, 5, 30, 30)), class_name="truck")
+TRUCK = replace(track(2, Box.sized(5, 5, 30, 30)), class_name="truck")
 
 
 def records(*frames: FrameTracks) -> Sequence[VehicleRecord]:
@@ -122,7 +122,7 @@ class TestVideoPage:
         assert "2vehicles" in made.text, "all of them count"
 
     def test_a_long_table_is_closed_at_first(self) -> None:
-        many = records(*(frame(n, track(n + 1, Box(5, 5, 30, 30))) for n in range(60)))
+        many = records(*(frame(n, track(n + 1, Box.sized(5, 5, 30, 30))) for n in range(60)))
         text = seen(replace(page(), records=many)).text
         assert "Show 60 vehicles" in text
 
@@ -147,7 +147,7 @@ class TestVideoPage:
         assert "0vehicles" in made.text
 
     def test_every_name_is_escaped(self) -> None:
-        bus = replace(track(1, Box(5, 5, 30, 30)), class_name=NASTY)
+        bus = replace(track(1, Box.sized(5, 5, 30, 30)), class_name=NASTY)
         made = replace(
             page(source=Path("clips") / NASTY, player=player_of(NASTY)),
             records=records(frame(0, bus), frame(1, bus)),

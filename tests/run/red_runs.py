@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, red_finder, road
-from vdet.boxes import Box
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import Settings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, StagePictures
 from vdet.detect.svm.detector import SvmModel
 from vdet.files import OutputFiles
@@ -90,10 +89,10 @@ def result_of(
         Track(number, each, 0.9, predicted=False) if isinstance(each, Box) else each
         for number, each in enumerate(vehicles, start=1)
     )
-    return FrameResult(source, frame, NO_DETECTIONS, tracks, found)
+    return FrameResult(source, frame, NO_BOXES, tracks, found)
 
 
-def stages_of_trace(image: Image, detections: Detections) -> dict[str, Image]:
+def stages_of_trace(image: Image, detections: Boxes) -> dict[str, Image]:
     """Return the stage pictures of the detector of red cars, where it made the detections."""
     if detections.trace is None:
         return {}

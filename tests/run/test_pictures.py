@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 import pytest
 
+from boxing import rounded
 from red_cars import CAR, PERSPECTIVE, SETTINGS, road
 from run.conftest import Register
 from run.red_runs import model_for
@@ -150,11 +151,11 @@ class TestRun:
         assert (result.frame.index, result.frame.time) == (0, Fraction(0))
         np.testing.assert_array_equal(result.frame.image, image)
         (track,) = result.tracks
-        assert [track.box] == detections.rounded
+        assert [track.box] == rounded(detections)
         assert track.score == pytest.approx(detections.scores.tolist()[0])
         assert (track.id, track.predicted) == (1, False)
         assert track.box.iou(CAR) > 0.35
-        assert result.detections.strengths[0] > settings.svm.heat.threshold
+        assert result.detections.data["strength"][0] > settings.svm.heat.threshold
 
     def test_writes_nothing_that_is_not_asked_for(self, source: Path) -> None:
         run_red(source)
@@ -163,10 +164,10 @@ class TestRun:
     def test_draws_the_boxes_into_the_picture_only(self, source: Path) -> None:
         out = source.with_name("out.png")
         (track,) = run_red(source, picture=out).tracks
-        box = track.box
+        x1, y1, _, y2 = track.box.pixels
         changed = (read_image(out) != road(CAR)).any(axis=2)
-        assert changed[box.y : box.bottom, box.x].all()
-        assert not changed[box.bottom :].any()
+        assert changed[y1:y2, x1].all()
+        assert not changed[y2:].any()
         np.testing.assert_array_equal(read_image(source), road(CAR))
 
     def test_an_empty_road_is_written_as_it_is(self, tmp_path: Path) -> None:

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from run.red_runs import follow
-from vdet.boxes import Box
+from vdet.boxes import Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings
-from vdet.detect.detections import Detections
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame, Picture
 from vdet.run.loop import NullDetector
@@ -48,11 +47,11 @@ class TrueDetector(NullDetector):
     def search(self, picture: Picture, index: int | None) -> None:
         """Do nothing: the vehicles keep their distances."""
 
-    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
+    def detect(self, candidates: None) -> Boxes:  # noqa: ARG002
         """Return the true boxes of the scene."""
         boxes = [each.box for each in true_boxes(SCENE, 0)]
-        corners = [(box.x, box.y, box.right, box.bottom) for box in boxes]
-        return Detections(corners, np.full(len(corners), 0.95))
+        corners = [(box.x1, box.y1, box.x2, box.y2) for box in boxes]
+        return Boxes(corners, np.full(len(corners), 0.95))
 
     def for_video(self, *_: object) -> "TrueDetector":
         return self
@@ -68,7 +67,7 @@ def roads() -> RoadFinder:
 
 def check(tracks: tuple[Track, ...]) -> None:
     """Compare tracks from left to right with where the vehicles are."""
-    left_to_right = sorted(tracks, key=lambda track: track.box.x)
+    left_to_right = sorted(tracks, key=lambda track: track.box.x1)
     assert len(left_to_right) == 3
     for track, place in zip(left_to_right, true_places(SCENE, 0), strict=True):
         assert track.distance == pytest.approx(place.distance, rel=0.1)
@@ -106,7 +105,7 @@ def track_at(box: Box) -> Track:
 
 
 def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
-    box = Box(300, 200, 60, 50)
+    box = Box.sized(300, 200, 60, 50)
     [plain] = with_positions([track_at(box)], road, 0)
     [lower] = with_positions([replace(track_at(box), whole_foot=(330.0, 270.0))], road, 0)
     assert plain.distance is not None
@@ -115,7 +114,7 @@ def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
 
 
 def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road) -> None:
-    low, right = track_at(Box(300, 200, 60, 50)), track_at(Box(300, 200, 60, 45))
+    low, right = track_at(Box.sized(300, 200, 60, 50)), track_at(Box.sized(300, 200, 60, 45))
     [shortened], [expected] = with_positions([low], road, 0.1), with_positions([right], road, 0)
     assert expected.distance is not None
     assert shortened.distance == pytest.approx(expected.distance)
@@ -123,7 +122,13 @@ def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road
 
 
 @pytest.mark.parametrize(
-    "box", [Box(300, 300, 60, 60), Box(0, 230, 60, 60), Box(580, 230, 60, 60), Box(300, 150, 9, 9)]
+    "box",
+    [
+        Box.sized(300, 300, 60, 60),
+        Box.sized(0, 230, 60, 60),
+        Box.sized(580, 230, 60, 60),
+        Box.sized(300, 150, 9, 9),
+    ],
 )
 def test_a_vehicle_whose_foot_is_not_on_the_road_in_the_frame_has_none(
     road: Road, box: Box

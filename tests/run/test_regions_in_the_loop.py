@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, drive, road
 from run.red_runs import follow, model_for, outputs, run_red
 from vdet.batch.task import Work
@@ -40,11 +41,11 @@ def test_a_vehicle_is_shown_from_where_its_foot_is_in_the_region() -> None:
 
 @pytest.mark.parametrize("settings", [SETTINGS, PERSPECTIVE], ids=["outlines", "votes"])
 def test_a_picture_shows_only_what_stands_in_the_region(settings: Settings) -> None:
-    image = road(CAR.moved_to(20, 120), CAR.moved_to(220, 120))
+    image = road(moved_to(CAR, 20, 120), moved_to(CAR, 220, 120))
 
     def found(regions: Settings) -> list[Box]:
         result = detect_picture(Path("a.png"), image, model_for(regions), regions)
-        assert [t.box for t in result.tracks] == result.detections.rounded
+        assert [t.box for t in result.tracks] == rounded(result.detections)
         return [t.box for t in result.tracks]
 
     assert len(found(settings)) == 2

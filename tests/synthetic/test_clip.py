@@ -38,7 +38,7 @@ def test_truth_lines_are_motchallenge_columns_counting_from_1(tmp_path: Path, sc
     assert rows[:3, 1].tolist() == [1, 2, 3]
     assert (rows[:, 7] == 3).all()
     box = true_boxes(scene, 0)[0].box
-    assert rows[0, 2:6].tolist() == [box.x + 1, box.y + 1, box.width, box.height]
+    assert rows[0, 2:6].tolist() == [box.x1 + 1, box.y1 + 1, box.width, box.height]
 
 
 def test_hidden_and_small_vehicles_are_ignore_regions(tmp_path: Path, scene: Scene) -> None:

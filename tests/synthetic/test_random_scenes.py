@@ -28,13 +28,13 @@ def test_one_vehicle_leaves_at_the_right_edge(scene: Scene) -> None:
     assert seen[0][0] == 0
     assert seen[0][1].visibility > 0.99
     assert seen[-1][0] < scene.frames - 50
-    assert seen[-1][1].box.right == scene.camera.width
+    assert seen[-1][1].box.x2 == scene.camera.width
 
 
 def test_one_vehicle_enters_at_the_right_edge_and_stays(scene: Scene) -> None:
     seen = history(scene, 4)
     assert seen[0][0] > 25
-    assert seen[0][1].box.right == scene.camera.width
+    assert seen[0][1].box.x2 == scene.camera.width
     assert seen[0][1].visibility < 0.5
     assert seen[-1][0] == scene.frames - 5
 
@@ -53,8 +53,8 @@ def test_vehicles_in_full_view_have_the_sizes_that_the_window_sets_cover(scene: 
             box = vehicle.box
             if vehicle.visibility > 0.99:
                 assert 55 * unit < box.width < 420 * unit
-                assert 330 * unit < box.y
-                assert box.bottom < 640 * unit
+                assert 330 * unit < box.y1
+                assert box.y2 < 640 * unit
 
 
 def test_the_same_seed_gives_the_same_scene() -> None:

@@ -25,11 +25,11 @@ def drawn(scene: Scene) -> npt.NDArray[np.bool_]:
 
 
 def drawn_box(scene: Scene) -> Box:
-    return Box(*cv2.boundingRect(drawn(scene).astype(np.uint8)))
+    return Box.sized(*cv2.boundingRect(drawn(scene).astype(np.uint8)))
 
 
 def sides(box: Box) -> tuple[int, int, int, int]:
-    return box.x, box.y, box.right, box.bottom
+    return box.pixels
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -63,7 +63,7 @@ def test_a_vehicle_beside_the_camera_is_clipped_to_the_frame(
 ) -> None:
     scene = make_scene(parked(1, ahead, 3.7))
     [found] = true_boxes(scene, 0)
-    assert found.box.right == 1280
+    assert found.box.x2 == 1280
     # below, the shadow on the ground shows too
     assert sides(found.box)[:3] == pytest.approx(sides(drawn_box(scene))[:3], abs=2)
     assert 0 < found.visibility < 0.9
@@ -121,7 +121,7 @@ def test_a_vehicle_stands_on_the_lower_edge_of_its_box(
     scene = make_scene(parked(1, 15.0, lateral))
     [box], [place] = true_boxes(scene, 0), true_places(scene, 0)
     [[_, row]] = scene.camera.project(np.array([[place.lateral, 0.0, place.distance]]))
-    assert box.box.bottom - 0.5 == pytest.approx(row, abs=1.0)
+    assert box.box.y2 - 0.5 == pytest.approx(row, abs=1.0)
 
 
 @pytest.mark.parametrize(
@@ -131,5 +131,5 @@ def test_a_vehicle_stands_on_the_lower_edge_of_its_box(
 def test_a_vehicle_must_be_found_if_it_is_large_and_half_of_it_is_not_hidden(
     width: int, height: int, hidden: float, expected: bool
 ) -> None:
-    vehicle = TrueBox(1, Box(0, 0, width, height), visibility=1 - hidden, hidden=hidden)
+    vehicle = TrueBox(1, Box.sized(0, 0, width, height), visibility=1 - hidden, hidden=hidden)
     assert must_be_found(vehicle, 720) is expected

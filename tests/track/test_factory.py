@@ -4,8 +4,8 @@ import sys
 import pytest
 
 from seed import SEED
+from vdet.boxes import NO_BOXES
 from vdet.config.schema import RulesTrackerSettings, Settings
-from vdet.detect.detections import NO_DETECTIONS
 from vdet.track.factory import make_tracker
 from vdet.track.holding import HoldingTracker
 from vdet.track.motion.tracker import MotionTracker
@@ -29,7 +29,7 @@ def test_the_lengths_of_the_rules_are_scaled_to_the_frame(monkeypatch: pytest.Mo
 def test_every_tracker_is_new() -> None:
     first, second = (make_tracker(Settings(), 1280, 720) for _ in range(2))
     assert first is not second
-    assert first.update(NO_DETECTIONS, 0.0) == []
+    assert first.update(NO_BOXES, 0.0) == []
 
 
 def test_the_rules_do_without_scipy() -> None:

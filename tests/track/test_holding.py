@@ -1,10 +1,10 @@
-from vdet.boxes import Box
-from vdet.detect.detections import NO_DETECTIONS, Detections
+from boxing import moved_to
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.media import Picture
 from vdet.track.holding import HoldingTracker
 from vdet.track.track import Track
 
-CAR = Box(100, 100, 50, 40)
+CAR = Box.sized(100, 100, 50, 40)
 
 
 class SeesOne:
@@ -15,17 +15,17 @@ class SeesOne:
 
     def update(
         self,
-        detections: Detections,  # noqa: ARG002
+        detections: Boxes,  # noqa: ARG002
         time: float,
         picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
         self.times.append(time)
-        return [Track(1, CAR.moved_to(100 + round(100 * time), 100), 0.9, predicted=False)]
+        return [Track(1, moved_to(CAR, 100 + round(100 * time), 100), 0.9, predicted=False)]
 
 
 def test_vehicles_stay_where_they_were_in_frames_that_are_not_searched() -> None:
     tracker = HoldingTracker(SeesOne())
-    (seen,) = tracker.update(NO_DETECTIONS, 1.0)
+    (seen,) = tracker.update(NO_BOXES, 1.0)
     for time in (1.1, 1.2):
         (held,) = tracker.carry(time)
         assert (held.id, held.box, held.score) == (seen.id, seen.box, seen.score)
@@ -38,6 +38,6 @@ def test_the_tracker_sees_only_the_frames_that_are_searched() -> None:
     tracker = HoldingTracker(inner)
     assert tracker.carry(0.0) == []
     for time in (1.0, 2.0):
-        tracker.update(NO_DETECTIONS, time)
+        tracker.update(NO_BOXES, time)
         tracker.carry(time + 0.5)
     assert inner.times == [1.0, 2.0]

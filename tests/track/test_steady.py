@@ -7,16 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boxing import moved_to
 from vdet.boxes import Box
 from vdet.track.steady import GAP, LIMIT, SteadyBoxes
 from vdet.track.track import Track
 
 SECONDS = 0.4
-CAR = Box(300, 200, 200, 160)
+CAR = Box.sized(300, 200, 200, 160)
 
 
 def track(box: Box, id_: int = 1) -> Track:
-    return Track(id_, box, 0.9, predicted=False, whole_foot=(box.x + box.width / 2, box.bottom))
+    return Track(id_, box, 0.9, predicted=False, whole_foot=(box.x1 + box.width / 2, box.y2))
 
 
 def smoothed(boxes: Iterable[Box], rate: float = 25, seconds: float = SECONDS) -> list[Box]:
@@ -28,7 +29,8 @@ def smoothed(boxes: Iterable[Box], rate: float = 25, seconds: float = SECONDS) -
 def trembling(count: int, seed: int = 1, sides: float = 0.01) -> list[Box]:
     noise = np.random.default_rng(seed).normal(0, sides * CAR.width, (count, 4)).round().astype(int)
     return [
-        Box(CAR.x + x, CAR.y + y, CAR.width + w, CAR.height + h) for x, y, w, h in noise.tolist()
+        Box.sized(CAR.x1 + x, CAR.y1 + y, CAR.width + w, CAR.height + h)
+        for x, y, w, h in noise.tolist()
     ]
 
 
@@ -45,14 +47,14 @@ def test_widths_change_by_half_as_much_or_less(rate: int) -> None:
 
 @pytest.mark.parametrize("speed", [-12, 0, 12])
 def test_a_vehicle_that_moves_and_grows_steadily_is_shown_without_lag(speed: int) -> None:
-    given = [Box(600 + speed * n, 200, 200 + 2 * n, 160 + n) for n in range(40)]
+    given = [Box.sized(600 + speed * n, 200, 200 + 2 * n, 160 + n) for n in range(40)]
     for box, place in zip(smoothed(given)[2:], given[2:], strict=True):
         assert box.iou(place) > 0.98
 
 
 def test_a_vehicle_that_stops_at_once_is_hardly_overshot() -> None:
-    given = [Box(100 + 6 * min(n, 20), 200, 200, 160) for n in range(100)]
-    lag = [abs(box.x - place.x) for box, place in zip(smoothed(given), given, strict=True)]
+    given = [Box.sized(100 + 6 * min(n, 20), 200, 200, 160) for n in range(100)]
+    lag = [abs(box.x1 - place.x1) for box, place in zip(smoothed(given), given, strict=True)]
     assert max(lag) <= LIMIT * 200 + 1
     assert max(lag[90:]) <= 1
 
@@ -60,7 +62,7 @@ def test_a_vehicle_that_stops_at_once_is_hardly_overshot() -> None:
 @given(
     st.lists(
         st.builds(
-            Box,
+            Box.sized,
             st.integers(-50, 1300),
             st.integers(-50, 700),
             st.integers(1, 900),
@@ -73,10 +75,10 @@ def test_a_vehicle_that_stops_at_once_is_hardly_overshot() -> None:
 def test_a_side_never_lies_far_from_where_it_was_given(boxes: list[Box]) -> None:
     for box, place in zip(smoothed(boxes), boxes, strict=True):
         reach, drop = LIMIT * place.width + 0.5, LIMIT * place.height + 0.5
-        assert abs(box.x - place.x) <= reach
-        assert abs(box.right - place.right) <= reach
-        assert abs(box.y - place.y) <= drop
-        assert abs(box.bottom - place.bottom) <= drop
+        assert abs(box.x1 - place.x1) <= reach
+        assert abs(box.x2 - place.x2) <= reach
+        assert abs(box.y1 - place.y1) <= drop
+        assert abs(box.y2 - place.y2) <= drop
         assert box.area
 
 
@@ -84,14 +86,14 @@ def test_the_foot_moves_with_its_box() -> None:
     steady = SteadyBoxes(SECONDS)
     for number, box in enumerate(trembling(20)):
         (shown,) = steady.update([track(box)], number / 25)
-        middle = shown.box.x + shown.box.width / 2
-        assert shown.foot == pytest.approx((middle, shown.box.bottom))
+        middle = shown.box.x1 + shown.box.width / 2
+        assert shown.foot == pytest.approx((middle, shown.box.y2))
 
 
 def test_each_vehicle_is_smoothed_for_itself() -> None:
     alone = smoothed(trembling(30))
     steady = SteadyBoxes(SECONDS)
-    other = Box(900, 100, 80, 60)
+    other = Box.sized(900, 100, 80, 60)
     for number, (box, expected) in enumerate(zip(trembling(30), alone, strict=True)):
         first, second = steady.update([track(box), track(other, 2)], number / 25)
         assert (first.box, second.box) == (expected, other)
@@ -100,7 +102,7 @@ def test_each_vehicle_is_smoothed_for_itself() -> None:
 def test_a_vehicle_that_comes_back_later_begins_anew() -> None:
     steady = SteadyBoxes(SECONDS)
     for number in range(20):
-        steady.update([track(CAR.moved_to(10 * number, 200))], number / 25)
+        steady.update([track(moved_to(CAR, 10 * number, 200))], number / 25)
     (back,) = steady.update([track(CAR)], 1 + GAP + 0.1)
     assert back.box == CAR
 

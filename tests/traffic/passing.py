@@ -20,4 +20,4 @@ def frame(index: int, *tracks: Track, rate: float = RATE) -> FrameTracks:
 def passing(count: int, number: int = 1, speed: int = 2) -> Iterator[FrameTracks]:
     """Give frames of a vehicle of 40 × 30 pixels that goes to the right, `speed` pixels a frame."""
     for index in range(count):
-        yield frame(index, track(number, Box(10 + speed * index, 100, 40, 30)))
+        yield frame(index, track(number, Box.sized(10 + speed * index, 100, 40, 30)))

@@ -30,7 +30,7 @@ def track(
     predicted: bool = False,
 ) -> Track:
     """Return a track that stands at `foot`."""
-    box = Box(round(foot[0]) - height // 2, round(foot[1]) - height, height, height)
+    box = Box.sized(round(foot[0]) - height // 2, round(foot[1]) - height, height, height)
     return Track(number, box, score, predicted, name, foot)
 
 

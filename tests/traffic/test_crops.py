@@ -24,11 +24,11 @@ def crops(*shown: list[Track], settings: CropSettings = BARE) -> dict[int, Crop]
 
 
 def box(size: int, x: int = 50) -> Box:
-    return Box(x, 60, size, size)
+    return Box.sized(x, 60, size, size)
 
 
 def cut(place: Box) -> Image:
-    return ROAD[place.y : place.bottom, place.x : place.right]
+    return place.cut(ROAD)
 
 
 def test_the_largest_is_taken_and_shows_the_box() -> None:
@@ -43,7 +43,7 @@ def test_size_counts_times_score() -> None:
 
 
 def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
-    at_the_edge = Box(WIDTH - 90, 60, 90, 90)
+    at_the_edge = Box.sized(WIDTH - 90, 60, 90, 90)
     found = crops([track(1, box(40))], [track(1, at_the_edge)])
     assert found[1].image.shape == (40, 40, 3)
     alone = crops([track(1, at_the_edge)])
@@ -61,10 +61,10 @@ def test_a_vehicle_that_is_too_small_gets_no_picture() -> None:
 
 def test_padding_shows_what_is_around_as_far_as_the_frame_goes() -> None:
     settings = CropSettings(padding=0.5)
-    inside, corner = Box(100, 100, 40, 30), Box(0, 0, 40, 30)
+    inside, corner = Box.sized(100, 100, 40, 30), Box.sized(0, 0, 40, 30)
     found = crops([track(1, inside), track(2, corner)], settings=settings)
-    np.testing.assert_array_equal(found[1].image, cut(Box(80, 85, 80, 60)))
-    np.testing.assert_array_equal(found[2].image, cut(Box(0, 0, 60, 45)))
+    np.testing.assert_array_equal(found[1].image, cut(Box.sized(80, 85, 80, 60)))
+    np.testing.assert_array_equal(found[2].image, cut(Box.sized(0, 0, 60, 45)))
 
 
 def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:

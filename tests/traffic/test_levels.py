@@ -8,7 +8,7 @@ from vdet.traffic.levels import Levels
 def levels(*counts: int, rate: float = 25) -> Levels:
     made = Levels()
     for index, count in enumerate(counts):
-        tracks = [track(number, Box(9 * number, 5, 8, 8)) for number in range(1, count + 1)]
+        tracks = [track(number, Box.sized(9 * number, 5, 8, 8)) for number in range(1, count + 1)]
         made.add(frame(index, *tracks, rate=rate))
     return made
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from vdet.boxes import Box, to_sides
+from vdet.boxes import Box
 from vdet.config.loading import load_settings
 from vdet.labels.reading import read_truth
 from vdet.track.track import FrameTracks, Track
@@ -41,7 +41,7 @@ def true_tracks(path: Path) -> Iterator[FrameTracks]:
     video = video.where(~video.ignored)
     for number in sorted(set(video.frames.tolist())):
         rows = video.frame(number)
-        boxes = [Box(*map(round, box)) for box in to_sides(rows.boxes).tolist()]
+        boxes = [Box(*box).rounded for box in rows.boxes.tolist()]
         tracks = [
             Track(n, box, 1.0, False) for n, box in zip(rows.ids.tolist(), boxes, strict=True)
         ]

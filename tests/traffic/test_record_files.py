@@ -32,7 +32,7 @@ def test_csv_has_a_heading_and_a_row_a_vehicle(tmp_path: Path) -> None:
 
 
 def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
-    truck = frame(0, track(3, Box(1, 2, 30, 40), class_name="truck", predicted=True, score=1))
+    truck = frame(0, track(3, Box.sized(1, 2, 30, 40), class_name="truck", predicted=True, score=1))
     (item,) = json.loads(written(tmp_path / "a.JSON", truck))
     assert item == {
         "id": 3,
@@ -56,7 +56,9 @@ class TestJoined:
     def join(self, folder: Path, suffix: str) -> str:
         outputs = {name: folder / f"{number}{suffix}" for number, name in enumerate(self.NAMES)}
         for path in outputs.values():
-            written(path, *passing(26), frame(26, track(2, Box(5, 5, 30, 30), class_name="bus")))
+            written(
+                path, *passing(26), frame(26, track(2, Box.sized(5, 5, 30, 30), class_name="bus"))
+            )
         join_records(outputs, folder / f"all{suffix}")
         return (folder / f"all{suffix}").read_text(encoding="utf-8")
 

@@ -12,7 +12,7 @@ from vdet.boxes import Box
 from vdet.track.track import FrameTracks
 from vdet.traffic.records import PATH_STEP, VehicleRecord, summarize
 
-PLACE = Box(100, 100, 40, 30)
+PLACE = Box.sized(100, 100, 40, 30)
 
 
 def records(*frames: FrameTracks) -> list[VehicleRecord]:
@@ -46,7 +46,7 @@ def test_records_are_in_the_order_of_ids() -> None:
 
 
 def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
-    boxes = [PLACE, Box(90, 90, 60, 50), Box(95, 95, 50, 40)]
+    boxes = [PLACE, Box.sized(90, 90, 60, 50), Box.sized(95, 95, 50, 40)]
     tracks = [track(1, box, score=0.5 + 0.2 * n) for n, box in enumerate(boxes)]
     found = record(*(frame(n, each) for n, each in enumerate(tracks)))
     assert found.mean_score == pytest.approx(0.7)
@@ -84,7 +84,7 @@ class TestTime:
     @pytest.mark.parametrize("rate", [10, 25, 30, 60])
     def test_seconds_and_length_do_not_depend_on_the_rate(self, rate: int) -> None:
         frames = [
-            frame(n, track(1, Box(10 + round(40 * n / rate), 100, 40, 30)), rate=rate)
+            frame(n, track(1, Box.sized(10 + round(40 * n / rate), 100, 40, 30)), rate=rate)
             for n in range(4 * rate)
         ]
         found = record(*frames)
@@ -94,12 +94,14 @@ class TestTime:
 
 class TestPath:
     def test_a_vehicle_that_stands_and_trembles_goes_nowhere(self) -> None:
-        frames = [frame(n, track(1, Box(100 + n % 3, 100 - n % 2, 40, 30))) for n in range(500)]
+        frames = [
+            frame(n, track(1, Box.sized(100 + n % 3, 100 - n % 2, 40, 30))) for n in range(500)
+        ]
         assert record(*frames).length <= PATH_STEP * WIDTH
 
     def test_the_way_there_and_back_counts(self) -> None:
-        there = [frame(n, track(1, Box(100 + 2 * n, 100, 40, 30))) for n in range(51)]
-        back = [frame(51 + n, track(1, Box(200 - 2 * n, 100, 40, 30))) for n in range(51)]
+        there = [frame(n, track(1, Box.sized(100 + 2 * n, 100, 40, 30))) for n in range(51)]
+        back = [frame(51 + n, track(1, Box.sized(200 - 2 * n, 100, 40, 30))) for n in range(51)]
         found = record(*there, *back)
         assert found.path[0] == found.path[-1]
         assert found.length == pytest.approx(200, abs=5)
@@ -110,9 +112,9 @@ class TestPath:
 
     def test_predicted_frames_add_nothing(self) -> None:
         frames = [
-            frame(0, track(1, Box(0, 0, 40, 30), predicted=True)),
-            *(frame(n, track(1, Box(100 + 10 * n, 100, 40, 30))) for n in (1, 2, 3)),
-            frame(4, track(1, Box(280, 200, 40, 30), predicted=True)),
+            frame(0, track(1, Box.sized(0, 0, 40, 30), predicted=True)),
+            *(frame(n, track(1, Box.sized(100 + 10 * n, 100, 40, 30))) for n in (1, 2, 3)),
+            frame(4, track(1, Box.sized(280, 200, 40, 30), predicted=True)),
         ]
         found = record(*frames)
         assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
@@ -120,7 +122,7 @@ class TestPath:
 
     def test_of_a_vehicle_that_was_never_seen_they_are_all_there_is(self) -> None:
         found = record(
-            *(frame(n, track(1, Box(10 * n, 0, 40, 30), predicted=True)) for n in (0, 1))
+            *(frame(n, track(1, Box.sized(10 * n, 0, 40, 30), predicted=True)) for n in (0, 1))
         )
         assert found.path == ((20, 30), (30, 30))
 
@@ -129,7 +131,7 @@ class TestPath:
 def test_a_path_is_never_longer_than_the_way_nor_shorter_than_from_start_to_end(
     xs: Sequence[int],
 ) -> None:
-    frames = [frame(n, track(1, Box(x, 100, 40, 30))) for n, x in enumerate(xs)]
+    frames = [frame(n, track(1, Box.sized(x, 100, 40, 30))) for n, x in enumerate(xs)]
     found = record(*frames)
     way = sum(abs(b - a) for a, b in itertools.pairwise(xs))
     assert abs(xs[-1] - xs[0]) - 1e-6 <= found.length <= way + 1e-6

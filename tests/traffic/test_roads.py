@@ -14,10 +14,9 @@ from track.motion.traffic import (
     random_traffic,
     truth_at,
 )
-from vdet.boxes import Box
+from vdet.boxes import Box, Boxes
 from vdet.config.places import CountSettings, LineSettings
 from vdet.config.schema import MotionTrackerSettings
-from vdet.detect.detections import Detections
 from vdet.synthetic import demo_scene, must_be_found, true_boxes
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
 from vdet.track.motion.tracker import MotionTracker
@@ -42,7 +41,7 @@ def ways(frames: Sequence[FrameTracks], layout: Layout) -> list[str]:
 
 
 def followed(
-    find: Callable[[int], Detections], count: int, width: int, height: int
+    find: Callable[[int], Boxes], count: int, width: int, height: int
 ) -> list[FrameTracks]:
     tracker = MotionTracker(MotionTrackerSettings(), width, height)
     return [
@@ -75,9 +74,7 @@ def test_random_traffic(seed: int) -> None:
 
 
 def _true_track(vehicle: TrueVehicle) -> Track:
-    x, y, width, height = vehicle.box.tolist()
-    box = Box(round(x), round(y), round(width), round(height))
-    return Track(vehicle.id, box, 1.0, False, None, (x + width / 2, y + height))
+    return Track(vehicle.id, Box(*vehicle.box.tolist()), 1.0, predicted=False)
 
 
 def _unclear(true: Sequence[FrameTracks], row: float) -> set[int]:
@@ -145,9 +142,9 @@ def test_a_vehicle_that_stops_and_reverses_on_the_line() -> None:
     assert ways(tracks, across(lowest + 0.02, 320, 180)) == []
 
 
-def seen(scene: Scene, index: int) -> Detections:
+def seen(scene: Scene, index: int) -> Boxes:
     boxes: list[Box] = [
         each.box for each in true_boxes(scene, index) if must_be_found(each, scene.camera.height)
     ]
-    corners = [(box.x, box.y, box.right, box.bottom) for box in boxes]
-    return Detections(np.reshape(corners, (-1, 4)), np.full(len(boxes), 0.95))
+    corners = [(box.x1, box.y1, box.x2, box.y2) for box in boxes]
+    return Boxes(np.reshape(corners, (-1, 4)), np.full(len(boxes), 0.95))

@@ -82,7 +82,7 @@ def detect_image(
 def _print_vehicles(result: "FrameResult") -> None:
     rows = [
         f"  {track.class_name or 'vehicle':8} {track.score:.2f}  "
-        f"{track.box.x}, {track.box.y}, {track.box.width}, {track.box.height}"
+        f"{', '.join(map(str, track.box.xywh))}"
         for track in result.tracks
     ]
     print_message(f"{result.source}: {counted(len(rows), 'vehicle')}", *rows, err=False)

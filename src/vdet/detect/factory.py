@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from vdet.boxes import Boxes
 from vdet.config.kinds import kind_of_model
 from vdet.config.schema import DetectorSettings
-from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError
 from vdet.media import Picture
@@ -80,7 +80,7 @@ def _kind(settings: DetectorSettings) -> DetectorKind:
     return kind
 
 
-DetectorObject = DetectorModel | VideoDetector | Callable[[Image], Detections]
+DetectorObject = DetectorModel | VideoDetector | Callable[[Image], Boxes]
 """A detector: for any video, for one video, or as a function of an image."""
 
 
@@ -105,10 +105,10 @@ class _Shared:
 class _Function:
     """A detector that is a function of an image."""
 
-    find: Callable[[Image], Detections]
+    find: Callable[[Image], Boxes]
 
-    def search(self, picture: Picture, index: int | None) -> Detections:  # noqa: ARG002
+    def search(self, picture: Picture, index: int | None) -> Boxes:  # noqa: ARG002
         return self.find(picture.image)
 
-    def detect(self, candidates: Detections) -> Detections:
+    def detect(self, candidates: Boxes) -> Boxes:
         return candidates

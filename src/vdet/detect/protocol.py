@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
-from vdet.detect.detections import Detections
+from vdet.boxes import Boxes
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.regions import Regions, SearchArea
@@ -29,7 +29,7 @@ class VideoDetector(Protocol):
             in the settings, only every so many frames are searched.
         """
 
-    def detect(self, candidates: Any) -> Detections:
+    def detect(self, candidates: Any) -> Boxes:
         """Return the detections of the next frame, from what `search` returned for it.
 
         It is called in the order of the frames, and may keep what it needs of earlier ones.
@@ -40,14 +40,14 @@ class VideoDetector(Protocol):
 class StagedDetector(VideoDetector, Protocol):
     """A detector that shows its stages."""
 
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return a picture of each stage of the detection by its name, in the order of the stages.
 
         `detections` is what `detect` returned for this `image`.
         """
 
 
-StagePictures = Callable[[Image, Detections], dict[str, Image]]
+StagePictures = Callable[[Image, Boxes], dict[str, Image]]
 
 
 def stage_pictures_of(detector: VideoDetector) -> StagePictures:

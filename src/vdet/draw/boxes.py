@@ -1,8 +1,9 @@
 """Boxes with labels."""
 
 import colorsys
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,14 +60,14 @@ def draw_box(
     """
     width = line_width(surface, thickness)
     dash = _DASH * width if dashed else None
-    for side in _sides(box, width):
+    for side in _sides(box.rounded, width):
         for part in _dashes(side, dash) if dash else [side]:
             fill(surface, part, color)
     if label:
-        draw_label(surface, label, (box.x, box.y), color)
+        draw_label(surface, label, (box.x1, box.y1), color)
 
 
-def draw_label(surface: Surface, text: str, corner: tuple[int, int], color: Color) -> Box:
+def draw_label(surface: Surface, text: str, corner: tuple[float, float], color: Color) -> Box:
     """Write text on a filled tag whose lower left corner is `corner`, and return the tag.
 
     The corner is `(x, y)` in pixels. The tag is moved so that it lies in the surface. A text that
@@ -78,7 +79,7 @@ def draw_label(surface: Surface, text: str, corner: tuple[int, int], color: Colo
     return label.tag
 
 
-def label_tag(surface: Surface, text: str, corner: tuple[int, int]) -> Box:
+def label_tag(surface: Surface, text: str, corner: tuple[float, float]) -> Box:
     """Return the tag that `draw_label` would draw."""
     return _lay_out(surface, text, corner).tag
 
@@ -92,16 +93,17 @@ class _Label:
     style: TextStyle
 
 
-def _lay_out(surface: Surface, text: str, corner: tuple[int, int]) -> _Label:
+def _lay_out(surface: Surface, text: str, corner: tuple[float, float]) -> _Label:
     rows, columns = surface.shape[:2]
     scale = _text_scale(surface, text)
     style = TextStyle(scale, max(1, round(1.5 * scale)))
     margin = max(3, round(6 * scale))
     width, height, baseline = text_size(text, style)
     tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
-    x = max(0, min(corner[0], columns - tag_width))
-    y = max(0, min(corner[1], rows) - tag_height)
-    tag = Box(x, y, tag_width, tag_height)
+    left, bottom = (math.floor(value + 0.5) for value in corner)
+    x = max(0, min(left, columns - tag_width))
+    y = max(0, min(bottom, rows) - tag_height)
+    tag = Box.sized(x, y, tag_width, tag_height)
     return _Label(tag, (x + margin, y + margin + height), style)
 
 
@@ -124,19 +126,19 @@ def _text_scale(surface: Surface, text: str) -> float:
 def _sides(box: Box, width: int) -> Iterator[Box]:
     """Give the four sides of an outline just inside a box; those of a small box overlap."""
     across, down = min(width, box.width), min(width, box.height)
-    yield Box(box.x, box.y, box.width, down)
-    yield Box(box.x, box.bottom - down, box.width, down)
-    yield Box(box.x, box.y, across, box.height)
-    yield Box(box.right - across, box.y, across, box.height)
+    yield replace(box, y2=box.y1 + down)
+    yield replace(box, y1=box.y2 - down)
+    yield replace(box, x2=box.x1 + across)
+    yield replace(box, x1=box.x2 - across)
 
 
 def _dashes(side: Box, dash: int) -> Iterator[Box]:
     """Cut a side into dashes of about `dash` pixels and equal gaps, with a dash at each end."""
-    length = max(side.width, side.height)
+    length = int(max(side.width, side.height))
     gaps = max(1, round((length - dash) / (2 * dash)))
     dash = min(dash, max(1, length // 3))
     for start in np.linspace(0, length - dash, gaps + 1).round().astype(int).tolist():
         if side.width > side.height:
-            yield Box(side.x + start, side.y, dash, side.height)
+            yield Box.sized(side.x1 + start, side.y1, dash, side.height)
         else:
-            yield Box(side.x, side.y + start, side.width, dash)
+            yield Box.sized(side.x1, side.y1 + start, side.width, dash)

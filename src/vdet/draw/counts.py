@@ -56,13 +56,12 @@ def draw_counts(surface: Surface, lines: Sequence[DrawnLine], zones: Sequence[Dr
 
 def _draw_zone(surface: Surface, zone: DrawnZone) -> None:
     points = np.round(np.array(zone.corners)).astype(np.int32)
-    x, y, width, height = cv2.boundingRect(points)
     rows, columns = surface.shape[:2]
-    inside = Box(x, y, width, height).clipped(columns, rows)
-    mask = np.zeros((inside.height, inside.width), np.uint8)
+    x1, y1, x2, y2 = Box.sized(*cv2.boundingRect(points)).clipped(columns, rows).pixels
+    mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
     if mask.size:
-        cv2.fillPoly(mask, [points - np.array([inside.x, inside.y], np.int32)], 255)
-        blend(surface, mask, (inside.x, inside.y), ZONE, _SHADE)
+        cv2.fillPoly(mask, [points - np.array([x1, y1], np.int32)], 255)
+        blend(surface, mask, (x1, y1), ZONE, _SHADE)
     draw_outline(surface, zone.corners, ZONE, f"{zone.name}: {zone.present}")
 
 

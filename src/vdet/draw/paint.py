@@ -36,14 +36,14 @@ class TextStyle:
 def fill(surface: Surface, box: Box, color: Color) -> None:
     """Fill the part of a box that lies in the surface."""
     height, width = surface.shape[:2]
-    inside = box.clipped(width, height)
-    rows, columns = slice(inside.y, inside.bottom), slice(inside.x, inside.right)
+    x1, y1, x2, y2 = box.clipped(width, height).pixels
+    rows, columns = slice(y1, y2), slice(x1, x2)
     if not isinstance(surface, Planes):
         surface[rows, columns] = color
         return
     luma, blue, red = _coded(color, surface.coding)
     surface.luma[rows, columns] = luma
-    if inside.area:
+    if x1 < x2 and y1 < y2:
         half = _half(rows), _half(columns)
         surface.blue[half], surface.red[half] = blue, red
 
@@ -100,13 +100,12 @@ def write_text(
         cv2.putText(surface, text, origin, _FONT, style.scale, color, style.stroke, cv2.LINE_AA)
         return
     height, width = surface.shape
-    inside = within.clipped(width, height)
-    if not inside.area:
-        return
-    mask = np.zeros((inside.height, inside.width), np.uint8)
-    place = origin[0] - inside.x, origin[1] - inside.y
-    cv2.putText(mask, text, place, _FONT, style.scale, 255, style.stroke, cv2.LINE_AA)
-    blend(surface, mask, (inside.x, inside.y), color)
+    x1, y1, x2, y2 = within.clipped(width, height).pixels
+    mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
+    if mask.size:
+        place = origin[0] - x1, origin[1] - y1
+        cv2.putText(mask, text, place, _FONT, style.scale, 255, style.stroke, cv2.LINE_AA)
+        blend(surface, mask, (x1, y1), color)
 
 
 def text_size(text: str, style: TextStyle) -> tuple[int, int, int]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix, to_sides
+from vdet.boxes import BoolArray, Float64Array, Int64Array, coverage, iou_matrix
 from vdet.errors import TruthError
 from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.video import LabelledVideo
@@ -119,7 +119,7 @@ def compare(
             vehicles.boxes,
             tracks.boxes,
             tracks.scores,
-            iou_matrix(to_sides(vehicles.boxes), to_sides(tracks.boxes)),
+            iou_matrix(vehicles.boxes, tracks.boxes),
         )
         for number, (vehicles, tracks) in zip(numbers, kept, strict=True)
         if len(vehicles) or len(tracks)
@@ -212,9 +212,9 @@ def _apply_regions(
 ) -> tuple[LabelledVideo, LabelledVideo]:
     """Return the vehicles and the predictions of a frame that count."""
     vehicles, regions = truth.where(~truth.ignored), truth.where(truth.ignored)
-    iou = iou_matrix(to_sides(vehicles.boxes), to_sides(tracks.boxes))
+    iou = iou_matrix(vehicles.boxes, tracks.boxes)
     _, paired = assign(np.where(at_least(iou, MATCH_IOU), iou, 0))
-    covered = at_least(coverage(to_sides(tracks.boxes), to_sides(regions.boxes)), _IGNORED_SHARE)
+    covered = at_least(coverage(tracks.boxes, regions.boxes), _IGNORED_SHARE)
     dropped = np.asarray(covered.any(axis=1) | tracks.ignored)
     dropped[paired] = False
     return vehicles, tracks.where(~dropped)

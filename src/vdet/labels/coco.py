@@ -19,7 +19,7 @@ from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
 from vdet.files import printable
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo
-from vdet.labels.label import Label, from_size, limited, line_error, whole_pixels
+from vdet.labels.label import Label, from_size, limited, line_error
 from vdet.labels.parsing import LIMIT, JsonNumber, first_mistake, read_text, text_of
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.video import SavedTracks
@@ -62,7 +62,7 @@ class CocoWriter:
             self._annotations.append(json.dumps(self._annotation(track)))
 
     def _annotation(self, track: Track) -> dict[str, Any]:
-        x, y, width, height = whole_pixels(track.box)
+        x, y, width, height = track.box.xywh
         return {
             "id": len(self._annotations) + 1,
             "image_id": len(self._images),

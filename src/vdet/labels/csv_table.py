@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from vdet.labels.formats import Format, LineWriter
-from vdet.labels.label import Label, from_size, limited, line_error, whole_pixels
+from vdet.labels.label import Label, from_size, limited, line_error
 from vdet.labels.parsing import parse_number, parse_whole, text_of
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
@@ -31,7 +31,7 @@ def _lines(frame: FrameTracks) -> Iterator[str]:
     for track in frame.tracks:
         yield _line(
             [
-                *(frame.index, f"{frame.time:.6f}", track.id, *whole_pixels(track.box)),
+                *(frame.index, f"{frame.time:.6f}", track.id, *track.box.xywh),
                 f"{track.score:.4f}",
                 int(track.predicted),
                 track.class_name,

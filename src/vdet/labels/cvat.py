@@ -45,10 +45,8 @@ class CvatWriter:
         """Keep the boxes of a frame."""
         self._frames = frame.index + 1
         for track in frame.tracks:
-            box = track.box
-            corners = (
-                f'xtl="{box.x:.2f}" ytl="{box.y:.2f}" xbr="{box.right:.2f}" ybr="{box.bottom:.2f}"'
-            )
+            x1, y1, x2, y2 = track.box.pixels
+            corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
             text = f'occluded="{int(track.predicted)}" keyframe="1" {corners} z_order="0"'
             self._boxes[track.id].append((frame.index, text))
             self._classes[track.id].add(track.class_name or UNKNOWN, track.score)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from vdet.errors import TruthError
 from vdet.labels.formats import Format, LineWriter
-from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error, whole_pixels
+from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
 from vdet.labels.parsing import LIMIT, JsonNumber, first_mistake, numbered_lines, text_of
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
@@ -23,7 +23,7 @@ def _lines(frame: FrameTracks) -> Iterator[str]:
 
 
 def _track_record(track: Track) -> dict[str, Any]:
-    x, y, width, height = whole_pixels(track.box)
+    x, y, width, height = track.box.xywh
     return {
         "id": track.id,
         "x": x,

@@ -26,8 +26,8 @@ _AFTER = "-1 -1 -1 -1000 -1000 -1000 -10"  # size, place and direction in metres
 def _lines(frame: FrameTracks) -> Iterator[str]:
     """Yield for each box the 17 columns of the format, and the score."""
     for track in frame.tracks:
-        box, name = track.box, _TYPES.get(track.class_name, "Misc")
-        corners = f"{box.x:.2f} {box.y:.2f} {box.right:.2f} {box.bottom:.2f}"
+        name = _TYPES.get(track.class_name, "Misc")
+        corners = " ".join(f"{side:.2f}" for side in track.box.pixels)
         yield f"{frame.index} {track.id} {name} {_BEFORE} {corners} {_AFTER} {track.score:.4f}\n"
 
 

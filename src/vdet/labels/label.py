@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.boxes import Box
 from vdet.errors import TruthError
 
 MAX_LABELS = 500_000
@@ -60,12 +59,6 @@ class Label:
 def from_size(x: float, y: float, width: float, height: float) -> Corners:
     """Return the corners of a box that is given by its near corner and its size."""
     return x, y, x + width, y + height
-
-
-def whole_pixels(box: Box) -> tuple[int, int, int, int]:
-    """Return x, y, width and height of a box, rounded to whole pixels; a side is at least 1."""
-    x, y = round(box.x), round(box.y)
-    return x, y, max(1, round(box.right) - x), max(1, round(box.bottom) - y)
 
 
 def line_error(path: Path | str, place: int | str, what: str) -> TruthError:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from vdet.labels.formats import Format, LineWriter
-from vdet.labels.label import Label, from_size, limited, line_error, whole_pixels
+from vdet.labels.label import Label, from_size, limited, line_error
 from vdet.labels.parsing import label_lines, parse_number, parse_whole, text_of
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
@@ -19,7 +19,7 @@ _TRUTH_COLUMNS, _RESULT_COLUMNS = 9, 10
 def _lines(frame: FrameTracks) -> Iterator[str]:
     """Yield for each box: frame, id, left, top, width, height, score, -1, -1, -1."""
     for track in frame.tracks:
-        x, y, width, height = whole_pixels(track.box)
+        x, y, width, height = track.box.xywh
         place = f"{x + 1},{y + 1},{width},{height}"
         yield f"{frame.index + 1},{track.id},{place},{track.score:.4f},-1,-1,-1\n"
 

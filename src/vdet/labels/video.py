@@ -84,10 +84,9 @@ class SavedTracks:
 
 
 def _track(label: Label) -> Track:
-    x, y, right, bottom = map(round, label.box)
     return Track(
         label.id,
-        Box(x, y, max(1, right - x), max(1, bottom - y)),
+        Box.sized(*Box(*label.box).xywh),
         min(1.0, max(0.0, label.score)),
         label.predicted,
         None if label.name is None else our_name(label.name) or label.name,

@@ -66,7 +66,7 @@ class YoloWriter:
 
     def _line(self, track: Track) -> str:
         width, height = self._size
-        box = track.box.clipped(width, height)
+        box = track.box.rounded.clipped(width, height)
         if not box.area:
             return ""
         number = self._classes.setdefault(track.class_name or UNKNOWN, len(self._classes))

@@ -114,14 +114,13 @@ class Undistorter:
         outline = self.points(_outline(box))
         left, top = np.rint(outline.min(axis=0) + 0.5).astype(int).tolist()
         right, bottom = np.rint(outline.max(axis=0) + 0.5).astype(int).tolist()
-        moved = Box(left, top, right - left, bottom - top)
-        return moved.clipped(self._camera.width, self._camera.height)
+        return Box(left, top, right, bottom).clipped(self._camera.width, self._camera.height)
 
 
 def _outline(box: Box) -> Float64Array:
     """Return points on the outline of a box, half a pixel outside its outer pixel centres."""
-    x = np.linspace(box.x - 0.5, box.right - 0.5, _OUTLINE_POINTS)
-    y = np.linspace(box.y - 0.5, box.bottom - 0.5, _OUTLINE_POINTS)
+    x = np.linspace(box.x1 - 0.5, box.x2 - 0.5, _OUTLINE_POINTS)
+    y = np.linspace(box.y1 - 0.5, box.y2 - 0.5, _OUTLINE_POINTS)
     sides = [
         np.column_stack([x, np.full_like(x, y[0])]),
         np.column_stack([x, np.full_like(x, y[-1])]),

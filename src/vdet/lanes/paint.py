@@ -89,9 +89,9 @@ def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
     farthest = top_view.outline[:, 1].min()
     hidden = mask.copy()
     for box in boxes:
-        top, bottom = max(box.y - 0.5, farthest), box.bottom - 0.5
+        top, bottom = max(box.y1 - 0.5, farthest), box.y2 - 0.5
         if top < bottom:
-            left, right = box.x - 0.5, box.right - 0.5
+            left, right = box.x1 - 0.5, box.x2 - 0.5
             corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
             outline = np.rint(top_view.frame_to_top(corners)).astype(np.int32)
             cv2.fillConvexPoly(hidden, outline, (HIDDEN,))

@@ -82,8 +82,8 @@ class Road:
     def cuts(self, box: Box) -> bool:
         """Tell whether the original frame's left, right or lower edge cuts a box in that frame."""
         height, width = self.image.shape[:2]
-        beside = box.x <= _EDGE * width or box.right >= (1 - _EDGE) * width
-        return bool(beside or box.bottom >= (1 - _EDGE) * height)
+        beside = box.x1 <= _EDGE * width or box.x2 >= (1 - _EDGE) * width
+        return bool(beside or box.y2 >= (1 - _EDGE) * height)
 
     def position(self, foot: tuple[float, float]) -> RoadPosition | None:
         """Return where on the road a vehicle is that stands at `foot` in the original frame.

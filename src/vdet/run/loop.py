@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.schema import Settings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector, limited
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture, VideoInfo
@@ -71,7 +71,7 @@ def follow(
                 detections = detector.detect(candidates)
                 tracks = tracker.update(detections, time, picture)
             else:
-                detections = NO_DETECTIONS
+                detections = NO_BOXES
                 tracks = tracker.carry(time, picture)
             result = FrameResult(source, frame, detections, tuple(tracks), searched=searched)
             for step in steps:
@@ -167,6 +167,6 @@ class NullDetector:
     def search(self, picture: Picture, index: int | None) -> None:
         """Do nothing."""
 
-    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
+    def detect(self, candidates: None) -> Boxes:  # noqa: ARG002
         """Return no detections."""
-        return NO_DETECTIONS
+        return NO_BOXES

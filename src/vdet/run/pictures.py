@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-import numpy as np
-
+from vdet.boxes import Boxes
 from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
-from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel, VideoDetector, limited, stage_pictures_of
 from vdet.errors import ConfigError, ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
@@ -197,7 +195,7 @@ def detect_picture(
 
 def search_picture(
     source: Path, image: Image, model: DetectorModel, regions: RegionsSettings = _WHOLE_FRAME
-) -> Detections:
+) -> Boxes:
     """Return what a picture shows; threads may call this at once.
 
     With `regions`, only vehicles that stand in them are found.
@@ -209,8 +207,7 @@ def search_picture(
         detections = detector.detect(detector.search(Picture(image), None))
     if laid is None:
         return detections
-    boxes = detections.rounded
-    return detections[[n for n, box in enumerate(boxes) if laid.contains(box.foot)]]
+    return detections[[n for n, each in enumerate(detections) if laid.contains(each.box.foot)]]
 
 
 def _start(
@@ -222,7 +219,7 @@ def _start(
 
 
 def _context(files: OutputFiles, model: DetectorModel, settings: Settings) -> SinkContext:
-    def stage_pictures(image: Image, detections: Detections) -> dict[str, Image]:
+    def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
         detector, _ = _start(image, model, settings.regions)
         return stage_pictures_of(detector)(image, detections)
 
@@ -238,16 +235,8 @@ def _named(source: Path) -> Iterator[None]:
         raise ImageError(f"{source}: {error}") from error
 
 
-def _tracks(detections: Detections) -> tuple[Track, ...]:
+def _tracks(detections: Boxes) -> tuple[Track, ...]:
     return tuple(
-        Track(
-            number + 1,
-            box,
-            float(np.float64(score)),
-            predicted=False,
-            class_name=name,
-        )
-        for number, (box, score, name) in enumerate(
-            zip(detections.rounded, detections.scores.tolist(), detections.class_names, strict=True)
-        )
+        Track(number, each.box, each.score, predicted=False, class_name=each.class_name)
+        for number, each in enumerate(detections, start=1)
     )

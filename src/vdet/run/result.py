@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.detect.detections import Detections
+from vdet.boxes import Boxes
 from vdet.lanes.lane import lane_record
 from vdet.lanes.road import Road
 from vdet.media import Frame
@@ -35,7 +35,7 @@ class FrameResult:
 
     source: Path
     frame: Frame
-    detections: Detections
+    detections: Boxes
     tracks: tuple[Track, ...]
     road: Road | None = None
     searched: bool = True

@@ -111,14 +111,14 @@ def _around(box: Box, rng: np.random.Generator) -> Box:
     """
     side = max(1.1 * box.height, rng.uniform(0.8, 1.25) * box.width)
     x, y = np.array(box.center) + rng.uniform(-0.08, 0.08, 2) * side - side / 2
-    return Box(round(x), round(y), round(side), round(side))
+    return Box.sized(round(x), round(y), round(side), round(side))
 
 
 def _along_road(image: Image, rng: np.random.Generator) -> Box:
     height, width = image.shape[:2]
     side = int(height * rng.uniform(0.08, 0.4))
     x, y = rng.integers(0, (width - side, height - side))
-    return Box(int(x), int(y), side, side)
+    return Box.sized(int(x), int(y), side, side)
 
 
 def _at_edge(box: Box, rng: np.random.Generator) -> Box:
@@ -129,7 +129,7 @@ def _at_edge(box: Box, rng: np.random.Generator) -> Box:
     angle = rng.uniform(0, 2 * np.pi)
     x = box.center[0] + np.cos(angle) * (box.width + side) * 0.42 - side / 2
     y = box.center[1] + np.sin(angle) * (box.height + side) * 0.42 - side / 2
-    return Box(round(x), round(y), side, side)
+    return Box.sized(round(x), round(y), side, side)
 
 
 def _fits(window: Box, image: Image) -> bool:
@@ -145,8 +145,7 @@ def _is_filled(window: Box, vehicles: tuple[TrueBox, ...]) -> bool:
 
 def _cut(image: Image, window: Box, rng: np.random.Generator) -> Image:
     """Return a window as a patch, with random blur, mirroring and exposure."""
-    part = image[window.y : window.bottom, window.x : window.right]
-    patch = cv2.resize(part, (PATCH, PATCH), interpolation=cv2.INTER_AREA)
+    patch = cv2.resize(window.cut(image), (PATCH, PATCH), interpolation=cv2.INTER_AREA)
     if rng.random() < 0.4:
         patch = cv2.GaussianBlur(patch, (0, 0), float(rng.uniform(0.4, 1.2)))
     if rng.random() < 0.5:
@@ -208,6 +207,6 @@ def _objects(scene: Scene, index: int) -> tuple[Box, ...]:
             left, right = item.lateral - item.width / 2, item.lateral + item.width / 2
             corners = np.array([[left, item.height, ahead], [right, 0.0, ahead]])
             (x0, y0), (x1, y1) = scene.camera.project(corners)
-            boxes.append(Box(round(x0), round(y0), round(x1 - x0), round(y1 - y0)))
+            boxes.append(Box.sized(round(x0), round(y0), round(x1 - x0), round(y1 - y0)))
     inside = [b for b in boxes if b.clipped(scene.camera.width, scene.camera.height) == b]
     return tuple(inside[:_OBJECTS])

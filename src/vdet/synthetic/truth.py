@@ -95,7 +95,7 @@ def _lane(lateral: float, lines: Iterable[Line]) -> int:
 def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox:
     inside = cv2.countNonZero(mask)
     free = cv2.countNonZero(mask & ~covered)
-    box = Box(*cv2.boundingRect(mask))
+    box = Box.sized(*cv2.boundingRect(mask))
     return TrueBox(number, box, visibility=min(1.0, free / whole), hidden=1 - free / inside)
 
 
@@ -143,6 +143,7 @@ def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
 
 
 def _line(number: int, vehicle: TrueBox, frame_height: int) -> str:
-    box, flag = vehicle.box, int(must_be_found(vehicle, frame_height))
-    place = f"{box.x + 1},{box.y + 1},{box.width},{box.height}"
+    x, y, width, height = vehicle.box.xywh
+    flag = int(must_be_found(vehicle, frame_height))
+    place = f"{x + 1},{y + 1},{width},{height}"
     return f"{number},{vehicle.id},{place},{flag},{_CAR},{vehicle.visibility:.3f}\n"

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from vdet.detect.detections import Detections
+from vdet.boxes import Boxes
 from vdet.media import Picture
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import Track
@@ -21,9 +21,7 @@ class HoldingTracker:
         self.tracker = tracker
         self._shown: list[Track] = []
 
-    def update(
-        self, detections: Detections, time: float, picture: Picture | None = None
-    ) -> list[Track]:
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
         """Follow the vehicles into a frame that was searched; as `VideoTracker.update`."""
         self._shown = self.tracker.update(detections, time, picture)
         return self._shown

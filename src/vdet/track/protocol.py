@@ -2,7 +2,7 @@
 
 from typing import Protocol, runtime_checkable
 
-from vdet.detect.detections import Detections
+from vdet.boxes import Boxes
 from vdet.media import Picture
 from vdet.track.track import Track
 
@@ -10,9 +10,7 @@ from vdet.track.track import Track
 class VideoTracker(Protocol):
     """Follows the vehicles of one video; a new one is made for every video."""
 
-    def update(
-        self, detections: Detections, time: float, picture: Picture | None = None
-    ) -> list[Track]:
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
         """Follow the vehicles into the next frame.
 
         Parameters

@@ -59,7 +59,7 @@ class SteadyBoxes:
 
     def _smoothed(self, track: Track, time: float) -> Box:
         box = track.box
-        given = [float(side) for side in (box.x, box.y, box.right, box.bottom)]
+        given = [box.x1, box.y1, box.x2, box.y2]
         sides = self._sides.get(track.id)
         if sides is None:
             self._sides[track.id] = _Sides(given, [0.0] * 4, time)
@@ -78,8 +78,7 @@ class SteadyBoxes:
             kept_near = min(max(place, side - limit), side + limit)
             sides.places[number] = kept_near
             sides.speeds[number] += (h * error + SETTLING * (kept_near - place)) / elapsed
-        left, top, right, bottom = (math.floor(place + 0.5) for place in sides.places)
-        return Box(left, top, right - left, bottom - top)
+        return Box(*sides.places)
 
 
 def _with_box(track: Track, box: Box) -> Track:

@@ -17,16 +17,16 @@ class Track:
         1, 2, 3 … in the order in which the vehicles of a video are first shown; an id is never
         used again for another vehicle.
     box
-        Its place, whole pixels of the full frame. From the motion tracker: the estimate for this
-        frame, the part inside the frame. From the rules: the average of the car's last rectangles
-        (`tracker.history` of them), which lie in the frame.
+        Its place in pixels of the full frame. From the motion tracker: the estimate for this frame,
+        the part inside the frame. From the rules: the average of the car's last rectangles
+        (`tracker.history` of them), in whole pixels, which lie in the frame.
     score
         0 to 1: the share of shown boxes with such a score that are vehicles.
     predicted
         Whether the detector did not see the vehicle in this frame: it is shown where its motion
         leads or, by the rules, where its image was found again.
     class_name
-        Its class, one of `Detections.names`; None where the detector does not tell classes.
+        Its class, one of `Boxes.names`; None where the detector does not tell classes.
     whole_foot
         Middle of the lower edge of the whole box, with its part outside the frame; x and y, pixels.
         None where the tracker does not know it: see `foot`.

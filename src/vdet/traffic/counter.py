@@ -264,16 +264,15 @@ def _sighting(track: Track, frame: FrameTracks) -> Sighting:
         round(frame.time, 6),
         frame.index,
         (round(x, 2), round(y, 2)),
-        float(track.box.height),
+        float(track.box.xywh[3]),
         round(track.score, 4),
     )
 
 
 def _touched_sides(box: Box, size: tuple[int, int]) -> Point:
     """Return at which sides of the frame a box is: -1 left or top, 1 right or bottom, 0 neither."""
-    x = (box.right >= size[0] - 1) - (box.x <= 1)
-    y = (box.bottom >= size[1] - 1) - (box.y <= 1)
-    return x, y
+    x1, y1, x2, y2 = box.pixels
+    return (x2 >= size[0] - 1) - (x1 <= 1), (y2 >= size[1] - 1) - (y1 <= 1)
 
 
 def _finished(event: Event, class_name: str | None) -> Event:

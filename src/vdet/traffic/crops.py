@@ -59,15 +59,14 @@ class BestCrops:
 
     def _merit(self, track: Track, picture: Picture) -> _Merit | None:
         """Return None where the vehicle was not seen, or is too small."""
-        box = track.box
+        box = track.box.rounded
         if track.predicted or min(box.width, box.height) < self._settings.least:
             return None
-        inside = box.right < picture.width and box.bottom < picture.height
-        is_whole = inside and min(box.x, box.y) > 0
+        inside = box.x2 < picture.width and box.y2 < picture.height
+        is_whole = inside and min(box.x1, box.y1) > 0
         return is_whole, box.area * track.score
 
     def _cut(self, box: Box, picture: Picture) -> Image:
+        box = box.rounded
         x, y = (round(side * self._settings.padding) for side in (box.width, box.height))
-        padded = Box(box.x - x, box.y - y, box.width + 2 * x, box.height + 2 * y)
-        part = padded.clipped(picture.width, picture.height)
-        return picture.image[part.y : part.bottom, part.x : part.right].copy()
+        return Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y).cut(picture.image).copy()

@@ -31,10 +31,10 @@ class HeatMap:
         """Add the vehicles of a frame."""
         for track in frame.tracks:
             box = track.box
-            top = max(0, int((box.bottom - _FOOT * box.height) * self._scale))
-            left = max(0, int(box.x * self._scale))
-            bottom = max(top + 1, round(box.bottom * self._scale))
-            right = max(left + 1, round(box.right * self._scale))
+            top = max(0, int((box.y2 - _FOOT * box.height) * self._scale))
+            left = max(0, int(box.x1 * self._scale))
+            bottom = max(top + 1, round(box.y2 * self._scale))
+            right = max(left + 1, round(box.x2 * self._scale))
             self._cells[top:bottom, left:right] += 1
 
     def over(self, still: Image) -> Image:

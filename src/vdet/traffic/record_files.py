@@ -50,7 +50,6 @@ def _items(
 
 
 def _item(record: VehicleRecord) -> dict[str, Any]:
-    box = record.largest
     return {
         "id": record.id,
         "class": record.class_name,
@@ -67,7 +66,7 @@ def _item(record: VehicleRecord) -> dict[str, Any]:
             "length": round(record.length, 1),
             "length_share": round(record.share, 4),
         },
-        "largest": {"x": box.x, "y": box.y, "width": box.width, "height": box.height},
+        "largest": dict(zip(("x", "y", "width", "height"), record.largest.xywh, strict=True)),
     }
 
 

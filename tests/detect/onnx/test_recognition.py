@@ -17,8 +17,8 @@ from detect.onnx.graphs import (
     write_rt_detr,
     yolox,
 )
+from vdet.boxes import Boxes
 from vdet.config.schema import NetworkSettings
-from vdet.detect.detections import Detections
 from vdet.detect.onnx.detector import NetworkModel
 from vdet.detect.onnx.recognition import COCO, recognize
 from vdet.detect.onnx.session import Session
@@ -49,13 +49,13 @@ def frame_with_red(x: int, y: int) -> Image:
     return image
 
 
-def detect(path: Path, image: Image, **settings: object) -> Detections:
+def detect(path: Path, image: Image, **settings: object) -> Boxes:
     model = NetworkModel(path, NetworkSettings.model_validate(settings))
     detector = model.for_video(image.shape[1], image.shape[0], [image])
     return detector.detect(detector.search(Picture(image), 0))
 
 
-def class_names(found: Detections) -> list[str]:
+def class_names(found: Boxes) -> list[str]:
     assert found.classes is not None
     return [found.names[number] for number in found.classes.tolist()]
 
@@ -78,7 +78,7 @@ def test_a_centred_letterbox_in_rgb(
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
     # The frame of 256 × 256 is shrunk to 64 × 64, and lies 32 pixels from the left.
     found = detect(path, frame_with_red(128, 128))
-    assert found.boxes == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
+    assert found.sides == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
     assert class_names(found) == ["car"]
     assert len(detect(path, frame_with_red(64, 64))) == 1  # the dark grey of 60 has 0.24
@@ -92,7 +92,7 @@ def test_the_metadata_tell_the_size_of_an_input_of_any_size(tmp_path: Path) -> N
         tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=ULTRALYTICS, dynamic=True
     )
     found = detect(path, frame_with_red(128, 128))
-    assert found.boxes == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
+    assert found.sides == pytest.approx(np.array([[96, 112, 160, 144]]), abs=0.01)
 
 
 @pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
@@ -101,7 +101,7 @@ def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(raw: bool, tmp_path: Pat
     path = write_network(tmp_path / "net.onnx", form, SIZE, (40, 32))
     found = detect(path, frame_with_red(160, 128))
     # 64 of the 128 columns are the frame: the part beyond it does not count.
-    assert found.boxes == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
+    assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
     assert recognize(Session(path), path).name == "YOLOX"
 
@@ -109,7 +109,7 @@ def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(raw: bool, tmp_path: Pat
 def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:
     path = write_rt_detr(tmp_path / "net.onnx", BOX, SIZE, (64, 32))
     found = detect(path, frame_with_red(128, 128))
-    assert found.boxes == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
+    assert found.sides == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
     assert recognize(Session(path), path).name == "RT-DETR"
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
-from vdet.boxes import Box, Float32Array
+from vdet.boxes import Box, Boxes, Float32Array
 from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
-from vdet.detect.detections import Detections
 from vdet.detect.svm.detector import SvmModel, horizon_of
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.scores import detection_scores
@@ -28,21 +28,21 @@ DEFAULT = THREE_SETS.svm
 """Window sets by perspective, alternating; boxes from votes."""
 
 
-def detect_video(*images: Image, settings: SvmSettings = ROWS) -> list[Detections]:
+def detect_video(*images: Image, settings: SvmSettings = ROWS) -> list[Boxes]:
     """Give the detections in consecutive frames of a video."""
     model = SvmModel(MODEL, settings)
     detector = model.for_video(WIDTH, HEIGHT, images[:1])
     return [detector.detect(detector.search(Picture(image), i)) for i, image in enumerate(images)]
 
 
-def detect_still(image: Image, settings: SvmSettings = ROWS) -> Detections:
+def detect_still(image: Image, settings: SvmSettings = ROWS) -> Boxes:
     """Give the detections in a still picture."""
     height, width = image.shape[:2]
     detector = SvmModel(MODEL, settings).for_video(width, height, [image])
     return detector.detect(detector.search(Picture(image), None))
 
 
-def trace_of(detections: Detections) -> Trace:
+def trace_of(detections: Boxes) -> Trace:
     assert isinstance(detections.trace, Trace)
     return detections.trace
 
@@ -55,12 +55,12 @@ def but(settings: SvmSettings, section: str, **changes: Any) -> SvmSettings:
 
 def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
     *_, detections = detect_video(road(CAR), road(CAR))
-    (box,) = detections.rounded
+    (box,) = rounded(detections)
     assert box.intersection(CAR) == CAR
     assert box.iou(CAR) > 0.35
-    assert detections.strengths.tolist() == pytest.approx([trace_of(detections).heat.peak])
-    assert detections.strengths[0] > 1.4
-    assert box.contains((detections.centroids[0, 0], detections.centroids[0, 1]))
+    assert detections.data["strength"].tolist() == pytest.approx([trace_of(detections).heat.peak])
+    assert detections.data["strength"][0] > 1.4
+    assert box.contains((detections.data["centroid"][0, 0], detections.data["centroid"][0, 1]))
 
 
 def test_the_score_follows_from_the_strength_by_the_settings() -> None:
@@ -68,7 +68,7 @@ def test_the_score_follows_from_the_strength_by_the_settings() -> None:
     *_, detections = detect_video(road(CAR), road(CAR), settings=settings)
     assert len(detections) == 1
     np.testing.assert_array_equal(
-        detections.scores, detection_scores(detections.strengths, settings.score)
+        detections.scores, detection_scores(detections.data["strength"], settings.score)
     )
 
 
@@ -104,25 +104,25 @@ def test_nothing_is_detected_on_an_empty_road() -> None:
 
 
 def test_two_cars_apart_are_two_detections() -> None:
-    boxes = detect_still(road(CAR, CAR.moved_to(224, 120))).rounded
-    assert [box.x < 190 for box in boxes] == [True, False]
+    boxes = rounded(detect_still(road(CAR, moved_to(CAR, 224, 120))))
+    assert [box.x1 < 190 for box in boxes] == [True, False]
 
 
 def test_a_coarser_heatmap_finds_the_same_car() -> None:
     fine = but(ROWS, "heat", weight="coverage", shrink=1, threshold=0.7)
     coarse = but(fine, "heat", shrink=SvmSettings().heat.shrink)
     expected, found = detect_still(road(CAR), fine), detect_still(road(CAR), coarse)
-    (expected_box,), (box,) = expected.rounded, found.rounded
+    (expected_box,), (box,) = rounded(expected), rounded(found)
     assert expected_box.iou(CAR) > 0.5
     assert box.iou(expected_box) > 0.8
-    assert found.strengths[0] == pytest.approx(expected.strengths[0], rel=0.05)
+    assert found.data["strength"][0] == pytest.approx(expected.data["strength"][0], rel=0.05)
 
 
 def test_lengths_scale_with_the_frame() -> None:
     image = np.repeat(np.repeat(road(CAR), 2, axis=0), 2, axis=1)
-    (small,) = detect_still(road(CAR)).rounded
-    (large,) = detect_still(image).rounded
-    doubled = Box(2 * small.x, 2 * small.y, 2 * small.width, 2 * small.height)
+    (small,) = rounded(detect_still(road(CAR)))
+    (large,) = rounded(detect_still(image))
+    doubled = Box.sized(2 * small.x1, 2 * small.y1, 2 * small.width, 2 * small.height)
     assert large.iou(doubled) > 0.9
 
 
@@ -131,38 +131,40 @@ class TestDefaultSettings:
 
     def test_a_car_is_detected_where_it_is(self) -> None:
         detections = detect_still(road(CAR), DEFAULT)
-        (box,) = detections.rounded
+        (box,) = rounded(detections)
         assert box.iou(CAR) > 0.6
-        ((x, y),) = detections.centroids.tolist()
+        ((x, y),) = detections.data["centroid"].tolist()
         assert box.contains((x, y))
 
     def test_two_cars_that_one_hot_region_covers_are_told_apart(self) -> None:
-        cars = CAR.moved_to(60, 120), CAR.moved_to(156, 120)  # half a car between them
+        cars = moved_to(CAR, 60, 120), moved_to(CAR, 156, 120)  # half a car between them
         image = road(*cars)
         outlines = detect_still(image, but(DEFAULT, "heat", regions="outline"))
         assert len(outlines) == 1
-        voted = detect_still(image, DEFAULT).rounded
+        voted = rounded(detect_still(image, DEFAULT))
         assert len(voted) == 2
         for car in cars:
             assert max(box.iou(car) for box in voted) > 0.6
 
     @pytest.mark.parametrize("x", [-32, WIDTH - 32])
     def test_a_car_half_beyond_the_side_is_detected_and_its_box_ends_there(self, x: int) -> None:
-        seen = CAR.moved_to(x, 120).clipped(WIDTH, HEIGHT)
-        (box,) = detect_still(road(seen), DEFAULT).rounded
+        seen = moved_to(CAR, x, 120).clipped(WIDTH, HEIGHT)
+        (box,) = rounded(detect_still(road(seen), DEFAULT))
         assert box.clipped(WIDTH, HEIGHT) == box
         assert box.iou(seen) > 0.4
 
     def test_votes_of_forgotten_frames_do_not_count(self) -> None:
         frames = DEFAULT.heat.frames
-        before, car = [road(CAR)] * frames, CAR.moved_to(CAR.x + 8, CAR.y)
+        before, car = [road(CAR)] * frames, moved_to(CAR, CAR.x1 + 8, CAR.y1)
         for now, count in ((road(), 0), (road(car), 1)):
             detections = detect_video(*before, *[now] * frames, settings=DEFAULT)
             expected = detect_video(*[road()] * frames, *[now] * frames, settings=DEFAULT)
             assert len(detections[frames - 1]) == 1
             assert len(detections[-1]) == count
-            np.testing.assert_array_equal(detections[-1].boxes, expected[-1].boxes)
-            np.testing.assert_array_equal(detections[-1].strengths, expected[-1].strengths)
+            np.testing.assert_array_equal(detections[-1].sides, expected[-1].sides)
+            np.testing.assert_array_equal(
+                detections[-1].data["strength"], expected[-1].data["strength"]
+            )
 
     def test_nothing_is_detected_on_an_empty_road(self) -> None:
         assert len(detect_still(road(), DEFAULT)) == 0
@@ -180,15 +182,17 @@ def test_the_horizon_is_told_where_windows_depend_on_it(
 class TestStillPictures:
     """A still picture equals the last of `heat.frames` equal frames of a video."""
 
-    @pytest.mark.parametrize(("strength", "shown"), [(2.0, CAR), (0.5, Box(104, 124, 30, 20))])
+    @pytest.mark.parametrize(
+        ("strength", "shown"), [(2.0, CAR), (0.5, Box.sized(104, 124, 30, 20))]
+    )
     def test_of_boxes_in_one_another_the_strongest_is_shown(
         self, monkeypatch: pytest.MonkeyPatch, strength: float, shown: Box
     ) -> None:
-        part = Box(104, 124, 30, 20)
+        part = Box.sized(104, 124, 30, 20)
         assert part.intersection(CAR) == part
         regions = [HotRegion(CAR, CAR.center, strength), HotRegion(part, part.center, 1.0)]
         monkeypatch.setattr("vdet.detect.svm.detector.split_regions", lambda *_: regions)
-        assert detect_still(road(CAR), DEFAULT).rounded == [shown]
+        assert rounded(detect_still(road(CAR), DEFAULT)) == [shown]
 
     @pytest.mark.parametrize("frames", [1, 2, 5])
     def test_a_still_picture_is_as_hot_as_a_video_of_the_same_frame(self, frames: int) -> None:
@@ -196,14 +200,15 @@ class TestStillPictures:
         *_, video = detect_video(*[road(CAR)] * frames, settings=settings)
         still = detect_still(road(CAR), settings)
         np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
-        assert still.rounded == video.rounded
+        assert rounded(still) == rounded(video)
 
     def test_by_votes_too_it_shows_what_the_video_shows(self) -> None:
         *_, video = detect_video(*[road(CAR)] * DEFAULT.heat.frames, settings=DEFAULT)
         still = detect_still(road(CAR), DEFAULT)
-        assert still.rounded == video.rounded
-        for name in ("strengths", "scores", "centroids"):
-            np.testing.assert_allclose(getattr(still, name), getattr(video, name), rtol=1e-5)
+        assert rounded(still) == rounded(video)
+        np.testing.assert_allclose(still.scores, video.scores, rtol=1e-5)
+        for name, column in still.data.items():
+            np.testing.assert_allclose(column, video.data[name], rtol=1e-5)
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
     def test_a_still_picture_is_searched_once(
@@ -231,7 +236,7 @@ class TestStillPictures:
     ) -> None:
         everything = settings.model_copy(update={"stills": StillSettings(strength=0, width=0)})
         whole = detect_still(road(CAR), everything)
-        (box,), (strength,) = whole.rounded, whole.strengths.tolist()
+        (box,), (strength,) = rounded(whole), whole.data["strength"].tolist()
         width, height = box.width / WIDTH, box.height / HEIGHT
         least = StillSettings(strength=strength - 1e-4, width=width, height=height)
         for stills, shown in (
@@ -241,7 +246,7 @@ class TestStillPictures:
             (least.model_copy(update={"height": height + 1 / HEIGHT}), False),
         ):
             found = detect_still(road(CAR), settings.model_copy(update={"stills": stills}))
-            assert found.rounded == ([box] if shown else [])
+            assert rounded(found) == ([box] if shown else [])
 
     def test_the_least_size_is_a_share_of_the_picture(self) -> None:
         wide = np.hstack([road(CAR), road(), road(), road()])

@@ -220,7 +220,7 @@ class TestShrunk:
 
     def test_regions_are_in_pixels_of_the_frame(self, shrink: int) -> None:
         (region,) = find_regions(drawn((5, 3, 4, 2, 2), shrink=shrink), 1)
-        assert region.box == Box(5 * shrink, 3 * shrink, 4 * shrink, 2 * shrink)
+        assert region.box == Box.sized(5 * shrink, 3 * shrink, 4 * shrink, 2 * shrink)
         # the middles of the outermost values' pixels are at equal distance from it
         left, right = (5 + 0.5) * shrink - 0.5, (8 + 0.5) * shrink - 0.5
         top, bottom = (3 + 0.5) * shrink - 0.5, (4 + 0.5) * shrink - 0.5
@@ -229,13 +229,13 @@ class TestShrunk:
 
     def test_a_single_value_is_a_region_with_its_middle(self, shrink: int) -> None:
         (region,) = find_regions(drawn((5, 3, 1, 1, 2), shrink=shrink), 1)
-        assert region.box == Box(5 * shrink, 3 * shrink, shrink, shrink)
+        assert region.box == Box.sized(5 * shrink, 3 * shrink, shrink, shrink)
         assert region.centroid == region.box.center
 
     def test_a_hit_becomes_a_region(self, shrink: Literal[2, 4, 8]) -> None:
         heat = heat_map(shrink=shrink).update(found((16, 8, 32, 24, 2)))
         (region,) = find_regions(heat, 1)
-        assert region.box == Box(16, 8, 32, 24)
+        assert region.box == Box.sized(16, 8, 32, 24)
         assert region.centroid == pytest.approx((31.5, 19.5))
 
 
@@ -243,7 +243,7 @@ def test_a_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
     heat = drawn((20, 10, 31, 21, 2))
     heat.values[15, 30] = 5
     (region,) = find_regions(heat, 1.4)
-    assert region.box == Box(20, 10, 31, 21)
+    assert region.box == Box.sized(20, 10, 31, 21)
     assert region.centroid == pytest.approx((35, 20))
     assert region.strength == 5
 
@@ -251,14 +251,14 @@ def test_a_rectangle_gives_its_box_its_middle_and_its_peak() -> None:
 def test_each_region_has_its_own_peak() -> None:
     regions = find_regions(drawn((50, 5, 10, 10, 2), (5, 30, 10, 10, 3)), 1)
     assert [(region.box, region.strength) for region in regions] == [
-        (Box(50, 5, 10, 10), 2.0),
-        (Box(5, 30, 10, 10), 3.0),
+        (Box.sized(50, 5, 10, 10), 2.0),
+        (Box.sized(5, 30, 10, 10), 3.0),
     ]
 
 
 def test_regions_are_ordered_from_the_top_and_then_from_the_left() -> None:
     heat = drawn((60, 5, 4, 4, 2), (5, 5, 4, 4, 2), (30, 40, 4, 4, 2), (2, 20, 4, 4, 2))
-    corners = [(region.box.x, region.box.y) for region in find_regions(heat, 1)]
+    corners = [(region.box.x1, region.box.y1) for region in find_regions(heat, 1)]
     assert corners == [(5, 5), (60, 5), (2, 20), (30, 40)]
 
 
@@ -274,7 +274,7 @@ def test_a_cold_map_has_no_regions() -> None:
 
 def test_a_hole_does_not_split_a_region() -> None:
     (region,) = find_regions(drawn((20, 10, 30, 30, 2), (30, 20, 10, 10, 0)), 1)
-    assert region.box == Box(20, 10, 30, 30)
+    assert region.box == Box.sized(20, 10, 30, 30)
     assert region.centroid == pytest.approx((34.5, 24.5))
     assert region.strength == 2
 
@@ -283,27 +283,27 @@ def test_the_strength_is_the_peak_of_the_region_and_not_of_its_box() -> None:
     # an L around a hotter spot that it does not touch
     heat = drawn((10, 10, 5, 40, 2), (10, 45, 40, 5, 2), (30, 15, 5, 5, 9))
     peaks = {region.box: region.strength for region in find_regions(heat, 1)}
-    assert peaks == {Box(10, 10, 40, 40): 2.0, Box(30, 15, 5, 5): 9.0}
+    assert peaks == {Box.sized(10, 10, 40, 40): 2.0, Box.sized(30, 15, 5, 5): 9.0}
 
 
 def test_a_single_pixel_is_a_region_with_its_middle() -> None:
     (region,) = find_regions(drawn((7, 9, 1, 1, 3)), 1)
-    assert region.box == Box(7, 9, 1, 1)
+    assert region.box == Box.sized(7, 9, 1, 1)
     assert region.centroid == (7.5, 9.5)
     assert region.strength == 3
 
 
 def test_a_line_is_a_region_with_the_middle_of_its_box() -> None:
     (region,) = find_regions(drawn((10, 9, 20, 1, 3)), 1)
-    assert region.box == Box(10, 9, 20, 1)
+    assert region.box == Box.sized(10, 9, 20, 1)
     assert region.centroid == (20, 9.5)
 
 
 def test_pixels_that_touch_at_a_corner_are_connected() -> None:
     (region,) = find_regions(drawn((10, 10, 5, 5, 2), (15, 15, 5, 5, 2)), 1)
-    assert region.box == Box(10, 10, 10, 10)
+    assert region.box == Box.sized(10, 10, 10, 10)
 
 
 def test_a_region_at_the_border_of_the_frame_is_whole() -> None:
     (region,) = find_regions(drawn((0, 0, 100, 60, 2)), 1)
-    assert region.box == Box(0, 0, 100, 60)
+    assert region.box == Box.sized(0, 0, 100, 60)

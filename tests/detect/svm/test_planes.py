@@ -9,7 +9,7 @@ from codings import in_any_coding
 from detect.svm.engine_comparison import fitted, log_odds, road
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder
 from red_cars import road as plain_road
-from vdet.boxes import Float32Array, Float64Array, iou_matrix, to_sides
+from vdet.boxes import Float32Array, Float64Array, iou_matrix
 from vdet.config.schema import FeatureSettings, Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import SvmModel
@@ -67,7 +67,7 @@ TRUE_BOXES = np.array([astuple(true.box) for true in true_boxes(SCENE, 200)], np
 def vehicles_in(picture: Picture) -> Vehicles:
     detector = load_detector(SvmSettings()).for_video(1280, 720, [road()])
     found = detector.detect(detector.search(picture, None))
-    boxes = to_sides(found.boxes)
+    boxes = found.sides
     nearest = iou_matrix(boxes, TRUE_BOXES).argmax(axis=0)
     return Vehicles(boxes[nearest], found.scores[nearest])
 
@@ -80,11 +80,11 @@ def test_a_model_of_another_colour_space_finds_exactly_the_same(
     image = plain_road(CAR)
     model = SvmModel(red_finder(), settings.svm)
 
-    def found_in(picture: Picture) -> tuple[Float32Array, Float32Array]:
+    def found_in(picture: Picture) -> tuple[Float64Array, Float64Array]:
         detector = model.for_video(WIDTH, HEIGHT, [image])
         for index in range(settings.svm.heat.frames + 1):
             found = detector.detect(detector.search(picture, index))
-        return found.boxes, found.strengths
+        return found.sides, found.data["strength"]
 
     ours, expected = (found_in(picture) for picture in both_forms(image, coding))
     assert len(expected[0]) == 1

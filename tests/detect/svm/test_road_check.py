@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from red_cars import red_finder
+from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.schema import SvmSettings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.detect.factory import load_detector, model_file
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import SvmModel
@@ -22,20 +22,20 @@ CARS = ((10, 10, 40, 30), (60, 10, 90, 30), (110, 10, 140, 30))
 WARNING = "does not seem to know this road"
 
 
-def boxes(*corners: tuple[int, int, int, int], score: float = 0.9) -> Detections:
-    return Detections(np.reshape(corners, (-1, 4)), np.full(len(corners), score))
+def boxes(*corners: tuple[int, int, int, int], score: float = 0.9) -> Boxes:
+    return Boxes(np.reshape(corners, (-1, 4)), np.full(len(corners), score))
 
 
 class Finds(NullDetector):
     """Another detector, which finds the same in every picture."""
 
-    def __init__(self, found: Detections) -> None:
+    def __init__(self, found: Boxes) -> None:
         self._found = found
 
     def for_video(self, *_: object) -> "Finds":
         return self
 
-    def detect(self, candidates: None) -> Detections:  # noqa: ARG002
+    def detect(self, candidates: None) -> Boxes:  # noqa: ARG002
         return self._found
 
 
@@ -43,7 +43,7 @@ def test_a_model_that_misses_most_vehicles_warns_once(caplog: pytest.LogCaptureF
     check = RoadCheck(lambda: Finds(boxes(*CARS)))
     check.compare(PICTURE, boxes(CARS[0]))  # 3 + 1 boxes are too few
     assert not caplog.records
-    check.compare(PICTURE, NO_DETECTIONS)
+    check.compare(PICTURE, NO_BOXES)
     assert f"{WARNING}: it agrees with the network on 29 % of the boxes" in caplog.text
     assert not check.is_due()
 
@@ -52,14 +52,12 @@ def test_a_model_that_misses_most_vehicles_warns_once(caplog: pytest.LogCaptureF
     "found",
     [
         boxes(*CARS),
-        Detections([*CARS, (150, 50, 190, 90)], [0.9, 0.9, 0.9, 0.3]),
-        Detections([*CARS, (150, 50, 158, 58)], [0.9] * 4),
+        Boxes([*CARS, (150, 50, 190, 90)], [0.9, 0.9, 0.9, 0.3]),
+        Boxes([*CARS, (150, 50, 158, 58)], [0.9] * 4),
     ],
     ids=["the same", "an unsure one more", "a narrow one more"],
 )
-def test_a_model_that_agrees_does_not_warn(
-    found: Detections, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_model_that_agrees_does_not_warn(found: Boxes, caplog: pytest.LogCaptureFixture) -> None:
     check = RoadCheck(lambda: Finds(boxes(*CARS)))
     for _ in range(5):
         check.compare(PICTURE, found)
@@ -67,7 +65,7 @@ def test_a_model_that_agrees_does_not_warn(
 
 
 def test_a_few_frames_of_a_long_video_are_compared() -> None:
-    check = RoadCheck(lambda: Finds(NO_DETECTIONS))
+    check = RoadCheck(lambda: Finds(NO_BOXES))
     assert [n for n in range(100) if check.is_due()] == [0, 1, 2, 4, 8, 16, 32, 64]
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SCALE, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import Box
 from vdet.config.schema import FeatureSettings, SvmSettings, WindowSettings
@@ -71,8 +72,8 @@ def test_the_patches_are_the_likeliest_and_the_unlikeliest_window() -> None:
 def test_hits_are_drawn_around_the_car_alone() -> None:
     changed = (pictures_of(road(CAR))["hits"] != road(CAR)).any(axis=2)
     rows, columns = np.nonzero(changed)
-    assert CAR.x - 32 <= columns.min() < columns.max() < CAR.right + 40
-    assert CAR.y - 32 <= rows.min() < rows.max() < CAR.bottom + 40
+    assert CAR.x1 - 32 <= columns.min() < columns.max() < CAR.x2 + 40
+    assert CAR.y1 - 32 <= rows.min() < rows.max() < CAR.y2 + 40
 
 
 def test_labels_of_hits_do_not_cover_one_another() -> None:
@@ -84,7 +85,7 @@ def test_labels_of_hits_do_not_cover_one_another() -> None:
     )
     expected = road()
     for box in boxes.tolist():
-        draw_box(expected, Box(*box), GREEN)
+        draw_box(expected, Box.sized(*box), GREEN)
     for text, box in (("0.90", boxes[1]), ("0.70", boxes[2])):
         draw_label(expected, text, (int(box[0]), int(box[1] + box[3])), GREEN)
     np.testing.assert_array_equal(drawn["hits"], expected)
@@ -92,7 +93,7 @@ def test_labels_of_hits_do_not_cover_one_another() -> None:
 
 def test_heat_is_brightest_on_the_car() -> None:
     heat = pictures_of(road(CAR))["heat"].sum(axis=2, dtype=int)
-    on_car = heat[CAR.y + 10 : CAR.bottom - 10, CAR.x + 10 : CAR.right - 10]
+    on_car = heat[CAR.y1 + 10 : CAR.y2 - 10, CAR.x1 + 10 : CAR.x2 - 10]
     assert on_car.min() > heat[200:, 200:].max()
 
 
@@ -125,7 +126,7 @@ def beyond(share: float) -> SvmSettings:
 def test_windows_beyond_the_sides_are_drawn_as_far_as_they_are_visible(
     share: float, x: int
 ) -> None:
-    image = road(CAR.moved_to(x, CAR.y).clipped(WIDTH, HEIGHT))
+    image = road(moved_to(CAR, x, CAR.y1).clipped(WIDTH, HEIGHT))
     pictures = pictures_of(image, beyond(share))
     assert list(pictures) == NAMES
     for name in NAMES[1:]:
@@ -136,7 +137,7 @@ def test_windows_beyond_the_sides_are_drawn_as_far_as_they_are_visible(
 
 
 def test_the_likeliest_window_is_shown_with_the_columns_that_it_repeats() -> None:
-    edge = road(Box(0, 110, 8, 60))  # beyond the frame, its window repeats these red columns
+    edge = road(Box.sized(0, 110, 8, 60))  # beyond the frame, its window repeats these red columns
     likely = np.vsplit(pictures_of(edge, beyond(0.75))["patches"], 2)[0]
     patch = likely[28:220, 4:196]
     red = (patch[..., 2].astype(int) - patch[..., 0]) > 100

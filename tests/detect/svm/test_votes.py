@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.boxes import Box
+from boxing import moved_to
+from vdet.boxes import Box, from_sizes
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.votes import MAX_VOTES, Votes, split_regions
 from vdet.detect.svm.windows import Windows
@@ -16,25 +17,28 @@ from vdet.detect.svm.windows import Windows
 Vote = tuple[float, float, float, float, float]
 """x, y, width, height, weight."""
 
-LEFT, RIGHT = Box(100, 100, 80, 60), Box(160, 96, 90, 66)  # side by side, a third in common
-EVERYWHERE = Box(-1000, -1000, 5000, 5000)
+LEFT, RIGHT = (
+    Box.sized(100, 100, 80, 60),
+    Box.sized(160, 96, 90, 66),
+)  # side by side, a third in common
+EVERYWHERE = Box.sized(-1000, -1000, 5000, 5000)
 
 
 def votes_of(*votes: Vote) -> Votes:
     """Return votes whose weights for presence and position are equal."""
     table = np.array(votes, np.float64).reshape(-1, 5)
-    return Votes(table[:, :4], table[:, 4], table[:, 4])
+    return Votes(from_sizes(table[:, :4]), table[:, 4], table[:, 4])
 
 
 def around(box: Box, weight: float = 0.1, seed: int = 0, count: int = 12) -> list[Vote]:
     """Draw votes for a vehicle, each a few pixels off."""
     off = np.random.default_rng(seed).normal(scale=0.04 * box.width, size=(count, 4))
-    true = np.array([box.x, box.y, box.width, box.height])
+    true = np.array([box.x1, box.y1, box.width, box.height])
     return [(x, y, width, height, weight) for x, y, width, height in (true + off).tolist()]
 
 
 def exactly(box: Box, weight: float) -> Vote:
-    return box.x, box.y, box.width, box.height, weight
+    return box.x1, box.y1, box.width, box.height, weight
 
 
 def split(votes: Sequence[Vote], *regions: Box, least: float = 0.12) -> list[HotRegion]:
@@ -59,7 +63,7 @@ class TestVehicles:
     def test_two_vehicles_that_overlap_are_told_apart(self) -> None:
         found = split(around(LEFT, seed=1) + around(RIGHT, seed=2), LEFT.union(RIGHT))
         assert len(found) == 2
-        left, right = sorted(boxes(found), key=lambda box: box.x)
+        left, right = sorted(boxes(found), key=lambda box: box.x1)
         assert left.iou(LEFT) > 0.9
         assert right.iou(RIGHT) > 0.9
 
@@ -70,30 +74,30 @@ class TestVehicles:
         assert first.strength > second.strength
 
     def test_scattered_votes_do_not_pull_the_box_far(self) -> None:
-        stray = [exactly(LEFT.moved_to(x, y), 0.1) for x, y in ((60, 100), (140, 130), (100, 60))]
+        stray = [exactly(moved_to(LEFT, x, y), 0.1) for x, y in ((60, 100), (140, 130), (100, 60))]
         (vehicle, *_) = split(around(LEFT) + stray)
         assert vehicle.box.iou(LEFT) > 0.85
 
     def test_a_heavier_vote_pulls_more(self) -> None:
-        near, far = LEFT, LEFT.moved_to(120, 100)
+        near, far = LEFT, moved_to(LEFT, 120, 100)
         (even,) = split([exactly(near, 1), exactly(far, 1)])
         (uneven,) = split([exactly(near, 1), exactly(far, 3)])
-        assert 105 < even.box.x < 115
-        assert 115 < uneven.box.x < 120
+        assert 105 < even.box.x1 < 115
+        assert 115 < uneven.box.x1 < 120
 
     def test_the_sides_of_a_vehicle_are_rounded_to_pixels(self) -> None:
         (vehicle,) = split([(10.4, 20.6, 30.3, 40.3, 1)])
-        assert vehicle.box == Box(10, 21, 31, 40)
+        assert vehicle.box == Box.sized(10, 21, 31, 40)
         assert vehicle.centroid == pytest.approx((25.55, 40.75))
 
     def test_a_vehicle_beyond_the_sides_is_not_cut_off_here(self) -> None:
-        (vehicle,) = split([exactly(Box(-30, 40, 80, 60), 1)])
-        assert vehicle.box == Box(-30, 40, 80, 60)
+        (vehicle,) = split([exactly(Box.sized(-30, 40, 80, 60), 1)])
+        assert vehicle.box == Box.sized(-30, 40, 80, 60)
 
 
 class TestWeights:
     def test_the_strength_is_the_weight_of_the_votes_that_agree(self) -> None:
-        other = LEFT.moved_to(110, 100)
+        other = moved_to(LEFT, 110, 100)
         (vehicle,) = split([exactly(LEFT, 0.5), exactly(other, 0.25)])
         assert vehicle.strength == pytest.approx(0.5 + 0.25 * LEFT.iou(other))
 
@@ -106,18 +110,21 @@ class TestWeights:
         assert split(around(LEFT, 0.02, count=1)) == []
 
     def test_presence_and_position_have_weights_of_their_own(self) -> None:
-        off = LEFT.moved_to(120, 100)
+        off = moved_to(LEFT, 120, 100)
         table = np.array([exactly(LEFT, 0)[:4], exactly(off, 0)[:4]], np.float64)
-        votes = Votes(table, presence=np.array([0.2, 0.6]), position=np.array([1e4, 1.0]))
+        presence, position = np.array([0.2, 0.6]), np.array([1e4, 1.0])
+        votes = Votes(from_sizes(table), presence, position)
         (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
         assert vehicle.box == LEFT
         assert vehicle.strength == pytest.approx(0.2 + 0.6 * LEFT.iou(off))
 
     def test_a_single_vote_of_high_position_weight_does_not_hide_a_vehicle(self) -> None:
-        lone = exactly(LEFT.moved_to(300, 100), 0)[:4]
+        lone = exactly(moved_to(LEFT, 300, 100), 0)[:4]
         table = np.array([lone, *[exactly(LEFT, 0)[:4]] * 3], np.float64)
         votes = Votes(
-            table, presence=np.array([0.01, 0.1, 0.1, 0.1]), position=np.array([9, 1, 1, 1.0])
+            from_sizes(table),
+            presence=np.array([0.01, 0.1, 0.1, 0.1]),
+            position=np.array([9, 1, 1, 1.0]),
         )
         (vehicle,) = split_regions([HotRegion(EVERYWHERE, (0, 0), 1)], votes, 0.12)
         assert vehicle.box == LEFT
@@ -127,7 +134,7 @@ class TestWeights:
 
 
 class TestParts:
-    BONNET = Box(110, 130, 36, 28)  # in LEFT
+    BONNET = Box.sized(110, 130, 36, 28)  # in LEFT
 
     def test_a_part_found_after_its_vehicle_is_not_reported(self) -> None:
         found = split(around(LEFT, 0.1) + around(self.BONNET, 0.05, seed=3))
@@ -143,52 +150,54 @@ class TestParts:
         assert boxes(found) == [self.BONNET, LEFT]
 
     def test_a_part_found_in_another_region_is_not_reported(self) -> None:
-        left, right = Box(100, 100, 60, 60), Box(160, 100, 20, 60)
-        part = Box(162, 110, 16, 30)
+        left, right = Box.sized(100, 100, 60, 60), Box.sized(160, 100, 20, 60)
+        part = Box.sized(162, 110, 16, 30)
         found = split([exactly(LEFT, 1), exactly(part, 0.5)], left, right)
         assert boxes(found) == [LEFT]
 
     def test_votes_for_a_part_of_one_vehicle_do_not_count_for_another(self) -> None:
-        part = Box(140, 110, 44, 40)  # in LEFT, except its end, which lies in RIGHT
+        part = Box.sized(140, 110, 44, 40)  # in LEFT, except its end, which lies in RIGHT
         assert RIGHT.iou(part) > 0.1
         found = split([exactly(LEFT, 1), exactly(RIGHT, 0.5), exactly(part, 0.25)])
         assert boxes(found) == [LEFT, RIGHT]
         assert found[1].strength == 0.5
 
     def test_a_box_that_reaches_far_enough_outside_is_not_a_part(self) -> None:
-        beside = self.BONNET.moved_to(LEFT.right - 18, 130)  # half of it in LEFT
+        beside = moved_to(self.BONNET, LEFT.x2 - 18, 130)  # half of it in LEFT
         found = split([exactly(LEFT, 1), exactly(beside, 0.5)])
         assert boxes(found) == [LEFT, beside]
 
 
 class TestRegions:
     def test_a_region_has_the_votes_whose_middle_lies_in_it(self) -> None:
-        one, other = Box(0, 0, 200, 200), Box(200, 0, 200, 200)
-        votes = [exactly(LEFT, 1), exactly(LEFT.moved_to(300, 100), 1)]
+        one, other = Box.sized(0, 0, 200, 200), Box.sized(200, 0, 200, 200)
+        votes = [exactly(LEFT, 1), exactly(moved_to(LEFT, 300, 100), 1)]
         assert boxes(split(votes, one)) == [LEFT]
-        assert boxes(split(votes, other)) == [LEFT.moved_to(300, 100)]
-        assert boxes(split(votes, other, one)) == [LEFT.moved_to(300, 100), LEFT]
+        assert boxes(split(votes, other)) == [moved_to(LEFT, 300, 100)]
+        assert boxes(split(votes, other, one)) == [moved_to(LEFT, 300, 100), LEFT]
 
     def test_a_vote_on_a_border_belongs_to_one_region(self) -> None:
-        vote = exactly(Box(90, 90, 20, 20), 1)  # its middle is (100, 100)
-        quarters = [Box(x, y, 100, 100) for x in (0, 100) for y in (0, 100)]
-        assert boxes(split([vote], *quarters)) == [Box(90, 90, 20, 20)]
+        vote = exactly(Box.sized(90, 90, 20, 20), 1)  # its middle is (100, 100)
+        quarters = [Box.sized(x, y, 100, 100) for x in (0, 100) for y in (0, 100)]
+        assert boxes(split([vote], *quarters)) == [Box.sized(90, 90, 20, 20)]
 
-    @pytest.mark.parametrize("aside", [(Box(130, 90, 100, 100),), (Box(400, 90, 9, 9), EVERYWHERE)])
+    @pytest.mark.parametrize(
+        "aside", [(Box.sized(130, 90, 100, 100),), (Box.sized(400, 90, 9, 9), EVERYWHERE)]
+    )
     def test_regions_that_overlap_do_not_count_a_vote_twice(self, aside: tuple[Box, ...]) -> None:
         votes = around(LEFT)
         (alone,) = split(votes)
-        assert split(votes, Box(90, 90, 100, 100), *aside) == [alone]
+        assert split(votes, Box.sized(90, 90, 100, 100), *aside) == [alone]
 
     def test_regions_that_a_third_one_joins_are_split_as_one(self) -> None:
-        left, right = Box(0, 0, 130, 300), Box(150, 0, 100, 300)
+        left, right = Box.sized(0, 0, 130, 300), Box.sized(150, 0, 100, 300)
         votes = around(LEFT)
         (alone,) = split(votes)
-        assert split(votes, left, right, Box(120, 0, 40, 300)) == [alone]
+        assert split(votes, left, right, Box.sized(120, 0, 40, 300)) == [alone]
 
     def test_a_region_without_votes_has_no_vehicles(self) -> None:
         assert split([]) == []
-        assert split(around(LEFT), Box(0, 0, 10, 10)) == []
+        assert split(around(LEFT), Box.sized(0, 0, 10, 10)) == []
         assert split_regions([], votes_of(*around(LEFT)), 0.12) == []
 
 
@@ -207,7 +216,7 @@ class TestCollecting:
             return Windows(np.zeros((count, 4), np.int32), values, shares, vehicles)
 
         votes = collected(windows(2, 0), windows(0, 0), windows(1, 50))
-        assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 10, 20], [50, 0, 10, 20]]
+        assert votes.boxes.tolist() == [[0, 0, 10, 20], [1, 0, 11, 20], [50, 0, 60, 20]]
         assert votes.presence.tolist() == [0.5 * 0.125, 1 * 0.25, 0.5 * 0.125]
         assert votes.boxes.dtype == votes.presence.dtype == votes.position.dtype == np.float64
 
@@ -226,16 +235,16 @@ class TestCollecting:
         ones = np.ones(4, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), ones, ones, np.array(vehicles, np.float32))
         votes = collected(windows)
-        assert votes.boxes.tolist() == [[90, 10, 10, 20], [0, 0, 5, 5], [60, 95, 20, 5]]
+        assert votes.boxes.tolist() == [[90, 10, 100, 30], [0, 0, 5, 5], [60, 95, 80, 100]]
         assert len(votes.presence) == len(votes.position) == 3
 
     def test_votes_for_a_vehicle_that_is_cut_off_agree(self) -> None:
         votes = np.array([[60, 40, width, 30] for width in (45, 60, 90, 120)], np.float32)
         quarters = np.full(4, 0.25, np.float32)
         windows = Windows(np.zeros((4, 4), np.int32), quarters, quarters, votes)
-        regions = [HotRegion(Box(60, 40, 40, 30), (80, 55), 1)]
+        regions = [HotRegion(Box.sized(60, 40, 40, 30), (80, 55), 1)]
         (vehicle,) = split_regions(regions, collected(windows), 0.12)
-        assert vehicle.box == Box(60, 40, 40, 30)
+        assert vehicle.box == Box.sized(60, 40, 40, 30)
         assert vehicle.strength == pytest.approx(0.25)
 
     def test_of_too_many_votes_the_best_positioned_are_kept_in_their_order(self) -> None:
@@ -272,8 +281,8 @@ def test_boxes_lie_within_the_hull_of_the_votes(votes: list[Vote]) -> None:
     (left, top), (right, bottom) = table[:, :2].min(axis=0), (table[:, :2] + table[:, 2:4]).max(0)
     found = split(votes, least=0)
     for box in boxes(found):
-        assert left - 1 <= box.x < box.right <= right + 1
-        assert top - 1 <= box.y < box.bottom <= bottom + 1
+        assert left - 1 <= box.x1 < box.x2 <= right + 1
+        assert top - 1 <= box.y1 < box.y2 <= bottom + 1
     assert found
 
 
@@ -285,7 +294,7 @@ def test_the_order_of_the_votes_does_not_matter(votes: list[Vote], random: Rando
     assert len(one) == len(other)
     for a, b in zip(one, other, strict=True):
         np.testing.assert_allclose(
-            [a.x, a.y, a.width, a.height], [b.x, b.y, b.width, b.height], atol=1
+            [a.x1, a.y1, a.width, a.height], [b.x1, b.y1, b.width, b.height], atol=1
         )
 
 

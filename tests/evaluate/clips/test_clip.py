@@ -85,7 +85,7 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     for each, others in zip(zip(*together, strict=True), alone, strict=True):
         assert [result.tracks for result in each] == [result.tracks for result in others]
         for one, other in zip(each, others, strict=True):
-            np.testing.assert_array_equal(one.detections.boxes, other.detections.boxes)
+            np.testing.assert_array_equal(one.detections.sides, other.detections.sides)
             np.testing.assert_array_equal(one.detections.scores, other.detections.scores)
     found = {str([result.tracks for result in each]) for each in alone}
     assert len(found) > 1, "the settings should differ in what they find"

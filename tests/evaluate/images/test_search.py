@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from evaluate.images.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.boxes import Box
@@ -28,7 +29,7 @@ def model() -> SvmModel:
 @pytest.fixture
 def red_set(tmp_path: Path) -> LabelledPictures:
     """Five pictures with a car in other places, and one without."""
-    cars = {f"{n}": CAR.moved_to(30 + 40 * n, CAR.y) for n in range(5)}
+    cars = {f"{n}": moved_to(CAR, 30 + 40 * n, CAR.y1) for n in range(5)}
     return write_set(tmp_path / "red", cars | {"9": None})
 
 
@@ -37,7 +38,7 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledPictures:
         name: Labelled(
             WIDTH,
             HEIGHT,
-            () if car is None else (Boxed("car", (car.x, car.y, car.width, car.height)),),
+            () if car is None else (Boxed("car", (car.x1, car.y1, car.width, car.height)),),
         )
         for name, car in cars.items()
     }

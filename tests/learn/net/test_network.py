@@ -167,7 +167,7 @@ def test_what_was_learnt_is_found_again(
         detections = detector.detect(detector.search(Picture(sample.image), None))
         assert detections.classes is not None
         names = [detections.names[each] for each in detections.classes.tolist()]
-        boxes = torch.tensor(detections.boxes)
+        boxes = torch.tensor(detections.sides)
         wanted += len(sample.boxes)
         for truth, kind in zip(sample.boxes, sample.classes, strict=True):
             overlaps = paired_iou(boxes, torch.tensor(truth).expand(len(boxes), 4))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box
@@ -28,7 +29,7 @@ from vdet.run.sinks.overlay import Overlay, time_text
 from vdet.track.track import Track
 
 LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
-CORNER = Box(0, 0, 12, 12)
+CORNER = Box.sized(0, 0, 12, 12)
 LANE = Lane(
     curvature=0.0,
     radius=None,
@@ -79,7 +80,7 @@ def test_predicted_vehicles_are_drawn_dashed() -> None:
     dashed = drawn_on(result_of(predicted))
     np.testing.assert_array_equal(dashed, expected)
     solid = drawn_on(result_of(seen))
-    lower = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
+    lower = np.s_[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
     drawn, gaps = (solid[lower] == color_of(1)).all(1), (dashed[lower] != solid[lower]).any(1)
     assert drawn.all()
     assert 0.2 < gaps.mean() < 0.8
@@ -117,10 +118,10 @@ def test_the_frames_of_the_result_are_not_drawn_on() -> None:
 
 
 def test_the_lane_lies_under_the_boxes() -> None:
-    box = Box(100, 150, 120, 60)
+    box = Box.sized(100, 150, 120, 60)
     with_lane = replace(road_seen(None), lane=LANE)
     drawn = drawn_on(result_of(box, found=with_lane))
-    assert (drawn[box.bottom - 1, box.x : box.right] == color_of(1)).all()
+    assert (Box(box.x1, box.y2 - 1, box.x2, box.y2).cut(drawn)[0] == color_of(1)).all()
     blue, green, red = drawn[180, 160].astype(int) - road(CAR)[180, 160]
     assert green > max(blue, red)
 
@@ -156,19 +157,21 @@ def white(width: int, height: int) -> Image:
 
 
 def test_only_boxes_and_their_labels_are_drawn_on() -> None:
-    boxes = [Box(200, 400, 120, 90), Box(800, 420, 240, 150)]
+    boxes = [Box.sized(200, 400, 120, 90), Box.sized(800, 420, 240, 150)]
     image = drawn_on(result_of(*boxes, image=white(1280, 720)))
     allowed = np.zeros(image.shape[:2], bool)
     for box in boxes:
-        allowed[box.y - 32 : box.bottom, box.x : box.right] = True
-        allowed[box.y + 5 : box.bottom - 5, box.x + 5 : box.right - 5] = False
+        allowed[box.y1 - 32 : box.y2, box.x1 : box.x2] = True
+        allowed[box.y1 + 5 : box.y2 - 5, box.x1 + 5 : box.x2 - 5] = False
     drawn = (image != 255).any(axis=2)
     assert drawn.any()
     assert not (drawn & ~allowed).any()
 
 
 def test_each_id_has_its_own_color() -> None:
-    result = result_of(Box(20, 100, 50, 50), Box(200, 100, 50, 50), image=white(320, 240))
+    result = result_of(
+        Box.sized(20, 100, 50, 50), Box.sized(200, 100, 50, 50), image=white(320, 240)
+    )
     three, four = (replace(track, id=track.id + 2) for track in result.tracks)
     image = drawn_on(replace(result, tracks=(three, four)))
     assert tuple(image[149, 45]) == color_of(3)
@@ -226,7 +229,7 @@ def test_a_still_picture_shows_ids_and_scores() -> None:
 
 def test_boxes_can_be_hidden_and_labels_stay() -> None:
     expected = road(CAR)
-    draw_label(expected, "#1", (CAR.x, CAR.y), color_of(1))
+    draw_label(expected, "#1", (CAR.x1, CAR.y1), color_of(1))
     np.testing.assert_array_equal(drawn_on(result_of(CAR), boxes=False), expected)
 
 
@@ -259,20 +262,25 @@ def test_lines_can_be_thicker() -> None:
     widths = []
     for thickness in (1.0, 3.0):
         image = drawn_on(result_of(CAR), thickness=thickness, label=())
-        column = (image[CAR.y : CAR.bottom, CAR.x + CAR.width // 2] == color_of(1)).all(axis=1)
+        column = (
+            Box(CAR.x1 + CAR.width // 2, CAR.y1, CAR.x1 + CAR.width // 2 + 1, CAR.y2).cut(image)[
+                :, 0
+            ]
+            == color_of(1)
+        ).all(axis=1)
         widths.append(int(column[: CAR.height // 2].sum()))
     assert widths[1] == 3 * widths[0]
 
 
 def test_colors_can_be_those_of_the_classes() -> None:
-    boxes = [Box(10 + 60 * n, 100, 50, 50) for n in range(5)]
+    boxes = [Box.sized(10 + 60 * n, 100, 50, 50) for n in range(5)]
     names = ["car", "car", "truck", "tram", None]
     tracks = [
         Track(n, box, 0.9, predicted=False, class_name=name)
         for n, (box, name) in enumerate(zip(boxes, names, strict=True), start=1)
     ]
     image = drawn_on(result_of(*tracks, image=white(320, 240) // 2), colors="class")
-    colors = [tuple(image[149, box.x + 25].tolist()) for box in boxes]
+    colors = [tuple(image[149, box.pixels[0] + 25].tolist()) for box in boxes]
     assert colors[0] == colors[1]
     assert len(set(colors)) == 4
 
@@ -286,16 +294,18 @@ def test_colors_can_be_those_of_the_regions() -> None:
     settings = Settings(
         draw=DrawSettings(colors="region"), regions=RegionsSettings(polygons=tuple(polygons))
     )
-    boxes = [Box(x, 100, 40, 40) for x in (10, 80, 170, 260)]
+    boxes = [Box.sized(x, 100, 40, 40) for x in (10, 80, 170, 260)]
     image = shown(Overlay(settings, None), result_of(*boxes, image=white(320, 240) // 2))
-    one, same, other, outside = (tuple(image[139, box.x + 20].tolist()) for box in boxes)
+    one, same, other, outside = (tuple(image[139, box.pixels[0] + 20].tolist()) for box in boxes)
     assert one == same
     assert len({one, other, outside}) == 3
     assert outside == WHITE
 
 
 def test_all_vehicles_can_have_one_color() -> None:
-    result = result_of(Box(20, 100, 50, 50), Box(200, 100, 50, 50), image=white(320, 240))
+    result = result_of(
+        Box.sized(20, 100, 50, 50), Box.sized(200, 100, 50, 50), image=white(320, 240)
+    )
     image = drawn_on(result, colors="one")
     assert tuple(image[149, 45]) == tuple(image[149, 225]) == GREEN
 
@@ -306,7 +316,7 @@ def test_all_vehicles_can_have_one_color() -> None:
 def passing(count: int, rate: int = 25) -> Iterator[FrameResult]:
     """Give frames in which a vehicle moves to the right, 4 pixels a frame."""
     for number in range(count):
-        box = Box(10 + 4 * number, 100, 40, 30)
+        box = Box.sized(10 + 4 * number, 100, 40, 30)
         time = Fraction(number, rate)
         yield result_of(box, image=white(320, 240), index=number, time=time)
 
@@ -338,18 +348,18 @@ def test_a_vehicle_that_was_just_found_has_no_trail() -> None:
 def test_trails_lie_under_the_boxes() -> None:
     overlay = overlay_with(trails=1.0, smoothing=None, label=())
     *_, last = (shown(overlay, result) for result in passing(50))
-    box = Box(10 + 4 * 49, 100, 40, 30)
-    assert (last[box.bottom - 1, box.x : box.right] == color_of(1)).all()
+    box = Box.sized(10 + 4 * 49, 100, 40, 30)
+    assert (Box(box.x1, box.y2 - 1, box.x2, box.y2).cut(last)[0] == color_of(1)).all()
 
 
 def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
     seen = road_seen(LENS)
-    foot = np.array([[CAR.x + CAR.width / 2, float(CAR.bottom)]])
+    foot = np.array([[CAR.x1 + CAR.width / 2, float(CAR.y2)]])
     ((x, y),) = seen.place_points(foot).tolist()
-    assert abs(y - CAR.bottom) > 1, "the lens moves the foot"
+    assert abs(y - CAR.y2) > 1, "the lens moves the foot"
     overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=None)
     for number in range(10):
-        start = CAR.moved_to(CAR.x - 4 * (9 - number), CAR.y)
+        start = moved_to(CAR, CAR.x1 - 4 * (9 - number), CAR.y1)
         drawn = shown(overlay, result_of(start, found=seen, time=Fraction(number, 25)))
     rows, columns = np.nonzero((drawn != seen.image).any(axis=2))
     assert abs(columns.max() - x) <= 2
@@ -397,7 +407,7 @@ def test_boxes_that_tremble_are_drawn_steadily() -> None:
         overlay = overlay_with(smoothing=smoothing, label=(), thickness=0.1)
         images = []
         for number in range(40):
-            box = Box(100 + number % 2 * 2, 100, 100, 80)
+            box = Box.sized(100 + number % 2 * 2, 100, 100, 80)
             time = Fraction(number, 25)
             result = result_of(box, image=white(320, 240), index=number, time=time)
             images.append(shown(overlay, result))
@@ -409,5 +419,5 @@ def test_boxes_that_tremble_are_drawn_steadily() -> None:
 def test_boxes_that_are_smoothed_stay_in_the_frame() -> None:
     overlay = overlay_with()
     for number in range(60):
-        box = Box(max(0, 150 - 8 * number), 100, 60, 50)
+        box = Box.sized(max(0, 150 - 8 * number), 100, 60, 50)
         overlay.draw(result_of(box, image=white(320, 240), time=Fraction(number, 25)))

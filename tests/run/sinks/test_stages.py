@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from boxing import rounded
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
 from run.red_runs import model_for, result_of, video_info, write
 from run.sinks.test_overlay import LANE, LENS, road_seen
-from vdet.boxes import Box
-from vdet.detect.detections import Detections
+from vdet.boxes import Box, Boxes
 from vdet.draw.boxes import color_of
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import Road
@@ -53,7 +53,7 @@ def test_the_moment_counts_from_the_first_frame(tmp_path: Path) -> None:
     )
     write(Output("stages", tmp_path), results, at=Fraction(1), video=late)
     picture = read_image(tmp_path / "5-boxes.png")
-    assert (picture[CAR.bottom - 1, CAR.x : CAR.right] == color_of(1)).all()
+    assert (Box(CAR.x1, CAR.y2 - 1, CAR.x2, CAR.y2).cut(picture)[0] == color_of(1)).all()
 
 
 def test_pictures_are_made_once(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path:
 
 
 def test_pictures_of_any_detector_come_first_in_its_order(tmp_path: Path) -> None:
-    def pictures(image: Image, _: Detections) -> dict[str, Image]:
+    def pictures(image: Image, _: Boxes) -> dict[str, Image]:
         return {"z-first": image // 2, "a-second": 255 - image}
 
     write(Output("stages", tmp_path), [result_of()], stage_pictures=pictures)
@@ -118,18 +118,18 @@ class TestBoxes:
             self.picture(tmp_path / name, result_of(*boxes, image=road()))
             for name, boxes in (("a", ()), ("b", (CAR,)))
         )
-        side = np.s_[CAR.bottom - 1, CAR.x : CAR.right]
+        side = np.s_[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
         assert (boxed[side] != plain[side]).any(axis=1).all()
-        assert (boxed[: CAR.y] != plain[: CAR.y]).any(), "the label stands above the box"
+        assert (boxed[: CAR.y1] != plain[: CAR.y1]).any(), "the label stands above the box"
 
     def test_predicted_vehicles_are_drawn_dashed(self, tmp_path: Path) -> None:
         track = Track(1, CAR, 0.9, predicted=True)
         picture = self.picture(tmp_path, result_of(track, image=road()))
-        side = (picture[CAR.bottom - 1, CAR.x : CAR.right] == color_of(1)).all(axis=1)
+        side = (Box(CAR.x1, CAR.y2 - 1, CAR.x2, CAR.y2).cut(picture)[0] == color_of(1)).all(axis=1)
         assert 0.2 < side.mean() < 0.8
 
     def test_detections_are_drawn_even_where_no_vehicle_is_shown(self, tmp_path: Path) -> None:
         result = detected()
-        (box,) = result.detections.rounded
+        (box,) = rounded(result.detections)
         picture = self.picture(tmp_path, result)
-        assert (picture[box.y : box.bottom, box.x] == 255).all()
+        assert (Box(box.x1, box.y1, box.x1 + 1, box.y2).cut(picture)[:, 0] == 255).all()

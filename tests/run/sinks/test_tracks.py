@@ -22,11 +22,13 @@ from vdet.run.sinks.protocol import Output, check_sinks
 from vdet.track.track import Track
 
 RESULTS = (
-    result_of(Track(1, Box(10, 20, 30, 40), 0.98765, False, "car"), index=4, time=Fraction(4, 25)),
+    result_of(
+        Track(1, Box.sized(10, 20, 30, 40), 0.98765, False, "car"), index=4, time=Fraction(4, 25)
+    ),
     result_of(index=5, time=Fraction(1, 3)),
     result_of(
-        Track(1, Box(11, 21, 31, 41), 0.5, True, "car", (27.25, 63.504), 18.249, -1),
-        Track(2, Box(0, -3, 5, 6), 1.0, predicted=False),
+        Track(1, Box.sized(11, 21, 31, 41), 0.5, True, "car", (27.25, 63.504), 18.249, -1),
+        Track(2, Box.sized(0, -3, 5, 6), 1.0, predicted=False),
         index=6,
         time=Fraction(6, 25),
     ),

@@ -42,7 +42,7 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
 
 def test_pictures_have_the_size_and_the_format_that_is_set(tmp_path: Path) -> None:
     png = SETTINGS.model_copy(update={"crops": CropSettings(format="png", padding=0.25, least=60)})
-    small = Box(10, 150, 59, 70)
+    small = Box.sized(10, 150, 59, 70)
     write(Output("crops", tmp_path), [result_of(CAR, small)], settings=png)
     assert names(tmp_path) == []
     png = SETTINGS.model_copy(update={"crops": CropSettings(format="png", padding=0.25, least=48)})
@@ -54,7 +54,7 @@ def test_pictures_have_the_size_and_the_format_that_is_set(tmp_path: Path) -> No
 
 
 def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Path) -> None:
-    large = Box(50, 50, 80, 60)
+    large = Box.sized(50, 50, 80, 60)
     results = [
         result_of(CAR, time=Fraction(0)),
         result_of(index=1, time=Fraction(1)),

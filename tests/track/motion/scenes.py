@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 
-from vdet.boxes import Box
+from boxing import moved_to
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import MotionTrackerSettings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
 
@@ -23,21 +23,21 @@ def frames(seconds: float, rate: int = RATE) -> int:
 
 def moving(box: Box, dx: float = 0, dy: float = 0, frames: int = 30) -> list[Box]:
     """Give the places of a box that moves steadily, so many pixels a frame."""
-    return [box.moved_to(round(box.x + n * dx), round(box.y + n * dy)) for n in range(frames)]
+    return [moved_to(box, round(box.x1 + n * dx), round(box.y1 + n * dy)) for n in range(frames)]
 
 
 def inside(box: Box) -> Box:
     return box.clipped(WIDTH, HEIGHT)
 
 
-def detections(found: Sequence[Scored | Box]) -> Detections:
+def detections(found: Sequence[Scored | Box]) -> Boxes:
     """Give the detections at these places; a box without a score is seen clearly."""
     scored = [(each, CLEAR) if isinstance(each, Box) else each for each in found]
     scored = [(box, score) for box, score in scored if box.area]
     if not scored:
-        return NO_DETECTIONS
-    corners = [(box.x, box.y, box.right, box.bottom) for box, _ in scored]
-    return Detections(corners, [score for _, score in scored])
+        return NO_BOXES
+    corners = [(box.x1, box.y1, box.x2, box.y2) for box, _ in scored]
+    return Boxes(corners, [score for _, score in scored])
 
 
 def follow(

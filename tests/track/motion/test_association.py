@@ -21,8 +21,8 @@ from vdet.track.motion.vehicle import Observation, Vehicle
 
 # How well boxes fit
 
-EXPECTED = np.array([[100.0, 100, 100, 60], [400, 100, 50, 50]])
-BESIDE = np.array([[210.0, 100, 100, 60]])
+EXPECTED = np.array([[100.0, 100, 200, 160], [400, 100, 450, 150]])
+BESIDE = np.array([[210.0, 100, 310, 160]])
 
 
 def buffers(x: float, y: float) -> Float64Array:
@@ -30,7 +30,7 @@ def buffers(x: float, y: float) -> Float64Array:
 
 
 def test_without_a_buffer_it_is_the_intersection_over_union() -> None:
-    found = np.array([[120.0, 110, 100, 60], [410, 100, 50, 60]])
+    found = np.array([[120.0, 110, 220, 170], [410, 100, 460, 160]])
     fit = buffered_iou(EXPECTED, buffers(0, 0), found)
     assert fit == pytest.approx(iou_matrix(EXPECTED, found))
 
@@ -41,7 +41,7 @@ def test_boxes_that_do_not_touch_fit_where_the_motion_is_unknown() -> None:
 
 
 def test_the_nearer_of_two_boxes_fits_better() -> None:
-    found = np.array([[140.0, 100, 100, 60], [180, 100, 100, 60]])
+    found = np.array([[140.0, 100, 240, 160], [180, 100, 280, 160]])
     nearer, farther = buffered_iou(EXPECTED, buffers(0.5, 0.5), found)[0]
     assert nearer > farther > 0
 
@@ -108,7 +108,7 @@ def test_no_other_pairs_add_up_to_more(values: Float64Array) -> None:
 # Vehicles that are the same one
 
 SIZE = (1000, 500)
-BOX = np.array([400.0, 200.0, 100.0, 60.0])
+BOX = np.array([400.0, 200.0, 500.0, 260.0])
 
 
 def vehicle(
@@ -125,7 +125,7 @@ def vehicle(
 
 
 def moved(dx: float, dy: float = 0) -> Float64Array:
-    return np.asarray(BOX + np.array([dx, dy, 0, 0]))
+    return np.asarray(BOX + np.array([dx, dy, dx, dy]))
 
 
 def test_a_newly_confirmed_vehicle_near_a_lost_one_takes_its_id() -> None:
@@ -182,7 +182,7 @@ def test_of_others_the_one_with_the_higher_score_stays_under_the_older_id(
     assert stronger.id == kept
 
 
-AROUND = np.array([430.0, 195.0, 160.0, 66.0])  # stands level with BOX, and covers most of it
+AROUND = np.array([430.0, 195.0, 590.0, 261.0])  # stands level with BOX, and covers most of it
 
 
 def test_an_unconfirmed_track_with_a_higher_score_waits_beside_the_confirmed_one() -> None:
@@ -198,7 +198,7 @@ def test_an_unconfirmed_track_with_a_lower_score_is_dropped() -> None:
     assert without(unconfirmed, stronger) == [stronger]
 
 
-PART = np.array([420.0, 205.0, 50.0, 30.0])
+PART = np.array([420.0, 205.0, 470.0, 235.0])
 
 
 def test_a_new_track_inside_a_vehicle_is_a_part_of_it_and_a_shown_one_is_not() -> None:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from track.motion.scenes import HEIGHT, WIDTH, detections, ids, inside
 from track.motion.traffic import Noise, random_traffic, track_scores, truth_at
 from vdet.boxes import Box
@@ -13,7 +14,7 @@ from vdet.evaluate.scores import Scores
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import Track
 
-CAR = Box(400, 400, 100, 70)
+CAR = Box.sized(400, 400, 100, 70)
 RATE = 25
 DEFAULTS = MotionTrackerSettings()
 
@@ -37,7 +38,7 @@ def follow_strided(
 
 
 def test_a_vehicle_moves_on_between_the_searched_frames() -> None:
-    places = [inside(CAR.moved_to(100 + 6 * n, 400)) for n in range(60)]
+    places = [inside(moved_to(CAR, 100 + 6 * n, 400)) for n in range(60)]
     shown = follow_strided(places, 5)
     for tracks, place in zip(shown[20:], places[20:], strict=True):
         (track,) = tracks

@@ -1,10 +1,12 @@
 """The same scene at any frame rate gives about the same tracks."""
 
+from dataclasses import astuple
 from functools import cache
 
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from track.motion.scenes import WIDTH, detections, follow, id_at, ids, inside
 from track.motion.traffic import (
     PERFECT,
@@ -23,7 +25,7 @@ from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker
 
 RATES = (5, 10, 25, 50)
-CAR = Box(400, 400, 100, 70)
+CAR = Box.sized(400, 400, 100, 70)
 DEFAULTS = MotionTrackerSettings()
 
 every_rate = pytest.mark.parametrize("rate", RATES)
@@ -59,7 +61,7 @@ def test_a_lost_vehicle_keeps_its_id_for_the_same_time(rate: int) -> None:
 
 @pytest.mark.parametrize("dx", [-80, 80])
 def test_a_new_vehicle_that_moves_most_of_its_width_between_frames_is_one(dx: int) -> None:
-    places = [CAR.moved_to(640 + n * dx, 400) for n in range(-7, 7)]
+    places = [moved_to(CAR, 640 + n * dx, 400) for n in range(-7, 7)]
     shown = follow(([place] for place in places), rate=5)
     assert ids(shown) == {1}
     assert [id_at(tracks, place) for tracks, place in zip(shown[3:], places[3:], strict=True)] == [
@@ -72,7 +74,7 @@ def test_frames_may_come_at_any_times() -> None:
     times = np.cumsum(rng.uniform(0.01, 0.2, 100))
     tracker = MotionTracker(DEFAULTS, WIDTH, 720)
     for number, time in enumerate(times):
-        place = inside(CAR.moved_to(round(100 + 70 * time), 400))
+        place = inside(moved_to(CAR, round(100 + 70 * time), 400))
         tracks = tracker.update(detections([place]), float(time))
         if number > 20:
             (track,) = tracks
@@ -152,7 +154,7 @@ def drawn_clip() -> list[list[TrueVehicle]]:
         [
             TrueVehicle(
                 each.id,
-                np.array([each.box.x, each.box.y, each.box.width, each.box.height], np.float64),
+                np.array(astuple(each.box), np.float64),
                 each.hidden,
             )
             for each in true_boxes(scene, index)

@@ -12,7 +12,7 @@ def scored_boxes(draw: st.DrawFn) -> tuple[Box, float]:
     """A detection anywhere in the frame or across its border."""
     x = draw(st.integers(-150, WIDTH))
     y = draw(st.integers(-150, HEIGHT))
-    box = Box(x, y, draw(st.integers(1, 600)), draw(st.integers(1, 400)))
+    box = Box.sized(x, y, draw(st.integers(1, 600)), draw(st.integers(1, 400)))
     return box, draw(st.floats(0, 1))
 
 

@@ -13,7 +13,7 @@ from vdet.track.motion.overlapping import (
 
 
 def box(x: float, y: float, width: float, height: float) -> Float64Array:
-    return np.array([x, y, width, height], np.float64)
+    return np.array([x, y, x + width, y + height], np.float64)
 
 
 def boxes(*each: Float64Array) -> Float64Array:

@@ -2,6 +2,7 @@
 
 import pytest
 
+from boxing import moved_to
 from track.motion.scenes import (
     CLEAR,
     FAINT,
@@ -23,7 +24,7 @@ from vdet.config.schema import MotionTrackerSettings
 from vdet.track.motion.overlapping import PART
 from vdet.track.motion.tracker import MotionTracker
 
-CAR = Box(400, 400, 100, 70)
+CAR = Box.sized(400, 400, 100, 70)
 DEFAULTS = MotionTrackerSettings()
 CARRIED = frames(DEFAULTS.carried)
 REMEMBERED = frames(DEFAULTS.remembered)
@@ -46,7 +47,7 @@ def test_evidence_weaker_than_the_leak_never_adds_up() -> None:
 
 
 def test_flicker_is_never_shown() -> None:
-    places = [CAR.moved_to(x, 400) for x in (50, 300, 550, 800, 1050)]
+    places = [moved_to(CAR, x, 400) for x in (50, 300, 550, 800, 1050)]
     flicker = [[places[n % 5]] if n % 2 else [] for n in range(200)]
     assert ids(follow(flicker)) == set()
 
@@ -64,7 +65,7 @@ def test_a_vehicle_that_is_hardly_likely_is_not_shown() -> None:
 
 def test_a_vehicle_is_shown_once_it_is_wide_enough() -> None:
     least = DEFAULTS.smallest * WIDTH
-    places = [Box(600 - n // 2, 400, 20 + n, 14 + n) for n in range(60)]
+    places = [Box.sized(600 - n // 2, 400, 20 + n, 14 + n) for n in range(60)]
     shown = follow([place] for place in places)
     assert ids(shown) == {1}
     assert all(track.box.width >= least - 1 for tracks in shown for track in tracks)
@@ -84,23 +85,23 @@ def test_a_steadily_moving_vehicle_is_shown_where_it_is(dx: float, dy: float) ->
 
 
 def test_a_fast_vehicle_is_not_lost() -> None:
-    places = moving(Box(0, 400, 200, 100).moved_to(20, 400), dx=50, frames=20)
+    places = moving(Box.sized(20, 400, 200, 100), dx=50, frames=20)
     assert ids(follow([inside(place)] for place in places)) == {1}
 
 
 def test_a_jittering_region_is_shown_steadier_than_it_is() -> None:
-    places = [CAR.moved_to(400 + (8 if n % 2 else -8), 400) for n in range(40)]
+    places = [moved_to(CAR, 400 + (8 if n % 2 else -8), 400) for n in range(40)]
     shown = follow([place] for place in places)[20:]
-    lefts = [tracks[0].box.x for tracks in shown]
+    lefts = [tracks[0].box.x1 for tracks in shown]
     assert max(lefts) - min(lefts) < 12
     assert sum(lefts) / len(lefts) == pytest.approx(400, abs=2)
 
 
 def test_weak_evidence_moves_a_vehicle_less() -> None:
-    aside = CAR.moved_to(430, 400)
+    aside = moved_to(CAR, 430, 400)
     strong = follow([*[[CAR]] * 20, [(aside, CLEAR)]])[-1]
     weak = follow([*[[CAR]] * 20, [(aside, WEAK / 5)]])[-1]
-    assert CAR.x < weak[0].box.x < strong[0].box.x < aside.x
+    assert CAR.x1 < weak[0].box.x1 < strong[0].box.x1 < aside.x1
 
 
 # Missed frames
@@ -144,7 +145,7 @@ def test_a_vehicle_with_only_faint_detections_is_not_shown_for_ever() -> None:
 
 
 def test_a_shown_vehicle_has_its_region_before_a_new_one() -> None:
-    aside, between = Box(455, 380, 100, 70), Box(430, 390, 100, 70)
+    aside, between = Box.sized(455, 380, 100, 70), Box.sized(430, 390, 100, 70)
     shown = follow([*[[CAR]] * 20, [CAR, aside], [between]])
     assert between.iou(aside) > between.iou(CAR)
     assert [(track.id, track.predicted) for track in shown[-1]] == [(1, False)]
@@ -152,7 +153,7 @@ def test_a_shown_vehicle_has_its_region_before_a_new_one() -> None:
 
 # One vehicle behind another
 
-VAN = Box(100, 390, 180, 130)
+VAN = Box.sized(100, 390, 180, 130)
 
 
 def test_a_vehicle_hidden_by_a_nearer_one_is_not_shown_and_keeps_its_id() -> None:
@@ -173,7 +174,7 @@ def test_a_vehicle_hidden_by_a_nearer_one_is_not_shown_and_keeps_its_id() -> Non
 
 
 def test_two_vehicles_that_cross_keep_their_ids() -> None:
-    vans, cars = moving(VAN, dx=6, frames=150), moving(CAR.moved_to(800, 400), dx=-2, frames=150)
+    vans, cars = moving(VAN, dx=6, frames=150), moving(moved_to(CAR, 800, 400), dx=-2, frames=150)
     clip = [
         [van] if car.intersection(van).area > car.area / 2 else [car, van]
         for car, van in zip(cars, vans, strict=True)
@@ -186,8 +187,8 @@ def test_two_vehicles_that_cross_keep_their_ids() -> None:
 
 
 def test_a_vehicle_that_comes_out_displaced_is_the_same_one() -> None:
-    hiding = VAN.moved_to(370, 390)
-    beside = Box(530, 400, 110, 75)  # it went on behind the van
+    hiding = moved_to(VAN, 370, 390)
+    beside = Box.sized(530, 400, 110, 75)  # it went on behind the van
     clip = [
         *[[CAR, van] for van in moving(VAN, dx=6, frames=46)],
         *[[hiding]] * 40,
@@ -199,15 +200,15 @@ def test_a_vehicle_that_comes_out_displaced_is_the_same_one() -> None:
 
 
 def test_weak_detections_on_the_nearer_vehicle_do_not_move_the_hidden_one() -> None:
-    arriving, hiding = moving(VAN, dx=6, frames=46), VAN.moved_to(370, 390)
+    arriving, hiding = moving(VAN, dx=6, frames=46), moved_to(VAN, 370, 390)
     parts: list[Scored] = [
-        (Box(400 - n // 2, 400 - n // 5, 100 + n, 70 + n), WEAK) for n in range(50)
+        (Box.sized(400 - n // 2, 400 - n // 5, 100 + n, 70 + n), WEAK) for n in range(50)
     ]
     clip: list[list[Box] | list[Scored]] = [
         *[[CAR, van] for van in arriving],
         *[[(hiding, CLEAR), part] for part in parts],
         *[[van] for van in moving(hiding, dx=6, frames=12)],
-        *[[van, CAR] for van in moving(hiding.moved_to(442, 390), dx=6, frames=10)],
+        *[[van, CAR] for van in moving(moved_to(hiding, 442, 390), dx=6, frames=10)],
     ]
     shown = follow(clip)
     assert ids(shown) == {1, 2}
@@ -216,7 +217,10 @@ def test_weak_detections_on_the_nearer_vehicle_do_not_move_the_hidden_one() -> N
 
 
 def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detected() -> None:
-    hiding, half = VAN.moved_to(370, 390), Box(480, 400, 110, 70)  # it went on behind the van
+    hiding, half = (
+        moved_to(VAN, 370, 390),
+        Box.sized(480, 400, 110, 70),
+    )  # it went on behind the van
     assert half.intersection(hiding).area > PART * half.area
     before = [[CAR, van] for van in moving(VAN, dx=6, frames=46)]
     shown = follow([*before, *[[hiding]] * 20, *[[hiding, half]] * 6])
@@ -225,19 +229,19 @@ def test_a_vehicle_that_comes_out_from_behind_is_shown_once_it_is_clearly_detect
 
 
 def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:
-    van = VAN.moved_to(370, 390)
+    van = moved_to(VAN, 370, 390)
     clip = [
         *[[CAR]] * 10,
-        *[[CAR, each] for each in moving(VAN.moved_to(200, 390), dx=10, frames=10)],
+        *[[CAR, each] for each in moving(moved_to(VAN, 200, 390), dx=10, frames=10)],
         *[[van]] * (frames(DEFAULTS.remembered_hidden) + 30),
-        *[[VAN.moved_to(800, 390), CAR]] * 8,
+        *[[moved_to(VAN, 800, 390), CAR]] * 8,
     ]
     shown = follow(clip)
     assert id_at(shown[-1], CAR) not in ids(shown[:20])
 
 
 def test_two_vehicles_seen_as_one_are_both_shown_and_keep_their_places() -> None:
-    truck = Box(490, 380, 160, 120)
+    truck = Box.sized(490, 380, 160, 120)
     clip = [*[[CAR, truck]] * 20, *[[CAR.union(truck)]] * 20, *[[CAR, truck]] * 5]
     shown = follow(clip)
     assert ids(shown) == {1, 2}
@@ -250,7 +254,7 @@ def test_two_vehicles_seen_as_one_are_both_shown_and_keep_their_places() -> None
 
 
 def test_a_vehicle_that_comes_in_at_the_side_is_shown_as_far_as_it_is_seen() -> None:
-    places = moving(Box(WIDTH - 40, 400, 260, 160), dx=-6, frames=70)
+    places = moving(Box.sized(WIDTH - 40, 400, 260, 160), dx=-6, frames=70)
     shown = follow([inside(place)] for place in places)
     assert ids(shown) == {1}
     assert first_shown(shown) < 5
@@ -260,7 +264,7 @@ def test_a_vehicle_that_comes_in_at_the_side_is_shown_as_far_as_it_is_seen() -> 
 
 @pytest.mark.parametrize("dx", [-10, 10])
 def test_a_vehicle_that_leaves_is_followed_to_the_side_and_dropped_there(dx: int) -> None:
-    places = moving(Box(WIDTH // 2 - 100, 400, 200, 120), dx, frames=90)
+    places = moving(Box.sized(WIDTH // 2 - 100, 400, 200, 120), dx, frames=90)
     seen = [inside(place) for place in places]
     shown = follow([place] if place.width > 20 else [] for place in seen)
     assert ids(shown) == {1}
@@ -271,21 +275,23 @@ def test_a_vehicle_that_leaves_is_followed_to_the_side_and_dropped_there(dx: int
 
 
 def test_the_next_vehicle_at_that_side_is_another_one() -> None:
-    leaving = [inside(place) for place in moving(Box(900, 400, 200, 120), dx=10, frames=38)]
-    shown = follow([*[[place] for place in leaving], *[[]] * 8, *[[Box(1180, 400, 100, 120)]] * 8])
-    assert id_at(shown[-1], Box(1180, 400, 100, 120)) == 2
+    leaving = [inside(place) for place in moving(Box.sized(900, 400, 200, 120), dx=10, frames=38)]
+    shown = follow(
+        [*[[place] for place in leaving], *[[]] * 8, *[[Box.sized(1180, 400, 100, 120)]] * 8]
+    )
+    assert id_at(shown[-1], Box.sized(1180, 400, 100, 120)) == 2
 
 
 # One vehicle, one track
 
 
 def test_a_region_inside_a_shown_vehicle_is_no_vehicle() -> None:
-    part = Box(430, 405, 60, 40)
+    part = Box.sized(430, 405, 60, 40)
     assert ids(follow([*[[CAR]] * 6, *[[CAR, part]] * 30])) == {1}
 
 
 def test_a_vehicle_that_comes_to_lie_inside_another_one_is_not_shown() -> None:
-    parts = moving(Box(300, 410, 60, 40), dx=3, frames=50)
+    parts = moving(Box.sized(300, 410, 60, 40), dx=3, frames=50)
     shown = follow([[CAR, part] for part in parts])
     assert ids(shown) == {1, 2}
     for tracks in shown[40:]:
@@ -293,17 +299,17 @@ def test_a_vehicle_that_comes_to_lie_inside_another_one_is_not_shown() -> None:
 
 
 def test_two_boxes_that_overlap_and_stand_level_are_one_vehicle() -> None:
-    rear, side = Box(400, 400, 120, 80), Box(470, 398, 130, 84)
+    rear, side = Box.sized(400, 400, 120, 80), Box.sized(470, 398, 130, 84)
     assert ids(follow([[rear, side]] * 30)) == {1}
 
 
 def test_a_vehicle_behind_another_one_is_a_vehicle() -> None:
-    behind = Box(480, 395, 90, 45)
+    behind = Box.sized(480, 395, 90, 45)
     assert ids(follow([[CAR, behind]] * 10)) == {1, 2}
 
 
 def test_two_tracks_that_come_together_become_the_older_one() -> None:
-    other = [CAR.moved_to(max(400, 600 - 10 * n), 400) for n in range(60)]
+    other = [moved_to(CAR, max(400, 600 - 10 * n), 400) for n in range(60)]
     clip = [[CAR], [CAR], *[[CAR, place] for place in other]]
     shown = follow(clip)
     assert ids(shown[:12]) == {1, 2}
@@ -311,8 +317,8 @@ def test_two_tracks_that_come_together_become_the_older_one() -> None:
 
 
 def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:
-    truck = Box(300, 250, 300, 200)
-    cars = moving(Box(150, 400, 110, 80), dx=5, frames=60)
+    truck = Box.sized(300, 250, 300, 200)
+    cars = moving(Box.sized(150, 400, 110, 80), dx=5, frames=60)
     shown = follow([truck, car] for car in cars)
     assert ids(shown) == {1, 2}
     assert [len(tracks) for tracks in shown[5:]] == [2] * 55
@@ -322,7 +328,7 @@ def test_a_small_vehicle_before_a_large_one_is_not_a_part_of_it() -> None:
 
 
 def test_ids_count_up_in_the_order_of_showing() -> None:
-    first, second, third = CAR, CAR.moved_to(100, 400), CAR.moved_to(800, 400)
+    first, second, third = CAR, moved_to(CAR, 100, 400), moved_to(CAR, 800, 400)
     later: list[tuple[Box, float] | Box] = [first, (third, WEAK), second]
     shown = follow([[first]] * 5 + [later] * 20)
     assert [id_at(shown[-1], box) for box in (first, second, third)] == [1, 2, 3]
@@ -334,15 +340,19 @@ def test_every_tracker_counts_its_own() -> None:
 
 
 def test_regions_outside_the_frame_do_not_count() -> None:
-    outside = [Box(-200, 400, 100, 70), Box(WIDTH, 400, 90, 70), Box(10, HEIGHT + 5, 90, 70)]
+    outside = [
+        Box.sized(-200, 400, 100, 70),
+        Box.sized(WIDTH, 400, 90, 70),
+        Box.sized(10, HEIGHT + 5, 90, 70),
+    ]
     assert ids(follow([outside] * 10)) == set()
 
 
 def test_the_size_of_the_frame_does_not_matter() -> None:
     def doubled(box: Box) -> Box:
-        return Box(2 * box.x, 2 * box.y, 2 * box.width, 2 * box.height)
+        return Box.sized(2 * box.x1, 2 * box.y1, 2 * box.width, 2 * box.height)
 
-    places = [inside(place) for place in moving(Box(900, 400, 120, 80), dx=8, frames=60)]
+    places = [inside(place) for place in moving(Box.sized(900, 400, 120, 80), dx=8, frames=60)]
     large = MotionTracker(DEFAULTS, 2 * WIDTH, 2 * HEIGHT)
     shown = follow([place] for place in places)
     for n, (place, tracks) in enumerate(zip(places, shown, strict=True)):
@@ -353,8 +363,8 @@ def test_the_size_of_the_frame_does_not_matter() -> None:
 
 
 def test_a_vehicle_that_leaves_the_frame_stands_where_its_whole_box_does() -> None:
-    last = follow([[box] for box in moving(CAR.moved_to(WIDTH - 160, 400), 8, frames=15)])[-1]
+    last = follow([[box] for box in moving(moved_to(CAR, WIDTH - 160, 400), 8, frames=15)])[-1]
     (track,) = last
-    assert track.box.right == WIDTH
-    assert track.foot[0] > track.box.x + track.box.width / 2 + 5
+    assert track.box.x2 == WIDTH
+    assert track.foot[0] > track.box.x1 + track.box.width / 2 + 5
     assert track.foot[1] == pytest.approx(470, abs=3)

@@ -14,7 +14,7 @@ FRAME = 0.04
 def observation(
     x: float = 400, width: float = 100, score: float = 1.0, class_name: str | None = None
 ) -> Observation:
-    return Observation(np.array([x, 200, width, width / 2]), score, class_name)
+    return Observation(np.array([x, 200, x + width, 200 + width / 2]), score, class_name)
 
 
 def seen(

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from track.motion.scenes import HEIGHT, WIDTH
-from vdet.boxes import Float64Array, coverage
+from vdet.boxes import Boxes, Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
-from vdet.detect.detections import Detections
 from vdet.evaluate.scores import Scores, score
 from vdet.labels.label import NO_ID, Label, from_size
 from vdet.labels.video import LabelledVideo
@@ -35,7 +34,8 @@ class TrueVehicle:
     @property
     def counts(self) -> bool:
         """Whether a tracker has to show it: large enough, and at least half of it visible."""
-        return self.hidden <= 0.5 and self.box[2] >= 40 and self.box[3] >= 24
+        width, height = self.box[2:] - self.box[:2]
+        return self.hidden <= 0.5 and width >= 40 and height >= 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class RoadVehicle:
         top = _HORIZON + scale * (_CAMERA_HEIGHT - self.height)
         near = np.clip([left, top], 0, (WIDTH, HEIGHT))
         far = np.clip([left + scale * self.width, top + scale * self.height], 0, (WIDTH, HEIGHT))
-        return np.concatenate([near, far - near]) if (far - near > 8).all() else None
+        return np.concatenate([near, far]) if (far - near > 8).all() else None
 
 
 def random_traffic(seed: int, seconds: float, fastest: float) -> list[RoadVehicle]:
@@ -113,14 +113,14 @@ class Noise:
 PERFECT = Noise(0, 0, 0)
 
 
-def detect(truth: Iterable[TrueVehicle], noise: Noise, rng: np.random.Generator) -> Detections:
+def detect(truth: Iterable[TrueVehicle], noise: Noise, rng: np.random.Generator) -> Boxes:
     """Give what a detector with such noise sees; without noise all scores are 1."""
     boxes, scores = [], []
     for vehicle in truth:
         missed = noise.missed + (0.5 * vehicle.hidden if noise.missed else 0)
-        if vehicle.hidden > 0.6 or rng.random() < missed or vehicle.box[2] < 24:
+        if vehicle.hidden > 0.6 or rng.random() < missed or vehicle.box[2] - vehicle.box[0] < 24:
             continue
-        near, size = vehicle.box[:2], vehicle.box[2:]
+        near, size = vehicle.box[:2], vehicle.box[2:] - vehicle.box[:2]
         jitter = rng.normal(0, noise.sides, 4) if noise.sides else np.zeros(4)
         boxes.append([*(near + jitter[:2] * size), *(near + size + jitter[2:] * size)])
         scores.append(rng.beta(8, 1.2) if noise.sides else 1.0)
@@ -129,7 +129,7 @@ def detect(truth: Iterable[TrueVehicle], noise: Noise, rng: np.random.Generator)
         left, top = rng.uniform(0, WIDTH - width), rng.uniform(350, 600)
         boxes.append([left, top, left + width, top + 0.8 * width])
         scores.append(rng.uniform(0.1, noise.surest))
-    return Detections(np.reshape(boxes, (-1, 4)), scores)
+    return Boxes(np.reshape(boxes, (-1, 4)), scores)
 
 
 def track_scores(
@@ -161,7 +161,7 @@ def track_scores(
             tracks = tracker.update(detect(vehicles, noise, rng), number / rate)
         for track in tracks:
             box = track.box
-            corners = box.x, box.y, box.right, box.bottom
+            corners = box.x1, box.y1, box.x2, box.y2
             shown.append(Label(0, corners, frame=number, id=track.id, score=track.score))
     videos = [LabelledVideo.of(rows, frame_count=len(clip), rate=rate) for rows in (shown, true)]
     return score(*videos)

@@ -2,6 +2,7 @@
 
 import pytest
 
+from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from vdet.boxes import Box
@@ -17,7 +18,7 @@ from vdet.track.rules.association import (
 from vdet.track.rules.car import Car, Region
 
 SETTINGS = SEED_TRACKER
-LEFT, RIGHT = Box(100, 200, 100, 80), Box(320, 200, 100, 80)
+LEFT, RIGHT = Box.sized(100, 200, 100, 80), Box.sized(320, 200, 100, 80)
 
 
 def road(*boxes: Box | None) -> Image:
@@ -54,34 +55,34 @@ def boxes_of(association: Association) -> dict[Car, Box]:
 
 def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
     cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
-    over_right, over_left = Box(310, 190, 100, 80), Box(90, 190, 100, 80)
+    over_right, over_left = Box.sized(310, 190, 100, 80), Box.sized(90, 190, 100, 80)
     result = associate(cars, [over_right, over_left])
     assert boxes_of(result) == {cars[1]: over_right, cars[0]: over_left}
     assert result.cars == cars
 
 
 def test_the_centroid_that_counts_is_the_average_one() -> None:
-    car = a_car(Box(100, 200, 100, 80), road())
-    car.see(Region(Box(160, 200, 100, 80), (210, 240), 2.0), road())
-    around_the_average = Box(130, 200, 70, 80)
+    car = a_car(Box.sized(100, 200, 100, 80), road())
+    car.see(Region(Box.sized(160, 200, 100, 80), (210, 240), 2.0), road())
+    around_the_average = Box.sized(130, 200, 70, 80)
     assert boxes_of(associate([car], [around_the_average])) == {car: around_the_average}
 
 
 def test_a_car_has_one_place_even_if_two_regions_contain_it() -> None:
     car = a_car(LEFT, road())
-    result = associate([car], [Box(80, 190, 110, 90), Box(100, 180, 120, 90)])
-    assert result.places[car].box == Box(80, 190, 110, 90)
+    result = associate([car], [Box.sized(80, 190, 110, 90), Box.sized(100, 180, 120, 90)])
+    assert result.places[car].box == Box.sized(80, 190, 110, 90)
 
 
 def test_a_region_that_contains_a_car_is_not_lost_to_a_neighbour() -> None:
     inside, beside = a_car(RIGHT, road()), a_car(LEFT, road())
-    result = associate([beside, inside], [Box(205, 200, 80, 80), RIGHT])
-    assert boxes_of(result) == {inside: RIGHT, beside: Box(205, 200, 80, 80)}
+    result = associate([beside, inside], [Box.sized(205, 200, 80, 80), RIGHT])
+    assert boxes_of(result) == {inside: RIGHT, beside: Box.sized(205, 200, 80, 80)}
 
 
 # Rule 3
 
-AROUND_BOTH = Box(90, 190, 340, 100)
+AROUND_BOTH = Box.sized(90, 190, 340, 100)
 
 
 def two_cars(*shown_as: int | None) -> list[Car]:
@@ -92,7 +93,7 @@ def two_cars(*shown_as: int | None) -> list[Car]:
 
 def test_of_several_cars_in_a_region_those_that_are_still_there_are_confirmed() -> None:
     cars = two_cars()
-    left, right = LEFT.moved_to(120, 205), RIGHT.moved_to(300, 195)
+    left, right = moved_to(LEFT, 120, 205), moved_to(RIGHT, 300, 195)
     result = associate(cars, [AROUND_BOTH], road(left, right))
     assert boxes_of(result) == {cars[0]: left, cars[1]: right}
 
@@ -106,7 +107,7 @@ def test_a_region_of_several_cars_with_one_confirmed_is_that_cars() -> None:
 
 def test_a_region_of_several_cars_with_none_confirmed_is_the_nearest_ones() -> None:
     cars = two_cars()
-    nearer_to_right = Box(140, 190, 340, 100)
+    nearer_to_right = Box.sized(140, 190, 340, 100)
     result = associate(cars, [nearer_to_right], road())
     assert boxes_of(result) == {cars[1]: nearer_to_right}
 
@@ -115,7 +116,7 @@ def test_a_region_of_several_cars_with_none_confirmed_is_the_nearest_ones() -> N
 def test_a_car_is_confirmed_within_the_match_distance(distance: int, confirmed: bool) -> None:
     cars = two_cars()
     settings = tracker_but(match_distance=distance)
-    result = associate(cars, [AROUND_BOTH], road(LEFT.moved_to(150, 200), RIGHT), settings)
+    result = associate(cars, [AROUND_BOTH], road(moved_to(LEFT, 150, 200), RIGHT), settings)
     assert (cars[0] in result.places) is confirmed
 
 
@@ -130,7 +131,7 @@ def test_a_car_is_confirmed_by_a_match_of_the_least_score() -> None:
 
 # Rules 4 and 5
 
-CLOSE = Box(150, 200, 100, 80)
+CLOSE = Box.sized(150, 200, 100, 80)
 
 
 def overlapping_cars(*shown_as: int | None) -> tuple[list[Car], Image]:
@@ -141,7 +142,7 @@ def overlapping_cars(*shown_as: int | None) -> tuple[list[Car], Image]:
 
 def test_confirmed_cars_that_overlap_become_one_new_car_shown_at_once() -> None:
     cars, frame = overlapping_cars(None, None)
-    around = Box(95, 195, 160, 90)
+    around = Box.sized(95, 195, 160, 90)
     result = associate(cars, [around], frame)
     (car,) = result.cars
     assert car not in cars
@@ -159,15 +160,15 @@ def test_a_merged_car_keeps_the_lowest_id_that_was_shown(
     shown_as: tuple[int | None, int | None], kept: int | None
 ) -> None:
     cars, frame = overlapping_cars(*shown_as)
-    (car,) = associate(cars, [Box(95, 195, 160, 90)], frame).cars
+    (car,) = associate(cars, [Box.sized(95, 195, 160, 90)], frame).cars
     assert car.id == kept
 
 
 def test_if_two_of_three_cars_overlap_all_three_become_one() -> None:
-    far = Box(400, 200, 100, 80)
+    far = Box.sized(400, 200, 100, 80)
     frame = road(LEFT, CLOSE, far)
     cars = [a_car(box, frame) for box in (LEFT, CLOSE, far)]
-    result = associate(cars, [Box(95, 195, 410, 90)], frame)
+    result = associate(cars, [Box.sized(95, 195, 410, 90)], frame)
     assert len(result.cars) == 1
 
 
@@ -177,12 +178,12 @@ def test_cars_merge_when_they_overlap_by_more_than_the_setting(
 ) -> None:
     cars, frame = overlapping_cars(None, None)
     settings = tracker_but(merge_overlap=merge_overlap)
-    assert len(associate(cars, [Box(95, 195, 160, 90)], frame, settings).cars) == cars_left
+    assert len(associate(cars, [Box.sized(95, 195, 160, 90)], frame, settings).cars) == cars_left
 
 
 def test_confirmed_cars_apart_stay_apart_and_move_to_their_matches() -> None:
     cars = two_cars(3, 5)
-    left, right = LEFT.moved_to(110, 200), RIGHT.moved_to(310, 204)
+    left, right = moved_to(LEFT, 110, 200), moved_to(RIGHT, 310, 204)
     result = associate(cars, [AROUND_BOTH], road(left, right))
     assert result.cars == cars
     assert [car.id for car in result.cars] == [3, 5]
@@ -212,19 +213,19 @@ def test_the_confident_peak_and_its_count_are_settings() -> None:
 @pytest.mark.parametrize(("width", "added"), [(66, False), (67, True), (250, True)])
 def test_a_region_wider_than_two_thirds_of_its_car_is_added(width: int, added: bool) -> None:
     car = a_car(LEFT, road())
-    result = associate([car], [Box(110, 200, width, 80)])
+    result = associate([car], [Box.sized(110, 200, width, 80)])
     assert (car in result.places) is added
     assert result.cars == [car]
 
 
 @pytest.mark.parametrize(("width", "added"), [(200, False), (201, True)])
 def test_a_region_wider_than_200_pixels_is_added_to_any_car(width: int, added: bool) -> None:
-    car = a_car(Box(100, 200, 320, 80), road())
-    assert (car in associate([car], [Box(150, 200, width, 80)]).places) is added
+    car = a_car(Box.sized(100, 200, 320, 80), road())
+    assert (car in associate([car], [Box.sized(150, 200, width, 80)]).places) is added
 
 
 def test_what_is_wide_and_what_share_is_good_are_settings() -> None:
-    narrow = Box(120, 200, 60, 80)
+    narrow = Box.sized(120, 200, 60, 80)
     for settings in (tracker_but(wide=59), tracker_but(good_fraction=0.5)):
         car = a_car(LEFT, road())
         assert car in associate([car], [narrow], settings=settings).places
@@ -238,14 +239,14 @@ def test_a_region_of_good_size_within_50_pixels_of_a_car_is_added_to_it(
     x: int, car_is_near: bool
 ) -> None:
     car = a_car(LEFT, road())
-    result = associate([car], [Box(x, 200, 80, 80)])
+    result = associate([car], [Box.sized(x, 200, 80, 80)])
     assert (car in result.places) is car_is_near
     assert len(result.cars) == (1 if car_is_near else 2)
 
 
 def test_near_is_a_setting() -> None:
     car = a_car(LEFT, road())
-    beside = Box(230, 200, 80, 80)
+    beside = Box.sized(230, 200, 80, 80)
     assert car not in associate([car], [beside], settings=tracker_but(near=29)).places
 
 
@@ -254,27 +255,27 @@ def test_a_near_region_that_is_too_narrow_is_neither_added_nor_a_new_car(
     width: int, added: bool
 ) -> None:
     car = a_car(LEFT, road())
-    result = associate([car], [Box(210, 200, width, 80)])
+    result = associate([car], [Box.sized(210, 200, width, 80)])
     assert (car in result.places) is added
     assert result.cars == [car]
 
 
 def test_of_two_near_cars_the_nearer_gets_the_region() -> None:
     cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
-    assert list(associate(cars, [Box(225, 200, 80, 80)]).places) == [cars[1]]
+    assert list(associate(cars, [Box.sized(225, 200, 80, 80)]).places) == [cars[1]]
 
 
 def test_of_two_near_cars_the_one_without_a_region_goes_first() -> None:
     cars = [a_car(LEFT, road()), a_car(RIGHT, road())]
-    beside = Box(225, 200, 80, 80)
+    beside = Box.sized(225, 200, 80, 80)
     assert boxes_of(associate(cars, [RIGHT, beside])) == {cars[1]: RIGHT, cars[0]: beside}
 
 
 # Rules 9 and 10
 
-LORRY = Box(100, 200, 200, 100)
-ITS_FRONT, ITS_REAR = Box(80, 200, 70, 100), Box(250, 200, 60, 100)
-COMBINED = Box(80, 200, 230, 100)
+LORRY = Box.sized(100, 200, 200, 100)
+ITS_FRONT, ITS_REAR = Box.sized(80, 200, 70, 100), Box.sized(250, 200, 60, 100)
+COMBINED = Box.sized(80, 200, 230, 100)
 
 
 @pytest.mark.parametrize("parts", [[ITS_FRONT, ITS_REAR], [ITS_REAR, ITS_FRONT]])
@@ -288,36 +289,36 @@ def test_two_regions_by_a_car_that_make_up_its_size_are_added_as_one(parts: list
 
 def test_of_several_other_regions_the_nearest_to_the_car_is_combined() -> None:
     car = a_car(LORRY, road())
-    further = Box(330, 200, 60, 100)
+    further = Box.sized(330, 200, 60, 100)
     result = associate([car], [ITS_FRONT, further, ITS_REAR])
-    assert sorted(boxes_of(result).values(), key=lambda box: box.x) == [COMBINED, further]
+    assert sorted(boxes_of(result).values(), key=lambda box: box.x1) == [COMBINED, further]
     assert result.places[car].box == COMBINED
 
 
 def test_a_region_that_is_not_near_the_car_is_not_combined() -> None:
     car = a_car(LORRY, road())
-    too_narrow, too_far = Box(305, 200, 60, 100), Box(355, 200, 90, 100)
+    too_narrow, too_far = Box.sized(305, 200, 60, 100), Box.sized(355, 200, 90, 100)
     assert list(boxes_of(associate([car], [too_narrow, too_far])).values()) == [too_far]
 
 
 def test_a_wide_region_alone_is_not_combined_with_itself() -> None:
-    car = a_car(Box(100, 200, 260, 100), road())
-    beside = Box(365, 200, 260, 100)
+    car = a_car(Box.sized(100, 200, 260, 100), road())
+    beside = Box.sized(365, 200, 260, 100)
     assert boxes_of(associate([car], [beside])) == {car: beside}
 
 
 def test_a_region_inside_a_car_is_combined_with_one_beside_it() -> None:
     car = a_car(LORRY, road())
-    too_narrow = Box(90, 200, 120, 100)
+    too_narrow = Box.sized(90, 200, 120, 100)
     result = associate([car], [too_narrow, ITS_REAR])
-    assert boxes_of(result) == {car: Box(90, 200, 220, 100)}
+    assert boxes_of(result) == {car: Box.sized(90, 200, 220, 100)}
     assert result.cars == [car]
 
 
 def test_a_region_that_a_car_has_already_is_combined_with_one_beside_it() -> None:
     car = a_car(LORRY, road())
-    its_own = Box(90, 200, 150, 100)
-    assert boxes_of(associate([car], [ITS_REAR, its_own])) == {car: Box(90, 200, 220, 100)}
+    its_own = Box.sized(90, 200, 150, 100)
+    assert boxes_of(associate([car], [ITS_REAR, its_own])) == {car: Box.sized(90, 200, 220, 100)}
 
 
 def test_how_wide_the_combined_regions_may_be_is_a_setting() -> None:
@@ -330,7 +331,7 @@ def test_how_wide_the_combined_regions_may_be_is_a_setting() -> None:
 
 def test_regions_that_are_not_the_cars_size_combined_are_judged_alone() -> None:
     car = a_car(LEFT, road())
-    left, right = Box(30, 200, 80, 80), Box(190, 200, 80, 80)
+    left, right = Box.sized(30, 200, 80, 80), Box.sized(190, 200, 80, 80)
     result = associate([car], [left, right])
     assert result.places[car].box == left
     assert [boxes_of(result)[new] for new in result.cars if new is not car] == [right]
@@ -342,8 +343,8 @@ def test_what_is_about_the_cars_size_is_a_setting() -> None:
     assert car not in associate([car], [ITS_FRONT, ITS_REAR], settings=strict).places
 
 
-HIDING = Box(100, 200, 260, 100)
-ONE, OTHER = Box(70, 200, 120, 100), Box(250, 200, 110, 100)
+HIDING = Box.sized(100, 200, 260, 100)
+ONE, OTHER = Box.sized(70, 200, 120, 100), Box.sized(250, 200, 110, 100)
 
 
 @pytest.mark.parametrize("regions", [[ONE, OTHER], [OTHER, ONE]])
@@ -367,10 +368,10 @@ def test_of_the_two_cars_the_nearer_one_keeps_the_id() -> None:
 
 def test_a_car_that_has_a_region_already_may_still_become_two() -> None:
     car = a_car(HIDING, road(), shown_as=4)
-    its_own = Box(60, 200, 205, 100)
-    beside = Box(300, 200, 70, 100)
+    its_own = Box.sized(60, 200, 205, 100)
+    beside = Box.sized(300, 200, 70, 100)
     result = associate([car], [its_own, beside])
-    assert sorted(place.box.x for place in result.places.values()) == [60, 300]
+    assert sorted(place.box.x1 for place in result.places.values()) == [60, 300]
     assert car not in result.cars
 
 
@@ -380,7 +381,7 @@ def test_a_car_that_has_a_region_already_may_still_become_two() -> None:
 @pytest.mark.parametrize(("peak", "needed"), [(4.0, 10), (4.1, 3)])
 def test_a_region_with_no_car_near_is_a_new_car(peak: float, needed: int) -> None:
     known = a_car(LEFT, road())
-    far = Box(600, 200, 90, 80)
+    far = Box.sized(600, 200, 90, 80)
     result = associate([known], [far], peak=peak)
     old, new = result.cars
     assert old is known
@@ -396,14 +397,14 @@ def test_how_many_detections_a_new_car_needs_is_set() -> None:
 
 def test_a_region_beside_a_car_that_has_its_own_is_a_new_car() -> None:
     car = a_car(LEFT, road())
-    beside = Box(220, 200, 90, 80)
+    beside = Box.sized(220, 200, 90, 80)
     result = associate([car], [LEFT, beside])
     assert result.places[car].box == LEFT
     assert [boxes_of(result)[new] for new in result.cars if new is not car] == [beside]
 
 
 def test_two_regions_side_by_side_are_two_new_cars() -> None:
-    assert len(associate([], [LEFT, Box(210, 200, 90, 80)]).cars) == 2
+    assert len(associate([], [LEFT, Box.sized(210, 200, 90, 80)]).cars) == 2
 
 
 def test_without_regions_the_cars_stay_as_they_are() -> None:
@@ -423,11 +424,13 @@ def test_without_regions_the_cars_stay_as_they_are() -> None:
 def test_good_size_is_over_two_thirds_of_the_car_or_over_200_pixels(
     width: int, car_width: int, good: bool
 ) -> None:
-    assert is_good_size(Box(0, 0, width, 50), Box(0, 0, car_width, 99), SETTINGS) is good
+    assert (
+        is_good_size(Box.sized(0, 0, width, 50), Box.sized(0, 0, car_width, 99), SETTINGS) is good
+    )
 
 
 def test_good_size_is_set_by_share_and_width() -> None:
-    narrow, car = Box(0, 0, 90, 50), Box(0, 0, 150, 50)
+    narrow, car = Box.sized(0, 0, 90, 50), Box.sized(0, 0, 150, 50)
     assert not is_good_size(narrow, car, SETTINGS)
     assert is_good_size(narrow, car, tracker_but(good_fraction=0.5))
     assert is_good_size(narrow, car, tracker_but(wide=89))
@@ -435,17 +438,19 @@ def test_good_size_is_set_by_share_and_width() -> None:
 
 @pytest.mark.parametrize(("width", "about"), [(79, False), (80, True), (160, True), (161, False)])
 def test_about_the_size_is_within_a_third_of_the_cars_width(width: int, about: bool) -> None:
-    assert is_about_size(Box(0, 0, width, 50), Box(0, 0, 120, 90), SETTINGS) is about
+    assert is_about_size(Box.sized(0, 0, width, 50), Box.sized(0, 0, 120, 90), SETTINGS) is about
 
 
 def test_combined_regions_have_one_box_the_common_centroid_and_the_higher_peak() -> None:
-    both = combine(region(Box(0, 0, 60, 60), peak=2), region(Box(100, 0, 20, 60), peak=5))
-    assert both == Region(Box(0, 0, 120, 60), (50, 30), 5)
+    both = combine(
+        region(Box.sized(0, 0, 60, 60), peak=2), region(Box.sized(100, 0, 20, 60), peak=5)
+    )
+    assert both == Region(Box.sized(0, 0, 120, 60), (50, 30), 5)
 
 
 @pytest.mark.parametrize(
     ("x", "y", "overlap"), [(59, 59, True), (60, 59, False), (59, 60, False), (300, 300, False)]
 )
 def test_overlap_counts_across_and_down(x: int, y: int, overlap: bool) -> None:
-    boxes = [Box(500, 500, 100, 100), Box(0, 0, 100, 100), Box(x, y, 100, 100)]
+    boxes = [Box.sized(500, 500, 100, 100), Box.sized(0, 0, 100, 100), Box.sized(x, y, 100, 100)]
     assert any_overlap(boxes, 40) is overlap

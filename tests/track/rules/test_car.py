@@ -1,12 +1,13 @@
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from vdet.boxes import Box
 from vdet.media.images import Image
 from vdet.track.rules.car import Car, Region, find_template
 
-BOX = Box(100, 60, 80, 60)
+BOX = Box.sized(100, 60, 80, 60)
 FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
 
 
@@ -24,15 +25,15 @@ def shifted(frame: Image, dx: int, dy: int) -> Image:
 def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
     car = seen()
     for i in range(10):
-        car.see(Region(Box(10 * i, 20 + i, 60 + 2 * i, 51), (10.0 * i, 5.0), 2.0), FRAME)
-    assert car.box == Box(45, 24, 69, 51)
+        car.see(Region(Box.sized(10 * i, 20 + i, 60 + 2 * i, 51), (10.0 * i, 5.0), 2.0), FRAME)
+    assert car.box == Box.sized(45, 24, 69, 51)
     assert car.centroid == (45.0, 5.0)
 
 
 def test_the_last_ten_images_are_kept_cut_from_their_frames() -> None:
     car = Car(needed=10, history=10)
     for x in range(12):
-        car.see(Region(Box(x, 0, 50, 60), (x, 0), 2.0), FRAME)
+        car.see(Region(Box.sized(x, 0, 50, 60), (x, 0), 2.0), FRAME)
     assert len(car.detections) == 10
     for x, detection in enumerate(car.detections, start=2):
         np.testing.assert_array_equal(detection.image, FRAME[0:60, x : x + 50])
@@ -50,8 +51,8 @@ def test_a_kept_image_does_not_change_with_the_frame_that_it_was_cut_from() -> N
 def test_the_history_setting_says_how_many_are_averaged(history: int) -> None:
     car = Car(needed=10, history=history)
     for x in (0, 30, 60, 90):
-        car.see(Region(Box(x, 0, 50, 50), (x, 0), 2.0), FRAME)
-    assert car.box.x == {1: 90, 3: 60}[history]
+        car.see(Region(Box.sized(x, 0, 50, 50), (x, 0), 2.0), FRAME)
+    assert car.box.x1 == {1: 90, 3: 60}[history]
 
 
 def test_detections_are_counted_in_a_row_and_in_all() -> None:
@@ -66,8 +67,8 @@ def test_detections_are_counted_in_a_row_and_in_all() -> None:
 
 def test_a_match_counts_as_a_detection_and_moves_the_centroid_with_the_box() -> None:
     car = seen()
-    car.see_match(BOX.moved_to(106, 52), FRAME)
-    assert car.detections[-1].box == Box(106, 52, 80, 60)
+    car.see_match(moved_to(BOX, 106, 52), FRAME)
+    assert car.detections[-1].box == Box.sized(106, 52, 80, 60)
     assert car.detections[-1].centroid == (146, 82)
     assert (car.detected, car.count, car.in_a_row, car.matches) == (True, 2, 2, 1)
 
@@ -115,14 +116,14 @@ def test_vouching_takes_no_detections_away() -> None:
 
 def test_the_latest_image_is_searched_around_the_latest_box() -> None:
     car = Car(needed=10, history=10)
-    car.see(Region(Box(0, 0, 60, 60), (30, 30), 2.0), FRAME)
+    car.see(Region(Box.sized(0, 0, 60, 60), (30, 30), 2.0), FRAME)
     car.see(Region(BOX, (140, 90), 2.0), FRAME)
-    assert car.find_in(shifted(FRAME, 7, -4), SEED_TRACKER) == BOX.moved_to(107, 56)
+    assert car.find_in(shifted(FRAME, 7, -4), SEED_TRACKER) == moved_to(BOX, 107, 56)
 
 
 def test_the_settings_limit_the_search() -> None:
     moved = shifted(FRAME, 30, 0)
-    assert seen().find_in(moved, tracker_but(match_distance=30)) == BOX.moved_to(130, 60)
+    assert seen().find_in(moved, tracker_but(match_distance=30)) == moved_to(BOX, 130, 60)
     assert seen().find_in(moved, tracker_but(match_distance=29)) is None
 
 
@@ -159,34 +160,38 @@ def search(
 
 def test_a_moved_template_is_found_to_the_pixel_with_a_perfect_score() -> None:
     piece = texture(60, 40)
-    found = search(frame_with(piece, 120, 77), piece, Box(100, 80, 60, 40), min_score=1)
-    assert found == Box(120, 77, 60, 40)
+    found = search(frame_with(piece, 120, 77), piece, Box.sized(100, 80, 60, 40), min_score=1)
+    assert found == Box.sized(120, 77, 60, 40)
 
 
 def test_a_score_below_the_least_one_is_no_match() -> None:
     frame = frame_with(texture(60, 40, seed=1), 100, 80)
-    assert search(frame, texture(60, 40), Box(100, 80, 60, 40), min_score=0.95) is None
+    assert search(frame, texture(60, 40), Box.sized(100, 80, 60, 40), min_score=0.95) is None
 
 
 def test_noise_lowers_the_score() -> None:
     piece = texture(60, 40)
     noise = np.random.default_rng(5).integers(0, 128, piece.shape, dtype=np.uint8)
     frame = frame_with(piece // 2 + noise, 100, 80)
-    assert search(frame, piece, Box(100, 80, 60, 40), min_score=0.6) == Box(100, 80, 60, 40)
-    assert search(frame, piece, Box(100, 80, 60, 40), min_score=0.9) is None
+    assert search(frame, piece, Box.sized(100, 80, 60, 40), min_score=0.6) == Box.sized(
+        100, 80, 60, 40
+    )
+    assert search(frame, piece, Box.sized(100, 80, 60, 40), min_score=0.9) is None
 
 
 def test_the_distance_is_the_longest_way_and_a_straight_line() -> None:
     piece = texture(60, 40)
-    near = Box(100, 80, 60, 40)
-    assert search(frame_with(piece, 130, 120), piece, near, distance=50) == Box(130, 120, 60, 40)
+    near = Box.sized(100, 80, 60, 40)
+    assert search(frame_with(piece, 130, 120), piece, near, distance=50) == Box.sized(
+        130, 120, 60, 40
+    )
     assert search(frame_with(piece, 130, 120), piece, near, distance=49) is None
     assert search(frame_with(piece, 140, 120), piece, near, distance=50) is None
 
 
 def test_with_no_distance_only_the_old_place_counts() -> None:
     piece = texture(60, 40)
-    near = Box(100, 80, 60, 40)
+    near = Box.sized(100, 80, 60, 40)
     assert search(frame_with(piece, 100, 80), piece, near, distance=0) == near
     assert search(frame_with(piece, 101, 80), piece, near, distance=0) is None
 
@@ -194,16 +199,18 @@ def test_with_no_distance_only_the_old_place_counts() -> None:
 @pytest.mark.parametrize(("x", "y"), [(0, 0), (240, 160), (0, 160)])
 def test_a_template_is_found_in_the_corner_of_a_frame(x: int, y: int) -> None:
     piece = texture(60, 40)
-    near = Box(min(x + 20, 240), max(y - 20, 0), 60, 40)
-    assert search(frame_with(piece, x, y), piece, near) == Box(x, y, 60, 40)
+    near = Box.sized(min(x + 20, 240), max(y - 20, 0), 60, 40)
+    assert search(frame_with(piece, x, y), piece, near) == Box.sized(x, y, 60, 40)
 
 
 def test_a_place_partly_outside_the_frame_is_searched_where_it_is_inside() -> None:
     piece = texture(60, 40)
-    assert search(frame_with(piece, 0, 0), piece, Box(-20, -10, 60, 40)) == Box(0, 0, 60, 40)
+    assert search(frame_with(piece, 0, 0), piece, Box.sized(-20, -10, 60, 40)) == Box.sized(
+        0, 0, 60, 40
+    )
 
 
-@pytest.mark.parametrize("near", [Box(900, 80, 60, 40), Box(-900, 80, 60, 40)])
+@pytest.mark.parametrize("near", [Box.sized(900, 80, 60, 40), Box.sized(-900, 80, 60, 40)])
 def test_a_place_far_outside_the_frame_has_no_match(near: Box) -> None:
     piece = texture(60, 40)
     assert search(frame_with(piece, 0, 0), piece, near) is None
@@ -212,22 +219,24 @@ def test_a_place_far_outside_the_frame_has_no_match(near: Box) -> None:
 @pytest.mark.parametrize(("width", "height"), [(301, 40), (60, 201)])
 def test_a_template_larger_than_the_frame_has_no_match(width: int, height: int) -> None:
     frame = np.full((200, 300, 3), BACKGROUND, np.uint8)
-    assert search(frame, texture(width, height), Box(0, 0, width, height), min_score=0) is None
+    assert (
+        search(frame, texture(width, height), Box.sized(0, 0, width, height), min_score=0) is None
+    )
 
 
 @pytest.mark.parametrize("color", [(0, 0, 0), (BACKGROUND,) * 3, (10, 200, 90)])
 def test_a_template_of_one_colour_has_no_match(color: tuple[int, int, int]) -> None:
     piece = np.full((40, 60, 3), color, np.uint8)
     frame = frame_with(piece, 100, 80)
-    assert search(frame, piece, Box(100, 80, 60, 40)) is None
+    assert search(frame, piece, Box.sized(100, 80, 60, 40)) is None
 
 
 def test_an_empty_template_has_no_match() -> None:
     frame = np.full((200, 300, 3), BACKGROUND, np.uint8)
-    assert search(frame, frame[:0], Box(0, 0, 300, 0), min_score=0) is None
+    assert search(frame, frame[:0], Box.sized(0, 0, 300, 0), min_score=0) is None
 
 
 @pytest.mark.parametrize("level", [0, BACKGROUND, 255])
 def test_nothing_is_found_in_a_frame_of_one_colour(level: int) -> None:
     frame = np.full((200, 300, 3), level, np.uint8)
-    assert search(frame, texture(60, 40), Box(100, 80, 60, 40)) is None
+    assert search(frame, texture(60, 40), Box.sized(100, 80, 60, 40)) is None

@@ -5,9 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seed import tracker_but
-from vdet.boxes import Box
+from vdet.boxes import Box, Boxes
 from vdet.config.schema import RulesTrackerSettings
-from vdet.detect.detections import Detections
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.tracker import RulesTracker
@@ -38,7 +37,7 @@ def regions(draw: st.DrawFn) -> tuple[Box, float]:
     """A region anywhere in the frame or across its border."""
     x = draw(st.integers(-30, WIDTH))
     y = draw(st.integers(-30, HEIGHT))
-    box = Box(x, y, draw(st.integers(1, 120)), draw(st.integers(1, 90)))
+    box = Box.sized(x, y, draw(st.integers(1, 120)), draw(st.integers(1, 90)))
     return box, draw(st.floats(1.4, 9))
 
 
@@ -62,9 +61,9 @@ def run(clip: Clip, tracker: RulesTrackerSettings) -> list[list[Track]]:
     ]
 
 
-def _detections(found: list[tuple[Box, float]]) -> Detections:
-    corners = [(box.x, box.y, box.right, box.bottom) for box, _ in found]
-    return Detections(corners, [1.0] * len(found), strengths=[peak for _, peak in found])
+def _detections(found: list[tuple[Box, float]]) -> Boxes:
+    corners = [(box.x1, box.y1, box.x2, box.y2) for box, _ in found]
+    return Boxes(corners, [1.0] * len(found), data={"strength": [peak for _, peak in found]})
 
 
 @settings(deadline=None)
@@ -99,9 +98,9 @@ def test_the_id_of_a_deleted_car_never_comes_back(clip: Clip) -> None:
 def test_boxes_lie_in_the_frame_and_are_not_too_small(clip: Clip) -> None:
     for tracks in run(clip, EAGER):
         for track in tracks:
-            assert min(track.box.x, track.box.y) >= 0
-            assert track.box.right <= WIDTH + 1  # place and size are rounded each for itself
-            assert track.box.bottom <= HEIGHT + 1
+            assert min(track.box.x1, track.box.y1) >= 0
+            assert track.box.x2 <= WIDTH + 1  # place and size are rounded each for itself
+            assert track.box.y2 <= HEIGHT + 1
             assert min(track.box.width, track.box.height) >= EAGER.min_region
 
 

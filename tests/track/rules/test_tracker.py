@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
+from boxing import moved_to
 from seed import SEED_TRACKER, tracker_but
 from textured_road import textured_road
 from track.rules.scenes import detections
-from vdet.boxes import Box
-from vdet.detect.detections import NO_DETECTIONS, Detections
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.car import Region
 from vdet.track.rules.tracker import RulesTracker, large_enough
 from vdet.track.track import Track
 
-SEDAN, VAN = Box(100, 200, 100, 80), Box(400, 200, 120, 100)
+SEDAN, VAN = Box.sized(100, 200, 100, 80), Box.sized(400, 200, 120, 100)
 GREY = np.full((360, 640, 3), 90, np.uint8)
 
 
@@ -47,8 +47,10 @@ def ids(tracks: list[Track]) -> list[int]:
 
 def test_regions_that_are_too_small_are_ignored() -> None:
     settings = tracker_but(detections_needed=1)
-    assert see(RulesTracker(settings), Box(100, 200, 49, 80), Box(300, 200, 80, 49)) == [[]]
-    assert len(see(RulesTracker(settings), Box(100, 200, 50, 50))[0]) == 1
+    assert see(
+        RulesTracker(settings), Box.sized(100, 200, 49, 80), Box.sized(300, 200, 80, 49)
+    ) == [[]]
+    assert len(see(RulesTracker(settings), Box.sized(100, 200, 50, 50))[0]) == 1
 
 
 def kept(*boxes: Box, **changes: object) -> list[Box]:
@@ -57,39 +59,39 @@ def kept(*boxes: Box, **changes: object) -> list[Box]:
 
 @pytest.mark.parametrize(("width", "height"), [(49, 80), (80, 49), (1, 1)])
 def test_a_region_narrower_or_lower_than_50_pixels_is_ignored(width: int, height: int) -> None:
-    assert kept(Box(10, 10, width, height)) == []
+    assert kept(Box.sized(10, 10, width, height)) == []
 
 
 def test_a_region_of_50_by_50_pixels_is_kept() -> None:
-    assert kept(Box(10, 10, 50, 50)) == [Box(10, 10, 50, 50)]
+    assert kept(Box.sized(10, 10, 50, 50)) == [Box.sized(10, 10, 50, 50)]
 
 
 def test_the_least_size_is_a_setting() -> None:
-    small = Box(10, 10, 30, 30)
+    small = Box.sized(10, 10, 30, 30)
     assert kept(small, min_region=30) == [small]
     assert kept(small, min_region=31) == []
 
 
 def test_what_lies_outside_the_frame_does_not_count() -> None:
-    regions = Box(-20, 10, 90, 60), Box(600, 10, 80, 60), Box(900, 10, 80, 60)
-    assert kept(*regions) == [Box(0, 10, 70, 60)]
+    regions = Box.sized(-20, 10, 90, 60), Box.sized(600, 10, 80, 60), Box.sized(900, 10, 80, 60)
+    assert kept(*regions) == [Box.sized(0, 10, 70, 60)]
 
 
 def test_a_region_outside_the_frame_is_ignored_whatever_the_setting() -> None:
-    assert kept(Box(700, 10, 60, 60), min_region=0) == []
+    assert kept(Box.sized(700, 10, 60, 60), min_region=0) == []
 
 
 def test_a_region_has_the_strength_of_its_detection_as_its_peak() -> None:
-    found = Detections([[10, 20, 90.4, 99.6]], [0.5], centroids=[[44, 55]], strengths=[3.5])
+    found = Boxes([[10, 20, 90.4, 99.6]], [0.5], data={"centroid": [[44, 55]], "strength": [3.5]})
     (region,) = large_enough(found, 640, 360, SEED_TRACKER)
-    assert region == Region(Box(10, 20, 80, 80), (44, 55), 3.5, 0.5)
+    assert region == Region(Box.sized(10, 20, 80, 80), (44, 55), 3.5, 0.5)
 
 
 # Rule 12
 
 ONE_PLACE = tracker_but(history=1)  # so that a car's rectangle is its latest one
-BUS = Box(230, 200, 120, 100)
-BOTH = Box(90, 190, 270, 120)
+BUS = Box.sized(230, 200, 120, 100)
+BOTH = Box.sized(90, 190, 270, 120)
 
 
 def see_side_by_side(cars: RulesTracker, frames: int) -> None:
@@ -126,11 +128,15 @@ def test_the_absorbing_car_keeps_its_own_id_if_it_was_shown_and_the_other_ends()
 
 def test_of_two_cars_around_a_lost_one_the_nearer_absorbs_it() -> None:
     cars = RulesTracker(ONE_PLACE)
-    lost, left, right = SEDAN.moved_to(250, 200), Box(100, 200, 120, 80), Box(400, 200, 120, 80)
+    lost, left, right = (
+        moved_to(SEDAN, 250, 200),
+        Box.sized(100, 200, 120, 80),
+        Box.sized(400, 200, 120, 80),
+    )
     show(cars, lost)
     for _ in range(2):
         update(cars, road(lost, left, right), lost, left, right)
-    around_left, around_right = Box(60, 190, 300, 100), Box(240, 190, 260, 100)
+    around_left, around_right = Box.sized(60, 190, 300, 100), Box.sized(240, 190, 260, 100)
     tracks = update(cars, road(None, left, right), around_left, around_right)
     assert tracks == [Track(1, around_right, 1.0, predicted=False)]
 
@@ -156,7 +162,7 @@ def test_a_car_beside_the_other_ones_rectangle_is_not_absorbed() -> None:
 def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
     cars = RulesTracker(tracker_but(history=1))
     show(cars, SEDAN)
-    moved = SEDAN.moved_to(130, 240)
+    moved = moved_to(SEDAN, 130, 240)
     assert update(cars, road(moved)) == [Track(1, moved, 1.0, predicted=True)]
     assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, predicted=False)]
 
@@ -164,15 +170,15 @@ def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
 def test_a_match_counts_in_the_average_box() -> None:
     cars = RulesTracker(SEED_TRACKER)
     show(cars, SEDAN)
-    (track,) = update(cars, road(SEDAN.moved_to(140, 200)))
-    assert track.box == SEDAN.moved_to(104, 200)
+    (track,) = update(cars, road(moved_to(SEDAN, 140, 200)))
+    assert track.box == moved_to(SEDAN, 104, 200)
 
 
 @pytest.mark.parametrize(("distance", "found"), [(50, 1), (49, 0)])
 def test_the_match_is_searched_within_the_distance(distance: int, found: int) -> None:
     cars = RulesTracker(tracker_but(match_distance=distance))
     show(cars, SEDAN)
-    assert len(update(cars, road(SEDAN.moved_to(150, 200)))) == found
+    assert len(update(cars, road(moved_to(SEDAN, 150, 200)))) == found
 
 
 def test_the_least_score_of_a_match_is_a_setting() -> None:
@@ -292,24 +298,24 @@ def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
 def test_a_shown_box_is_the_average_of_the_last_ten() -> None:
     cars = RulesTracker(SEED_TRACKER)
     for x in range(100, 124, 2):
-        tracks = update(cars, road(), SEDAN.moved_to(x, 200))
-    assert tracks == [Track(1, SEDAN.moved_to(113, 200), 1.0, predicted=False)]
+        tracks = update(cars, road(), moved_to(SEDAN, x, 200))
+    assert tracks == [Track(1, moved_to(SEDAN, 113, 200), 1.0, predicted=False)]
 
 
 def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:
     cars = RulesTracker(SEED_TRACKER)
-    see(cars, Box(100, 200, 260, 100), frames=10)
-    (tracks,) = see(cars, Box(70, 200, 120, 100), Box(250, 200, 110, 100))
-    assert [(track.id, track.box.x) for track in tracks] == [(1, 250), (2, 70)]
+    see(cars, Box.sized(100, 200, 260, 100), frames=10)
+    (tracks,) = see(cars, Box.sized(70, 200, 120, 100), Box.sized(250, 200, 110, 100))
+    assert [(track.id, track.box.x1) for track in tracks] == [(1, 250), (2, 70)]
 
 
 def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() -> None:
     cars = RulesTracker(SEED_TRACKER)
-    behind = Box(150, 200, 100, 80)
+    behind = Box.sized(150, 200, 100, 80)
     frame = road(SEDAN, behind)
     for _ in range(10):
         update(cars, frame, SEDAN, behind, VAN)
-    around = Box(95, 195, 160, 90)
+    around = Box.sized(95, 195, 160, 90)
     tracks = update(cars, frame, around, VAN)
     assert [(track.id, track.box) for track in tracks] == [(1, around), (3, VAN)]
 
@@ -335,9 +341,9 @@ def test_a_match_keeps_the_score_of_the_detection_before_it() -> None:
 
 def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
     cars = RulesTracker(tracker_but(detections_needed=1))
-    corners = [[SEDAN.x, SEDAN.y, SEDAN.right, SEDAN.bottom]]
+    corners = [[SEDAN.x1, SEDAN.y1, SEDAN.x2, SEDAN.y2]]
     for class_id in (0, 1, 1):
-        found = Detections(corners, [0.9], classes=[class_id], names=("car", "van"))
+        found = Boxes(corners, [0.9], classes=[class_id], names=("car", "van"))
         (track,) = cars.update(found, 0.0, Picture(GREY))
     assert track.class_name == "van"
     assert see(RulesTracker(tracker_but(detections_needed=1)), SEDAN)[0][0].class_name is None
@@ -345,4 +351,4 @@ def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
 
 def test_without_the_frame_it_says_that_it_needs_it() -> None:
     with pytest.raises(ValueError, match="needs the frame"):
-        RulesTracker(SEED_TRACKER).update(NO_DETECTIONS, 0.0)
+        RulesTracker(SEED_TRACKER).update(NO_BOXES, 0.0)

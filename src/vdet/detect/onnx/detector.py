@@ -7,10 +7,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float32Array, Int32Array, Int64Array, to_sides
+from vdet.boxes import Box, Boxes, Float32Array, Int32Array, Int64Array
 from vdet.config.schema import NetworkSettings
 from vdet.detect.classes import our_name
-from vdet.detect.detections import Detections
 from vdet.detect.onnx.layouts import RawBoxes
 from vdet.detect.onnx.preparation import Placement
 from vdet.detect.onnx.recognition import Recognized, recognize
@@ -91,13 +90,13 @@ class NetworkDetector:
             self._wanted(raw, place, picture.width, picture.height), is_still=index is None
         )
 
-    def detect(self, candidates: Candidates) -> Detections:
+    def detect(self, candidates: Candidates) -> Boxes:
         """Return one box for each vehicle."""
         raw = candidates.raw
         rows = suppress(raw.boxes, raw.scores, self._settings.overlap)
         if candidates.is_still:
             rows = rows[raw.scores[rows] >= self._settings.still_score]
-        return Detections(
+        return Boxes(
             raw.boxes[rows],
             raw.scores[rows],
             classes=raw.classes[rows],
@@ -105,14 +104,13 @@ class NetworkDetector:
             trace=raw,
         )
 
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return what the network sees, and its boxes before suppression."""
         values, _ = self._recognized.form.prepare(Picture(image))
         boxes = image.copy()
         raw: RawBoxes = detections.trace
         for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
-            left, top, right, bottom = box
-            draw_box(boxes, Box(left, top, right - left, bottom - top), GREEN, f"{score:.2f}")
+            draw_box(boxes, Box(*box), GREEN, f"{score:.2f}")
         return {"input": self._recognized.form.picture(values), "candidates": boxes}
 
     def _wanted(self, raw: RawBoxes, place: Placement, width: int, height: int) -> RawBoxes:
@@ -145,5 +143,7 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
     overlap
         A box with more intersection over union with a better one is removed.
     """
-    kept = cv2.dnn.NMSBoxes(to_sides(boxes).tolist(), scores.tolist(), 0.0, overlap)
+    near, far = boxes[:, :2], boxes[:, 2:]
+    places = np.concatenate([near, far - near], axis=1, dtype=np.float64)
+    kept = cv2.dnn.NMSBoxes(places.tolist(), scores.tolist(), 0.0, overlap)
     return np.asarray(kept, np.int64).reshape(-1)

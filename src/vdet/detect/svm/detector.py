@@ -3,14 +3,13 @@
 import logging
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import are_nested
+from vdet.boxes import Boxes, are_nested
 from vdet.config.schema import StillSettings, SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.detect.detections import Detections
 from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
@@ -120,7 +119,7 @@ class SvmDetector:
         windows = self._search.search(picture)
         return Candidates(windows, index is None, picture if self._check else None)
 
-    def detect(self, candidates: Candidates) -> Detections:
+    def detect(self, candidates: Candidates) -> Boxes:
         """Add the hits of the next frame to the heat, and return what is hot.
 
         A still picture counts as `heat.frames` frames that all show it, so that thresholds mean the
@@ -139,11 +138,11 @@ class SvmDetector:
             self._check.compare(candidates.picture, self._as_still(candidates, detections))
         return detections
 
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:
+    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return pictures of patches and their features, the windows, the hits and the heat."""
         return stage_pictures(image, detections.trace, self._features)
 
-    def _as_still(self, candidates: Candidates, detections: Detections) -> Detections:
+    def _as_still(self, candidates: Candidates, detections: Boxes) -> Boxes:
         """Return what is found where the frame is taken as a still picture."""
         if candidates.is_still:
             return detections
@@ -171,7 +170,7 @@ class SvmDetector:
         self, regions: Sequence[HotRegion], stills: StillSettings
     ) -> list[HotRegion]:
         shown = [each for each in regions if self._is_shown(each, stills)]
-        boxes = [(b.x, b.y, b.width, b.height) for b in (each.box for each in shown)]
+        boxes = [astuple(each.box) for each in shown]
         strengths = [each.strength for each in shown]
         dropped = are_nested(np.reshape(np.array(boxes, np.float64), (-1, 4)), strengths)
         return [each for each, drop in zip(shown, dropped.tolist(), strict=True) if not drop]
@@ -184,14 +183,16 @@ class SvmDetector:
             and region.box.height >= stills.height * height
         )
 
-    def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Detections:
+    def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Boxes:
         strengths = np.array([region.strength for region in regions], np.float32)
-        boxes = [(b.x, b.y, b.right, b.bottom) for b in (region.box for region in regions)]
-        return Detections(
+        boxes = [astuple(region.box) for region in regions]
+        return Boxes(
             np.reshape(boxes, (-1, 4)),
             detection_scores(strengths, self._settings.score),
-            centroids=np.reshape([region.centroid for region in regions], (-1, 2)),
-            strengths=strengths,
+            data={
+                "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
+                "strength": strengths,
+            },
             trace=trace,
         )
 

@@ -103,7 +103,7 @@ def find_regions(heat: Heat, threshold: float) -> list[HotRegion]:
     hot = (heat.values > threshold).astype(np.uint8)
     contours, _ = cv2.findContours(hot, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     regions = [_region(heat, hot, contour) for contour in contours]
-    return sorted(regions, key=lambda region: (region.box.y, region.box.x))
+    return sorted(regions, key=lambda region: (region.box.y1, region.box.x1))
 
 
 def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike) -> HotRegion:
@@ -113,7 +113,7 @@ def _region(heat: Heat, hot: npt.NDArray[np.uint8], contour: cv2.typing.MatLike)
     inside &= hot[y : y + height, x : x + width]
     peak = float(heat.values[y : y + height, x : x + width][inside > 0].max())
     n = heat.shrink
-    box = Box(n * x, n * y, n * width, n * height)
+    box = Box.sized(n * x, n * y, n * width, n * height)
     moments = cv2.moments(contour)
     area = moments["m00"]
     if not area:

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from vdet.boxes import Int64Array
+from vdet.boxes import Int64Array, from_sizes
 from vdet.config.schema import FeatureSettings
 from vdet.detect.svm.windows import WindowGrid
 from vdet.regions import SearchArea
@@ -27,7 +27,7 @@ def limited_grid(
     The windows of the area have the same pixels, and so the same features, as those of `grid`.
     """
     margin = math.ceil(max(_MARGIN * grid.size, grid.step))
-    grown = grid.boxes + np.array([-margin, -margin, 2 * margin, 2 * margin], np.int32)
+    grown = from_sizes(grid.boxes) + np.array([-margin, -margin, margin, margin])
     touched = area.touches(grown).reshape(grid.rows, grid.columns)
     if not touched.any():
         return None

@@ -3,8 +3,7 @@
 import logging
 from collections.abc import Callable
 
-from vdet.boxes import Float64Array, iou_matrix, to_sides
-from vdet.detect.detections import Detections
+from vdet.boxes import Boxes, Float64Array, iou_matrix
 from vdet.detect.protocol import DetectorModel
 from vdet.media import Picture
 
@@ -48,7 +47,7 @@ class RoadCheck:
         number, self._seen = self._seen, self._seen + 1
         return not self._has_warned and not number & (number - 1)
 
-    def compare(self, picture: Picture, found: Detections) -> None:
+    def compare(self, picture: Picture, found: Boxes) -> None:
         """Compare what is found in a still picture with what the other detector finds."""
         if self._other is None:
             self._other = self._load_other()
@@ -67,6 +66,6 @@ class RoadCheck:
             )
 
 
-def _compared(found: Detections, width: int) -> Float64Array:
-    boxes = to_sides(found.boxes)
-    return boxes[(found.scores >= LEAST_SCORE) & (boxes[:, 2] >= LEAST_WIDTH * width)]
+def _compared(found: Boxes, width: int) -> Float64Array:
+    wide = found.sides[:, 2] - found.sides[:, 0] >= LEAST_WIDTH * width
+    return found.sides[wide & (found.scores >= LEAST_SCORE)]

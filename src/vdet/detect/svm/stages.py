@@ -68,7 +68,7 @@ def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
                 picture[y : y + height, x] = color_of(number)
     for number, grid in enumerate(grids):
         across = number * grid.columns // len(grids)
-        example = Box(*grid.boxes[across].tolist())
+        example = Box.sized(*grid.boxes[across].tolist())
         draw_box(picture, example, color_of(number), f"{grid.size} px: {len(grid)} windows")
     return picture
 
@@ -77,11 +77,11 @@ def _draw_hits(image: Image, hits: Windows) -> Image:
     """Draw all hits, and the probability of each whose label covers no label of a likelier one."""
     picture = image.copy()
     for box in hits.boxes.tolist():
-        draw_box(picture, Box(*box), GREEN)
+        draw_box(picture, Box.sized(*box), GREEN)
     tags: list[Box] = []
     for i in np.argsort(-hits.probabilities, kind="stable").tolist():
-        box = Box(*hits.boxes[i].tolist())
-        text, corner = f"{hits.probabilities[i]:.2f}", (box.x, box.bottom)
+        box = Box.sized(*hits.boxes[i].tolist())
+        text, corner = f"{hits.probabilities[i]:.2f}", (box.x1, box.y2)
         tag = label_tag(picture, text, corner)
         if not any(tag.intersection(other).area for other in tags):
             tags.append(draw_label(picture, text, corner, GREEN))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Box, Float64Array, coverage, iou_matrix, visible
+from vdet.boxes import Box, Float64Array, area, coverage, from_sizes, iou_matrix, visible
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
@@ -44,7 +44,7 @@ class Votes:
     Attributes
     ----------
     boxes
-        float64 `(n, 4)`: x, y, width, height, pixels of the frame.
+        float64 `(n, 4)`: x1, y1, x2, y2, pixels of the frame.
     presence
         float64 `(n,)`: weight for there being a vehicle.
     position
@@ -62,13 +62,13 @@ class Votes:
         Boxes are cut off at the sides of the frame of `size` (width and height, pixels): windows
         can only guess how far a vehicle reaches beyond, so their guesses need not agree.
         """
-        boxes = np.concatenate([each.vehicles for each in hits], dtype=np.float64)
+        boxes = from_sizes(np.concatenate([each.vehicles for each in hits]))
         shares = np.concatenate([each.shares for each in hits], dtype=np.float64)
         probabilities = np.concatenate([each.probabilities for each in hits], dtype=np.float64)
         bounded = np.clip(probabilities, 1 - _MAX_PROBABILITY, _MAX_PROBABILITY)
         position = (-np.log1p(-bounded)) ** _SHARPNESS
         inside = visible(boxes, size)
-        seen = (inside[:, 2:] >= 1).all(axis=1)
+        seen = (inside[:, 2:] - inside[:, :2] >= 1).all(axis=1)
         return Votes(inside[seen], (probabilities * shares)[seen], position[seen])
 
     def within(self, boxes: Iterable[Box]) -> "Votes":
@@ -76,10 +76,10 @@ class Votes:
 
         Of too many, those of highest `position` are returned.
         """
-        x, y = (self.boxes[:, :2] + self.boxes[:, 2:] / 2).T
+        x, y = ((self.boxes[:, :2] + self.boxes[:, 2:]) / 2).T
         inside = np.zeros(len(x), np.bool_)
         for box in boxes:
-            inside |= (box.x <= x) & (x < box.right) & (box.y <= y) & (y < box.bottom)
+            inside |= (box.x1 <= x) & (x < box.x2) & (box.y1 <= y) & (y < box.y2)
         (indices,) = np.nonzero(inside)
         best = np.argsort(-self.position[indices], kind="stable")[:MAX_VOTES]
         indices = np.sort(indices[best])
@@ -100,7 +100,7 @@ class _VotedBox:
     @property
     def area(self) -> float:
         """Square pixels."""
-        return float(self.box[2] * self.box[3])
+        return float(area(self.box))
 
 
 def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> list[HotRegion]:
@@ -173,8 +173,5 @@ def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox]) -> bool:
 
 
 def _region(vehicle: _VotedBox) -> HotRegion:
-    box = vehicle.box
-    x1, y1 = np.floor(box[:2] + 0.5).astype(int).tolist()
-    x2, y2 = np.floor(box[:2] + box[2:] + 0.5).astype(int).tolist()
-    x, y = (box[:2] + box[2:] / 2).tolist()
-    return HotRegion(Box(x1, y1, x2 - x1, y2 - y1), (x, y), vehicle.presence)
+    box = Box(*vehicle.box.tolist())
+    return HotRegion(box.rounded, box.center, vehicle.presence)

@@ -199,6 +199,4 @@ class SharingDetector:
 
 
 def _label(number: int, track: Track) -> Label:
-    box = track.box
-    corners = box.x, box.y, box.right, box.bottom
-    return Label(0, corners, frame=number, id=track.id, score=track.score)
+    return Label(0, track.box.pixels, frame=number, id=track.id, score=track.score)

@@ -142,14 +142,13 @@ def _cropped(image: Image, loss: Loss, clip: ClipResult) -> Image:
         boxes = frame.vehicle_boxes[comparison.vehicle_ids[frame.vehicles] == loss.id]
     else:
         boxes = frame.track_boxes[comparison.track_ids[frame.tracks] == loss.id]
-    x, y, right, bottom = boxes[0].tolist()
-    width, height = right - x, bottom - y
+    x1, y1, x2, y2 = boxes[0].tolist()
     rows, columns = image.shape[:2]
     aspect = _SHAPE[0] / _SHAPE[1]
-    wanted = max(_CROP_SCALE * width, _CROP_SCALE * height * aspect, columns / 8)
+    wanted = max(_CROP_SCALE * max(x2 - x1, (y2 - y1) * aspect), columns / 8)
     across = int(min(wanted, columns, rows * aspect))
     down = min(rows, max(1, round(across / aspect)))
-    left = min(max(0, round(x + (width - across) / 2)), columns - across)
-    top = min(max(0, round(y + (height - down) / 2)), rows - down)
+    left = min(max(0, round((x1 + x2 - across) / 2)), columns - across)
+    top = min(max(0, round((y1 + y2 - down) / 2)), rows - down)
     outlines = (frame.vehicle_boxes, TRUE, 3), (frame.track_boxes, FOUND, 2)
     return draw_tile(image, (left, top), (across, down), _SHAPE[0], *outlines)

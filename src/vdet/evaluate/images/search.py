@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vdet.boxes import Float64Array
-from vdet.detect.detections import Detections
+from vdet.boxes import Boxes, Float64Array
 from vdet.detect.protocol import DetectorModel
 from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.pictures import LabelledPicture
@@ -67,7 +66,6 @@ def search_images(
     return searched
 
 
-def _searched(image: LabelledPicture, width: int, found: Detections) -> SearchedImage:
+def _searched(image: LabelledPicture, width: int, found: Boxes) -> SearchedImage:
     best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
-    boxes = found.boxes[best].astype(np.float64)
-    return SearchedImage(image, width, boxes, found.scores[best].astype(np.float64))
+    return SearchedImage(image, width, found.sides[best], found.scores[best])

@@ -53,10 +53,7 @@ class JsonSink:
 def _box(track: Track, *, on_road: bool) -> dict[str, Any]:
     """Return the values of a vehicle; with `on_road` also its place on the road."""
     values: dict[str, Any] = {
-        "x": track.box.x,
-        "y": track.box.y,
-        "width": track.box.width,
-        "height": track.box.height,
+        **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
         "score": round(track.score, 4),
     }
     if on_road:

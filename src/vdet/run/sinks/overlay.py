@@ -96,7 +96,7 @@ class Overlay:
             tracks = self._steady.update(tracks, float(result.frame.time))
         if self._settings.predicted == "hidden":
             tracks = [track for track in tracks if track.id not in self._missed]
-        return sorted(tracks, key=lambda track: track.box.bottom)
+        return sorted(tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(
         self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color], now: float
@@ -126,7 +126,7 @@ class Overlay:
                 draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:
             if text := label_text(track, self._label):
-                draw_label(surface, text, (track.box.x, track.box.y), colors[track.id])
+                draw_label(surface, text, (track.box.x1, track.box.y1), colors[track.id])
 
     def _color(self, track: Track, picture: Picture) -> Color:
         match self._settings.colors:

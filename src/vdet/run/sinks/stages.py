@@ -63,9 +63,9 @@ def _with_boxes(result: FrameResult) -> Image:
     """Draw the detections in white with their scores, and the shown vehicles over them."""
     picture = result.frame.image.copy()
     detections = result.detections
-    for box, score in zip(detections.rounded, detections.scores.tolist(), strict=True):
-        draw_box(picture, box, WHITE)
-        draw_label(picture, f"{score:.2f}", (box.x, box.bottom), WHITE)
+    for each in detections:
+        draw_box(picture, each.box, WHITE)
+        draw_label(picture, f"{each.score:.2f}", (each.box.x1, each.box.y2), WHITE)
     for track in result.tracks:
         text = label_text(track, PICTURE_LABEL)
         draw_box(picture, track.box, color_of(track.id), text, dashed=track.predicted)

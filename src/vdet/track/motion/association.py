@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vdet.boxes import Float64Array, iou, visible
+from vdet.boxes import Float64Array, area, iou, visible
 from vdet.track.motion.assignment import assign
 from vdet.track.motion.overlapping import CLEAR, PART, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
@@ -39,7 +39,7 @@ def buffered_iou(
     Parameters
     ----------
     expected, found
-        Shapes `(n, 4)` and `(m, 4)`: x, y, width, height in pixels, each with an area.
+        Shapes `(n, 4)` and `(m, 4)`: x1, y1, x2, y2 in pixels, each with an area.
     buffers
         Shape `(n, 2)`: shares of width and height by which a box is widened on each side.
     """
@@ -48,8 +48,9 @@ def buffered_iou(
 
 
 def _widened(boxes: Float64Array, shares: Float64Array) -> Float64Array:
-    margin = boxes[..., 2:] * shares
-    return np.concatenate([boxes[..., :2] - margin, boxes[..., 2:] + 2 * margin], axis=-1)
+    near, far = boxes[..., :2], boxes[..., 2:]
+    margin = (far - near) * shares
+    return np.concatenate([near - margin, far + margin], axis=-1)
 
 
 def pair(values: Float64Array, rounds: Sequence[Sequence[int]]) -> Pairs:
@@ -147,7 +148,7 @@ def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> 
 def _distance(one: Vehicle, other: Vehicle) -> float:
     """Return the distance of the centres in mean sizes; infinite where the sizes do not agree."""
     a, b = one.state.box, other.state.box
-    if abs(math.log(a[2] * a[3] / (b[2] * b[3]))) > math.log(_GROWTH):
+    if abs(math.log(area(a) / area(b))) > math.log(_GROWTH):
         return math.inf
-    offset = (a[:2] + a[2:] / 2 - b[:2] - b[2:] / 2) / ((a[2:] + b[2:]) / 2)
-    return math.hypot(*offset)
+    sizes = a[2:] - a[:2] + b[2:] - b[:2]
+    return math.hypot(*((a[:2] + a[2:] - b[:2] - b[2:]) / sizes))

@@ -35,12 +35,12 @@ def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float
     Parameters
     ----------
     boxes
-        Shape `(n, 4)`: x, y, width, height in pixels, each with an area.
+        Shape `(n, 4)`: x1, y1, x2, y2 in pixels, each with an area.
     present
         Shape `(n,)`: those that can hide others.
     """
-    bottoms = boxes[:, 1] + boxes[:, 3]
-    farther = bottoms < (bottoms - _LEVEL * boxes[:, 3])[:, np.newaxis]
+    bottoms = boxes[:, 3]
+    farther = bottoms < (bottoms - _LEVEL * (bottoms - boxes[:, 1]))[:, np.newaxis]
     hiding = (coverage(boxes, boxes) > share) & present & ~farther
     np.fill_diagonal(hiding, val=False)
     return [bool(row.any()) for row in hiding]
@@ -49,9 +49,8 @@ def are_hidden(boxes: Float64Array, present: npt.NDArray[np.bool_], share: float
 def is_same(box: Float64Array, others: Float64Array) -> bool:
     """Tell whether `box`, `(4,)`, shows the same vehicle as one of `others`, `(n, 4)`."""
     one = box[np.newaxis]
-    bottoms = others[:, 1] + others[:, 3]
-    height = np.minimum(box[3], others[:, 3])
-    level = np.abs(bottoms - box[1] - box[3]) < _LEVEL * height
+    height = np.minimum(box[3] - box[1], others[:, 3] - others[:, 1])
+    level = np.abs(others[:, 3] - box[3]) < _LEVEL * height
     overlap = np.maximum(coverage(one, others)[0], coverage(others, one)[:, 0])
     alike = iou_matrix(one, others)[0] > _ALIKE
     return bool((alike | (level & (overlap > _LEVEL_OVERLAP))).any())
@@ -77,8 +76,7 @@ def is_part(box: Float64Array, others: Float64Array, share: float) -> bool:
 
 def around(boxes: Float64Array) -> Float64Array:
     """Return the smallest box, `(4,)`, that covers all of `boxes`, `(n, 4)`."""
-    near = boxes[:, :2].min(axis=0)
-    return np.concatenate([near, (boxes[:, :2] + boxes[:, 2:]).max(axis=0) - near])
+    return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
 
 def shows_both(found: Float64Array, expected: Float64Array, share: float) -> bool:
@@ -94,5 +92,5 @@ def shows_both(found: Float64Array, expected: Float64Array, share: float) -> boo
 
 def stretched(box: Float64Array, before: Float64Array, after: Float64Array) -> Float64Array:
     """Return `box` moved and scaled as `before` was to become `after`; all of shape `(4,)`."""
-    scale = after[2:] / before[2:]
-    return np.concatenate([after[:2] + (box[:2] - before[:2]) * scale, box[2:] * scale])
+    scale = (after[2:] - after[:2]) / (before[2:] - before[:2])
+    return after[[0, 1, 0, 1]] + (box - before[[0, 1, 0, 1]]) * scale[[0, 1, 0, 1]]

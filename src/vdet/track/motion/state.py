@@ -46,9 +46,9 @@ class MotionState:
 
     @property
     def box(self) -> Float64Array:
-        """The vehicle's x, y, width, height in full-frame pixels, float64 `(4,)`; not clipped."""
-        size = np.exp(self.mean[2:, 0])
-        return np.concatenate([self.mean[:2, 0] - size / 2, size])
+        """The vehicle's x1, y1, x2, y2 in full-frame pixels, float64 `(4,)`; not clipped."""
+        center, half = self.mean[:2, 0], np.exp(self.mean[2:, 0]) / 2
+        return np.concatenate([center - half, center + half])
 
     @property
     def deviation(self) -> Float64Array:
@@ -94,8 +94,8 @@ class MotionState:
 
 
 def measurement_of(box: Float64Array) -> Float64Array:
-    """Return centre x and y and log width and height, `(4,)`, of an x, y, width, height box."""
-    return np.concatenate([box[:2] + box[2:] / 2, np.log(box[2:])])
+    """Return centre x and y and log width and height, `(4,)`, of a box of x1, y1, x2, y2."""
+    return np.concatenate([(box[:2] + box[2:]) / 2, np.log(box[2:] - box[:2])])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,14 +122,14 @@ def measure(state: MotionState, box: Float64Array, size: tuple[int, int]) -> Edg
     Parameters
     ----------
     box
-        x, y, width, height in full-frame pixels, inside the frame, with an area.
+        x1, y1, x2, y2 in full-frame pixels, inside the frame, with an area.
     size
         Width and height of the frame, pixels.
     """
     mean, covariance = state.mean.copy(), state.covariance.copy()
     measured, seen = measurement_of(box), np.ones(4)
     for axis, span in enumerate(size):
-        first, last = box[axis], box[axis] + box[axis + 2]
+        first, last = box[axis], box[axis + 2]
         cut_before, cut_behind = first <= BORDER * span, last >= span - BORDER * span
         if cut_before == cut_behind:
             continue

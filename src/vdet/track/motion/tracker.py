@@ -5,9 +5,8 @@ from itertools import count, product
 
 import numpy as np
 
-from vdet.boxes import Box, Float64Array, are_nested, to_sides, visible
+from vdet.boxes import Box, Boxes, Float64Array, are_nested, visible
 from vdet.config.schema import MotionTrackerSettings
-from vdet.detect.detections import Detections
 from vdet.media import Picture
 from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
 from vdet.track.motion.overlapping import (
@@ -50,7 +49,7 @@ class MotionTracker:
 
     def update(
         self,
-        detections: Detections,
+        detections: Boxes,
         time: float,
         picture: Picture | None = None,  # noqa: ARG002 - boxes are enough
     ) -> list[Track]:
@@ -97,14 +96,12 @@ class MotionTracker:
         self._time = time
         return step
 
-    def _observations(self, detections: Detections) -> list[Observation]:
-        boxes = visible(to_sides(detections.boxes), self._size)
+    def _observations(self, detections: Boxes) -> list[Observation]:
+        boxes = visible(detections.sides, self._size)
         return [
-            Observation(box, score, name)
-            for box, score, name in zip(
-                boxes, detections.scores.tolist(), detections.class_names, strict=True
-            )
-            if min(box[2:]) >= 1
+            Observation(box, each.score, each.class_name)
+            for box, each in zip(boxes, detections, strict=True)
+            if _least_side(box) >= 1
         ]
 
     def _predict(self, seconds: float) -> None:
@@ -124,8 +121,8 @@ class MotionTracker:
         """Return the vehicles that are neither over nor out of the frame."""
         return [
             vehicle
-            for vehicle, (_, _, width, height) in zip(self._vehicles, self._boxes(), strict=True)
-            if min(width, height) >= 1 and not vehicle.is_over(self._settings)
+            for vehicle, box in zip(self._vehicles, self._boxes(), strict=True)
+            if _least_side(box) >= 1 and not vehicle.is_over(self._settings)
         ]
 
     def _pair(
@@ -194,11 +191,11 @@ class MotionTracker:
             tracks.append(
                 Track(
                     vehicle.id,
-                    _rounded(box),
+                    Box(*box.tolist()),
                     vehicle.score,
                     predicted=vehicle.unseen > 0 or not searched,
                     class_name=vehicle.class_name,
-                    whole_foot=_foot(vehicle.state.box),
+                    whole_foot=Box(*vehicle.state.box.tolist()).foot,
                 )
             )
         return sorted(tracks, key=lambda track: track.id)
@@ -207,7 +204,7 @@ class MotionTracker:
         """Tell whether it is present, wide enough and likely enough to be shown."""
         return (
             vehicle.is_present(self._settings)
-            and box[2] >= self._settings.smallest * self._size[0]
+            and box[2] - box[0] >= self._settings.smallest * self._size[0]
             and vehicle.detection_score >= self._settings.least_score
         )
 
@@ -220,12 +217,5 @@ class MotionTracker:
         return [each for each, drop in zip(shown, dropped, strict=True) if not drop]
 
 
-def _rounded(box: Float64Array) -> Box:
-    left, top = np.floor(box[:2] + 0.5).astype(int).tolist()
-    right, bottom = np.floor(box[:2] + box[2:] + 0.5).astype(int).tolist()
-    return Box(left, top, right - left, bottom - top)
-
-
-def _foot(box: Float64Array) -> tuple[float, float]:
-    left, top, width, height = box.tolist()
-    return left + width / 2, top + height
+def _least_side(box: Float64Array) -> float:
+    return float(min(box[2:] - box[:2]))

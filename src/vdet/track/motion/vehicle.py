@@ -40,7 +40,7 @@ _LEAST_SCORE = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """A detection inside the frame: `box` is x, y, width, height in pixels, float64 `(4,)`."""
+    """A detection inside the frame: `box` is x1, y1, x2, y2 in pixels, float64 `(4,)`."""
 
     box: Float64Array
     score: float

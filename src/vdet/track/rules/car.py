@@ -19,7 +19,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A detection inside the frame; `peak` is its strength."""
+    """A detection inside the frame, in whole pixels; `peak` is its strength."""
 
     box: Box
     centroid: Point
@@ -61,7 +61,7 @@ class Car:
     in_a_row
         Detections in a row up to the latest frame.
     count
-        Detections so far.
+        Boxes so far.
     matches
         How many of the latest detections, in a row, were template matches. Misses in between do
         not end the row, a region does.
@@ -88,9 +88,9 @@ class Car:
     def box(self) -> Box:
         """Average rectangle, rounded to whole pixels."""
         boxes = [detection.box for detection in self.detections]
-        return Box(
-            round(fmean(box.x for box in boxes)),
-            round(fmean(box.y for box in boxes)),
+        return Box.sized(
+            round(fmean(box.x1 for box in boxes)),
+            round(fmean(box.y1 for box in boxes)),
             round(fmean(box.width for box in boxes)),
             round(fmean(box.height for box in boxes)),
         )
@@ -157,13 +157,12 @@ class Car:
         """Return the latest centroid, moved as the latest rectangle moved to `box`."""
         last = self.detections[-1]
         x, y = last.centroid
-        return x + box.x - last.box.x, y + box.y - last.box.y
+        return x + box.x1 - last.box.x1, y + box.y1 - last.box.y1
 
     def _add(self, region: Region, image: Image) -> None:
-        box = region.box
-        cutout = image[box.y : box.bottom, box.x : box.right].copy()
+        cutout = region.box.cut(image).copy()
         self.detections.append(
-            CarDetection(box, region.centroid, cutout, region.score, region.class_name)
+            CarDetection(region.box, region.centroid, cutout, region.score, region.class_name)
         )
         self.detected = True
         self.in_a_row += 1
@@ -200,18 +199,20 @@ def find_template(
     which fits anything flat.
     """
     height, width = template.shape[:2]
-    grown = Box(near.x - distance, near.y - distance, width + 2 * distance, height + 2 * distance)
+    grown = Box.sized(
+        near.x1 - distance, near.y1 - distance, width + 2 * distance, height + 2 * distance
+    )
     area = grown.clipped(image.shape[1], image.shape[0])
     if area.width < width or area.height < height or _is_flat(template):
         return None
-    searched = image[area.y : area.bottom, area.x : area.right]
+    searched = area.cut(image)
     scores = np.asarray(cv2.matchTemplate(searched, template, cv2.TM_CCOEFF_NORMED), np.float32)
     dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
-    scores[np.hypot(area.x + dx - near.x, area.y + dy - near.y) > distance] = -1
+    scores[np.hypot(area.x1 + dx - near.x1, area.y1 + dy - near.y1) > distance] = -1
     y, x = np.unravel_index(int(scores.argmax()), scores.shape)
     if round(float(scores[y, x]), 4) < min_score:  # a perfect fit may score 0.9999998
         return None
-    return Box(area.x + int(x), area.y + int(y), width, height)
+    return Box.sized(area.x1 + int(x), area.y1 + int(y), width, height)
 
 
 def _is_flat(image: Image) -> bool:

@@ -15,8 +15,8 @@ import math
 from collections.abc import Iterable
 from itertools import count
 
+from vdet.boxes import Boxes
 from vdet.config.schema import RulesTrackerSettings
-from vdet.detect.detections import Detections
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.association import Association
@@ -40,7 +40,7 @@ class RulesTracker:
 
     def update(
         self,
-        detections: Detections,
+        detections: Boxes,
         time: float,  # noqa: ARG002 - the rules count frames
         picture: Picture | None = None,
     ) -> list[Track]:
@@ -98,28 +98,23 @@ class RulesTracker:
 
 
 def large_enough(
-    detections: Detections, frame_width: int, frame_height: int, settings: RulesTrackerSettings
+    detections: Boxes, frame_width: int, frame_height: int, settings: RulesTrackerSettings
 ) -> list[Region]:
     """Return the regions, clipped to the frame, that are not narrower or lower than allowed.
 
     Rule 1. The part of a region outside the frame does not count.
     """
     least = max(1, settings.min_region)
+    centroids = detections.data.get("centroid", detections.centers).tolist()
+    strengths = detections.data.get("strength", detections.scores).tolist()
     regions = [
         Region(
-            box.clipped(frame_width, frame_height),
-            (float(x), float(y)),
-            float(strength),
-            float(score),
-            name,
+            each.box.rounded.clipped(frame_width, frame_height),
+            (x, y),
+            strength,
+            each.score,
+            each.class_name,
         )
-        for box, (x, y), strength, score, name in zip(
-            detections.rounded,
-            detections.centroids,
-            detections.strengths,
-            detections.scores,
-            detections.class_names,
-            strict=True,
-        )
+        for each, (x, y), strength in zip(detections, centroids, strengths, strict=True)
     ]
     return [r for r in regions if r.box.width >= least and r.box.height >= least]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.boxes import Box
+from vdet.boxes import Box, from_sizes
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
 from vdet.learn.svm.mining.choosing import (
@@ -19,14 +19,14 @@ from vdet.learn.svm.mining.choosing import (
 )
 
 WIDTH = 1000
-CAR = Box(400, 300, 100, 70)
-OTHER = Box(700, 300, 100, 70)
+CAR = Box.sized(400, 300, 100, 70)
+OTHER = Box.sized(700, 300, 100, 70)
 GENEROUS = MiningSettings(probability=0.2, per_vehicle=1000, false_alarms=1000, parts=1000)
 
 
 def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> FrameLabels:
     tables = [
-        np.array([(box.x, box.y, box.width, box.height) for box in boxes], np.float64)
+        np.array([(box.x1, box.y1, box.x2, box.y2) for box in boxes], np.float64)
         for boxes in (vehicles, ignored)
     ]
     return FrameLabels(*(table.reshape(-1, 4) for table in tables))
@@ -34,12 +34,12 @@ def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> FrameLabels:
 
 def about(x: float, side: int = 100, y: float = 335) -> Box:
     """Return a square window with this centre."""
-    return Box(round(x - side / 2), round(y - side / 2), side, side)
+    return Box.sized(round(x - side / 2), round(y - side / 2), side, side)
 
 
 def windows(*boxes: Box, probability: float = 1.0) -> Windows:
     table: npt.NDArray[np.int32] = np.array(
-        [(box.x, box.y, box.width, box.height) for box in boxes], np.int32
+        [(box.x1, box.y1, box.width, box.height) for box in boxes], np.int32
     )
     ones = np.ones(len(boxes), np.float32)
     return Windows(
@@ -81,7 +81,7 @@ def test_a_window_with_a_low_probability_is_no_false_alarm() -> None:
 
 
 def test_nothing_is_taken_from_ignore_regions() -> None:
-    region = Box(40, 280, 120, 120)
+    region = Box.sized(40, 280, 120, 120)
     inside, touching = about(100), about(185)
     for each, expected in ((inside, {}), (touching, {touching: "false alarm"})):
         assert kinds(chosen(windows(each), truth(ignored=(region,)))) == expected
@@ -94,7 +94,7 @@ def test_a_window_far_too_large_for_its_vehicle_is_a_false_alarm() -> None:
 
 
 def test_a_window_between_two_vehicles_belongs_to_the_nearer_one() -> None:
-    beside = Box(480, 300, 100, 70)
+    beside = Box.sized(480, 300, 100, 70)
     between = about(530)
     assert kinds(chosen(windows(between), truth(CAR, beside))) == {between: "vehicle"}
 
@@ -102,7 +102,7 @@ def test_a_window_between_two_vehicles_belongs_to_the_nearer_one() -> None:
 def test_a_part_in_an_ignore_region_is_not_taken() -> None:
     part = about(465, 36)
     assert kinds(chosen(windows(part), truth(CAR))) == {part: "part"}
-    assert chosen(windows(part), truth(CAR, ignored=(Box(455, 280, 90, 90),))) == []
+    assert chosen(windows(part), truth(CAR, ignored=(Box.sized(455, 280, 90, 90),))) == []
 
 
 def many() -> Windows:
@@ -116,7 +116,7 @@ def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> No
     kinds_in_order: tuple[PatchKind, ...] = ("vehicle", "box", "false alarm", "part")
     assert [counted.count(kind) for kind in kinds_in_order] == [8, 8, 7, 3]
     fitting = [choice.box for choice in choices if choice.kind == "vehicle"]
-    assert sum(box.x < 600 for box in fitting) == 4
+    assert sum(box.x1 < 600 for box in fitting) == 4
 
 
 def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
@@ -145,7 +145,7 @@ def window(side: float, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> tuple[flo
 
 
 def compare(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> WindowComparison:
-    return compare_windows(np.array(windows, np.float64), np.array(vehicle, np.float64), WIDTH)
+    return compare_windows(from_sizes(np.array(windows)), from_sizes(np.array([vehicle]))[0], WIDTH)
 
 
 def flags(*windows: tuple[float, ...], vehicle: tuple[float, ...] = VEHICLE) -> str:

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdet.boxes import Box
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import MiningSettings, OutputSettings, Settings, TrainSettings
-from vdet.detect.detections import NO_DETECTIONS, Detections
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
 from vdet.learn.svm.mining import MiningJob, MiningResult, PictureSource, VideoSource, mine
@@ -20,8 +19,8 @@ from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image, write_image
 
 WIDTH, HEIGHT, FRAMES = 640, 360, 5
-CAR = Box(270, 190, 100, 70)
-TREE = Box(60, 190, 96, 70)  # what the detector takes for a vehicle
+CAR = Box.sized(270, 190, 100, 70)
+TREE = Box.sized(60, 190, 96, 70)  # what the detector takes for a vehicle
 RED, GREEN = (0, 0, 255), (0, 160, 0)
 NAME = re.compile(r"(?:frame|picture)(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
@@ -30,7 +29,7 @@ def draw() -> Image:
     """Draw a red car and a green tree on a grey road."""
     image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
     for box, color in ((CAR, RED), (TREE, GREEN)):
-        image[box.y : box.bottom, box.x : box.right] = color
+        box.cut(image)[:] = color
     return image
 
 
@@ -38,7 +37,7 @@ def draw() -> Image:
 class FixedBoxes:
     """A detector that returns the same boxes for every picture, whatever it shows."""
 
-    detections: Detections
+    detections: Boxes
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "FixedBoxes":
         assert all(image.shape == (height, width, 3) for image in images)
@@ -48,17 +47,17 @@ class FixedBoxes:
         assert index is None, "mined frames are searched as still pictures"
         return picture.image
 
-    def detect(self, candidates: Image) -> Detections:
+    def detect(self, candidates: Image) -> Boxes:
         assert candidates.dtype == np.uint8
         return self.detections
 
-    def stage_pictures(self, image: Image, detections: Detections) -> dict[str, Image]:  # noqa: ARG002
+    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:  # noqa: ARG002
         return {}
 
 
-def found(*boxes: Box, score: float = 0.9) -> Detections:
-    corners = [(box.x, box.y, box.right, box.bottom) for box in boxes]
-    return Detections(corners, [score] * len(boxes)) if boxes else NO_DETECTIONS
+def found(*boxes: Box, score: float = 0.9) -> Boxes:
+    corners = [(box.x1, box.y1, box.x2, box.y2) for box in boxes]
+    return Boxes(corners, [score] * len(boxes)) if boxes else NO_BOXES
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +78,7 @@ Mine = Callable[..., MiningResult]
 def mined(clip: Path, tmp_path: Path) -> Mine:
     """Mine the clip, in which the truth has the car, with a detector that finds these boxes."""
     truth = tmp_path / "gt.txt"
-    box = f"{CAR.x + 1},{CAR.y + 1},{CAR.width},{CAR.height}"
+    box = f"{CAR.x1 + 1},{CAR.y1 + 1},{CAR.width},{CAR.height}"
     truth.write_text("".join(f"{number},1,{box},1,3,1\n" for number in range(1, FRAMES + 1)))
 
     def run(
@@ -102,7 +101,7 @@ def boxes_of(archive: Path, group: str) -> list[Box]:
         for name in file.namelist():
             if name.startswith(f"{group}/") and (match := NAME.search(name)):
                 _, x, y, side = map(int, match.groups())
-                boxes.append(Box(x, y, side, side))
+                boxes.append(Box.sized(x, y, side, side))
     return boxes
 
 
@@ -153,7 +152,7 @@ def test_a_detection_below_the_least_probability_is_no_false_alarm(mined: Mine) 
 
 
 def test_a_detection_of_a_part_of_a_vehicle_gives_parts(mined: Mine, tmp_path: Path) -> None:
-    part = Box(CAR.x + 34, CAR.y + 20, 32, 24)
+    part = Box.sized(CAR.x1 + 34, CAR.y1 + 20, 32, 24)
     result = mined(part)
     assert result.parts > 0
     assert result.false_alarms == 0
@@ -174,8 +173,8 @@ class Remembers(FixedBoxes):
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "Remembers":  # noqa: ARG002
         return Remembers(self.detections)
 
-    def detect(self, candidates: Image) -> Detections:  # noqa: ARG002
-        detections, self.detections = self.detections, NO_DETECTIONS
+    def detect(self, candidates: Image) -> Boxes:  # noqa: ARG002
+        detections, self.detections = self.detections, NO_BOXES
         return detections
 
 
@@ -193,7 +192,7 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
     job = MiningJob((VideoSource(source, truth),), tmp_path / "mined.zip")
     with pytest.raises(VideoError, match=r"tiny\.mp4: no window fits into a frame of 8×8 pixels"):
-        mine(job, Settings(), FixedBoxes(NO_DETECTIONS))
+        mine(job, Settings(), FixedBoxes(NO_BOXES))
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -217,7 +216,7 @@ class TestPictures:
         self, folder: Path, clip: Path, tmp_path: Path
     ) -> None:
         truth = tmp_path / "gt.txt"
-        box = f"{CAR.x + 1},{CAR.y + 1},{CAR.width},{CAR.height}"
+        box = f"{CAR.x1 + 1},{CAR.y1 + 1},{CAR.width},{CAR.height}"
         truth.write_text(f"1,1,{box},1,3,1\n")
         sources = (PictureSource(folder), VideoSource(clip, truth))
         job = MiningJob(sources, tmp_path / "mined.zip")

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import BoolArray, Box, Float64Array, coverage
+from vdet.boxes import BoolArray, Box, Float64Array, coverage, from_sizes
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
 from vdet.learn.svm.dataset import Sides
@@ -32,7 +32,7 @@ _EDGE = 0.002  # of the frame's width: a box this close to a side of the frame i
 class FrameLabels:
     """The true vehicles and the ignore regions of a frame.
 
-    Both are float64 `(n, 4)`: x, y, width, height, pixels.
+    Both are float64 `(n, 4)`: x1, y1, x2, y2, pixels.
     """
 
     vehicles: Float64Array
@@ -65,7 +65,7 @@ def choose_windows(
         Width of the frame, pixels.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
-    boxes = windows.boxes[first].astype(np.float64)
+    boxes = from_sizes(windows.boxes[first])
     is_hit = windows.probabilities[first] >= settings.probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in labels.vehicles]
     covered = coverage(boxes, np.concatenate([labels.vehicles, labels.ignored]))
@@ -77,13 +77,13 @@ def choose_windows(
         others = np.delete(covered, number, axis=1)
         is_part |= is_hit & comparison.part & (others <= _MAX_COVERED).all(axis=1)
         for row in _sample(comparison.fits & own, settings.per_vehicle, rng):
-            yield ChosenWindow("vehicle", _box(boxes[row]), _sides(comparison.sides[row]))
+            yield ChosenWindow("vehicle", Box(*boxes[row].tolist()), _sides(comparison.sides[row]))
         for row in _sample(comparison.shows & own, settings.per_vehicle, rng):
-            yield ChosenWindow("box", _box(boxes[row]), _sides(comparison.sides[row]))
+            yield ChosenWindow("box", Box(*boxes[row].tolist()), _sides(comparison.sides[row]))
     for row in _sample(is_alarm, settings.false_alarms, rng):
-        yield ChosenWindow("false alarm", _box(boxes[row]), None)
+        yield ChosenWindow("false alarm", Box(*boxes[row].tolist()), None)
     for row in _sample(is_part, settings.parts, rng):
-        yield ChosenWindow("part", _box(boxes[row]), None)
+        yield ChosenWindow("part", Box(*boxes[row].tolist()), None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,21 +123,21 @@ def compare_windows(
     Parameters
     ----------
     windows
-        `(n, 4)`: x, y, width, height of squares, frame pixels.
+        `(n, 4)`: x1, y1, x2, y2 of squares, frame pixels.
     vehicle
         `(4,)`: the same of the part of the vehicle's box inside the frame.
     frame_width
         Width of the frame, pixels.
     """
-    size = windows[:, 2]
-    middle = windows[:, :2] + windows[:, 2:] / 2
-    corners = np.concatenate([vehicle[:2], vehicle[:2] + vehicle[2:]])
-    sides = (corners - np.tile(middle, 2)) / size[:, np.newaxis]
+    size = windows[:, 2] - windows[:, 0]
+    middle = (windows[:, :2] + windows[:, 2:]) / 2
+    width, height = vehicle[2:] - vehicle[:2]
+    sides = (vehicle - np.tile(middle, 2)) / size[:, np.newaxis]
     measures = _Measures(
         abs(sides[:, 0] + sides[:, 2]) / 2,
         abs(sides[:, 1] + sides[:, 3]) / 2,
-        vehicle[2] / size,
-        vehicle[3] / size,
+        width / size,
+        height / size,
         coverage(windows, vehicle[np.newaxis])[:, 0],
     )
     cut = cut_sides(vehicle, frame_width)
@@ -156,7 +156,7 @@ def compare_windows(
 def cut_sides(vehicle: Float64Array, frame_width: int) -> BoolArray:
     """Return whether the left and right side of the frame cut a box `(4,)` off, bool `(2,)`."""
     edge = _EDGE * frame_width
-    return np.array([vehicle[0] <= edge, vehicle[0] + vehicle[2] >= frame_width - edge])
+    return np.array([vehicle[0] <= edge, vehicle[2] >= frame_width - edge])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -216,11 +216,6 @@ def _sample(flags: BoolArray, most: int, rng: np.random.Generator) -> list[int]:
     """Return at most `most` of the flagged rows, at random, in order."""
     (rows,) = np.nonzero(flags)
     return sorted(rng.permutation(rows)[:most].tolist())
-
-
-def _box(row: Float64Array) -> Box:
-    x, y, width, height = (int(value) for value in row)
-    return Box(x, y, width, height)
 
 
 def _sides(row: Float64Array) -> Sides:

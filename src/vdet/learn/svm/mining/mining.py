@@ -108,7 +108,7 @@ def _add(
     archive: PatchArchive, frame: LabelledFrame, chosen: Sequence[ChosenWindow], stem: str
 ) -> None:
     for window in chosen:
-        box = window.box
-        name = f"{frame.name}_x{box.x:04}_y{box.y:04}_s{box.width:04}"
-        patch = to_patch(cut_window(frame.image, box.x, box.y, box.width, box.height), PATCH)
+        x, y, width, height = window.box.xywh
+        name = f"{frame.name}_x{x:04}_y{y:04}_s{width:04}"
+        patch = to_patch(cut_window(frame.image, x, y, width, height), PATCH)
         archive.add(f"{_FOLDERS[window.kind].format(stem)}/{name}.png", patch, window.sides)

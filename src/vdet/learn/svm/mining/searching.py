@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vdet.boxes import Float32Array, Int32Array, to_sides
+from vdet.boxes import Boxes, Float32Array, Int32Array, from_sizes
 from vdet.config.schema import SvmSettings
-from vdet.detect.detections import Detections
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import SvmDetector, horizon_of
 from vdet.detect.svm.search import lay_grids
@@ -67,7 +66,7 @@ def _default_windows(width: int, height: int, images: Sequence[Image]) -> Int32A
     return np.concatenate([grid.boxes for grid in grids])
 
 
-def score_windows(boxes: Int32Array, detections: Detections, frame_width: int) -> Windows:
+def score_windows(boxes: Int32Array, detections: Boxes, frame_width: int) -> Windows:
     """Return windows with the highest score of the detections that each fits; 0 where none fits.
 
     Parameters
@@ -76,9 +75,8 @@ def score_windows(boxes: Int32Array, detections: Detections, frame_width: int) -
         int32 `(n, 4)`: x, y, width, height of square windows, frame pixels.
     """
     scores = np.zeros(len(boxes), np.float32)
-    squares = boxes.astype(np.float64)
-    found = to_sides(detections.boxes)
-    for box, score in zip(found, detections.scores.tolist(), strict=True):
+    squares = from_sizes(boxes)
+    for box, score in zip(detections.sides, detections.scores.tolist(), strict=True):
         fits = compare_windows(squares, box, frame_width).fits
         scores[fits] = np.maximum(scores[fits], score)
     return _scored(boxes, scores)

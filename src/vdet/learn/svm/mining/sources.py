@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from vdet.boxes import Float64Array, to_sides
+from vdet.boxes import Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.windows import Windows
@@ -155,5 +155,5 @@ class PictureSource:
 
 
 def _frame_labels(labelled: LabelledVideo | LabelledPicture) -> FrameLabels:
-    boxes, ignored = to_sides(labelled.boxes), labelled.ignored
+    boxes, ignored = labelled.boxes, labelled.ignored
     return FrameLabels(boxes[~ignored], boxes[ignored])
