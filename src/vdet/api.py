@@ -45,8 +45,7 @@ from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.count_files import count_file, count_frames
-from vdet.traffic.events import Event
-from vdet.traffic.totals import Counts
+from vdet.traffic.totals import Counts, Event
 
 __all__ = (
     "Box", "Boxes", "Counts", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",

@@ -6,8 +6,7 @@ import pytest
 from seed import SEED
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import RulesTrackerSettings, Settings
-from vdet.track.factory import make_tracker
-from vdet.track.holding import HoldingTracker
+from vdet.track.factory import HoldingTracker, make_tracker
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 

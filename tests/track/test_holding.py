@@ -1,7 +1,7 @@
 from boxing import moved_to
 from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.media import Picture
-from vdet.track.holding import HoldingTracker
+from vdet.track.factory import HoldingTracker
 from vdet.track.track import Track
 
 CAR = Box.sized(100, 100, 50, 40)

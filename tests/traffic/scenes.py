@@ -10,8 +10,8 @@ from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counter import count_events
-from vdet.traffic.events import Event
 from vdet.traffic.layout import Layout, lay_out
+from vdet.traffic.totals import Event
 
 WIDTH, HEIGHT = 1280, 720
 CAR_HEIGHT = 60

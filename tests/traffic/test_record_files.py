@@ -93,5 +93,5 @@ class TestJoined:
     ) -> None:
         path = tmp_path / f"a{suffix}"
         path.write_bytes(text.encode("latin-1"))
-        with pytest.raises(OutputError, match=r"a\.\w+: has no records of vehicles; remove it"):
+        with pytest.raises(OutputError, match=r"a\.\w+: has other content than expected"):
             join_records({"a": path}, tmp_path / f"all{suffix}")

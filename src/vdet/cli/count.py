@@ -57,7 +57,8 @@ def count(
     settings = choice.read().counts
     if not settings:
         raise click.UsageError("there is nothing to count at; give --lines FILE")
-    from vdet.traffic.count_files import SUFFIXES, count_file, write_counts, write_counts_of_all
+    from vdet.traffic.count_files import count_file, write_counts, write_counts_of_all
+    from vdet.traffic.tables import SUFFIXES
 
     if target is not None:
         if target.suffix.lower() not in SUFFIXES:
@@ -84,7 +85,9 @@ def _table(videos: "Mapping[str, Counts]") -> list[str]:
 
     totals = {name: counts.totals for name, counts in videos.items()}
     if len(videos) > 1:
-        totals["all files"] = sum_totals(videos.values())
+        totals["all files"] = sum_totals(
+            each for counts in videos.values() for each in counts.totals
+        )
     rows = [("file", "name", "direction", "count", "classes")]
     for name, each in totals.items():
         for total in each:

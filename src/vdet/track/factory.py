@@ -1,9 +1,10 @@
 """A tracker from its settings, of any kind."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from vdet.boxes import Boxes
 from vdet.config.schema import (
     MotionTrackerSettings,
     RulesTrackerSettings,
@@ -11,11 +12,12 @@ from vdet.config.schema import (
     TrackerSettings,
 )
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
+from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
-from vdet.track.holding import HoldingTracker
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.protocol import CarryingTracker, VideoTracker
 from vdet.track.rules.tracker import RulesTracker
+from vdet.track.track import Track
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,29 @@ def carrying(tracker: VideoTracker) -> CarryingTracker:
     Held vehicles stay where they are in frames that are not searched.
     """
     return tracker if isinstance(tracker, CarryingTracker) else HoldingTracker(tracker)
+
+
+class HoldingTracker:
+    """Shows the latest tracks of another tracker again; a `CarryingTracker`.
+
+    Attributes
+    ----------
+    tracker
+        The other one. It sees the searched frames only, with their times.
+    """
+
+    def __init__(self, tracker: VideoTracker) -> None:
+        self.tracker = tracker
+        self._shown: list[Track] = []
+
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
+        """Follow the vehicles into a frame that was searched; as `VideoTracker.update`."""
+        self._shown = self.tracker.update(detections, time, picture)
+        return self._shown
+
+    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
+        """Return the vehicles of the latest searched frame; as `CarryingTracker.carry`."""
+        return [replace(track, predicted=True) for track in self._shown]
 
 
 def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001

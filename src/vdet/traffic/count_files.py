@@ -4,10 +4,9 @@ A file over several videos has the same columns with `video` before them, or the
 video and the sum of all totals.
 """
 
-import csv
-import json
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, astuple, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +15,13 @@ from vdet.errors import ConfigError, TruthError
 from vdet.labels.reading import read_tracks
 from vdet.track.track import FrameTracks
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.events import Event
 from vdet.traffic.layout import lay_out
-from vdet.traffic.totals import Counts, Total
-
-SUFFIXES = (".csv", ".json")
+from vdet.traffic.tables import VIDEO, is_json, join, write_json, write_table
+from vdet.traffic.totals import Counts, Event, Total
 
 _COLUMNS = ("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds")
+"""Of `.csv`: the fields of an event in their order."""
+_FORMS = {"time": ".3f", "score": ".4f", "stitched": "d", "seconds": ".3f"}
 
 
 def count_file(
@@ -70,89 +69,52 @@ def count_frames(
 
 def write_counts(path: Path, counts: Counts) -> None:
     """Write the counts of one video."""
-    if path.suffix.lower() == ".json":
-        _write_json(path, _plain(counts))
+    if is_json(path):
+        write_json(path, _plain(counts))
     else:
-        _write_table(path, _COLUMNS, (_cells(event) for event in counts.events))
+        write_table(path, _COLUMNS, map(_cells, counts.events))
 
 
 def write_counts_of_all(path: Path, videos: Mapping[str, Counts]) -> None:
     """Write the counts of several videos, by their names."""
-    if path.suffix.lower() == ".json":
-        by_name = {name: _plain(counts) for name, counts in videos.items()}
-        sums = [asdict(each) for each in sum_totals(videos.values())]
-        _write_json(path, {"totals": sums, "videos": by_name})
+    if is_json(path):
+        write_json(path, _joined({name: _plain(counts) for name, counts in videos.items()}))
     else:
-        rows = (
-            (name, *_cells(event)) for name, counts in videos.items() for event in counts.events
-        )
-        _write_table(path, ("video", *_COLUMNS), rows)
+        rows = ((name, *_cells(event)) for name, each in videos.items() for event in each.events)
+        write_table(path, (VIDEO, *_COLUMNS), rows)
 
 
 def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
-    """Write the counts of several videos into one file, from the file of each of the same form."""
-    if path.suffix.lower() == ".json":
-        values = {name: json.loads(each.read_text("utf-8")) for name, each in outputs.items()}
-        sums = sum_totals(
-            (Counts((), tuple(Total(**total) for total in each["totals"]), (), ()))
-            for each in values.values()
-        )
-        _write_json(path, {"totals": [asdict(each) for each in sums], "videos": values})
-        return
-    _write_table(path, ("video", *_COLUMNS), _rows_of(outputs))
+    """Write the counts of several videos into one file, from the file of each of the same form.
+
+    Errors as of `join`.
+    """
+    join(outputs, path, _COLUMNS, _joined)
 
 
-def sum_totals(videos: Iterable[Counts]) -> tuple[Total, ...]:
-    """Return the totals of all videos together."""
+def sum_totals(totals: Iterable[Total]) -> tuple[Total, ...]:
+    """Return the sums of totals of the same name and direction."""
     sums: dict[tuple[str, str], Total] = {}
-    for counts in videos:
-        for each in counts.totals:
-            old = sums.get((each.name, each.direction), Total(each.name, each.direction, 0, {}))
-            names = sorted(old.classes.keys() | each.classes.keys())
-            classes = {name: old.classes.get(name, 0) + each.classes.get(name, 0) for name in names}
-            added = Total(each.name, each.direction, old.count + each.count, classes)
-            sums[each.name, each.direction] = added
+    for each in totals:
+        old = sums.get((each.name, each.direction), Total(each.name, each.direction, 0, {}))
+        classes = Counter(old.classes) + Counter(each.classes)
+        added = replace(old, count=old.count + each.count, classes=dict(sorted(classes.items())))
+        sums[each.name, each.direction] = added
     return tuple(sums.values())
 
 
-def _rows_of(outputs: Mapping[str, Path]) -> Iterator[list[str]]:
-    for name, each in outputs.items():
-        with each.open(encoding="utf-8", newline="") as file:
-            rows = csv.reader(file)
-            next(rows, None)
-            yield from ([name, *row] for row in rows)
+def _joined(videos: Mapping[str, Any]) -> dict[str, Any]:
+    totals = sum_totals(Total(**total) for each in videos.values() for total in each["totals"])
+    return {"totals": [asdict(each) for each in totals], "videos": videos}
 
 
 def _plain(counts: Counts) -> dict[str, Any]:
-    return {
-        "events": [dict(zip(_COLUMNS, _values(event), strict=True)) for event in counts.events],
-        "totals": [asdict(total) for total in counts.totals],
-        "minutes": [asdict(minute) for minute in counts.minutes],
-        "zones": [asdict(stay) for stay in counts.zones],
-    }
+    events = (dict(zip(_COLUMNS, astuple(event), strict=True)) for event in counts.events)
+    return asdict(counts) | {"events": list(events)}
 
 
-def _values(event: Event) -> tuple[Any, ...]:
-    return (
-        *(event.time, event.frame, event.name, event.direction, event.id, event.class_name),
-        *(event.score, event.stitched, event.seconds),
-    )
-
-
-def _cells(event: Event) -> tuple[Any, ...]:
-    time, *middle, score, stitched, seconds = _values(event)
-    shown = "" if seconds is None else f"{seconds:.3f}"
-    return f"{time:.3f}", *middle, f"{score:.4f}", int(stitched), shown
-
-
-def _write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-    # The name of a video may be no valid text.
-    with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(columns)
-        table.writerows(rows)
-
-
-def _write_json(path: Path, values: Any) -> None:
-    text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+def _cells(event: Event) -> list[str]:
+    return [
+        "" if value is None else format(value, _FORMS.get(column, ""))
+        for column, value in zip(_COLUMNS, astuple(event), strict=True)
+    ]

@@ -10,9 +10,8 @@ from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.border import CLOCK, BorderState, Change, Sighting
-from vdet.traffic.events import Event
 from vdet.traffic.layout import APPEAR, VANISH, Layout, Zone
-from vdet.traffic.totals import Counts
+from vdet.traffic.totals import Counts, Event
 
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""

@@ -13,7 +13,7 @@ from track.motion.scenes import HEIGHT, WIDTH
 from vdet.boxes import Boxes, Float64Array, coverage
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores, score
-from vdet.labels.label import NO_ID, Label, from_size
+from vdet.labels.label import NO_ID, Label
 from vdet.labels.video import LabelledVideo
 from vdet.track.motion.tracker import MotionTracker
 
@@ -151,9 +151,8 @@ def track_scores(
     for number, vehicles in enumerate(clip, start=1):
         for vehicle in vehicles:
             id_ = vehicle.id if vehicle.counts else NO_ID
-            x, y, width, height = vehicle.box.tolist()
-            counts = vehicle.counts
-            corners = from_size(x, y, width, height)
+            x1, y1, x2, y2 = vehicle.box.tolist()
+            corners, counts = (x1, y1, x2, y2), vehicle.counts
             true.append(Label(0, corners, frame=number, id=id_, ignored=not counts))
         if (number - 1) % stride:
             tracks = tracker.carry(number / rate)

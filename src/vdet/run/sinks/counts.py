@@ -18,9 +18,10 @@ from vdet.lanes.road import Road
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
-from vdet.traffic.count_files import SUFFIXES, join_counts, write_counts
+from vdet.traffic.count_files import join_counts, write_counts
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.layout import Line
+from vdet.traffic.tables import SUFFIXES
 
 
 class CountsSink:

@@ -15,11 +15,10 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.crops import BestCrops, Crop
-from vdet.traffic.events import Event
 from vdet.traffic.heat import HeatMap
 from vdet.traffic.levels import Levels
 from vdet.traffic.records import VehicleRecords
-from vdet.traffic.totals import by_minute
+from vdet.traffic.totals import Event, by_minute
 
 _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one that is faded in
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels

@@ -11,8 +11,9 @@ from vdet.media.images import encode_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
 from vdet.traffic.crops import BestCrops, Crop
-from vdet.traffic.record_files import SUFFIXES, join_records, write_records
+from vdet.traffic.record_files import join_records, write_records
 from vdet.traffic.records import VehicleRecords
+from vdet.traffic.tables import SUFFIXES
 
 
 class VehicleSink:

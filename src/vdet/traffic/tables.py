@@ -1,0 +1,78 @@
+"""Tables and JSON as files, of one video and of many; in those of many, the video comes first."""
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from vdet.errors import OutputError
+
+SUFFIXES = (".csv", ".json")
+
+VIDEO = "video"
+"""The column that has the name of the video."""
+
+
+def is_json(path: Path) -> bool:
+    """Tell whether a file is JSON by its name; else it is a table."""
+    return path.suffix.lower() == ".json"
+
+
+def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
+    """Write a table with a heading."""
+    # The name of a video may be no valid text.
+    with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(columns)
+        table.writerows(rows)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON, indented."""
+    text = json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def join(
+    outputs: Mapping[str, Path],
+    path: Path,
+    columns: tuple[str, ...],
+    joined: Callable[[Mapping[str, Any]], Any],
+) -> None:
+    """Write one file over those of many videos, by their names, which have the same form.
+
+    `joined` makes the JSON over all videos from that of each.
+
+    Raises
+    ------
+    OutputError
+        One of `outputs` is no such file.
+    """
+    if not is_json(path):
+        write_table(path, (VIDEO, *columns), _rows(outputs, columns))
+        return
+    values: dict[str, Any] = {}
+    for name, each in outputs.items():
+        try:
+            values[name] = json.loads(each.read_text("utf-8"))
+            joined({name: values[name]})
+        except (ValueError, TypeError, LookupError) as error:
+            raise _unusable(each) from error
+    write_json(path, joined(values))
+
+
+def _rows(outputs: Mapping[str, Path], columns: tuple[str, ...]) -> Iterator[list[str]]:
+    for name, path in outputs.items():
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = csv.reader(file, strict=True)
+            try:
+                if tuple(next(rows, ())) != columns:
+                    raise _unusable(path)
+                yield from ([name, *row] for row in rows)
+            except (ValueError, csv.Error) as error:
+                raise _unusable(path) from error
+
+
+def _unusable(path: Path) -> OutputError:
+    return OutputError(f"{path}: has other content than expected; remove it, and run again")
