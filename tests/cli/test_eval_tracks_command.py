@@ -38,7 +38,7 @@ def test_json_has_plain_keys(run: Run, found: Path, truth: Path) -> None:
     assert values["recall"] == 0.8
     keys = "f1 ap50 ap50_95 mean_iou mota motp idf1 hota deta assa id_switches fragmentations"
     assert set(keys.split()) <= set(values)
-    assert values["losses"][0]["last"] == 2
+    assert values["mistakes"][0]["last"] == 2
 
 
 def test_boxes_after_the_last_true_frame_are_left_out(run: Run, found: Path, truth: Path) -> None:
@@ -51,7 +51,7 @@ def test_writes_a_page(run: Run, found: Path, truth: Path, tmp_path: Path) -> No
     result = run("eval", "tracks", found, truth, "--page", tmp_path / "page")
     assert result.code == 0, result.err
     html = (tmp_path / "page" / "page.html").read_text()
-    for words in ("Vehicle by vehicle", "Largest losses", "vehicle 1 missed", "<svg"):
+    for words in ("Vehicle by vehicle", "Largest mistakes", "vehicle 1 missed", "<svg"):
         assert words in html
     assert f"compared with {truth} by vdet {vdet.__version__}" in html
 

@@ -14,7 +14,7 @@ IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 _RECALLS = np.linspace(0, 1, 101)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class DetectionMetrics:
     """Counts of boxes over all frames and their ratios, 0 to 1.
 

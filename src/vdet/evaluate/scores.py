@@ -3,10 +3,13 @@
 from dataclasses import asdict, dataclass
 
 from vdet.evaluate.comparison import Comparison, compare
-from vdet.evaluate.detection_metrics import detection_metrics
+from vdet.evaluate.detection_metrics import DetectionMetrics, detection_metrics
 from vdet.evaluate.matching import match
 from vdet.evaluate.timelines import FirstDetection, first_detections, timelines
 from vdet.evaluate.tracking_metrics import (
+    ClearMetrics,
+    HotaMetrics,
+    IdentityMetrics,
     clear_metrics,
     false_tracks,
     hota_metrics,
@@ -15,9 +18,9 @@ from vdet.evaluate.tracking_metrics import (
 from vdet.labels.video import LabelledVideo
 
 
-@dataclass(frozen=True, slots=True)
-class Scores:
-    """The metrics of `detection_metrics`, `tracking_metrics` and `timelines`.
+@dataclass(frozen=True, kw_only=True)
+class Scores(DetectionMetrics, ClearMetrics, IdentityMetrics, HotaMetrics):
+    """All metrics of a video.
 
     A ratio is 0 if there is nothing to divide by.
 
@@ -41,28 +44,6 @@ class Scores:
     vehicle_boxes: int
     tracks: int
     track_boxes: int
-    matches: int
-    false_positives: int
-    misses: int
-    precision: float
-    recall: float
-    f1: float
-    ap50: float
-    ap50_95: float
-    mean_iou: float
-    mota: float
-    motp: float
-    idf1: float
-    idp: float
-    idr: float
-    hota: float
-    deta: float
-    assa: float
-    id_switches: int
-    fragmentations: int
-    mostly_tracked: int
-    partly_tracked: int
-    mostly_lost: int
     first_detections: tuple[FirstDetection, ...]
     mean_delay: float | None
     never_found: int

@@ -24,7 +24,7 @@ _MOSTLY_TRACKED = 0.8
 _MOSTLY_LOST = 0.2
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ClearMetrics:
     """The CLEAR-MOT metrics.
 
@@ -103,7 +103,7 @@ def false_tracks(comparison: Comparison, matched: Sequence[MatchedFrame]) -> int
     return int(np.sum(2 * right < comparison.track_lengths()))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class IdentityMetrics:
     """F1, precision and recall of boxes if every vehicle has at most one track, 0 to 1."""
 
@@ -128,7 +128,7 @@ def identity_metrics(comparison: Comparison) -> IdentityMetrics:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class HotaMetrics:
     """HOTA and its two factors, detection accuracy and association accuracy, 0 to 1."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from labels.saving import checked_video, row
 from pages.html import Elements
 from vdet.evaluate.clips.evaluate import RunResult, score_video, total
-from vdet.evaluate.clips.page import loss_tiles, video_page
+from vdet.evaluate.clips.page import mistake_tiles, video_page
 from vdet.evaluate.tiles import FOUND, TRUE
 from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo
@@ -54,23 +54,23 @@ def test_a_sweep_in_which_nothing_is_found_can_be_drawn() -> None:
     assert "<svg" in video_page([run((f"a={n}",), range(0)) for n in (1, 2)], "")
 
 
-def test_a_loss_is_shown_by_its_middle_frame_with_boxes(clip_path: Path) -> None:
+def test_a_mistake_is_shown_by_its_middle_frame_with_boxes(clip_path: Path) -> None:
     found = video(*drive(1, TEN, x=20), *drive(2, range(2, 5), x=250))
     result = score_video("clip", found, video(*drive(7, TEN)), video=clip_path)
-    (missed,) = loss_tiles(result, "missed")
+    (missed,) = mistake_tiles(result, "missed")
     assert missed.title == "vehicle 7 missed, frame 5"
     assert missed.image.shape == (220, 330, 3)
     for color in (TRUE, FOUND):
         assert np.any((missed.image == color).all(axis=2))
-    titles = [picture.title for picture in loss_tiles(result, "false alarm")]
+    titles = [picture.title for picture in mistake_tiles(result, "false alarm")]
     assert titles == ["false alarm, track 1, frame 5", "false alarm, track 2, frame 3"]
 
 
-def test_the_picture_of_a_loss_at_the_edge_lies_inside_the_frame(clip_path: Path) -> None:
+def test_the_picture_of_a_mistake_at_the_edge_lies_inside_the_frame(clip_path: Path) -> None:
     result = score_video("clip", video(), video(*drive(7, TEN, x=290)), video=clip_path)
-    (picture,) = loss_tiles(result, "missed")
+    (picture,) = mistake_tiles(result, "missed")
     assert picture.image[:, -8:].any(axis=2).mean() > 0.9, "no black border"
 
 
 def test_without_a_video_there_are_no_pictures() -> None:
-    assert loss_tiles(score_video("clip", video(), video(*drive(7, TEN))), "missed") == []
+    assert mistake_tiles(score_video("clip", video(), video(*drive(7, TEN))), "missed") == []

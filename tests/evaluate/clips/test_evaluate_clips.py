@@ -34,7 +34,7 @@ def test_the_total_counts_the_boxes_of_all_clips() -> None:
 def test_several_clips_have_a_row_each_and_a_total() -> None:
     lines = list(result_lines([run((), TEN, range(1, 6))]))
     assert [line.split("  ")[0] for line in lines[1:4]] == ["clip 0", "clip 1", "total"]
-    assert any(line.startswith("largest of 1 losses in clip 1") for line in lines)
+    assert any(line.startswith("largest of 1 mistakes in clip 1") for line in lines)
 
 
 def test_a_single_clip_needs_no_total() -> None:

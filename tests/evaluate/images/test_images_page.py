@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from evaluate.images.writers import Boxed, Labelled, write_coco
+from vdet.boxes import Boxes
 from vdet.evaluate.images.evaluate import ImagesResult
 from vdet.evaluate.images.page import images_page, worst_tiles
 from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, score_source
-from vdet.evaluate.images.search import SearchedImage
 from vdet.evaluate.output import RunName
 from vdet.evaluate.tiles import FOUND, TRUE
 from vdet.labels.label import from_size
@@ -26,10 +26,9 @@ def result_of(folder: Path, *found: tuple[float, float, float, float]) -> Images
     }
     labelled = read_labelled_pictures(write_coco(folder, pictures))
     boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
-    searched = [
-        SearchedImage(each, 100, boxes, np.full(len(found), 0.9)) for each in labelled.pictures
-    ]
-    source = score_source([MeasuredImage.of(each, COUNTING) for each in searched], COUNTING)
+    shown = Boxes(boxes, np.full(len(found), 0.9))
+    measured = [MeasuredImage.of(each, 100, shown, COUNTING) for each in labelled.pictures]
+    source = score_source(measured, COUNTING)
     return ImagesResult(COUNTING, (labelled,), (source,), mean_scores([source], COUNTING))
 
 

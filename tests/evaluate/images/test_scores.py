@@ -1,5 +1,6 @@
 """Scores of pictures, with boxes whose matches are known by eye."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from vdet.boxes import Boxes
 from vdet.evaluate.images.scores import (
     Counting,
     ImageScores,
@@ -15,7 +17,6 @@ from vdet.evaluate.images.scores import (
     mean_scores,
     score_source,
 )
-from vdet.evaluate.images.search import SearchedImage
 from vdet.labels.label import Label
 from vdet.labels.pictures import LabelledPicture
 
@@ -23,38 +24,41 @@ PLAIN = Counting(score=0.5, least_width=0)
 WIDTH = 1000
 
 
-def at(x: float, width: float = 100) -> tuple[float, float, float, float]:
+def at(x: float, width: float = 100) -> "Box":
     return x, 0, x + width, 100
 
 
-def searched(
-    true: list[tuple[float, float, float, float]],
-    found: list[tuple[float, tuple[float, float, float, float]]],
-    *,
-    ignored: tuple[int, ...] = (),
-) -> SearchedImage:
-    """Return a picture; `found` are scores and boxes, `ignored` the rows of ignore regions."""
-    labels = (Label(row, box, "car", ignored=row in ignored) for row, box in enumerate(true))
-    image = LabelledPicture(Path("a.png"), Path("a.txt"), tuple(labels))
-    ranked = sorted(found, reverse=True)
-    return SearchedImage(
-        image,
-        WIDTH,
-        np.array([box for _, box in ranked], np.float64).reshape(-1, 4),
-        np.array([score for score, _ in ranked], np.float64),
-    )
+Box = tuple[float, float, float, float]
 
 
-def source(*pictures: SearchedImage, counting: Counting = PLAIN) -> Source:
-    return score_source([MeasuredImage.of(each, counting) for each in pictures], counting)
+@dataclass(frozen=True)
+class Searched:
+    """True boxes, found ones with their scores, and the rows of ignore regions."""
+
+    true: list[Box]
+    found: list[tuple[float, Box]]
+    ignored: tuple[int, ...] = ()
+
+    def measured(self, counting: Counting) -> MeasuredImage:
+        labels = (
+            Label(row, box, "car", ignored=row in self.ignored) for row, box in enumerate(self.true)
+        )
+        picture = LabelledPicture(Path("a.png"), Path("a.txt"), tuple(labels))
+        boxes = np.array([box for _, box in self.found]).reshape(-1, 4)
+        scores = np.array([score for score, _ in self.found])
+        return MeasuredImage.of(picture, WIDTH, Boxes(boxes, scores), counting)
 
 
-def scores(*pictures: SearchedImage, counting: Counting = PLAIN) -> ImageScores:
+def source(*pictures: Searched, counting: Counting = PLAIN) -> Source:
+    return score_source([each.measured(counting) for each in pictures], counting)
+
+
+def scores(*pictures: Searched, counting: Counting = PLAIN) -> ImageScores:
     return source(*pictures, counting=counting).scores
 
 
 def test_all_found() -> None:
-    found = scores(searched([at(0), at(300)], [(0.9, at(0)), (0.6, at(300))]), searched([], []))
+    found = scores(Searched([at(0), at(300)], [(0.9, at(0)), (0.6, at(300))]), Searched([], []))
     assert (found.images, found.vehicles, found.matches, found.false_positives) == (2, 2, 2, 0)
     ratios = (found.precision, found.recall, found.f1, found.mean_iou, found.ap50, found.ap50_95)
     assert ratios == pytest.approx((1, 1, 1, 1, 1, 1))
@@ -62,20 +66,20 @@ def test_all_found() -> None:
 
 def test_the_same_places_in_two_pictures_are_not_the_same_vehicles() -> None:
     """In video, a pair of the frame before stays together; pictures know no frame before."""
-    first = searched([at(0), at(300)], [(0.9, at(0)), (0.8, at(300))])
-    second = searched([at(300), at(0)], [(0.9, at(300)), (0.8, at(0)), (0.7, at(20))])
+    first = Searched([at(0), at(300)], [(0.9, at(0)), (0.8, at(300))])
+    second = Searched([at(300), at(0)], [(0.9, at(300)), (0.8, at(0)), (0.7, at(20))])
     assert scores(first, second).mean_iou == pytest.approx(1)
 
 
 def test_only_boxes_of_the_score_and_above_count() -> None:
-    found = scores(searched([at(0), at(300)], [(0.5, at(0)), (0.49, at(300))]))
+    found = scores(Searched([at(0), at(300)], [(0.5, at(0)), (0.49, at(300))]))
     assert (found.matches, found.recall, found.precision) == (1, 0.5, 1)
     assert found.ap50 == pytest.approx(1), "the average precision takes all scores"
 
 
 def test_a_wrong_box_in_an_ignore_region_does_not_count() -> None:
     found = [(0.9, at(0)), (0.8, at(350)), (0.7, at(600))]
-    result = scores(searched([at(0), at(300, 200)], found, ignored=(1,)))
+    result = scores(Searched([at(0), at(300, 200)], found, ignored=(1,)))
     assert (result.vehicles, result.matches, result.false_positives) == (1, 1, 1)
 
 
@@ -83,23 +87,23 @@ class TestLeastWidth:
     COUNTING = Counting(score=0.5, least_width=0.05)
 
     def test_a_narrower_vehicle_need_not_be_found(self) -> None:
-        result = scores(searched([at(0), at(300, 49)], []), counting=self.COUNTING)
+        result = scores(Searched([at(0), at(300, 49)], []), counting=self.COUNTING)
         assert result.vehicles == 1
 
     def test_a_vehicle_of_the_least_width_must_be_found(self) -> None:
-        assert scores(searched([at(300, 50)], []), counting=self.COUNTING).vehicles == 1
+        assert scores(Searched([at(300, 50)], []), counting=self.COUNTING).vehicles == 1
 
     def test_a_narrower_box_is_not_wrong(self) -> None:
         found = [(0.9, at(0)), (0.8, at(300, 49)), (0.7, at(600, 50))]
-        result = scores(searched([at(0)], found), counting=self.COUNTING)
+        result = scores(Searched([at(0)], found), counting=self.COUNTING)
         assert (result.matches, result.false_positives) == (1, 1)
 
     def test_a_narrower_box_may_find_a_wider_vehicle(self) -> None:
-        result = scores(searched([at(0, 60)], [(0.9, at(0, 45))]), counting=self.COUNTING)
+        result = scores(Searched([at(0, 60)], [(0.9, at(0, 45))]), counting=self.COUNTING)
         assert (result.matches, result.false_positives) == (1, 0)
 
     def test_a_wider_box_on_a_narrower_vehicle_is_in_its_ignore_region(self) -> None:
-        result = scores(searched([at(0, 45)], [(0.9, at(0, 55))]), counting=self.COUNTING)
+        result = scores(Searched([at(0, 45)], [(0.9, at(0, 55))]), counting=self.COUNTING)
         assert (result.vehicles, result.false_positives) == (0, 0)
 
 
@@ -107,7 +111,7 @@ class TestSizes:
     def test_each_vehicle_and_each_wrong_box_has_a_size(self) -> None:
         true = [at(0, 29), at(100, 30), at(200, 59), at(300, 60), at(500, 119), at(700, 120)]
         found = [(0.9, at(100, 30)), (0.9, at(200, 59)), (0.9, at(700, 120)), (0.8, at(400, 61))]
-        sizes = scores(searched(true, found)).sizes
+        sizes = scores(Searched(true, found)).sizes
         assert [size.vehicles for size in sizes] == [1, 2, 2, 1]
         assert [size.matches for size in sizes] == [0, 2, 0, 1]
         assert [size.false_positives for size in sizes] == [0, 0, 1, 0]
@@ -115,28 +119,28 @@ class TestSizes:
         assert [size.f1 for size in sizes] == [0, 1, 0, 1]
 
     def test_the_size_of_a_match_is_that_of_the_vehicle(self) -> None:
-        sizes = scores(searched([at(0, 50)], [(0.9, at(0, 70))])).sizes
+        sizes = scores(Searched([at(0, 50)], [(0.9, at(0, 70))])).sizes
         assert [size.matches for size in sizes] == [0, 1, 0, 0]
 
     def test_without_vehicles_of_a_size_there_is_no_ratio(self) -> None:
-        sizes = scores(searched([at(0, 50)], [])).sizes
+        sizes = scores(Searched([at(0, 50)], [])).sizes
         assert [size.recall for size in sizes] == [None, 0, None, None]
 
 
 class TestBestF1:
     def test_it_is_at_the_score_that_parts_right_from_wrong(self) -> None:
         found = [(0.4, at(0)), (0.3, at(300)), (0.2, at(600)), (0.1, at(800))]
-        result = scores(searched([at(0), at(300)], found))
+        result = scores(Searched([at(0), at(300)], found))
         assert (result.f1, result.best_f1, result.best_score) == (0, 1, 0.3)
 
     def test_equal_scores_count_together(self) -> None:
         found = [(0.6, at(0)), (0.6, at(600)), (0.6, at(800))]
-        result = scores(searched([at(0)], found))
+        result = scores(Searched([at(0)], found))
         assert (result.best_f1, result.best_score) == (0.5, 0.6)
 
     def test_without_vehicles_or_boxes_there_is_none(self) -> None:
-        assert scores(searched([], [(0.9, at(0))])).best_f1 is None
-        assert scores(searched([at(0)], [])).best_f1 is None
+        assert scores(Searched([], [(0.9, at(0))])).best_f1 is None
+        assert scores(Searched([at(0)], [])).best_f1 is None
 
     lists = st.lists(
         st.tuples(
@@ -151,7 +155,7 @@ class TestBestF1:
     def test_it_is_the_f1_at_its_score_and_none_shown_is_better(
         self, pictures: list[list[tuple[float, tuple[float, float, float, float]]]]
     ) -> None:
-        searched_ones = [searched([at(0), at(130), at(300)], found) for found in pictures]
+        searched_ones = [Searched([at(0), at(130), at(300)], found) for found in pictures]
         result = scores(*searched_ones)
         if result.best_score is None:
             assert not any(pictures)
@@ -165,9 +169,9 @@ class TestBestF1:
 
 class TestMean:
     def test_ratios_are_means_of_the_sources_with_vehicles_and_counts_are_sums(self) -> None:
-        good = source(searched([at(0)], [(0.9, at(0))]))
-        bad = source(searched([at(0), at(300), at(600)], []))
-        empty = source(searched([], [(0.9, at(0))]))
+        good = source(Searched([at(0)], [(0.9, at(0))]))
+        bad = source(Searched([at(0), at(300), at(600)], []))
+        empty = source(Searched([], [(0.9, at(0))]))
         assert empty.scores.f1 is None
         assert empty.scores.false_positives == 1
         mean = mean_scores([good, bad, empty], PLAIN)
@@ -176,13 +180,13 @@ class TestMean:
         assert mean.sizes[2].recall == 0.5
 
     def test_the_best_f1_is_at_one_score_for_all(self) -> None:
-        low = source(searched([at(0)], [(0.3, at(0)), (0.1, at(500))]))
-        high = source(searched([at(0)], [(0.8, at(0)), (0.6, at(500)), (0.5, at(700))]))
+        low = source(Searched([at(0)], [(0.3, at(0)), (0.1, at(500))]))
+        high = source(Searched([at(0)], [(0.8, at(0)), (0.6, at(500)), (0.5, at(700))]))
         assert (low.scores.best_score, high.scores.best_score) == (0.3, 0.8)
         mean = mean_scores([low, high], PLAIN)
         assert mean.best_score == 0.3
         assert mean.best_f1 == pytest.approx((1 + 0.5) / 2)
 
     def test_without_vehicles_there_is_none(self) -> None:
-        mean = mean_scores([source(searched([], [])), source(searched([], []))], PLAIN)
+        mean = mean_scores([source(Searched([], [])), source(Searched([], []))], PLAIN)
         assert (mean.f1, mean.best_f1, mean.sizes[0].recall) == (None, None, None)

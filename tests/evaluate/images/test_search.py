@@ -11,9 +11,8 @@ from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.boxes import Box
 from vdet.detect.svm.detector import SvmModel
 from vdet.errors import ImageError
-from vdet.evaluate.images.evaluate import evaluate_images
+from vdet.evaluate.images.evaluate import evaluate_images, measure
 from vdet.evaluate.images.scores import Counting
-from vdet.evaluate.images.search import search_images
 from vdet.labels.pictures import LabelledPictures
 from vdet.labels.reading import read_labelled_pictures
 
@@ -50,15 +49,14 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledPictures:
 
 def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmModel) -> None:
     done: list[int] = []
-    alone = search_images(red_set.pictures, model, advance=done.append)
-    together = search_images(red_set.pictures, model, threads=3)
+    alone = measure(red_set.pictures, model, COUNTING, advance=done.append)
+    together = measure(red_set.pictures, model, COUNTING, threads=3)
     assert done == [1] * 6
     for one, other, image in zip(alone, together, red_set.pictures, strict=True):
-        assert one.image is image is other.image
+        assert one.picture is image is other.picture
         assert one.width == WIDTH
-        assert np.array_equal(one.boxes, other.boxes)
-        assert np.array_equal(one.scores, other.scores)
-        assert np.array_equal(one.scores, np.sort(one.scores)[::-1])
+        assert np.array_equal(one.found.boxes, other.found.boxes)
+        assert np.array_equal(one.found.scores, other.found.scores)
 
 
 def test_each_set_is_scored_and_progress_counts_all_pictures(
@@ -82,10 +80,10 @@ def test_each_set_is_scored_and_progress_counts_all_pictures(
 def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model: SvmModel) -> None:
     red_set.pictures[2].path.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
-        search_images(red_set.pictures, model, threads=2)
+        measure(red_set.pictures, model, COUNTING, threads=2)
 
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path, model: SvmModel) -> None:
     path = write_coco(tmp_path, {"small": Labelled(8, 8)})
     with pytest.raises(ImageError, match=r"small\.png: "):
-        search_images(read_labelled_pictures(path).pictures, model)
+        measure(read_labelled_pictures(path).pictures, model, COUNTING)

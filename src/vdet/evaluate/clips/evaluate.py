@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vdet.evaluate.clips.clip import Clip, Variant, find_tracks
-from vdet.evaluate.clips.losses import Loss, losses
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.matching import match
+from vdet.evaluate.mistakes import Mistake, mistakes
 from vdet.evaluate.scores import Scores, score_comparison
 from vdet.evaluate.timelines import Timeline, timelines
 from vdet.labels.reading import read_predictions, read_truth
@@ -29,7 +29,7 @@ class ClipResult:
     video: Path | None
     comparison: Comparison
     scores: Scores
-    losses: tuple[Loss, ...]
+    mistakes: tuple[Mistake, ...]
     timelines: tuple[Timeline, ...]
     until: int
     left_out: int = 0
@@ -97,7 +97,7 @@ def score_video(
         video,
         comparison,
         score_comparison(comparison),
-        tuple(losses(comparison, matched)),
+        tuple(mistakes(comparison, matched)),
         tuple(timelines(comparison, matched)),
         max(prediction.last_frame, truth.last_frame),
     )

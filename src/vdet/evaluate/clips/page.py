@@ -7,9 +7,9 @@ from typing import Any
 from vdet.config.schema import InputSettings
 from vdet.evaluate.clips import text
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
-from vdet.evaluate.clips.losses import Loss, LossKind
 from vdet.evaluate.comparison import pool
 from vdet.evaluate.detection_metrics import IOU_THRESHOLDS, average_precisions
+from vdet.evaluate.mistakes import Mistake, MistakeKind
 from vdet.evaluate.tiles import FOUND, TRUE, Tile, draw_tile
 from vdet.media import VideoReader
 from vdet.media.images import Image
@@ -17,7 +17,7 @@ from vdet.pages.charts import BAD, FILL, Line, Plot, Span, Timeline, color, numb
 from vdet.pages.render import render
 
 _SHAPE = 330, 220  # of a picture, pixels
-_MOST_PICTURES = 12  # of each kind of loss
+_MOST_PICTURES = 12  # of each kind of mistake
 _CROP_SCALE = 2.4  # size of the crop, in sizes of the box
 _MOST_LINES = 12  # more could not be told apart in a legend
 
@@ -50,9 +50,9 @@ def _clip(clip: ClipResult) -> dict[str, Any]:
     return {
         "name": clip.name,
         "timeline": _timeline(clip),
-        "losses": [text.loss_row(loss) for loss in clip.losses[: text.LARGEST]],
-        "missed": loss_tiles(clip, "missed"),
-        "alarms": loss_tiles(clip, "false alarm"),
+        "mistakes": [text.mistake_row(mistake) for mistake in clip.mistakes[: text.LARGEST]],
+        "missed": mistake_tiles(clip, "missed"),
+        "alarms": mistake_tiles(clip, "false alarm"),
     }
 
 
@@ -63,11 +63,14 @@ def _timeline(clip: ClipResult) -> Timeline:
         for row, timeline in enumerate(clip.timelines)
         for each in timeline.stretches
     ]
-    alarms = [loss for loss in clip.losses if loss.kind == "false alarm"]
+    alarms = [mistake for mistake in clip.mistakes if mistake.kind == "false alarm"]
     bottom = len(clip.timelines)
     spans = [
         *(_span(*stretch, "missed" if stretch[3] is None else "found") for stretch in stretches),
-        *(_span(bottom, loss.first, loss.last, None, text.loss_name(loss)) for loss in alarms),
+        *(
+            _span(bottom, mistake.first, mistake.last, None, text.mistake_name(mistake))
+            for mistake in alarms
+        ),
     ]
     names = [*(f"vehicle {timeline.vehicle}" for timeline in clip.timelines), "false alarms"]
     axis = number_axis(0, max(1, clip.until) + 0.5, "frame", fixed=True)
@@ -106,23 +109,23 @@ def _tightness(run: RunResult) -> Plot:
     return Plot("Average precision by IoU", x, number_axis(0, 1), lines=[line])
 
 
-def loss_tiles(clip: ClipResult, kind: LossKind) -> list[Tile]:
-    """Return the middle frame of the largest losses of a kind, cropped around the box.
+def mistake_tiles(clip: ClipResult, kind: MistakeKind) -> list[Tile]:
+    """Return the middle frame of the largest mistakes of a kind, cropped around the box.
 
     The video is decoded again. The list is empty if there is no video. Raises `VideoError`.
     """
-    chosen = [loss for loss in clip.losses if loss.kind == kind][:_MOST_PICTURES]
+    chosen = [mistake for mistake in clip.mistakes if mistake.kind == kind][:_MOST_PICTURES]
     if clip.video is None or not chosen:
         return []
-    images = dict(_frames(clip.video, {loss.middle for loss in chosen}))
+    images = dict(_frames(clip.video, {mistake.middle for mistake in chosen}))
     return [
         Tile(
-            _cropped(images[loss.middle], loss, clip),
-            f"{text.loss_name(loss)}, frame {loss.middle}",
-            f"lost in {text.frame_span(loss)}, best IoU {loss.overlap:.2f}",
+            _cropped(images[mistake.middle], mistake, clip),
+            f"{text.mistake_name(mistake)}, frame {mistake.middle}",
+            f"lost in {text.frame_span(mistake)}, best IoU {mistake.overlap:.2f}",
         )
-        for loss in chosen
-        if loss.middle in images
+        for mistake in chosen
+        if mistake.middle in images
     ]
 
 
@@ -134,14 +137,14 @@ def _frames(video: Path, numbers: set[int]) -> Iterator[tuple[int, Image]]:
                 yield frame.index + 1, frame.image
 
 
-def _cropped(image: Image, loss: Loss, clip: ClipResult) -> Image:
-    """Return the part of a frame around the box of a loss, with the shape of a tile."""
+def _cropped(image: Image, mistake: Mistake, clip: ClipResult) -> Image:
+    """Return the part of a frame around the box of a mistake, with the shape of a tile."""
     comparison = clip.comparison
-    (frame,) = (each for each in comparison.frames if each.number == loss.middle)
-    if loss.kind == "missed":
-        boxes = frame.vehicle_boxes[comparison.vehicle_ids[frame.vehicles] == loss.id]
+    (frame,) = (each for each in comparison.frames if each.number == mistake.middle)
+    if mistake.kind == "missed":
+        boxes = frame.vehicle_boxes[comparison.vehicle_ids[frame.vehicles] == mistake.id]
     else:
-        boxes = frame.track_boxes[comparison.track_ids[frame.tracks] == loss.id]
+        boxes = frame.track_boxes[comparison.track_ids[frame.tracks] == mistake.id]
     x1, y1, x2, y2 = boxes[0].tolist()
     rows, columns = image.shape[:2]
     aspect = _SHAPE[0] / _SHAPE[1]

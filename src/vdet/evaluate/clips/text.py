@@ -5,12 +5,12 @@ from dataclasses import asdict
 from typing import Any
 
 from vdet.evaluate.clips.evaluate import ClipResult, RunResult, best
-from vdet.evaluate.clips.losses import Loss
+from vdet.evaluate.mistakes import Mistake
 from vdet.evaluate.output import ABSENT, RunName, plain_run, share, table
 from vdet.evaluate.scores import Scores
 
 LARGEST = 10
-"""Most losses listed for a video."""
+"""Most mistakes listed for a video."""
 
 HEADINGS = (
     *("precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
@@ -37,7 +37,7 @@ def result_lines(runs: Sequence[RunResult]) -> Iterator[str]:
     yield from map(frames_line, run.clips)
     yield from detail_lines(run.total)
     for clip in run.clips:
-        yield from loss_lines(clip)
+        yield from mistake_lines(clip)
 
 
 def frames_line(clip: ClipResult) -> str:
@@ -97,28 +97,37 @@ def detail_lines(scores: Scores) -> list[str]:
     return [boxes, tracks, vehicles, further]
 
 
-def loss_lines(clip: ClipResult) -> Iterator[str]:
-    """Yield the largest losses of a video as a table; nothing if there are none."""
-    if clip.losses:
+def mistake_lines(clip: ClipResult) -> Iterator[str]:
+    """Yield the largest mistakes of a video as a table; nothing if there are none."""
+    if clip.mistakes:
         yield ""
-        yield f"largest of {len(clip.losses)} losses in {clip.name}"
+        yield f"largest of {len(clip.mistakes)} mistakes in {clip.name}"
         headings = ("what", "frames", "boxes", "best IoU")
-        yield from table(headings, [loss_row(loss) for loss in clip.losses[:LARGEST]])
+        yield from table(headings, [mistake_row(mistake) for mistake in clip.mistakes[:LARGEST]])
 
 
-def loss_row(loss: Loss) -> list[str]:
-    """Return a loss as a row of text: what, frames, boxes, best IoU."""
-    return [loss_name(loss), frame_span(loss), str(loss.boxes), share(loss.overlap, 2)]
+def mistake_row(mistake: Mistake) -> list[str]:
+    """Return a mistake as a row of text: what, frames, boxes, best IoU."""
+    return [
+        mistake_name(mistake),
+        frame_span(mistake),
+        str(mistake.boxes),
+        share(mistake.overlap, 2),
+    ]
 
 
-def frame_span(loss: Loss) -> str:
-    """Write the frames of a loss."""
-    return f"{loss.first}–{loss.last}" if loss.boxes > 1 else str(loss.first)
+def frame_span(mistake: Mistake) -> str:
+    """Write the frames of a mistake."""
+    return f"{mistake.first}–{mistake.last}" if mistake.boxes > 1 else str(mistake.first)
 
 
-def loss_name(loss: Loss) -> str:
+def mistake_name(mistake: Mistake) -> str:
     """Name what was lost."""
-    return f"vehicle {loss.id} missed" if loss.kind == "missed" else f"false alarm, track {loss.id}"
+    return (
+        f"vehicle {mistake.id} missed"
+        if mistake.kind == "missed"
+        else f"false alarm, track {mistake.id}"
+    )
 
 
 def plain(runs: Sequence[RunResult], name: RunName) -> dict[str, Any]:
@@ -144,7 +153,7 @@ def _plain_result(run: RunResult) -> dict[str, Any]:
 
 
 def plain_clip(clip: ClipResult) -> dict[str, Any]:
-    """Return the scores of a video and its losses as values for JSON."""
-    lost = [{**asdict(loss), "boxes": loss.boxes} for loss in clip.losses]
+    """Return the scores of a video and its mistakes as values for JSON."""
+    lost = [{**asdict(mistake), "boxes": mistake.boxes} for mistake in clip.mistakes]
     frames = {"until": clip.until, "left_out": clip.left_out}
-    return {**asdict(clip.scores), **frames, "losses": lost}
+    return {**asdict(clip.scores), **frames, "mistakes": lost}

@@ -1,6 +1,6 @@
-"""Scores of a detector in several sets of labelled pictures."""
+"""Scores of a detector in several sets of labelled pictures, which are searched in parallel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from vdet.detect.protocol import DetectorModel
@@ -12,9 +12,10 @@ from vdet.evaluate.images.scores import (
     mean_scores,
     score_source,
 )
-from vdet.evaluate.images.search import search_images
-from vdet.labels.pictures import LabelledPictures
+from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.progress import Progress, no_progress
+from vdet.run.pictures import search_picture
+from vdet.run.threads import map_ordered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +61,35 @@ def evaluate_images(
     advance = progress(sum(len(each.pictures) for each in sets))
     sources = []
     for each in sets:
-        searched = search_images(each.pictures, model, threads=threads, advance=advance)
-        measured = [MeasuredImage.of(image, counting) for image in searched]
+        measured = measure(each.pictures, model, counting, threads=threads, advance=advance)
         sources.append(score_source(measured, counting))
     return ImagesResult(counting, tuple(sets), tuple(sources), mean_scores(sources, counting))
+
+
+def measure(
+    pictures: Sequence[LabelledPicture],
+    model: DetectorModel,
+    counting: Counting,
+    *,
+    threads: int = 1,
+    advance: Callable[[int], object] = lambda _: None,
+) -> list[MeasuredImage]:
+    """Search pictures, each on its own; `advance` is called with 1 after each.
+
+    Raises
+    ------
+    ImageError
+        A picture cannot be read or searched; the message names it.
+    """
+
+    def search(labelled: LabelledPicture) -> MeasuredImage:
+        image = labelled.read()
+        found = search_picture(labelled.path, image, model)
+        return MeasuredImage.of(labelled, image.shape[1], found, counting)
+
+    measured = []
+    with map_ordered(search, pictures, threads) as results:
+        for _, result in results:
+            measured.append(result)
+            advance(1)
+    return measured

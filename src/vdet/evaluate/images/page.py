@@ -73,7 +73,7 @@ def worst_tiles(source: Source, score: float) -> list[Tile]:
     return [
         Tile(
             _drawn(image, score),
-            image.searched.image.path.name,
+            image.picture.path.name,
             f"{missed} missed, {wrong} false alarm{'s' if wrong != 1 else ''}",
         )
         for (missed, wrong), image in ranked[:_MOST_PICTURES]
@@ -92,7 +92,7 @@ def _mistakes(image: MeasuredImage, score: float) -> tuple[int, int]:
 
 
 def _drawn(image: MeasuredImage, score: float) -> Image:
-    picture = image.searched.image.read()
+    picture = image.picture.read()
     outlines = [(image.truth.boxes[image.truth.ignored], IGNORED, 1)]
     for frame in image.compare(score).frames:
         outlines += [(frame.vehicle_boxes, TRUE, 2), (frame.track_boxes, FOUND, 1)]

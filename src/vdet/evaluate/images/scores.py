@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array, Int64Array
+from vdet.boxes import BoolArray, Boxes, Float64Array, Int64Array
 from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.detection_metrics import (
     RankedPredictions,
@@ -13,8 +13,9 @@ from vdet.evaluate.detection_metrics import (
     rank_predictions,
     ratio,
 )
-from vdet.evaluate.images.search import SearchedImage
 from vdet.evaluate.matching import MatchedFrame, match
+from vdet.labels.label import MAX_IN_FRAME
+from vdet.labels.pictures import LabelledPicture
 from vdet.labels.video import LabelledVideo
 
 SIZES = (0.03, 0.06, 0.12)
@@ -43,20 +44,34 @@ class Counting:
 class MeasuredImage:
     """A searched picture as a video of one frame: its vehicles, and detections of every score."""
 
-    searched: SearchedImage
+    picture: LabelledPicture
+    width: int
     truth: LabelledVideo
     found: LabelledVideo
 
     @staticmethod
-    def of(searched: SearchedImage, counting: Counting) -> "MeasuredImage":
-        """Mark what is an ignore region, and which detections need not find anything."""
-        image = searched.image
-        least = counting.least_width * searched.width
-        regions = image.ignored | (_widths(image.boxes) < least)
+    def of(
+        picture: LabelledPicture,
+        width: int,
+        found: Boxes,
+        counting: Counting,
+    ) -> "MeasuredImage":
+        """Mark what is an ignore region, and which detections need not find anything.
+
+        Parameters
+        ----------
+        width
+            Width of the picture, pixels.
+        """
+        least = counting.least_width * width
+        regions = picture.ignored | (_widths(picture.boxes) < least)
+        best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
+        boxes = found.sides[best]
         return MeasuredImage(
-            searched,
-            _one_frame(image.boxes, np.ones(len(regions)), regions),
-            _one_frame(searched.boxes, searched.scores, _widths(searched.boxes) < least),
+            picture,
+            width,
+            _one_frame(picture.boxes, np.ones(len(regions)), regions),
+            _one_frame(boxes, found.scores[best], _widths(boxes) < least),
         )
 
     def compare(self, score: float) -> Comparison:
@@ -241,7 +256,7 @@ def _by_size(
 ) -> tuple[SizeScores, ...]:
     counts = np.zeros((3, len(SIZE_NAMES)), np.int64)  # vehicles, matches, false positives
     for image, frames in zip(images, matched, strict=True):
-        width = image.searched.width
+        width = image.width
         for pairs in frames:
             vehicles = _sizes(pairs.frame.vehicle_boxes, width)
             wrong = np.delete(pairs.frame.track_boxes, pairs.track_rows, axis=0)

@@ -1,4 +1,4 @@
-"""Losses: runs of frames in which a vehicle is missed or a track is wrong."""
+"""Mistakes: runs of frames in which a vehicle is missed or a track is wrong."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -11,11 +11,11 @@ from vdet.boxes import Int64Array
 from vdet.evaluate.comparison import Comparison
 from vdet.evaluate.matching import MatchedFrame
 
-LossKind = Literal["missed", "false alarm"]
+MistakeKind = Literal["missed", "false alarm"]
 
 
 @dataclass(frozen=True, slots=True)
-class Loss:
+class Mistake:
     """Consecutive frames with the same mistake.
 
     Attributes
@@ -29,7 +29,7 @@ class Loss:
         such box. Below 0.5: the box fits badly. Above: the box is matched with another one.
     """
 
-    kind: LossKind
+    kind: MistakeKind
     id: int
     first: int
     last: int
@@ -50,9 +50,9 @@ _Misses = list[tuple[int, float]]
 """Number of the frame and best IoU of each mistake, in order."""
 
 
-def losses(comparison: Comparison, matched: Sequence[MatchedFrame]) -> list[Loss]:
-    """Return the losses of one video, the longest first; `matched` is `match(comparison)`."""
-    misses: dict[tuple[LossKind, int], _Misses] = defaultdict(list)
+def mistakes(comparison: Comparison, matched: Sequence[MatchedFrame]) -> list[Mistake]:
+    """Return the mistakes of one video, the longest first; `matched` is `match(comparison)`."""
+    misses: dict[tuple[MistakeKind, int], _Misses] = defaultdict(list)
     for pairs in matched:
         frame = pairs.frame
         vehicle_ids = comparison.vehicle_ids[frame.vehicles]
@@ -64,11 +64,11 @@ def losses(comparison: Comparison, matched: Sequence[MatchedFrame]) -> list[Loss
             overlap = float(frame.iou[:, row].max(initial=0))
             misses["false alarm", int(track_ids[row])].append((frame.number, overlap))
     found = [
-        Loss(kind, id_, run[0][0], run[-1][0], sum(overlap for _, overlap in run) / len(run))
+        Mistake(kind, id_, run[0][0], run[-1][0], sum(overlap for _, overlap in run) / len(run))
         for (kind, id_), each in misses.items()
         for run in _runs(each)
     ]
-    return sorted(found, key=lambda loss: (-loss.boxes, loss.first, loss.kind, loss.id))
+    return sorted(found, key=lambda each: (-each.boxes, each.first, each.kind, each.id))
 
 
 def _others(count: int, rows: Int64Array) -> list[int]:

@@ -1,0 +1,49 @@
+import pytest
+
+from evaluate.scenes import TEN, drive, video
+from labels.saving import row
+from vdet.evaluate.comparison import compare
+from vdet.evaluate.matching import match
+from vdet.evaluate.mistakes import Mistake, mistakes
+from vdet.labels.video import LabelledVideo
+
+
+def found_mistakes(found: LabelledVideo, truth: LabelledVideo) -> list[Mistake]:
+    comparison = compare(found, truth)
+    return mistakes(comparison, match(comparison))
+
+
+def test_nothing_is_lost_if_all_is_found() -> None:
+    assert found_mistakes(video(drive(1, TEN)), video(drive(7, TEN))) == []
+
+
+def test_frames_in_a_row_are_one_mistake_and_the_longest_comes_first() -> None:
+    found = video(drive(1, range(3, 6)), drive(1, range(7, 11)))
+    late, gap = found_mistakes(found, video(drive(7, TEN)))
+    assert late == Mistake("missed", 7, 1, 2, 0)
+    assert gap == Mistake("missed", 7, 6, 6, 0)
+    assert (late.boxes, late.middle, gap.boxes, gap.middle) == (2, 1, 1, 6)
+
+
+def test_a_false_alarm_is_a_mistake_too() -> None:
+    found = video(drive(1, TEN), drive(2, range(4, 8), x=300))
+    assert found_mistakes(found, video(drive(7, TEN))) == [Mistake("false alarm", 2, 4, 7, 0)]
+
+
+def test_a_box_that_fits_badly_is_lost_on_both_sides_with_its_overlap() -> None:
+    # 100 wide against 250 wide over it: IoU 0.4
+    alarm, missed = found_mistakes(video(drive(1, TEN, width=250)), video(drive(7, TEN)))
+    assert (alarm.kind, missed.kind) == ("false alarm", "missed")
+    assert alarm.overlap == missed.overlap == pytest.approx(0.4)
+
+
+def test_frames_in_which_the_vehicle_is_ignored_split_a_mistake() -> None:
+    ignored = [row(0, 5, 7, 0, 0, 100, 100, ignored=True)]
+    truth = video(drive(7, range(1, 5)) + ignored + drive(7, range(6, 11)))
+    spans = [(mistake.first, mistake.last) for mistake in found_mistakes(video(), truth)]
+    assert spans == [(6, 10), (1, 4)]
+
+
+def test_two_vehicles_missed_together_are_two_mistakes() -> None:
+    truth = video(drive(7, TEN), drive(8, TEN, x=300))
+    assert [mistake.id for mistake in found_mistakes(video(), truth)] == [7, 8]
