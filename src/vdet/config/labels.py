@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from vdet.config.section import Section
 
@@ -26,3 +26,8 @@ class LabelSettings(Section):
         "wrong; other: left out. Without a role, car, truck, bus, motorcycle and vehicle are "
         "vehicles if the detector looks for them, else ignored",
     )
+
+    @field_validator("roles")
+    @classmethod
+    def _add_defaults(cls, roles: dict[str, Role]) -> dict[str, Role]:
+        return _ROLES | roles
