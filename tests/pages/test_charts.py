@@ -1,5 +1,6 @@
 """Charts as values; the pages that draw them are tested where they are made."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.pages.charts import (
-    Series,
     Span,
     clock,
     curve,
@@ -55,7 +55,7 @@ def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
 
 
 def test_the_series_of_a_minute_are_stacked_and_named_with_their_sums() -> None:
-    series = [Series("in", {1: 3, 2: 1}), Series("out", {2: 2})]
+    series = {"in": Counter({1: 3, 2: 1}), "out": Counter({2: 2})}
     plot = minute_plot(series, range(1, 4), "counts")
     assert [(bar.low, bar.high) for bar in plot.bars] == [(0, 3), (0, 1), (1, 3)]
     assert plot.bars[0].color == plot.bars[1].color != plot.bars[2].color

@@ -1,6 +1,7 @@
 """The page of a video, and the page over many."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +15,6 @@ from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
-from vdet.pages.charts import Series
 from vdet.pages.index import write_index
 from vdet.pages.render import jpeg_uri
 from vdet.pages.video import Player, Thumbnail, VideoPage, read_facts
@@ -53,6 +53,7 @@ def page(
         still=STILL,
         player=player,
         settings="output:\n  crf: 25\n",
+        counts={},
     )
 
 
@@ -134,7 +135,7 @@ class TestVideoPage:
 
     def test_counts_are_shown_by_minute_where_there_are_any(self) -> None:
         made = seen(
-            replace(page(end=130), counts=[Series("north in", {0: 3}), Series(NASTY, {0: 1})])
+            replace(page(end=130), counts={"north in": Counter({0: 3}), NASTY: Counter({0: 1})})
         )
         assert "At lines and zones" in made.text
         assert "north in: 3" in made.text
@@ -173,7 +174,7 @@ class TestVideoPage:
 
 class TestFacts:
     def test_they_are_read_back(self, tmp_path: Path) -> None:
-        counts = [Series("</script><b>", {0: 7, 2: 1})]
+        counts = {"</script><b>": Counter({0: 7, 2: 1})}
         html = replace(page(), counts=counts).html()
         assert Elements(html).all("b", id="x") == []
         (tmp_path / "page.html").write_text(html, encoding="utf-8")
@@ -221,7 +222,7 @@ class TestIndex:
         outputs = {name: tmp_path / name for name in "ab"}
         for number, place in enumerate(outputs.values(), start=1):
             place.mkdir()
-            counts = [Series("north", {0: number})]
+            counts = {"north": Counter({0: number})}
             html = replace(page(), counts=counts).html()
             (place / "page.html").write_text(html, encoding="utf-8")
         write_index(outputs, tmp_path / "index.html")

@@ -6,6 +6,7 @@ read at any width.
 
 import heapq
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -110,17 +111,8 @@ class Timeline:
         return max([len(self.names), *(span.row + 1 for span in self.spans)])
 
 
-@dataclass(frozen=True, slots=True)
-class Series:
-    """How often something happened in each minute; minute n ends n + 1 minutes after second 0."""
-
-    name: str
-    by_minute: Mapping[int, int]
-
-    @property
-    def total(self) -> int:
-        """The sum over all minutes."""
-        return sum(self.by_minute.values())
+Minutes = Mapping[str, Counter[int]]
+"""How often something happened in each minute, by its name; minute n begins at second 60 n."""
 
 
 def color(number: int) -> str:
@@ -189,19 +181,20 @@ def level_plot(levels: Sequence[int], start: float, end: float, title: str) -> P
     return Plot(title, time_axis(start, end), _counts(max(levels, default=0)), bars)
 
 
-def minute_plot(series: Sequence[Series], minutes: range, title: str) -> Plot:
+def minute_plot(series: Minutes, minutes: range, title: str) -> Plot:
     """Return a bar for each minute, in which the series are stacked, with a legend."""
     bars, most = [], 0
     for minute in minutes:
         below = 0
-        for number, each in enumerate(series):
-            if count := each.by_minute.get(minute, 0):
-                tip = f"{clock(60 * minute)}: {count} {each.name}"
+        for number, (name, counts) in enumerate(series.items()):
+            if count := counts[minute]:
+                tip = f"{clock(60 * minute)}: {count} {name}"
                 place = 60 * (minute + 0.1), 60 * (minute + 0.9), below, below + count
                 bars.append(Bar(*place, color(number), tip))
                 below += count
         most = max(most, below)
-    legend = [(f"{each.name}: {each.total}", color(n)) for n, each in enumerate(series)]
+    names = [f"{name}: {counts.total()}" for name, counts in series.items()]
+    legend = [(name, color(number)) for number, name in enumerate(names)]
     x = time_axis(60 * minutes.start, 60 * minutes.stop)
     return Plot(title, x, _counts(most), bars, legend=legend)
 

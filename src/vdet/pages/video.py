@@ -17,7 +17,7 @@ from vdet.errors import OutputError
 from vdet.media import VideoInfo
 from vdet.media.images import Image
 from vdet.pages import charts
-from vdet.pages.charts import Plot, Series, Span, Timeline, clock
+from vdet.pages.charts import Minutes, Plot, Span, Timeline, clock
 from vdet.pages.render import jpeg_uri, link_to, plural, render
 from vdet.traffic.levels import Levels
 from vdet.traffic.records import VehicleRecord
@@ -111,7 +111,7 @@ class VideoPage:
     still: Image | None
     player: Player | None
     settings: str
-    counts: Sequence[Series] = ()
+    counts: Minutes
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
@@ -129,7 +129,7 @@ class VideoPage:
             vehicles=len(self.records),
             most=self.levels.most,
             still=_NO_PICTURE if self.still is None else jpeg_uri(self.still, _SMALL),
-            counts={each.name: each.total for each in self.counts},
+            counts={name: minutes.total() for name, minutes in self.counts.items()},
         )
 
     @property
@@ -148,7 +148,7 @@ class VideoPage:
             *((plural(name) if n != 1 else name, str(n)) for name, n in classes.most_common(4)),
             ("most at once", str(self.levels.most)),
             ("mean seconds shown", f"{shown:.1f}"),
-            *((each.name, str(each.total)) for each in self.counts),
+            *((name, str(minutes.total())) for name, minutes in self.counts.items()),
         ]
 
     @property
@@ -180,7 +180,7 @@ class VideoPage:
     def minute_plots(self) -> list[Plot]:
         """Vehicles, and the counts of lines and zones, by minute."""
         came = Counter(int(record.first // 60) for record in self.records)
-        series = {"First seen": [Series("vehicles", came)], "At lines and zones": self.counts}
+        series = {"First seen": {"vehicles": came}, "At lines and zones": self.counts}
         return [
             charts.minute_plot(some, self.minutes, title) for title, some in series.items() if some
         ]

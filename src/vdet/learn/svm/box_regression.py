@@ -13,7 +13,6 @@ from vdet.detect.svm.model import BoxRegression
 from vdet.learn.svm.augmentation import Augmenter, augment, zoom_in
 from vdet.learn.svm.dataset import PatchFile, Sides
 from vdet.learn.svm.extraction import LabelledVectors, Rows, extract
-from vdet.learn.svm.metrics import BoxError
 from vdet.progress import Steps, no_steps
 from vdet.workers import Workers
 
@@ -97,7 +96,7 @@ def fit_split_boxes(
     patches: BoxPatches,
     hold_out: Callable[[LabelledVectors], BoolArray],
     settings: Settings,
-) -> tuple[BoxRegression | None, BoxError | None]:
+) -> tuple[BoxRegression | None, float | None]:
     """Fit on the patches that are not held out and measure the error on the others.
 
     Parameters
@@ -107,7 +106,8 @@ def fit_split_boxes(
 
     Returns
     -------
-    Either is None if it has no patches.
+    The regression, and the mean absolute error on the known sides of patches that are held out, as
+    a share of the patch's side. Either is None if it has no patches.
     """
     sets = [data] if patches.boxed is None else [data, patches.boxed]
     held = [hold_out(each) for each in sets]
@@ -128,7 +128,7 @@ def fit_split_boxes(
     together = np.concatenate(errors)
     if not len(together):
         return regression, None
-    return regression, BoxError(len(together), round(float(np.nanmean(together)), 4))
+    return regression, round(float(np.nanmean(together)), 4)
 
 
 def _with_sides(data: LabelledVectors, kept: BoolArray) -> Rows:

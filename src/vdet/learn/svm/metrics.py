@@ -96,22 +96,12 @@ class Classification:
 
 
 @dataclass(frozen=True, slots=True)
-class BoxError:
-    """Error of the regression on the known box sides of held-out patches.
-
-    `mean` is the mean absolute error as a share of the patch's side, `patches` their number.
-    """
-
-    patches: int
-    mean: float
-
-
-@dataclass(frozen=True, slots=True)
 class SplitMetrics:
     """A model fitted on one part of the patches and tested on the other.
 
-    `train_augmented` is the number of samples made of the training patches. `boxes` is None if no
-    boxes are known.
+    `train_augmented` is the number of samples made of the training patches. `box_error` is the mean
+    absolute error of the regression on known sides of tested patches, as a share of the patch's
+    side; None if no sides are known.
     """
 
     split: str
@@ -119,7 +109,7 @@ class SplitMetrics:
     train_augmented: int
     train_accuracy: float
     test: Classification
-    boxes: BoxError | None
+    box_error: float | None
 
     def lines(self) -> Iterator[str]:
         """Yield the metrics as lines of text."""
@@ -130,11 +120,8 @@ class SplitMetrics:
             f"test accuracy {self.test.accuracy} ({self.test.patches} patches)"
         )
         yield from self.test.lines()
-        if self.boxes is not None:
-            yield (
-                f"sides of vehicles' boxes: mean error {self.boxes.mean:.3f} of a patch's side "
-                f"({self.boxes.patches} patches)"
-            )
+        if self.box_error is not None:
+            yield f"sides of vehicles' boxes: mean error {self.box_error:.3f} of a patch's side"
 
 
 _SPLITS = {

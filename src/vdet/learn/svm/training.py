@@ -119,5 +119,5 @@ def _fit_split(
         train_augmented=int(np.count_nonzero(~held[data.rows.origins[len(held) :]])),
         train_accuracy=float((predicted == data.vehicle)[~held].mean()),
         test=Classification.of(data.vehicle[held], predicted[held], data.groups[held]),
-        boxes=error,
+        box_error=error,
     )

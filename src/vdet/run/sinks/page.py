@@ -1,5 +1,6 @@
 """The sink `page`: a folder with the page of a video."""
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -7,7 +8,6 @@ from typing import Any, Self
 from vdet.config.rendering import render
 from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
-from vdet.pages.charts import Series
 from vdet.pages.index import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, write_page
 from vdet.pages.video import Player, Thumbnail, VideoPage
@@ -86,7 +86,7 @@ class PageSink:
             still=None if self._still is None else self._heat.over(self._still),
             player=self._player(),
             settings=render(self._context.settings),
-            counts=_series(self._counter.finish()) if self._counter else (),
+            counts=_by_minute(self._counter.finish()) if self._counter else {},
         )
 
     def _player(self) -> Player | None:
@@ -101,12 +101,13 @@ class PageSink:
         return None
 
 
-def _series(events: Sequence[Event]) -> list[Series]:
+def _by_minute(events: Sequence[Event]) -> dict[str, Counter[int]]:
     """Return the counts of each line or zone and direction by minute."""
-    minutes: dict[tuple[str, str], dict[int, int]] = {}
+    minutes: dict[str, Counter[int]] = {}
     for each in by_minute(events):
-        minutes.setdefault((each.name, each.direction), {})[each.minute] = each.count
-    return [Series(": ".join(key), counts) for key, counts in minutes.items()]
+        name = f"{each.name}: {each.direction}"
+        minutes.setdefault(name, Counter())[each.minute] = each.count
+    return minutes
 
 
 PAGE = SinkKind(
