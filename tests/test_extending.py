@@ -13,7 +13,7 @@ import pytest
 
 from doc_pages import blocks
 from evaluate.images.writers import Boxed, Labelled, show, write_coco
-from red_cars import HEIGHT, WIDTH, car_at, drive
+from red_cars import CAR, HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.config.schema import Settings
 from vdet.media.images import write_image
@@ -138,6 +138,27 @@ def test_the_format_is_written_counted_and_compared(
     compared = vdet(package, "eval", "tracks", tracks, truth, "--json", "-")
     assert compared.returncode == 0, compared.stderr
     assert json.loads(compared.stdout)["f1"] == 1
+
+
+def test_the_step_changes_what_all_outputs_get(package: Path, clip: Path, tmp_path: Path) -> None:
+    tally, tracks = tmp_path / "tally.txt", tmp_path / "t.csv"
+    options = ("--no-video", "--tracks", tracks, "--sink", f"tally={tally}", *CHOSEN)
+    narrow = ("--set", "steps.names=[wide]")
+    done = vdet(package, "detect-video", clip, *options, *narrow)
+    assert done.returncode == 0, done.stderr
+    assert CAR.width < WIDTH / 4
+    assert tally.read_text() == "".join(f"{number} 0\n" for number in range(FRAMES))
+    assert len(tracks.read_text().splitlines()) == 1, "the heading alone"
+    again = (*options, "--overwrite", "--set", "steps.names=[none]")
+    unknown = vdet(package, "detect-video", clip, *again)
+    assert "none: is no step; known are lanes, regions, counts, wide" in unknown.stderr
+
+
+def test_the_command_runs_and_is_listed(package: Path, clip: Path) -> None:
+    done = vdet(package, "frames", clip)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == [f"{number}: 1" for number in range(FRAMES)]
+    assert "frames" in vdet(package, "--help").stdout
 
 
 def test_the_detector_runs_through_eval_images(package: Path, tmp_path: Path) -> None:
