@@ -1,17 +1,15 @@
 """Zip files from outside: listed and read, up to their limits."""
 
-import contextlib
 import io
 import struct
 import tracemalloc
 import zipfile
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.archives import ArchiveError, list_members, open_archive, read_member
+from vdet.archives import ArchiveError, open_archive, read_member
 
 
 def zipped(name: str, data: bytes, compression: int = zipfile.ZIP_DEFLATED) -> bytes:
@@ -29,14 +27,6 @@ def member(data: bytes, name: str = "a", most: int = 10**9) -> bytes:
 @given(st.binary(), st.sampled_from([zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED]))
 def test_a_member_is_read_as_it_was_written(data: bytes, compression: int) -> None:
     assert member(zipped("a", data, compression)) == data
-
-
-@given(st.binary(min_size=30, max_size=200), st.data())
-def test_a_member_is_read_whole_or_not_at_all(content: bytes, drawn: st.DataObject) -> None:
-    data = bytearray(zipped("a", content))
-    data[drawn.draw(st.integers(0, len(data) - 1))] ^= drawn.draw(st.integers(1, 255))
-    with contextlib.suppress(ArchiveError):
-        assert member(bytes(data)) == content
 
 
 @pytest.mark.parametrize(
@@ -64,10 +54,3 @@ def test_a_member_is_unpacked_no_further_than_it_claims_to_go() -> None:
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 2_000_000
-
-
-@pytest.mark.parametrize("name", ["a", "a/b..c", "...", "a/.b/c", "12:30.png", "C/a", "~/a", "é"])
-def test_ordinary_names_are_listed(tmp_path: Path, name: str) -> None:
-    path = tmp_path / "a.zip"
-    path.write_bytes(zipped(name, b""))
-    assert list_members(path) == [name]

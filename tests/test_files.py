@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.errors import ConfigError, OutputError, VideoError
+from vdet.errors import ConfigError, OutputError
 from vdet.files import (
     OutputFiles,
     check_output,
@@ -100,16 +100,6 @@ def test_of_three_runs_to_one_output_one_succeeds(tmp_path: Path) -> None:
     assert names(tmp_path) == ["out.txt"]
 
 
-def test_what_may_not_be_replaced_is_kept_also_if_it_appears_during_the_run(tmp_path: Path) -> None:
-    path = tmp_path / "out.txt"
-    files = OutputFiles(overwrite=True)
-    files.stage(path, lambda path: path.read_text() == "ours").write_text("new")
-    path.write_text("theirs")
-    with pytest.raises(OutputError, match="vdet did not write it, so it is kept"), files:
-        pass
-    assert path.read_text() == "theirs"
-
-
 def test_a_link_is_replaced_and_not_what_it_leads_to(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("precious")
     (tmp_path / "out.txt").symlink_to("precious")
@@ -127,15 +117,6 @@ def test_a_full_disk_names_the_output(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"out\.txt: cannot be written: No space left on device"):
         write()
     assert names(tmp_path) == []
-
-
-def test_an_error_of_vdet_passes_unchanged(tmp_path: Path) -> None:
-    def write() -> None:
-        with staged(tmp_path / "out.mp4"):
-            raise VideoError("in.mp4: is cut off")
-
-    with pytest.raises(VideoError, match=r"^in\.mp4: is cut off$"):
-        write()
 
 
 LEAVE_ONE = """
@@ -202,16 +183,6 @@ class TestOutputFiles:
             run()
         assert names(tmp_path) == ["1.txt"]
         assert (tmp_path / "1.txt").read_text() == "old"
-
-    def test_none_appears_where_one_cannot_be_staged(self, tmp_path: Path) -> None:
-        def run() -> None:
-            with OutputFiles() as files:
-                self.write(tmp_path, files, 1, 2)
-                files.stage(tmp_path / "none" / "x.txt")
-
-        with pytest.raises(OutputError, match=r"x\.txt: cannot be written: No such file"):
-            run()
-        assert names(tmp_path) == []
 
     def test_none_appears_where_one_cannot_be_synced(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -359,11 +330,6 @@ def test_a_folder_is_no_output_file(tmp_path: Path, overwrite: bool) -> None:
         check_output(tmp_path, overwrite=overwrite)
 
 
-def test_an_output_in_a_missing_folder_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="does not exist; make it first"):
-        check_output(tmp_path / "no" / "out.txt", overwrite=True)
-
-
 def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     check_output(tmp_path / "a" / "b" / "out.txt", overwrite=False, makes_folder=True)
@@ -374,13 +340,6 @@ def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
 
 def read(path: Path, most: int) -> bytes:
     return read_whole(path, most=most, what="letter", error=ConfigError)
-
-
-@pytest.mark.parametrize("size", [0, 9, 10])
-def test_a_file_within_its_limit_is_read_whole(tmp_path: Path, size: int) -> None:
-    path = tmp_path / "file"
-    path.write_bytes(b"x" * size)
-    assert read(path, 10) == b"x" * size
 
 
 def test_a_larger_file_is_refused_with_the_error_of_the_caller(tmp_path: Path) -> None:
@@ -397,11 +356,6 @@ def test_an_endless_file_takes_no_more_memory_than_the_limit() -> None:
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 7_500_000
-
-
-def test_a_missing_file_is_named() -> None:
-    with pytest.raises(ConfigError, match="none: cannot be read: No such file"):
-        read(Path("none"), 10)
 
 
 @given(st.text(max_size=200))

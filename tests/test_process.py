@@ -69,19 +69,6 @@ def test_what_the_user_names_stays_on_the_path(
         assert os.environ["PYTHONPATH"].split(os.pathsep) == [*([named] if named else []), "/other"]
 
 
-def test_a_folder_that_was_removed_is_no_place_for_modules(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("PYTHONPATH", "PYTHONSAFEPATH"):
-        monkeypatch.setenv(name, "")
-    (tmp_path / "gone").mkdir()
-    monkeypatch.chdir(tmp_path / "gone")
-    (tmp_path / "gone").rmdir()
-    monkeypatch.setattr(sys, "path", ["/other"])
-    leave_out_current_folder()
-    assert sys.path == ["/other"]
-
-
 def test_a_batch_goes_on_without_standard_error(
     batch: tuple[str, ...], running: list[Running], tmp_path: Path
 ) -> None:
@@ -99,15 +86,6 @@ def test_what_cannot_be_written_is_dropped() -> None:
         assert file.write(b"unheard") == 7
     with LossyFile("/dev/full", "w") as file:
         assert file.write(b"unheard") == 7
-
-
-def test_a_pipe_that_nobody_empties_takes_no_more() -> None:
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    with LossyFile(writer, "w") as file:
-        for _ in range(1000):
-            assert file.write(bytes(1000)) > 0
-    os.close(reader)
 
 
 def test_too_little_memory_is_reported_in_one_line(running: list[Running], tmp_path: Path) -> None:

@@ -60,10 +60,6 @@ def test_an_error_of_the_function_is_raised(workers: Workers) -> None:
         list(workers.map(partial(divmod, 1), [1, 0]))
 
 
-def test_in_this_process_results_come_in_order() -> None:
-    assert list(ThisProcess().map(process_of, range(2))) == [(0, os.getpid()), (1, os.getpid())]
-
-
 def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
     results = list(LocalProcesses(1).map(process_of, range(4)))
     assert [number for number, _ in results] == [0, 1, 2, 3]

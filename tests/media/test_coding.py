@@ -82,21 +82,3 @@ def test_grey_is_grey_from_black_to_white(coding: Coding) -> None:
     np.testing.assert_allclose(ours[0], (steps - black) * 255 / (white - black), atol=0.5)
     assert (blue == 128).all()
     assert (red == 128).all()
-
-
-@in_any_coding
-def test_values_that_no_colour_has_stay_in_the_range(coding: Coding) -> None:
-    ends = np.array([0, 255], np.uint8)
-    luma, blue, red = (np.array(each) for each in np.meshgrid(ends, ends, ends))
-    layers = luma.reshape(1, 8), blue.reshape(1, 8), red.reshape(1, 8)
-    for before, after in zip(layers, coding.to_common(layers), strict=True):
-        assert ((before < 128) == (after < 128)).all()
-
-
-@in_any_coding
-def test_the_planes_are_not_changed(coding: Coding) -> None:
-    planes = Planes.of_image(squares(), coding)
-    before = [layer.copy() for layer in planes.layers]
-    coding.to_common(planes.layers)
-    for layer, expected in zip(planes.layers, before, strict=True):
-        np.testing.assert_array_equal(layer, expected)

@@ -1,49 +1,73 @@
-"""Packets are read from a file in spite of read errors."""
+"""An index that claims more samples than a file can have is refused before it costs memory."""
 
-from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any, cast
+import struct
+from collections.abc import Callable
+from pathlib import Path
 
-import av
-from av.container import InputContainer
+import pytest
+from hypothesis import strategies as st
 
-from vdet.media.demux import packets
+from vdet.errors import VideoError
+from vdet.media import VideoReader
+from vdet.media.demux import check_mp4_index
 
-
-class Failing:
-    """A container whose reads follow `script`: packets to yield, or errors to raise."""
-
-    def __init__(self, *script: Any) -> None:
-        self.script = iter(script)
-
-    def demux(self, _streams: list[Any]) -> Iterator[Any]:
-        for step in self.script:
-            if isinstance(step, Exception):
-                raise step
-            yield step
+Writer = Callable[..., Path]
+MANY = 90_000_000
 
 
-def error() -> av.FFmpegError:
-    return av.error.InvalidDataError(1, "damaged")
+def box(kind: bytes, content: bytes) -> bytes:
+    return struct.pack(">I4s", 8 + len(content), kind) + content
 
 
-def read(*script: Any) -> tuple[list[Any], int]:
-    errors: list[None] = []
-    container = cast(InputContainer, Failing(*script))
-    found = list(packets(container, on_error=lambda: errors.append(None)))
-    return found, len(errors)
+def with_claim(path: Path, count: int, size: int = 1) -> Path:
+    """Make the sample table claim `count` samples of `size` bytes."""
+    data = bytearray(path.read_bytes())
+    at = data.index(b"stsz")
+    data[at + 8 : at + 16] = struct.pack(">II", size, count)
+    path.write_bytes(data)
+    return path
 
 
-A, B = SimpleNamespace(size=10), SimpleNamespace(size=20)
+def test_more_samples_than_bytes_are_refused(tmp_path: Path, write_clip: Writer) -> None:
+    path = with_claim(write_clip(tmp_path / "bomb.mp4"), MANY)
+    with pytest.raises(VideoError, match=r"bomb\.mp4: claims 90,000,000 samples in \d,\d+ bytes"):
+        VideoReader(path)
 
 
-def test_reading_goes_on_after_an_error() -> None:
-    assert read(A, error(), B) == ([A, B], 1)
+@pytest.mark.parametrize("parts", [1, 30])
+def test_fragments_that_claim_too_many_samples_together_are_refused(
+    parts: int, tmp_path: Path
+) -> None:
+    run = box(b"trun", struct.pack(">III", 1, MANY // parts, 0))
+    data = box(b"ftyp", b"isom") + box(b"moof", box(b"traf", run)) * parts
+    (tmp_path / "bomb.mp4").write_bytes(data)
+    with pytest.raises(VideoError, match="claims 90,000,000 samples"):
+        check_mp4_index(tmp_path / "bomb.mp4")
 
 
-def test_a_file_of_nothing_but_errors_ends() -> None:
-    assert read(*(error() for _ in range(1000)), A) == ([], 1)
+def test_an_index_after_a_box_with_a_64_bit_size_is_checked(tmp_path: Path) -> None:
+    large = struct.pack(">I4sQ", 1, b"mdat", 16 + 5000) + bytes(5000)
+    table = box(b"moov", box(b"trak", box(b"stsz", struct.pack(">III", 0, 1, MANY))))
+    (tmp_path / "bomb.mov").write_bytes(large + table)
+    with pytest.raises(VideoError, match="claims 90,000,000"):
+        check_mp4_index(tmp_path / "bomb.mov")
 
 
-def test_empty_packets_are_dropped() -> None:
-    assert read(SimpleNamespace(size=0), A) == ([A], 0)
+def test_whole_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
+    for suffix, options in (
+        ("mp4", {"sounds": ["aac"]}),
+        ("mov", {"sounds": ["pcm_s16le"], "sound_seconds": 100, "count": 2}),
+        ("mp4", {"movflags": "+frag_keyframe+empty_moov"}),
+        ("mkv", {}),
+    ):
+        check_mp4_index(write_clip(tmp_path / f"clip.{suffix}", **options))
+
+
+BOXES = st.lists(
+    st.tuples(
+        st.sampled_from([0, 1, 8, 12, 16, 24, 2**32 - 1]),
+        st.sampled_from([b"moov", b"trak", b"stsz", b"trun", b"moof", b"free"]),
+        st.binary(max_size=20),
+    ).map(lambda part: struct.pack(">I4s", part[0], part[1]) + part[2]),
+    max_size=8,
+).map(b"".join)

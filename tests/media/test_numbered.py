@@ -84,11 +84,6 @@ def test_a_name_that_is_no_pattern_is_a_file(name: str, tmp_path: Path) -> None:
     assert find_sequence(tmp_path / name) is None
 
 
-def test_an_existing_file_with_the_name_of_a_pattern_is_a_file(tmp_path: Path) -> None:
-    make(tmp_path, "a%d.mp4", "a1.mp4")
-    assert find_sequence(tmp_path / "a%d.mp4") is None
-
-
 @pytest.mark.parametrize(
     ("names", "words"),
     [

@@ -74,12 +74,6 @@ class TestCoding:
         assert found is not None
         assert (found.matrix, found.full_range) == (name, full_range)
 
-    def test_of_video_without_tags_is_the_default(self) -> None:
-        assert Coding.of(av.VideoFrame(32, 32, "yuv420p")) == Coding("bt601", full_range=False)
-
-    def test_the_pixels_of_jpeg_use_the_full_range_whatever_the_tag(self) -> None:
-        assert Coding.of(decoded("yuvj420p")) == Coding(full_range=True)
-
     @pytest.mark.parametrize(
         "pixels", ["yuv444p", "yuvj444p", "yuv422p", "yuv420p10le", "nv12", "gray", "bgr24"]
     )
@@ -101,13 +95,6 @@ class TestViews:
         np.testing.assert_array_equal(planes.luma, values[:32])
         np.testing.assert_array_equal(planes.blue, values[32:40].reshape(16, 32))
         np.testing.assert_array_equal(planes.red, values[40:].reshape(16, 32))
-
-    @pytest.mark.parametrize("side", [32, 97])
-    def test_a_value_of_chroma_stands_for_what_is_left_of_an_odd_side(self, side: int) -> None:
-        planes = Planes(decoded(side=side), Coding())
-        half = -(-side // 2)
-        assert planes.shape == planes.luma.shape == (side, side)
-        assert planes.blue.shape == planes.red.shape == (half, half)
 
 
 class TestCopy:

@@ -182,15 +182,3 @@ def test_sound_may_come_before_or_after_its_pictures(begins: list[int], lead: in
     for stream in (PICTURES, SOUND_STREAM):
         times = [time - begins[0] for index, time in found if index == stream]
         assert times == [40 * number for number in range(50 * len(begins))]
-
-
-def test_the_sound_of_a_part_may_begin_before_the_pictures_of_another_end() -> None:
-    first, second = part_of(0, lead=0), part_of(90_000, lead=0)
-    held = [each for each in first[-8:] if each.stream_index == PICTURES]
-    early = [each for each in second[:8] if each.stream_index == SOUND_STREAM]
-    before = [each for each in first if each not in held]
-    after = [each for each in second if each not in early]
-    found = joined([*before, *early, *held, *after])
-    for stream in (PICTURES, SOUND_STREAM):
-        times = [time for index, time in found if index == stream]
-        assert times == [40 * number for number in range(100)]

@@ -127,12 +127,3 @@ def test_a_start_beyond_the_end_gives_no_frame_and_the_length(
     with VideoReader(path, start=Fraction(10**13)) as reader:
         assert list(reader) == []
         assert reader.length == pytest.approx(Fraction(60, 25), abs=0.002)
-
-
-def test_the_declared_length_is_known_before_and_after_a_part_is_read(
-    tmp_path: Path, write_clip: Writer
-) -> None:
-    with VideoReader(write_clip(tmp_path / "clip.mp4", **GOPS), frames=2) as reader:
-        assert reader.length == Fraction(60, 25)
-        assert len(list(reader)) == 2
-    assert reader.length == Fraction(60, 25)

@@ -107,19 +107,6 @@ def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
         assert container.streams.video[0].frames == 12
 
 
-def test_a_source_cut_off_gives_the_sound_before_the_cut(
-    tmp_path: Path, write_clip: Writer, warnings: Warnings
-) -> None:
-    source = write_clip(tmp_path / "in.mkv", sounds=["aac"], count=50)
-    data = source.read_bytes()
-    source.write_bytes(data[: len(data) // 2])
-    target = copy(source, tmp_path / "out.mp4")
-    assert len(warnings()) == 1
-    kept = sound(target)
-    assert len(kept) > 10
-    assert_same(kept, sound(source)[-len(kept) :])
-
-
 def test_damaged_sound_does_not_affect_the_picture(
     tmp_path: Path, write_clip: Writer, warnings: Warnings
 ) -> None:

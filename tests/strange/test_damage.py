@@ -83,12 +83,6 @@ def test_too_much_damage_is_an_error_and_nothing_is_written(
     assert not list(out.parent.iterdir())
 
 
-def test_the_limit_of_damage_is_a_setting(tmp_path: Path, process: Process) -> None:
-    source = damaged(tmp_path, "mp4", [11, 22, 33, 34])
-    shown = process(source, "--set", "input.max_damaged=0.1")
-    assert "4 of 40 frames damaged or lost" in shown.warnings[0]
-
-
 def test_damage_after_the_last_frame_read_does_not_count(tmp_path: Path, process: Process) -> None:
     source = damaged(tmp_path, "mp4", [31, 32, 33, 34])
     shown = process(source, "--frames", "25")

@@ -8,7 +8,6 @@ import pytest
 from av.stream import Disposition
 
 from clips import joined, write_clip
-from conftest import Run
 from strange.conftest import Process, Shown, assert_whole
 
 
@@ -99,14 +98,3 @@ def test_frames_too_small_for_any_window_pass_with_a_warning(
     width, height = size
     assert "tiny.mkv: gets no boxes: no search window fits into a frame" in warning
     assert f"{width}×{height}" in warning
-
-
-def test_frames_with_too_many_windows_are_refused(run: Run, tmp_path: Path) -> None:
-    source = write_clip(
-        tmp_path / "wide.mkv", size=(16_000, 100), count=1, codec="ffv1", pix_fmt="bgr0"
-    )
-    fine = "detector.search.windows=[{size: 60, overlap: 0.9, top: 0, bottom: 720}]"
-    result = run("detect-video", source, tmp_path / "out.mp4", "-c", "svm", "--set", fine)
-    assert result.code == 1
-    assert "wide.mkv: " in result.err
-    assert "search windows would be laid" in result.err
