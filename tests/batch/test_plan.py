@@ -10,7 +10,7 @@ import pytest
 
 from running import write_drive
 from vdet.batch.manifest import Origin, Record, open_manifest
-from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, make_plan
+from vdet.batch.plan import OutputSuffix, Plan, make_plan
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, ConfigError, OutputError
 from vdet.run.sinks import tracks
@@ -39,14 +39,19 @@ def plan(*inputs: str, folder: str = "out", tracks: str | None = None, **options
 
 
 def plan_outputs(
-    *inputs: str, suffixes: Mapping[str, str | None], folder: str = "out", **options: bool
+    *inputs: str,
+    suffixes: Mapping[str, str | None],
+    folder: str = "out",
+    overwrite: bool = False,
+    skip_existing: bool = False,
 ) -> Plan:
-    clips = [Path(path) for path in inputs]
-    return make_plan(clips, Path(folder), COMMON, wanted(suffixes, **options), DIGEST)
-
-
-def wanted(suffixes: Mapping[str, str | None], **options: bool) -> OutputOptions:
-    return OutputOptions([OutputSuffix(*each) for each in suffixes.items()], **options)
+    return make_plan(
+        [Path(path) for path in inputs],
+        Path(folder),
+        replace(COMMON, overwrite=overwrite),
+        [OutputSuffix(*each) for each in suffixes.items()],
+        digest=DIGEST if skip_existing else None,
+    )
 
 
 def outputs(jobs: tuple[VideoJob, ...]) -> list[list[str]]:
@@ -97,7 +102,7 @@ class TestJobs:
 
     def test_a_sink_may_write_several_outputs_of_each_video(self) -> None:
         suffixes = [OutputSuffix("tracks", end) for end in (".txt", ".kitti.txt", ".coco.json")]
-        plan = make_plan([Path("clips/a.mp4")], Path("out"), COMMON, OutputOptions(suffixes))
+        plan = make_plan([Path("clips/a.mp4")], Path("out"), COMMON, suffixes)
         assert outputs(plan.jobs) == [["out/a.txt", "out/a.kitti.txt", "out/a.coco.json"]]
 
     def test_a_suffix_for_the_video_chooses_its_container(self) -> None:
@@ -283,7 +288,7 @@ class TestTotals:
     def test_two_of_one_name_are_refused(self, monkeypatch: pytest.MonkeyPatch) -> None:
         total = BatchTotal("all", lambda _, target: target.touch(), suffix=".json")
         monkeypatch.setattr(tracks, "TRACKS", replace(tracks.TRACKS, total=total))
-        both = OutputOptions([OutputSuffix("tracks", ".csv"), OutputSuffix("tracks", ".txt")])
+        both = [OutputSuffix("tracks", ".csv"), OutputSuffix("tracks", ".txt")]
         with pytest.raises(BatchError, match=r"both would become out/all\.json"):
             make_plan([Path("clips")], Path("out"), COMMON, both)
 

@@ -8,7 +8,7 @@ from typing import TypeVar
 import pytest
 
 from running import write_drive
-from vdet.batch.plan import OutputOptions, OutputSuffix, Plan, Total, make_plan
+from vdet.batch.plan import OutputSuffix, Plan, Total, make_plan
 from vdet.batch.run import each_once, run_batch, write_totals
 from vdet.batch.task import Work
 from vdet.config.schema import Settings
@@ -76,7 +76,7 @@ def test_what_is_repeated_may_differ_and_counts_for_its_item() -> None:
 
 def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: Path) -> None:
     clip = write_drive(tmp_path / "clip.mp4", 3)
-    outputs = OutputOptions([OutputSuffix("tracks", ".csv")])
+    outputs = [OutputSuffix("tracks", ".csv")]
     plan = make_plan([clip], tmp_path / "out", VideoJob(Path()), outputs)
     workers = FakeWorkers(1, deadly=list(enumerate(plan.jobs)), kills_left=1)
     work = Work(Settings(), None, threads=1)

@@ -41,15 +41,15 @@ def plan_of(*names: str) -> Plan:
     return Plan(Path(), tuple(VideoJob(Path(name), frames=100) for name in names), ())
 
 
-def test_the_bar_of_a_batch_names_the_running_files_and_counts_frames(terminal: Terminal) -> None:
-    with batch_bar(plan_of("a.mp4", "b\x1b.mp4", "c.mp4")) as counts:
+def test_the_bar_of_a_batch_counts_files_and_frames(terminal: Terminal) -> None:
+    with batch_bar(plan_of("a.mp4", "b.mp4", "c.mp4")) as counts:
         assert counts is not None
         counts.progress_of(0)(100)(100)
         counts.end(0, 100)
         counts.progress_of(1)(50)(25)
     last = terminal.getvalue().rstrip("\n").rpartition("\r")[2]
     assert " 125/225 frames [" in last  # the third file is as long as the mean of the others
-    assert " frames/s, 1 of 3 files, b\\x1b.mp4 50%]" in last
+    assert " frames/s, 1 of 3 files]" in last
 
 
 def test_a_bar_shows_that_the_program_is_at_work(

@@ -11,13 +11,7 @@ from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
 from vdet.media.writer import may_replace_video
-from vdet.run.sinks.protocol import (
-    BatchTotal,
-    Output,
-    check_sinks,
-    output_state,
-    sink_kind,
-)
+from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, output_state, sink_kind
 from vdet.run.video import VideoJob
 
 MANIFEST = "manifest.jsonl"
@@ -40,26 +34,6 @@ class OutputSuffix:
 
     sink: str
     suffix: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class OutputOptions:
-    """Which outputs every video gets, and what happens to outputs that are there already.
-
-    Attributes
-    ----------
-    suffixes
-        The outputs of each video; a sink may come several times.
-    overwrite
-        Outputs that are there already are replaced.
-    skip_existing
-        A job is skipped if all its outputs are there, and the manifest says that they are up to
-        date. Else all are made again, but only outputs that vdet wrote are replaced.
-    """
-
-    suffixes: Sequence[OutputSuffix]
-    overwrite: bool = False
-    skip_existing: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,23 +67,27 @@ def make_plan(
     clips: Sequence[Path],
     folder: Path,
     common: VideoJob,
-    options: OutputOptions,
-    digest: str = "",
+    suffixes: Sequence[OutputSuffix],
+    *,
+    digest: str | None = None,
 ) -> Plan:
     """Plan a job for every video of `clips`; outputs lie in `folder` by the places of the videos.
 
     Parameters
     ----------
     common
-        A job with the times, the number of frames and the lanes of all jobs.
+        A job with what all jobs have in common.
+    suffixes
+        The outputs of each video; a sink may come several times.
     digest
-        From `work_digest`, for `skip_existing`.
+        That of the `Work`, to skip jobs whose outputs are all there, and up to date as the manifest
+        says. Else all outputs of a job are made again, but only those that vdet wrote are replaced.
 
     Raises
     ------
     BatchError
         There is no video; an input lies in `folder`, or `folder` in an input; two outputs have one
-        name; with `skip_existing`, an output is there that vdet did not write.
+        name; with `digest`, an output is there that vdet did not write.
     OutputError
         An output cannot be written, or is there already; the manifest cannot be used.
     ConfigError
@@ -118,26 +96,27 @@ def make_plan(
     _refuse_nested(clips, folder)
     sources = find_sources(clips)
     _refuse_inside(sources, folder)
-    jobs = [_job(source, folder, common, options) for source in sources]
-    totals = _totals(sources, folder, options)
+    jobs = [_job(source, folder, common, suffixes) for source in sources]
+    totals = _totals(sources, folder, suffixes)
     _refuse_shared(jobs, totals, folder)
     manifest = folder / MANIFEST
     check_manifest(manifest)
     check_output(manifest, overwrite=True, makes_folder=True)
-    written = read_written(manifest) if options.skip_existing else {}
-    skipped = tuple(job for job in jobs if written and _is_done(job, digest, written))
-    to_do = [job for job in jobs if job not in skipped]
-    if options.skip_existing:
-        to_do = [_replacing_ours(job, written, manifest) for job in to_do]
-    for job in to_do:
+    replaces, skipped = common.overwrite, []
+    if digest is not None:
+        written, replaces = read_written(manifest), manifest.exists()
+        skipped = [job for job in jobs if _is_done(job, digest, written)]
+        jobs = [_replacing_ours(job, written, manifest) for job in jobs if job not in skipped]
+    for job in jobs:
         check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
     for total in totals:
-        replaces = options.overwrite or (options.skip_existing and manifest.exists())
         check_output(total.path, overwrite=replaces, makes_folder=True)
-    return Plan(folder, tuple(to_do), skipped, totals)
+    return Plan(folder, tuple(jobs), tuple(skipped), totals)
 
 
-def _totals(sources: Sequence[Source], folder: Path, options: OutputOptions) -> tuple[Total, ...]:
+def _totals(
+    sources: Sequence[Source], folder: Path, suffixes: Sequence[OutputSuffix]
+) -> tuple[Total, ...]:
     return tuple(
         Total(
             total,
@@ -147,15 +126,17 @@ def _totals(sources: Sequence[Source], folder: Path, options: OutputOptions) -> 
                 for source in sources
             },
         )
-        for each in options.suffixes
+        for each in suffixes
         if (total := sink_kind(each.sink).total)
     )
 
 
-def _job(source: Source, folder: Path, common: VideoJob, options: OutputOptions) -> VideoJob:
+def _job(
+    source: Source, folder: Path, common: VideoJob, suffixes: Sequence[OutputSuffix]
+) -> VideoJob:
     place = folder / source.place
-    outputs = tuple(Output(each.sink, _path(place, each)) for each in options.suffixes)
-    return replace(common, source=source.path, outputs=outputs, overwrite=options.overwrite)
+    outputs = tuple(Output(each.sink, _path(place, each)) for each in suffixes)
+    return replace(common, source=source.path, outputs=outputs)
 
 
 def _path(place: Path, output: OutputSuffix) -> Path:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from vdet.progress import Advance, Progress, no_progress
 from vdet.run.video import VideoJob
 
-_ROW = np.dtype([("done", "i8"), ("expected", "i8"), ("begun", "?"), ("ended", "?")])
+_ROW = np.dtype([("done", "i8"), ("expected", "i8"), ("ended", "?")])
 """Of a file: frames done and expected, 0 for unknown."""
 
 
@@ -29,14 +29,11 @@ class BatchState:
         Frames done, and of all files. Of files that are not begun, they are guessed from the size.
     ended
         Number of files that have ended.
-    running
-        Numbers of the files in work, with the share of each that is done (0 if unknown).
     """
 
     done: int
     total: int
     ended: int
-    running: tuple[tuple[int, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +61,7 @@ class FrameCounts:
             return no_progress
 
         def start(expected: int | None) -> Advance:
-            rows[number] = (0, expected or 0, True, False)
+            rows[number] = (0, expected or 0, False)
 
             def advance(frames: int) -> None:
                 rows["done"][number] += frames
@@ -77,7 +74,7 @@ class FrameCounts:
         """Note that a file has ended; `frames` is None if it failed."""
         rows = self._rows()
         done = rows["done"][number] if frames is None else frames
-        rows[number] = (done, done, True, True)
+        rows[number] = (done, done, True)
 
     def state(self) -> BatchState:
         """Return how far the batch is."""
@@ -85,14 +82,10 @@ class FrameCounts:
         known = (rows["expected"] > 0) | rows["ended"]
         ratio = rows["expected"][known].sum() / max(sizes[known].sum(), 1e-9)
         expected = np.where(known, rows["expected"], sizes * ratio)
-        expected = np.maximum(expected, rows["done"])
-        running = np.flatnonzero(rows["begun"] & ~rows["ended"])
-        shares = rows["done"][running] / np.maximum(expected[running], 1)
         return BatchState(
             done=int(rows["done"].sum()),
-            total=round(float(expected.sum())),
+            total=round(float(np.maximum(expected, rows["done"]).sum())),
             ended=int(np.count_nonzero(rows["ended"])),
-            running=tuple(zip(running.tolist(), shares.tolist(), strict=True)),
         )
 
 

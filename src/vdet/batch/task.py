@@ -5,7 +5,7 @@ import logging
 import os
 import time
 import traceback
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -193,27 +193,21 @@ def _record(job: VideoJob) -> Record:
     )
 
 
-class _WarningCollector(logging.Handler):
-    """Keeps the warnings about `paths`; other threads of the process may log about other files."""
-
-    def __init__(self, paths: Sequence[Path], messages: list[str]) -> None:
-        super().__init__(logging.WARNING)
-        self._prefixes = tuple(f"{path}: " for path in paths)
-        self._messages = messages
-
-    def emit(self, record: logging.LogRecord) -> None:
-        message = record.getMessage()
-        if message.startswith(self._prefixes):
-            self._messages.append(message)
-
-
 @contextmanager
 def _collected_warnings(job: VideoJob) -> Iterator[list[str]]:
+    """Give a list of the warnings about a job; other threads may log about other files."""
+    prefixes = tuple(f"{path}: " for path in (job.source, *(each.path for each in job.outputs)))
     messages: list[str] = []
-    collector = _WarningCollector([job.source, *(each.path for each in job.outputs)], messages)
+
+    def collect(record: logging.LogRecord) -> bool:
+        message = record.getMessage()
+        if record.levelno >= logging.WARNING and message.startswith(prefixes):
+            messages.append(message)
+        return True
+
     log = logging.getLogger("vdet")
-    log.addHandler(collector)
+    log.addFilter(collect)
     try:
         yield messages
     finally:
-        log.removeHandler(collector)
+        log.removeFilter(collect)

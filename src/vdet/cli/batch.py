@@ -13,13 +13,12 @@ import click
 from vdet.cli.messages import counted, is_quiet, live_bar, print_lines, print_message
 from vdet.cli.options import Wanted, bundle, jobs_option, option, scheduler_option
 from vdet.errors import failure_code
-from vdet.files import escaped
 
 if TYPE_CHECKING:
     from tqdm import tqdm
 
     from vdet.batch.manifest import Record
-    from vdet.batch.plan import OutputOptions, Plan
+    from vdet.batch.plan import OutputSuffix, Plan
     from vdet.batch.progress import FrameCounts
     from vdet.batch.task import Work
     from vdet.run.video import VideoJob
@@ -72,11 +71,9 @@ batch_options = bundle(
 )
 
 
-def read_output_options(
-    wanted: Sequence[Wanted], options: BatchOptions, *, no_video: bool, overwrite: bool
-) -> "OutputOptions":
+def read_suffixes(wanted: Sequence[Wanted], *, no_video: bool) -> "list[OutputSuffix]":
     """Return which outputs the videos of a batch get; raise `click.UsageError` on nonsense."""
-    from vdet.batch.plan import OutputOptions, OutputSuffix
+    from vdet.batch.plan import OutputSuffix
 
     suffixes = [OutputSuffix(sink, _suffix(sink, path)) for sink, path in wanted]
     for each in suffixes:
@@ -84,7 +81,7 @@ def read_output_options(
             raise click.UsageError(f"{each.sink} is given {each.suffix} twice; leave one out")
     if not no_video and not any(each.sink == "video" for each in suffixes):
         suffixes.insert(0, OutputSuffix("video"))
-    return OutputOptions(suffixes, overwrite=overwrite, skip_existing=options.skip_existing)
+    return suffixes
 
 
 def _suffix(sink: str, path: Path) -> str:
@@ -103,7 +100,7 @@ def _suffix(sink: str, path: Path) -> str:
 def process_batch(
     clips: Sequence[Path],
     common: "VideoJob",
-    outputs: "OutputOptions",
+    suffixes: "Sequence[OutputSuffix]",
     work: "Work",
     options: BatchOptions,
 ) -> int:
@@ -115,7 +112,8 @@ def process_batch(
     if options.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
         work = work.with_absolute_paths()
-    plan = make_plan(clips, folder, common, outputs, work.digest)
+    digest = work.digest if options.skip_existing else None
+    plan = make_plan(clips, folder, common, suffixes, digest=digest)
     if options.dry_run:
         print_lines(*_plan_lines(plan))
         return 0
@@ -195,9 +193,8 @@ def batch_bar(plan: "Plan") -> "Iterator[FrameCounts | None]":
             return
         state = counts.state()
         bar.n, bar.total = state.done, state.total
-        parts = [f"{state.ended} of {counted(len(plan.jobs), 'file')}"]
-        parts += [f"{escaped(plan.jobs[n].source.name)} {share:.0%}" for n, share in state.running]
-        bar.set_postfix_str(", ".join(parts), refresh=False)
+        ended = f"{state.ended} of {counted(len(plan.jobs), 'file')}"
+        bar.set_postfix_str(ended, refresh=False)
 
     with (
         frame_counts(plan.jobs) as made,

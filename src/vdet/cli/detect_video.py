@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from vdet.cli import options
-from vdet.cli.batch import BatchOptions, batch_options, process_batch, read_output_options
+from vdet.cli.batch import BatchOptions, batch_options, process_batch, read_suffixes
 from vdet.cli.command import command
 from vdet.cli.messages import counted, is_quiet, print_message, progress_steps
 from vdet.cli.options import option
@@ -134,10 +134,10 @@ def detect_video(
         job = replace(job, outputs=options.as_outputs(wanted))
         _process_one(job, settings, choice, threads)
         return 0
-    outputs = read_output_options(wanted, batch, no_video=no_video, overwrite=overwrite)
-    sinks = {each.sink for each in outputs.suffixes}
+    suffixes = read_suffixes(wanted, no_video=no_video)
+    sinks = {each.sink for each in suffixes}
     work = Work.of(job, sinks, settings, choice.model_path, threads)
-    return process_batch(clips, job, outputs, work, batch)
+    return process_batch(clips, job, suffixes, work, batch)
 
 
 def _check_times(
