@@ -24,7 +24,7 @@ _SEARCH = {"input", "detector", "tracker", "regions"}
 """The sections of the settings that tracks depend on."""
 
 _READ_BY = {"tracks": set[str](), "counts": {"counts"}, "crops": {"crops"}}
-"""The sections that a sink reads in addition. Another sink may read all but `train`."""
+"""The sections that a sink reads too. Another sink may read all but `train` and `labels`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class Work:
 
 def _sections(sinks: Iterable[str], *, with_lanes: bool) -> set[str]:
     """Return the sections of the settings that outputs depend on."""
-    all_of_them = set(Settings.model_fields) - {"train"}
+    all_of_them = set(Settings.model_fields) - {"train", "labels"}
     found = _SEARCH.union(*(_READ_BY.get(sink, all_of_them) for sink in sinks))
     return found | {"lanes"} if with_lanes else found - {"lanes"}
 
