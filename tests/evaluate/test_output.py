@@ -11,10 +11,6 @@ def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
     ]
 
 
-def test_a_table_without_rows_is_its_headings() -> None:
-    assert table(("name", "n"), []) == ["name  n"]
-
-
 def test_a_run_says_what_its_model_was_trained_on_where_that_is_known() -> None:
     first, second = run_lines(RunName("net", Path("x/a.onnx"), None, ("b=1",), ("idd", "uk")))
     assert first.endswith(", detector net, model a.onnx, settings default b=1")

@@ -26,12 +26,6 @@ def test_another_track_after_any_gap_is_a_switch() -> None:
     assert timeline.switches == (6,)
 
 
-def test_the_same_track_after_a_gap_is_no_switch() -> None:
-    found = video(drive(4, range(1, 4)), drive(4, range(6, 11)))
-    (timeline,) = found_timelines(found, video(drive(7, range(1, 11))))
-    assert timeline.switches == ()
-
-
 def test_frames_without_the_vehicle_are_in_no_stretch() -> None:
     truth = video(drive(7, range(1, 4)), drive(7, range(8, 11)), drive(8, range(1, 11), x=300))
     first, second = found_timelines(video(drive(4, range(1, 11))), truth)
@@ -75,8 +69,3 @@ def test_false_tracks_per_minute_use_the_length_of_the_video() -> None:
     found = video(drive(1, range(1, 9), x=300), drive(2, range(20, 30), x=300))
     truth = video(drive(8, range(741, 751)))
     assert score(found, truth, rate=25).false_tracks_per_minute == pytest.approx(4)
-
-
-def test_false_tracks_per_minute_are_unknown_without_a_rate() -> None:
-    found = video(drive(1, range(1, 9)))
-    assert score(found, found).false_tracks_per_minute is None

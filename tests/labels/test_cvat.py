@@ -48,9 +48,6 @@ class TestReading:
         box = BOX.replace("/>", '><attribute name="colour">red</attribute></box>')
         assert len(rows(track(box))) == 1
 
-    def test_a_file_without_tracks_has_no_rows(self) -> None:
-        assert rows(document("")) == ()
-
     def test_the_size_of_the_frames_is_read(self) -> None:
         assert read_cvat(FILE, document("").encode()).size == (640, 360)
         assert read_cvat(FILE, b"<annotations/>").size is None
@@ -80,22 +77,10 @@ class TestWriting:
         assert self.frames_of(track, outside="0") == [0, 3]
         assert self.frames_of(track, outside="1") == [1]
 
-    def test_a_track_that_ends_before_the_video_ends_with_a_box_outside(self) -> None:
-        (track,) = self.tracks([frame(0, car()), frame(1, car()), frame(2)])
-        assert self.frames_of(track, outside="1", keyframe="1") == [2]
-
-    def test_after_the_last_frame_of_the_video_there_is_none(self) -> None:
-        (track,) = self.tracks([frame(0, car()), frame(1, car())])
-        assert self.frames_of(track, outside="1") == []
-
     def test_a_part_of_a_video_ends_with_a_box_outside(self) -> None:
         part = SourceVideo("in.mp4", 1280, 720, frames=100)
         (track,) = self.tracks([frame(0, car()), frame(1, car())], part)
         assert self.frames_of(track, outside="1") == [2]
-
-    def test_a_predicted_box_is_occluded(self) -> None:
-        (track,) = self.tracks([frame(0, car()), frame(1, car(predicted=True))])
-        assert self.frames_of(track, occluded="1") == [1]
 
     def test_the_label_is_the_class_with_most_score(self) -> None:
         cars, trucks = [car(score=0.3)] * 2, [car(score=0.9, class_name="truck")]

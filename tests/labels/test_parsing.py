@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.errors import TruthError
-from vdet.labels.parsing import LIMIT, numbered_lines, parse_number, parse_whole, read_text
+from vdet.labels.parsing import numbered_lines, parse_number, parse_whole, read_text
 
 
 def test_blank_lines_count_and_any_line_ending_is_read() -> None:
@@ -17,11 +17,6 @@ def test_blank_lines_count_and_any_line_ending_is_read() -> None:
 )
 def test_a_decimal_number_is_read(text: str, value: float) -> None:
     assert parse_number(text) == value
-
-
-@given(st.floats(-LIMIT, LIMIT))
-def test_every_float_within_the_limit_is_read_back(value: float) -> None:
-    assert parse_number(repr(value)) == value
 
 
 @given(st.text(st.sampled_from("0123456789+-.eE_xnaif ٣"), max_size=12))
@@ -54,22 +49,12 @@ def test_a_whole_number_may_have_a_decimal_point() -> None:
     assert parse_whole("3.0") == 3
 
 
-def test_a_fraction_is_not_a_whole_number() -> None:
-    with pytest.raises(ValueError, match=r"'3\.5' is not a whole number"):
-        parse_whole("3.5")
-
-
 @pytest.mark.parametrize("content", [b"\xff\xfe\x00", b"1,2\x003", bytes(range(256))])
 def test_a_file_that_is_not_text_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "gt.txt"
     path.write_bytes(content)
     with pytest.raises(TruthError, match="is not text"):
         read_text(path)
-
-
-def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(TruthError, match=r"gone\.txt: cannot be read: No such file"):
-        read_text(tmp_path / "gone.txt")
 
 
 def test_a_byte_order_mark_is_not_part_of_the_text(tmp_path: Path) -> None:

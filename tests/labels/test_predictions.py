@@ -3,9 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from labels.saving import row
 from vdet.errors import TruthError
-from vdet.evaluate.scores import score
 from vdet.labels.reading import read_predictions
 from vdet.labels.video import LabelledVideo
 
@@ -51,24 +49,6 @@ SCORED_TXT = "1,1,11,21,30,40,{score},-1,-1,-1\n"
 SCORED = {"txt": SCORED_TXT, "csv": SCORED_CSV, "jsonl": SCORED_JSONL}
 
 
-@pytest.mark.parametrize("suffix", SCORED)
-@pytest.mark.parametrize("value", [0, 0.25, 1])
-def test_every_format_may_give_scores(tmp_path: Path, suffix: str, value: float) -> None:
-    video = read(tmp_path, suffix, SCORED[suffix].format(score=value))
-    assert video.scores.tolist() == [value]
-    assert video.boxes.tolist() == [[10, 20, 40, 60]]
-
-
-def test_scores_rank_the_boxes_for_average_precision(tmp_path: Path) -> None:
-    line = "0,0.0,{},{},0,100,100,{}\n"
-    header = "frame,time,id,x,y,width,height,score\n"
-    found = line.format(1, 0, 0.9) + line.format(2, 500, 0.2)
-    truth = LabelledVideo.of([row(0, 1, 1, 0, 0, 100, 100)])
-    assert score(read(tmp_path, "csv", header + found), truth).ap50 == 1
-    swapped = line.format(1, 0, 0.2) + line.format(2, 500, 0.9)
-    assert score(read(tmp_path, "csv", header + swapped), truth).ap50 == pytest.approx(0.5)
-
-
 @pytest.mark.parametrize(
     ("suffix", "value", "message"),
     [
@@ -98,15 +78,6 @@ def test_a_header_with_two_scores_is_refused(tmp_path: Path) -> None:
 def test_only_jsonl_tells_how_many_frames_the_video_has(tmp_path: Path) -> None:
     counts = {suffix: read(tmp_path, suffix, text).frame_count for suffix, text in FORMATS.items()}
     assert counts == {"txt": None, "csv": None, "jsonl": 4}
-
-
-def test_times_tell_the_rate(tmp_path: Path) -> None:
-    rates = {suffix: read(tmp_path, suffix, text).rate for suffix, text in FORMATS.items()}
-    assert rates == {"txt": None, "csv": pytest.approx(25), "jsonl": pytest.approx(25)}
-
-
-def test_a_single_time_tells_no_rate(tmp_path: Path) -> None:
-    assert read(tmp_path, "csv", HEADER + "5,0.2,1,10,20,30,40,False\n").rate is None
 
 
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])

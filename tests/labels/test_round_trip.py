@@ -115,12 +115,6 @@ def test_what_is_written_is_read_again(
 
 
 @every_format
-def test_equal_tracks_give_equal_files(form: Format) -> None:
-    frames = [frame(0, car(1), car(2)), frame(1, car(2))]
-    assert written(form, frames) == written(form, frames)
-
-
-@every_format
 @settings(max_examples=40)
 @given(st.data())
 def test_a_damaged_file_is_read_or_refused_in_one_line(

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels import mot
-from vdet.labels.coco import COCO
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.reading import read_truth
 from vdet.labels.video import LabelledVideo
@@ -95,21 +94,6 @@ def cvat(label: str, occluded: int = 0) -> str:
     return f'<annotations>\n<track id="3" label="{label}">{box}</track></annotations>'
 
 
-def test_cars_vans_and_trucks_are_vehicles_in_kitti(tmp_path: Path) -> None:
-    video = read_truth(write(tmp_path, kitti("Car", "Van", "Truck")))
-    assert video.ignored.tolist() == [False] * 3
-
-
-def test_what_nobody_must_find_is_an_ignore_region(tmp_path: Path) -> None:
-    assert read_truth(write(tmp_path, kitti("DontCare", "Tram"))).ignored.tolist() == [True] * 2
-    assert read_truth(write(tmp_path, cvat("ignore"))).ignored.tolist() == [True]
-
-
-def test_people_are_neither_vehicles_nor_ignore_regions(tmp_path: Path) -> None:
-    assert len(read_truth(write(tmp_path, kitti("Pedestrian", "Cyclist")))) == 0
-    assert len(read_truth(write(tmp_path, cvat("pedestrian")))) == 0
-
-
 def test_an_occluded_vehicle_counts(tmp_path: Path) -> None:
     assert read_truth(write(tmp_path, cvat("car", occluded=1))).ignored.tolist() == [False]
 
@@ -132,9 +116,3 @@ def test_tracks_of_every_format_can_be_truth(tmp_path: Path, form: Format) -> No
     assert np.allclose(video.boxes, [[10, 20, 40, 60]] * 3, atol=0.01)
     assert video.scores.tolist() == [1, 1, 1]
     assert video.ignored.tolist() == [False, False, True]
-
-
-def test_a_crowd_in_coco_is_an_ignore_region(tmp_path: Path) -> None:
-    path = tmp_path / "truth.json"
-    path.write_bytes(written(COCO, [frame(0, car())]).replace(b'"iscrowd": 0', b'"iscrowd": 1'))
-    assert read_truth(path).ignored.tolist() == [True]

@@ -19,16 +19,6 @@ def test_a_frame_consists_of_its_rows() -> None:
     assert frame.boxes.tolist() == [[10, 0, 15, 5], [20, 0, 25, 5]]
 
 
-def test_a_frame_without_rows_is_empty() -> None:
-    assert [len(scene().frame(number)) for number in (0, 1, 4, 6)] == [0, 0, 0, 0]
-
-
-def test_the_last_frame_is_that_of_the_video_or_else_of_the_rows() -> None:
-    assert scene().last_frame == 5
-    assert scene(frame_count=9).last_frame == 9
-    assert checked_video([], Path("scene")).last_frame == 0
-
-
 def test_until_keeps_the_frames_up_to_the_last() -> None:
     part = scene(frame_count=9).until(3)
     assert part.frames.tolist() == [2, 2, 3, 3]
@@ -52,12 +42,6 @@ def test_rows_are_ordered_by_frame_and_keep_their_order_within_one() -> None:
     video = checked_video(rows, FILE)
     assert video.frames.tolist() == [1, 1, 2]
     assert video.ids.tolist() == [9, 4, 5]
-
-
-def test_no_rows_make_a_video_without_boxes() -> None:
-    video = checked_video([], FILE)
-    assert len(video) == 0
-    assert video.boxes.shape == (0, 4)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +73,3 @@ def test_an_id_twice_in_a_frame_is_refused_with_both_lines() -> None:
 def test_a_frame_may_have_many_ignore_regions_without_an_id() -> None:
     rows = [row(line, 1, NO_ID, 0, 0, 5, 5, ignored=True) for line in (1, 2, 3)]
     assert checked_video(rows, FILE).ignored.tolist() == [True] * 3
-
-
-def test_the_last_frame_of_the_video_is_not_beyond_it() -> None:
-    assert checked_video([row(1, 10, 1, 0, 0, 5, 5)], FILE, frame_count=10).last_frame == 10

@@ -145,12 +145,6 @@ def test_only_the_frames_that_the_truth_covers_are_read(
     assert found.rate == 25
 
 
-def test_until_ends_sooner(clip_path: Path, truth_path: Path, variant: OfModel) -> None:
-    clip = open_clip(clip_path, truth_path, until=4)
-    (run,) = evaluate_clips([clip], [variant()])
-    assert max(frame.number for frame in run.clips[0].comparison.frames) == 4
-
-
 def test_truth_beyond_the_video_is_refused_with_its_line(
     clip_path: Path, tmp_path: Path, variant: OfModel
 ) -> None:
