@@ -23,10 +23,6 @@ def laid(
     return Regions(RegionsSettings.model_validate({"polygons": polygons, "mask": mask}), *size)
 
 
-def test_no_regions_are_the_whole_frame() -> None:
-    assert lay_regions(RegionsSettings(), 320, 180) is None
-
-
 def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:
     regions = laid(ROAD, BUSH | {"kind": "exclude"})
     assert regions.contains((200, 120))
@@ -34,12 +30,6 @@ def test_a_point_counts_where_it_is_included_and_not_excluded() -> None:
     assert not regions.contains((270, 130))
     assert regions.name_at((200, 120)) == "road"
     assert regions.name_at((60, 120)) is None
-
-
-def test_with_nothing_included_all_but_the_excluded_counts() -> None:
-    regions = laid(BUSH | {"kind": "exclude"})
-    assert regions.contains((60, 20))
-    assert not regions.contains((270, 130))
 
 
 def test_what_stands_beyond_the_edge_counts_as_at_the_edge() -> None:

@@ -1,7 +1,6 @@
 """What is drawn into planes looks like what is drawn into images."""
 
 from collections.abc import Callable
-from itertools import product
 
 import av
 import cv2
@@ -150,27 +149,7 @@ def test_nothing_else_is_changed(name: str, coding: Coding) -> None:
     assert not (changed & ~grown(halved(drawn))).any()
 
 
-@each_coding
-def test_the_middle_of_a_thick_line_has_its_colour(coding: Coding) -> None:
-    planes, image = ground(coding), np.zeros((HEIGHT, WIDTH, 3), np.uint8)
-    for surface in (planes, image):
-        draw_lines(surface, CORNERS, RED, 8)
-    solid = (image == RED).all(axis=2).astype(np.uint8)
-    middle = cv2.erode(solid, np.ones((5, 5))) > 0
-    assert middle.sum() > 500
-    assert np.abs(planes.to_image()[middle].astype(int) - RED).max() <= 3
-
-
 class TestFill:
-    @each_coding
-    def test_has_its_colour(self, coding: Coding) -> None:
-        values = (0, 30, 60, 130, 220, 255)
-        for color in product(values, values, values):
-            planes = ground(coding, 16, 16)
-            fill(planes, Box.sized(2, 4, 12, 8), color)
-            shown = planes.to_image()[4:12, 2:14].astype(int)
-            assert np.abs(shown - color).max() <= 3, color
-
     @given(
         box=st.builds(
             Box, st.integers(-30, 50), st.integers(-30, 40), st.integers(0, 60), st.integers(0, 60)
@@ -195,41 +174,12 @@ class TestFill:
 
 
 class TestBlend:
-    @pytest.mark.parametrize("x", [0, 1])
-    @pytest.mark.parametrize("y", [0, 1])
-    def test_a_whole_mask_that_is_even_is_a_filled_box(self, x: int, y: int) -> None:
-        mixed, filled = ground(Coding(), 33, 25), ground(Coding(), 33, 25)
-        box = Box.sized(2 * x, 2 * y, 20, 16)
-        blend(mixed, np.full((16, 20), 255, np.uint8), (2 * x, 2 * y), RED)
-        fill(filled, box, RED)
-        for ours, theirs in zip(mixed.layers, filled.layers, strict=True):
-            np.testing.assert_array_equal(ours, theirs)
-
     def test_chroma_is_mixed_by_the_share_of_its_pixels(self) -> None:
         planes = ground(Coding(), 32, 32)
         before, (_, blue, _) = planes.copy(), _coded(RED)
         blend(planes, np.full((1, 1), 255, np.uint8), (5, 7), RED)
         old = float(before.blue[3, 2])
         assert planes.blue[3, 2] == pytest.approx(old + (blue - old) / 4, abs=1)
-
-    @pytest.mark.parametrize("corner", [(30, 20), (31, 21), (32, 24)])
-    def test_reaches_the_last_pixel_of_odd_sides(self, corner: tuple[int, int]) -> None:
-        planes = ground(Coding(), 33, 25)
-        x, y = corner
-        blend(planes, np.full((25 - y, 33 - x), 255, np.uint8), corner, RED)
-        luma, _, _ = _coded(RED)
-        assert (planes.luma[y:, x:] == luma).all()
-
-    def test_without_opacity_nothing_changes(self) -> None:
-        planes = ground(Coding())
-        blend(planes, triangle(), (77, 51), RED, 0.0)
-        for ours, theirs in zip(planes.layers, ground(Coding()).layers, strict=True):
-            np.testing.assert_array_equal(ours, theirs)
-
-    @pytest.mark.parametrize("size", [(0, 0), (0, 5), (5, 0)])
-    def test_an_empty_mask_changes_nothing(self, size: tuple[int, int]) -> None:
-        for surface in (ground(Coding()), ground(Coding()).to_image()):
-            blend(surface, np.zeros(size, np.uint8), (10, 10), RED)
 
 
 class TestText:
@@ -241,12 +191,6 @@ class TestText:
         rows, columns = np.nonzero(changed)
         assert within.x1 <= columns.min() <= columns.max() < within.x2
         assert within.y1 <= rows.min() <= rows.max() < within.y2
-
-    @pytest.mark.parametrize("origin", [(-50, 10), (300, 239), (310, 300), (900, 900)])
-    def test_may_lie_beyond_the_frame(self, origin: tuple[int, int]) -> None:
-        planes = ground(Coding())
-        within = Box.sized(origin[0], origin[1] - 30, 200, 40)
-        write_text(planes, "#12 car", origin, TextStyle(1.2, 2), RED, within=within)
 
 
 def _coded(color: Color) -> list[int]:

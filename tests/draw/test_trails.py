@@ -1,7 +1,6 @@
 """Trails of vehicles."""
 
 import numpy as np
-import pytest
 
 from vdet.draw.boxes import BLACK
 from vdet.draw.trails import draw_trail
@@ -31,15 +30,6 @@ def test_a_trail_goes_through_its_points_without_a_gap() -> None:
 def test_it_grows_thinner_into_the_past() -> None:
     rows = heights(trail(LEVEL, width=8))
     assert rows[30] < rows[90] < rows[150] < rows[205]
-
-
-@pytest.mark.parametrize("points", [[], [(10.0, 10.0)]])
-def test_less_than_two_points_are_no_trail(points: list[tuple[float, float]]) -> None:
-    assert trail(points).min() == 255
-
-
-def test_two_points_are_one() -> None:
-    assert trail([(20.0, 20.0), (60.0, 20.0)]).min() == 0
 
 
 def test_points_that_tremble_give_a_smooth_line() -> None:

@@ -1,10 +1,6 @@
-import subprocess
-import sys
-
 import pytest
 
 from seed import SEED
-from vdet.boxes import NO_BOXES
 from vdet.config.schema import RulesTrackerSettings, Settings
 from vdet.track.factory import HoldingTracker, make_tracker
 from vdet.track.motion.tracker import MotionTracker
@@ -23,15 +19,3 @@ def test_the_lengths_of_the_rules_are_scaled_to_the_frame(monkeypatch: pytest.Mo
     monkeypatch.setattr(RulesTracker, "__init__", lambda _, settings: made.append(settings))
     make_tracker(SEED, 640, 360)
     assert (made[0].min_region, made[0].near) == (25, 25)
-
-
-def test_every_tracker_is_new() -> None:
-    first, second = (make_tracker(Settings(), 1280, 720) for _ in range(2))
-    assert first is not second
-    assert first.update(NO_BOXES, 0.0) == []
-
-
-def test_the_rules_do_without_scipy() -> None:
-    code = "import sys, vdet.track.factory, vdet.track.rules.tracker; print('scipy' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"

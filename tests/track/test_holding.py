@@ -31,13 +31,3 @@ def test_vehicles_stay_where_they_were_in_frames_that_are_not_searched() -> None
         assert (held.id, held.box, held.score) == (seen.id, seen.box, seen.score)
         assert held.predicted
     assert not seen.predicted
-
-
-def test_the_tracker_sees_only_the_frames_that_are_searched() -> None:
-    inner = SeesOne()
-    tracker = HoldingTracker(inner)
-    assert tracker.carry(0.0) == []
-    for time in (1.0, 2.0):
-        tracker.update(NO_BOXES, time)
-        tracker.carry(time + 0.5)
-    assert inner.times == [1.0, 2.0]

@@ -90,25 +90,9 @@ def test_the_foot_moves_with_its_box() -> None:
         assert shown.foot == pytest.approx((middle, shown.box.y2))
 
 
-def test_each_vehicle_is_smoothed_for_itself() -> None:
-    alone = smoothed(trembling(30))
-    steady = SteadyBoxes(SECONDS)
-    other = Box.sized(900, 100, 80, 60)
-    for number, (box, expected) in enumerate(zip(trembling(30), alone, strict=True)):
-        first, second = steady.update([track(box), track(other, 2)], number / 25)
-        assert (first.box, second.box) == (expected, other)
-
-
 def test_a_vehicle_that_comes_back_later_begins_anew() -> None:
     steady = SteadyBoxes(SECONDS)
     for number in range(20):
         steady.update([track(moved_to(CAR, 10 * number, 200))], number / 25)
     (back,) = steady.update([track(CAR)], 1 + GAP + 0.1)
     assert back.box == CAR
-
-
-def test_times_that_stand_still_do_no_harm() -> None:
-    steady = SteadyBoxes(SECONDS)
-    for _ in range(5):
-        (shown,) = steady.update([track(CAR)], 1.0)
-    assert shown.box == CAR

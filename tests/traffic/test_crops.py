@@ -1,7 +1,6 @@
 """The best picture of each vehicle."""
 
 import numpy as np
-import pytest
 
 from traffic.passing import HEIGHT, WIDTH, frame, track
 from vdet.boxes import Box
@@ -37,11 +36,6 @@ def test_the_largest_is_taken_and_shows_the_box() -> None:
     assert found[1].time == 1 / 25
 
 
-def test_size_counts_times_score() -> None:
-    found = crops([track(1, box(50), score=0.5)], [track(1, box(40), score=0.9)])
-    assert found[1].image.shape == (40, 40, 3)
-
-
 def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
     at_the_edge = Box.sized(WIDTH - 90, 60, 90, 90)
     found = crops([track(1, box(40))], [track(1, at_the_edge)])
@@ -52,11 +46,6 @@ def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
 
 def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
     assert crops([track(1, box(40), predicted=True)]) == {}
-
-
-def test_a_vehicle_that_is_too_small_gets_no_picture() -> None:
-    settings = CropSettings(least=30, padding=0)
-    assert crops([track(1, box(29)), track(2, box(30))], settings=settings).keys() == {2}
 
 
 def test_padding_shows_what_is_around_as_far_as_the_frame_goes() -> None:
@@ -83,17 +72,3 @@ def test_memory_holds_only_vehicles_that_are_shown() -> None:
     for number in range(1, 200):
         best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), PICTURE)
     assert len(best.end()) == 2
-
-
-def test_a_picture_is_a_copy() -> None:
-    image = ROAD.copy()
-    best = BestCrops(BARE)
-    best.add(frame(0, track(1, box(40))), Picture(image))
-    image[:] = 0
-    assert best.end()[0].image.any()
-
-
-@pytest.mark.parametrize("least", [0, -1])
-def test_a_picture_has_a_size(least: int) -> None:
-    with pytest.raises(ValueError, match="greater than or equal to 1"):
-        CropSettings(least=least)

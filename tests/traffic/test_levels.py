@@ -20,10 +20,6 @@ def test_each_step_has_the_most_vehicles_that_are_shown_in_it() -> None:
     assert list(made.steps(12)) == [0, 0, 0, 0, 2, 2, 2, 2, 1, 3, 1, 1]
 
 
-def test_a_level_lasts_until_the_next_frame_however_long_that_takes() -> None:
-    assert list(levels(2, 2, 2, rate=0.1).steps(20)) == [2] * 20
-
-
 def test_of_one_frame_or_none_there_are_levels_too() -> None:
     assert list(levels(2).steps(3)) == [2, 0, 0]
     assert list(levels().steps(3)) == [0, 0, 0]

@@ -75,12 +75,6 @@ class TestJoined:
         ]
 
     @pytest.mark.parametrize("suffix", [".csv", ".json"])
-    def test_of_no_videos_it_is_empty(self, tmp_path: Path, suffix: str) -> None:
-        join_records({}, tmp_path / f"all{suffix}")
-        text = (tmp_path / f"all{suffix}").read_text()
-        assert text == (f"video,{HEADING}" if suffix == ".csv" else "[]\n")
-
-    @pytest.mark.parametrize("suffix", [".csv", ".json"])
     def test_a_name_that_is_no_text_is_escaped(self, tmp_path: Path, suffix: str) -> None:
         written(tmp_path / f"a{suffix}", *passing(2))
         join_records({"clip\udcff": tmp_path / f"a{suffix}"}, tmp_path / f"all{suffix}")

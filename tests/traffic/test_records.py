@@ -24,11 +24,6 @@ def record(*frames: FrameTracks) -> VehicleRecord:
     return only
 
 
-def test_without_vehicles_there_are_no_records() -> None:
-    assert records() == []
-    assert records(frame(0), frame(1)) == []
-
-
 def test_a_vehicle_has_its_times_frames_and_path() -> None:
     found = record(*passing(51))
     assert (found.id, found.first, found.last) == (1, 0.0, 2.0)
@@ -38,11 +33,6 @@ def test_a_vehicle_has_its_times_frames_and_path() -> None:
     assert found.path[-1] == (130, 130)
     assert found.length == pytest.approx(100)
     assert found.share == pytest.approx(100 / WIDTH)
-
-
-def test_records_are_in_the_order_of_ids() -> None:
-    frames = [frame(0, track(2, PLACE)), frame(1, track(1, PLACE), track(2, PLACE))]
-    assert [found.id for found in records(*frames)] == [1, 2]
 
 
 def test_scores_are_those_of_all_frames_and_the_largest_box_is_kept() -> None:
@@ -76,11 +66,6 @@ class TestTime:
         found = record(frame(0, track(1, PLACE)), *(frame(n, track(1, PLACE)) for n in (10, 11)))
         assert found.seconds == pytest.approx(3 / RATE)
 
-    def test_frames_count_as_long_as_they_are_shown(self) -> None:
-        times = [0.0, 0.1, 0.5, 0.6]
-        frames = [FrameTracks(n, time, (track(1, PLACE),)) for n, time in enumerate(times)]
-        assert record(*frames).seconds == pytest.approx(0.7)
-
     @pytest.mark.parametrize("rate", [10, 25, 30, 60])
     def test_seconds_and_length_do_not_depend_on_the_rate(self, rate: int) -> None:
         frames = [
@@ -99,13 +84,6 @@ class TestPath:
         ]
         assert record(*frames).length <= PATH_STEP * WIDTH
 
-    def test_the_way_there_and_back_counts(self) -> None:
-        there = [frame(n, track(1, Box.sized(100 + 2 * n, 100, 40, 30))) for n in range(51)]
-        back = [frame(51 + n, track(1, Box.sized(200 - 2 * n, 100, 40, 30))) for n in range(51)]
-        found = record(*there, *back)
-        assert found.path[0] == found.path[-1]
-        assert found.length == pytest.approx(200, abs=5)
-
     def test_the_part_of_the_box_outside_the_frame_counts_where_it_is_known(self) -> None:
         found = record(frame(0, track(1, PLACE, whole_foot=(50.0, 260.0))))
         assert found.path == ((50.0, 260.0),)
@@ -119,12 +97,6 @@ class TestPath:
         found = record(*frames)
         assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
         assert (found.seen, found.predicted) == (3, 2)
-
-    def test_of_a_vehicle_that_was_never_seen_they_are_all_there_is(self) -> None:
-        found = record(
-            *(frame(n, track(1, Box.sized(10 * n, 0, 40, 30), predicted=True)) for n in (0, 1))
-        )
-        assert found.path == ((20, 30), (30, 30))
 
 
 @given(xs=st.lists(st.integers(-50, 300), min_size=1, max_size=30))

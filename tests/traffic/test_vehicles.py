@@ -52,12 +52,6 @@ class TestNewIds:
         assert (event.id, event.direction, event.stitched) == (2, "here", True)
         assert 1.9 < event.time < 2.1
 
-    def test_it_knows_that_the_old_one_was_counted(self) -> None:
-        """The box of the new track begins a little before the line, and goes over it again."""
-        old = frames(through((0, 600, 300), (2.4, 600, 420)), seconds=3)
-        new = numbered(frames(through((2.6, 600, 390), (6, 600, 520))), 2)
-        assert [(event.id, event.direction) for event in events(joined(old, new))] == [(1, "here")]
-
     def test_a_new_id_elsewhere_or_later_is_another_vehicle(self) -> None:
         old = frames(through((0, 600, 300), (1.9, 600, 395)), seconds=2)
         for new in (
@@ -110,18 +104,6 @@ class TestClasses:
         ]
         (event,) = events(video)
         assert event.class_name == "car"
-
-    def test_scores_are_the_weights(self) -> None:
-        video = [
-            FrameTracks(n, n / 25, (track((600, 300 + 2 * n), score=s, name=c),))
-            for n, (c, s) in enumerate([("car", 0.2)] * 60 + [("bus", 0.9)] * 30)
-        ]
-        (event,) = events(video)
-        assert event.class_name == "bus"
-
-    def test_without_classes_there_is_none(self) -> None:
-        (event,) = events(frames(DOWN))
-        assert event.class_name is None
 
 
 def test_a_long_absence_ends_a_vehicle() -> None:

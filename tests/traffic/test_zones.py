@@ -45,14 +45,6 @@ def test_a_new_id_inside_goes_on_with_the_stay() -> None:
     assert found[1].seconds == pytest.approx(4, abs=0.02)
 
 
-def test_overlapping_zones_count_each_for_itself() -> None:
-    other = ZoneSettings(name="other", points=((600, 300), (900, 300), (900, 500), (600, 500)))
-    found = events(frames(ACROSS), ZONE, other)
-    assert [(event.name, event.direction) for event in found] == [
-        ("zone", "enter"), ("other", "enter"), ("zone", "exit"), ("other", "exit"),
-    ]  # fmt: skip
-
-
 def test_a_vehicle_is_in_one_of_two_zones_side_by_side() -> None:
     left = ZoneSettings(name="left", points=((0, 0), (640, 0), (640, 720), (0, 720)))
     right = ZoneSettings(name="right", points=((640, 0), (1280, 0), (1280, 720), (640, 720)))

@@ -39,52 +39,12 @@ def missed(vehicle: Vehicle, frames: int, seconds: float = FRAME) -> Vehicle:
 # Evidence
 
 
-def test_a_vehicle_is_confirmed_by_evidence_above_the_leak() -> None:
-    assert [seen(frames).confirmed for frames in (3, 4)] == [False, True]
-    assert [seen(frames, score=0.5).confirmed for frames in (9, 11)] == [False, True]
-
-
-@pytest.mark.parametrize("rate", [10, 25, 50, 100])
-def test_a_vehicle_is_confirmed_after_the_same_time_at_any_frame_rate(rate: int) -> None:
-    frames = next(n for n in range(1, 100) if seen(n, seconds=1 / rate).confirmed)
-    assert frames / rate == pytest.approx(0.15, abs=0.5 / rate + 0.02)
-
-
 def test_a_single_frame_does_not_confirm_a_vehicle_however_long_it_lasts() -> None:
     assert [seen(frames, seconds=0.5).confirmed for frames in (1, 2)] == [False, True]
     assert SETTINGS.needed > LONGEST_LOOK
 
 
-def test_an_unconfirmed_vehicle_is_over_when_its_evidence_has_leaked_away() -> None:
-    assert [missed(seen(1), frames).is_over(SETTINGS) for frames in (3, 5)] == [False, True]
-
-
 # Time without a detection
-
-
-def test_a_confirmed_vehicle_is_over_when_it_is_no_longer_remembered() -> None:
-    assert [missed(seen(9), frames).is_over(SETTINGS) for frames in (10, 11)] == [False, True]
-
-
-def test_time_behind_another_vehicle_is_counted_by_itself() -> None:
-    vehicle = missed(seen(9), 40)
-    vehicle.hidden = 30 * FRAME
-    assert not vehicle.is_over(SETTINGS)
-    vehicle.hidden = 29 * FRAME
-    assert vehicle.is_over(SETTINGS)
-
-
-@pytest.mark.parametrize(("seconds", "frames"), [(0.04, 5), (0.1, 2), (0.2, 1)])
-def test_a_vehicle_is_present_as_long_as_it_is_carried(seconds: float, frames: int) -> None:
-    vehicle = seen(9, seconds=seconds)
-    assert missed(vehicle, frames, seconds).is_present(SETTINGS)
-    assert not missed(vehicle, 1, seconds).is_present(SETTINGS)
-
-
-def test_a_detection_ends_the_time_without_one() -> None:
-    vehicle = missed(seen(9), 8)
-    vehicle.see(observation(), FRAME, SIZE, SETTINGS)
-    assert (vehicle.unseen, vehicle.is_present(SETTINGS)) == (0, True)
 
 
 def test_a_carried_vehicle_keeps_its_velocity_and_a_lost_one_comes_to_rest() -> None:
@@ -93,12 +53,6 @@ def test_a_carried_vehicle_keeps_its_velocity_and_a_lost_one_comes_to_rest() -> 
     assert velocity == pytest.approx(5 / FRAME, abs=2.5)
     assert missed(vehicle, 5).state.mean[0, 1] == pytest.approx(velocity)
     assert abs(missed(vehicle, 60).state.mean[0, 1]) < 0.1 * velocity
-
-
-def test_an_unseen_vehicle_soon_stops_growing() -> None:
-    vehicle = seen(40, growth=1.02)
-    width = vehicle.state.box[2]
-    assert width < missed(vehicle, 100).state.box[2] < 1.25 * width
 
 
 # Score and class

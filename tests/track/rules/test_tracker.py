@@ -57,21 +57,6 @@ def kept(*boxes: Box, **changes: object) -> list[Box]:
     return [r.box for r in large_enough(detections(boxes), 640, 360, tracker_but(**changes))]
 
 
-@pytest.mark.parametrize(("width", "height"), [(49, 80), (80, 49), (1, 1)])
-def test_a_region_narrower_or_lower_than_50_pixels_is_ignored(width: int, height: int) -> None:
-    assert kept(Box.sized(10, 10, width, height)) == []
-
-
-def test_a_region_of_50_by_50_pixels_is_kept() -> None:
-    assert kept(Box.sized(10, 10, 50, 50)) == [Box.sized(10, 10, 50, 50)]
-
-
-def test_the_least_size_is_a_setting() -> None:
-    small = Box.sized(10, 10, 30, 30)
-    assert kept(small, min_region=30) == [small]
-    assert kept(small, min_region=31) == []
-
-
 def test_what_lies_outside_the_frame_does_not_count() -> None:
     regions = Box.sized(-20, 10, 90, 60), Box.sized(600, 10, 80, 60), Box.sized(900, 10, 80, 60)
     assert kept(*regions) == [Box.sized(0, 10, 70, 60)]
@@ -141,14 +126,6 @@ def test_of_two_cars_around_a_lost_one_the_nearer_absorbs_it() -> None:
     assert tracks == [Track(1, around_right, 1.0, predicted=False)]
 
 
-def test_a_car_that_was_never_shown_is_not_absorbed() -> None:
-    cars = RulesTracker(ONE_PLACE)
-    for _ in range(7):
-        update(cars, road(SEDAN), SEDAN)
-    see_side_by_side(cars, frames=2)
-    assert hide_sedan_behind_bus(cars) == []
-
-
 def test_a_car_beside_the_other_ones_rectangle_is_not_absorbed() -> None:
     cars = RulesTracker(ONE_PLACE)
     show(cars, SEDAN)
@@ -165,28 +142,6 @@ def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
     moved = moved_to(SEDAN, 130, 240)
     assert update(cars, road(moved)) == [Track(1, moved, 1.0, predicted=True)]
     assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, predicted=False)]
-
-
-def test_a_match_counts_in_the_average_box() -> None:
-    cars = RulesTracker(SEED_TRACKER)
-    show(cars, SEDAN)
-    (track,) = update(cars, road(moved_to(SEDAN, 140, 200)))
-    assert track.box == moved_to(SEDAN, 104, 200)
-
-
-@pytest.mark.parametrize(("distance", "found"), [(50, 1), (49, 0)])
-def test_the_match_is_searched_within_the_distance(distance: int, found: int) -> None:
-    cars = RulesTracker(tracker_but(match_distance=distance))
-    show(cars, SEDAN)
-    assert len(update(cars, road(moved_to(SEDAN, 150, 200)))) == found
-
-
-def test_the_least_score_of_a_match_is_a_setting() -> None:
-    noisy = road(SEDAN) // 2 + road(None, SEDAN) // 2
-    for least, found in ((0.5, 1), (0.9, 0)):
-        cars = RulesTracker(tracker_but(match_score=least))
-        show(cars, SEDAN)
-        assert len(update(cars, noisy)) == found
 
 
 def test_a_car_that_was_never_shown_is_not_searched() -> None:
@@ -214,15 +169,6 @@ def test_a_car_is_shown_after_ten_detections_in_a_row_or_three_confident_ones(
     shown = see(RulesTracker(SEED_TRACKER), SEDAN, frames=12, peak=peak)
     assert [bool(tracks) for tracks in shown].index(True) == first_shown - 1
     assert all(shown[first_shown - 1 :])
-
-
-def test_how_many_detections_are_enough_is_a_setting() -> None:
-    settings = tracker_but(detections_needed=4, confident_detections_needed=2)
-    assert [len(tracks) for tracks in see(RulesTracker(settings), SEDAN, frames=4)] == [0, 0, 0, 1]
-    assert [len(tracks) for tracks in see(RulesTracker(settings), SEDAN, frames=2, peak=5)] == [
-        0,
-        1,
-    ]
 
 
 def test_a_missed_car_is_not_shown_and_counted_from_the_start_again() -> None:
@@ -281,12 +227,6 @@ def test_a_car_missed_five_frames_in_a_row_is_deleted(
 # Ids and boxes
 
 
-def test_ids_start_at_1_in_every_video() -> None:
-    for _ in range(2):
-        shown = see(RulesTracker(SEED_TRACKER), SEDAN, VAN, frames=10)
-        assert ids(shown[-1]) == [1, 2]
-
-
 def test_ids_follow_the_order_in_which_cars_are_first_shown() -> None:
     cars = RulesTracker(SEED_TRACKER)
     see(cars, SEDAN, frames=5)
@@ -329,14 +269,6 @@ def test_the_score_of_a_track_is_the_average_of_its_last_ten_detections() -> Non
         cars.update(detections([SEDAN], score=0.05 * n), 0.0, Picture(GREY)) for n in range(12)
     ]
     assert [track.score for track in shown[-1]] == pytest.approx([0.05 * 6.5])
-
-
-def test_a_match_keeps_the_score_of_the_detection_before_it() -> None:
-    cars = RulesTracker(tracker_but(history=2, detections_needed=1))
-    cars.update(detections([SEDAN], score=0.4), 0.0, Picture(road(SEDAN)))
-    for _ in range(3):
-        (track,) = update(cars, road(SEDAN))
-    assert track.score == pytest.approx(0.4)
 
 
 def test_a_track_has_the_most_frequent_class_of_its_detections() -> None:
