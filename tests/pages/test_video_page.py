@@ -26,7 +26,7 @@ NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
 FOLDER = Path("found/a.page")
 VIDEO = Player.of(Path("found/a.mp4"), FOLDER, is_drawn=True, start=0.0)
-TRUCK = replace(track(2, Box.sized(5, 5, 30, 30)), class_name="truck")
+TRUCK = replace(track(2, Box.sized(5, 5, 30.123456, 29.9)), class_name="truck")
 
 
 def records(*frames: FrameTracks) -> Sequence[VehicleRecord]:
@@ -111,6 +111,7 @@ class TestVideoPage:
         assert len(made.all("tr")) == 1 + len(TWO)
         assert "#1–0:000:02" in made.text
         assert "#2truck0:020:02" in made.text
+        assert "30 × 30" in made.text
 
     def test_only_the_vehicles_that_are_shown_longest_are_shown_one_by_one(
         self, monkeypatch: pytest.MonkeyPatch

@@ -117,7 +117,9 @@ class VideoPage:
         """Return the page; it loads nothing but the video."""
         packages = (
             ("Python", platform.python_version()),
-            *((each.__name__, each.__version__) for each in (cv2, np, av)),
+            ("OpenCV", cv2.__version__),
+            ("NumPy", np.__version__),
+            ("PyAV", av.__version__),
         )
         facts = self._facts().model_dump(mode="json")
         return render("video.html", page=self, facts=facts, packages=packages)

@@ -122,7 +122,7 @@ def mistake_tiles(clip: ClipResult, kind: MistakeKind) -> list[Tile]:
         Tile(
             _cropped(images[mistake.middle], mistake, clip),
             f"{text.mistake_name(mistake)}, frame {mistake.middle}",
-            f"lost in {text.frame_span(mistake)}, best IoU {mistake.overlap:.2f}",
+            f"{text.frame_span(mistake)}: best IoU {mistake.overlap:.2f}",
         )
         for mistake in chosen
         if mistake.middle in images
