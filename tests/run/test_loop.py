@@ -5,7 +5,6 @@ import json
 import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from itertools import count, islice
 from pathlib import Path
@@ -38,8 +37,8 @@ from running import write_drive
 from vdet.config.loading import load_settings
 from vdet.config.schema import DrawSettings, OutputSettings, Settings
 from vdet.detect.factory import load_detector
-from vdet.errors import ImageError, OutputError, VdetError, VideoError
-from vdet.media import Frame, Picture, VideoWriter
+from vdet.errors import OutputError, VdetError, VideoError
+from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image, read_image
 from vdet.media.planes import Planes
 from vdet.run.loop import FIRST_FRAMES, peek
@@ -96,28 +95,6 @@ class TestFollowFrames:
             heat, same = (each.detections.trace.heat.values for each in (first, second))
             np.testing.assert_array_equal(heat, same)
 
-    def test_shows_nothing_on_an_empty_road(self) -> None:
-        empty = (replace(frame, picture=Picture(road())) for frame in drive(15))
-        for result in follow(empty):
-            assert result.tracks == ()
-            assert len(result.detections) == 0
-
-    def test_gives_every_frame_untouched(self) -> None:
-        for result in follow(drive(15)):
-            np.testing.assert_array_equal(result.frame.image, road(car_at(result.frame.index)))
-
-    def test_ids_begin_at_1_in_every_video(self) -> None:
-        for _ in range(2):
-            *_, last = follow(drive(15))
-            assert [track.id for track in last.tracks] == [1]
-
-    def test_no_frames_give_no_results(self) -> None:
-        assert list(follow([])) == []
-
-    def test_a_frame_too_small_for_any_window_is_refused(self) -> None:
-        with pytest.raises(ImageError, match="no search window fits into a frame of 20×240"):
-            list(follow(drive(3), width=20))
-
 
 class TestFirstFrames:
     """The first frames tell the detector where the horizon is; they are searched like all others.
@@ -152,17 +129,6 @@ class TestFirstFrames:
         list(follow(drive(6), PERSPECTIVE))
         assert asked == []
 
-    def test_a_found_horizon_gives_what_the_same_set_horizon_gives(
-        self, asked: list[list[Image]]
-    ) -> None:
-        found, given = (
-            [(each.frame.index, each.tracks) for each in follow(drive(12), settings)]
-            for settings in (self.FREE, PERSPECTIVE)
-        )
-        assert found == given
-        assert [index for index, _ in found] == list(range(12))
-        assert asked
-
     @pytest.mark.parametrize("frames", [0, 1, 4])
     def test_a_clip_may_be_shorter(self, asked: list[list[Image]], frames: int) -> None:
         results = list(follow(drive(frames), self.FREE))
@@ -178,20 +144,6 @@ class TestFirstFrames:
 
 
 class TestMemory:
-    def test_following_holds_few_frames_at_a_time(self) -> None:
-        alive: list[weakref.ref[object]] = []
-
-        def watched() -> Iterator[Frame]:
-            for frame in drive(COUNT):
-                alive.append(weakref.ref(frame.image))
-                yield frame
-
-        most = 0
-        for _ in follow(watched()):
-            most = max(most, sum(image() is not None for image in alive))
-        assert len(alive) == COUNT
-        assert 0 < most <= QUEUED
-
     def test_the_first_frames_are_let_go_when_they_have_been_taken(self) -> None:
         images, rest = peek(drive(COUNT))
         first = weakref.ref(images[0])
@@ -286,20 +238,6 @@ class TestRun:
             assert not change[:, right + 3 :].any()
         assert records[-1]["tracks"]
 
-    def test_the_tracks_do_not_depend_on_whether_a_video_is_written(
-        self, red_clip: Path, tmp_path: Path
-    ) -> None:
-        both = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "a.csv")
-        run_red(VideoJob(red_clip, both, frames=20))
-        run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "b.csv"), frames=20))
-        assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
-        assert len((tmp_path / "a.csv").read_text().splitlines()) > 10
-
-    def test_a_run_leaves_no_thread_behind(self, red_clip: Path, tmp_path: Path) -> None:
-        before = threading.active_count()
-        run_red(VideoJob(red_clip, outputs(video=tmp_path / "out.mp4"), frames=10))
-        assert threading.active_count() == before
-
 
 def _breaking(method: Callable[..., object], error: BaseException) -> Callable[..., object]:
     """Return a method that works ten times and then breaks."""
@@ -360,13 +298,6 @@ class TestBreakage:
         with pytest.raises(KeyboardInterrupt):
             run_red(job, progress=lambda _: interrupt)
 
-    def test_the_work_is_interrupted(
-        self, job: VideoJob, breaks: Callable[[BaseException], None]
-    ) -> None:
-        breaks(KeyboardInterrupt())
-        with pytest.raises(KeyboardInterrupt):
-            run_red(job)
-
     def test_the_command_is_interrupted(
         self,
         run: Run,
@@ -381,14 +312,3 @@ class TestBreakage:
         assert result.code == 130
         assert "interrupted" in result.err
         assert list(tmp_path.iterdir()) == []
-
-    def test_an_earlier_output_is_kept(
-        self, red_clip: Path, tmp_path: Path, breaks: Callable[[BaseException], None]
-    ) -> None:
-        out = tmp_path / "out.mp4"
-        out.write_bytes(b"precious")
-        breaks(RuntimeError("broken"))
-        with pytest.raises(RuntimeError, match="broken"):
-            run_red(VideoJob(red_clip, outputs(video=out)))
-        assert out.read_bytes() == b"precious"
-        assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]

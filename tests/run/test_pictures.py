@@ -157,10 +157,6 @@ class TestRun:
         assert track.box.iou(CAR) > 0.35
         assert result.detections.data["strength"][0] > settings.svm.heat.threshold
 
-    def test_writes_nothing_that_is_not_asked_for(self, source: Path) -> None:
-        run_red(source)
-        assert [path.name for path in source.parent.iterdir()] == ["road.png"]
-
     def test_draws_the_boxes_into_the_picture_only(self, source: Path) -> None:
         out = source.with_name("out.png")
         (track,) = run_red(source, picture=out).tracks
@@ -169,23 +165,6 @@ class TestRun:
         assert changed[y1:y2, x1].all()
         assert not changed[y2:].any()
         np.testing.assert_array_equal(read_image(source), road(CAR))
-
-    def test_an_empty_road_is_written_as_it_is(self, tmp_path: Path) -> None:
-        source, out = tmp_path / "empty.png", tmp_path / "out.png"
-        write_image(source, road())
-        assert run_red(source, picture=out).tracks == ()
-        np.testing.assert_array_equal(read_image(out), road())
-
-    def test_stages_show_the_frame_without_the_boxes_of_the_output(self, source: Path) -> None:
-        both, alone = source.with_name("both"), source.with_name("alone")
-        for folder in (both, alone):
-            folder.mkdir()
-        run_red(source, picture=source.with_name("out.png"), stages=both)
-        run_red(source, stages=alone)
-        names = sorted(path.name for path in both.iterdir())
-        assert len(names) == 5
-        for name in names:
-            assert (both / name).read_bytes() == (alone / name).read_bytes()
 
     def test_a_picture_that_is_too_small_is_named(self, tmp_path: Path) -> None:
         source = tmp_path / "tiny.png"

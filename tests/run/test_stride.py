@@ -45,14 +45,6 @@ def test_frames_that_are_not_searched_have_no_detections_and_predicted_tracks() 
     assert any(result.tracks for result in results if not result.searched)
 
 
-@pytest.mark.parametrize("stride", [2, 5])
-def test_every_frame_shows_the_car_where_it_is(stride: int) -> None:
-    for result, usual in zip(followed(stride)[20:], followed(1)[20:], strict=True):
-        (track,), (expected,) = result.tracks, usual.tracks
-        assert track.id == expected.id == 1
-        assert track.box.iou(expected.box) > 0.75
-
-
 def test_results_do_not_depend_on_the_threads() -> None:
     frames = list(drive(20))
     one, three = (list(follow(frames, strided(3), threads=threads)) for threads in (1, 3))
@@ -88,12 +80,6 @@ def test_the_output_has_every_frame(red_clip: Path, tmp_path: Path) -> None:
     seen = {record["frame"] for record in records for t in record["tracks"] if not t["predicted"]}
     assert seen
     assert all(number % 4 == 0 for number in seen)
-
-
-def test_stages_are_those_of_a_searched_frame(red_clip: Path, tmp_path: Path) -> None:
-    stages = tmp_path / "stages"
-    run_red(VideoJob(red_clip, outputs(stages=stages), at=Fraction(21, 25)), strided(5))
-    assert (stages / "5-boxes.png").exists()
 
 
 def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:

@@ -109,15 +109,6 @@ class TestPrefetch:
         with prefetch(range(50), depth) as items:
             assert list(items) == list(range(50))
 
-    def test_without_items_it_gives_nothing(self) -> None:
-        with prefetch(range(0)) as items:
-            assert list(items) == []
-
-    def test_takes_items_before_they_are_asked_for(self) -> None:
-        made: list[int] = []
-        with prefetch(recording(range(3), made)):
-            until(lambda: made == [0, 1, 2])
-
     @pytest.mark.parametrize("depth", [1, 3])
     def test_depth_items_wait_and_one_more_is_held(self, depth: int) -> None:
         made: list[int] = []
@@ -145,10 +136,6 @@ class TestPrefetch:
             fail(error, after=next(items))
         assert caught.value is error
         assert len(made) <= 1 + 2 + 1
-
-    def test_the_reader_may_stop_early(self) -> None:
-        with prefetch(iter(int, 1)) as items:
-            assert next(items) == 0
 
     @pytest.mark.parametrize("take", [1, 3])
     def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
@@ -216,12 +203,6 @@ class TestWriteAsync:
         with write_async(taken.append, depth) as hand_over:
             hand_all(range(50), hand_over)
         assert taken == list(range(50))
-
-    def test_there_may_be_no_items(self) -> None:
-        taken: list[int] = []
-        with write_async(taken.append):
-            pass
-        assert taken == []
 
     def test_depth_items_wait_while_another_is_taken(self) -> None:
         gate = threading.Event()
@@ -378,17 +359,6 @@ class TestWriteAsync:
         hang.set()
         until(lambda: left == ["_ClosedError"])
 
-    @Errors
-    def test_after_an_error_of_the_giver_earlier_items_are_still_taken(
-        self, kind: type[BaseException]
-    ) -> None:
-        error = kind("giver")
-        taken: list[int] = []
-        with pytest.raises(kind) as caught, write_async(taken.append) as hand_over:
-            hand_all(failing(error, after=2), hand_over)
-        assert caught.value is error
-        assert taken == [0, 1]
-
 
 class TestMapOrdered:
     @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -403,15 +373,6 @@ class TestMapOrdered:
 
         with map_ordered(odd_ones_end_first, range(10), threads) as pairs:
             assert list(pairs) == [(item, item**2) for item in range(10)]
-
-    def test_without_items_there_are_no_pairs(self) -> None:
-        with map_ordered(str, range(0), 2) as pairs:
-            assert list(pairs) == []
-
-    def test_all_threads_work_at_once(self) -> None:
-        together = threading.Barrier(3, timeout=SOON)
-        with map_ordered(lambda _: together.wait(), range(3), threads=3) as pairs:
-            assert sorted(turn for _, turn in pairs) == [0, 1, 2]
 
     @pytest.mark.parametrize("threads", [1, 3])
     def test_at_most_one_item_more_than_threads_is_taken(self, threads: int) -> None:
@@ -437,16 +398,6 @@ class TestMapOrdered:
             received.extend(item for item, _ in pairs)
         assert caught.value is error
         assert received == list(range(5))
-
-    @Errors
-    def test_an_error_of_the_items_is_raised_unchanged(self, kind: type[BaseException]) -> None:
-        error = kind("items")
-        with (
-            pytest.raises(kind) as caught,
-            map_ordered(str, failing(error, after=3), threads=2) as pairs,
-        ):
-            list(pairs)
-        assert caught.value is error
 
     @Errors
     def test_after_an_error_of_the_reader_no_item_is_begun(self, kind: type[BaseException]) -> None:
@@ -477,11 +428,6 @@ class TestAllTogether:
             items = stack.enter_context(prefetch(source))
             for _, result in stack.enter_context(map_ordered(function, items, threads=2)):
                 hand_over(result)
-
-    def test_everything_arrives_in_order(self) -> None:
-        taken: list[int] = []
-        self.run(range(100), lambda item: -item, taken.append)
-        assert taken == [-item for item in range(100)]
 
     @Errors
     @pytest.mark.parametrize("place", PLACES)

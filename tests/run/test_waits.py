@@ -1,7 +1,6 @@
 """How long a run waits for its threads, and what it says of it."""
 
 import logging
-import time
 from pathlib import Path
 
 import pytest
@@ -25,35 +24,6 @@ def test_the_longest_wait_limits_the_run(part: Part) -> None:
     text = waits(**parts).describe(8.0)
     assert text.startswith(f"{part} limited the run: in 8.0 s it waited ")
     assert f" 4.0 s for {part}" in text
-
-
-def test_what_is_no_wait_is_the_time_of_tracking_and_drawing() -> None:
-    text = waits(1, 2, 3).describe(10)
-    assert text == (
-        "tracking and drawing limited the run: in 10.0 s it waited 1.0 s for reading, 2.0 s for "
-        "searching, 3.0 s for encoding; tracking and drawing took 4.0 s"
-    )
-
-
-def test_a_block_counts_also_if_it_fails() -> None:
-    found = Waits()
-
-    @found.on("reading")
-    def fail() -> None:
-        time.sleep(SOON)
-        raise OSError("gone")
-
-    with pytest.raises(OSError, match="gone"):
-        fail()
-    assert found.seconds["reading"] >= SOON
-
-
-def test_only_the_time_until_an_item_comes_is_waiting() -> None:
-    found = Waits()
-    began = time.perf_counter()
-    for _ in found.for_each("searching", range(2)):
-        time.sleep(SOON)
-    assert found.seconds["searching"] <= time.perf_counter() - began - 2 * SOON
 
 
 def test_a_run_says_what_limited_it(

@@ -65,15 +65,6 @@ def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     assert read(capsys.readouterr().out) == list(ITEMS)
 
 
-@pytest.mark.parametrize("name", ["boxes.json", "-"])
-def test_of_no_pictures_nothing_is_written(
-    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write(Output("json", Path("-") if name == "-" else tmp_path / name), [], video=None)
-    assert list(tmp_path.iterdir()) == []
-    assert capsys.readouterr().out == ""
-
-
 def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match=r"boxes\.json: cannot be written"):
         write(Output("json", tmp_path / "none" / "boxes.json"), RESULTS, video=None)

@@ -16,7 +16,7 @@ from vdet.config.lanes import LaneSettings
 from vdet.config.places import RegionSettings, RegionsSettings
 from vdet.config.schema import Settings
 from vdet.config.video import DrawSettings
-from vdet.draw.boxes import BLACK, GREEN, WHITE, color_of, draw_box, draw_label
+from vdet.draw.boxes import BLACK, WHITE, color_of, draw_box, draw_label
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.lane import Lane
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
@@ -102,11 +102,6 @@ def test_a_vehicle_that_undistortion_moves_out_of_the_picture_is_not_drawn() -> 
     np.testing.assert_array_equal(drawn, undistorted.image)
 
 
-def test_without_a_camera_vehicles_stay_where_they_are() -> None:
-    assert road_seen(None).place(CAR) == CAR
-    assert (road_seen(None).image == road(CAR)).all()
-
-
 def test_the_frames_of_the_result_are_not_drawn_on() -> None:
     with_lane = replace(road_seen(LENS), lane=LANE)
     undistorted = with_lane.image.copy()
@@ -144,14 +139,6 @@ def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
     assert np.abs(drawn.to_image().astype(int) - expected).mean() < 1.5
 
 
-def test_a_lane_is_drawn_into_the_undistorted_image_even_if_the_frame_is_planes() -> None:
-    undistorted = road_seen(LENS)
-    result = result_of(CAR, found=undistorted)
-    planes = Picture(Planes.of_image(road(CAR), Coding()))
-    as_planes = replace(result, frame=replace(result.frame, picture=planes))
-    np.testing.assert_array_equal(drawn_on(as_planes), drawn_on(result))
-
-
 def white(width: int, height: int) -> Image:
     return np.full((height, width, 3), 255, np.uint8)
 
@@ -178,14 +165,6 @@ def test_each_id_has_its_own_color() -> None:
     assert tuple(image[149, 225]) == color_of(4)
 
 
-def test_no_tracks_leave_the_picture_as_it_was() -> None:
-    result = result_of(image=white(320, 240))
-    for trails in (None, 1.0):
-        drawn = drawn_on(result, trails=trails)
-        assert drawn.min() == 255
-        assert not np.shares_memory(drawn, result.frame.image), "a copy may be drawn into"
-
-
 # Labels
 
 
@@ -209,13 +188,6 @@ def test_a_label_leaves_out_what_is_not_known() -> None:
     draw_box(expected, CAR, color_of(1), "#1")
     drawn = drawn_on(result_of(CAR), label=("distance", "id", "class"))
     np.testing.assert_array_equal(drawn, expected)
-
-
-@pytest.mark.parametrize("label", [(), ("class",)])
-def test_without_anything_to_say_there_is_no_label(label: tuple[str, ...]) -> None:
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(1))
-    np.testing.assert_array_equal(drawn_on(result_of(CAR), label=label), expected)
 
 
 def test_a_still_picture_shows_ids_and_scores() -> None:
@@ -302,14 +274,6 @@ def test_colors_can_be_those_of_the_regions() -> None:
     assert outside == WHITE
 
 
-def test_all_vehicles_can_have_one_color() -> None:
-    result = result_of(
-        Box.sized(20, 100, 50, 50), Box.sized(200, 100, 50, 50), image=white(320, 240)
-    )
-    image = drawn_on(result, colors="one")
-    assert tuple(image[149, 45]) == tuple(image[149, 225]) == GREEN
-
-
 # Trails
 
 
@@ -338,18 +302,6 @@ def test_a_trail_is_the_path_of_the_feet_in_the_last_seconds() -> None:
     assert abs(min(columns) - (end - 100)) <= 4
     assert columns == list(range(min(columns), max(columns) + 1)), "without a gap"
     assert abs(min(trail_columns(0.4)) - (end - 40)) <= 4
-
-
-def test_a_vehicle_that_was_just_found_has_no_trail() -> None:
-    assert trail_columns(1.0, count=1) == []
-    assert trail_columns(None) == []
-
-
-def test_trails_lie_under_the_boxes() -> None:
-    overlay = overlay_with(trails=1.0, smoothing=None, label=())
-    *_, last = (shown(overlay, result) for result in passing(50))
-    box = Box.sized(10 + 4 * 49, 100, 40, 30)
-    assert (Box(box.x1, box.y2 - 1, box.x2, box.y2).cut(last)[0] == color_of(1)).all()
 
 
 def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:

@@ -177,7 +177,7 @@ class TestFailure:
         assert len(read(tmp_path / "out.mp4")) == 20
         assert len(list((tmp_path / "stages").iterdir())) == 5
 
-    @pytest.mark.parametrize("moment", MOMENTS)
+    @pytest.mark.parametrize("moment", ["middle", "end"])
     def test_earlier_outputs_stay_as_they_were(
         self, job: VideoJob, register: Register, tmp_path: Path, moment: str
     ) -> None:
@@ -189,7 +189,7 @@ class TestFailure:
         for name in ("fragile.txt", "out.mp4", "out.csv"):
             assert (tmp_path / name).read_text() == "precious"
 
-    @pytest.mark.parametrize("moment", MOMENTS)
+    @pytest.mark.parametrize("moment", ["middle", "end"])
     def test_an_error_of_the_disk_names_the_output_that_it_hit(
         self, job: VideoJob, register: Register, tmp_path: Path, moment: str
     ) -> None:

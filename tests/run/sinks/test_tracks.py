@@ -18,7 +18,7 @@ from vdet.labels.reading import read_predictions
 from vdet.lanes.lane import Lane, lane_record
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, check_sinks
+from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track
 
 RESULTS = (
@@ -106,25 +106,6 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
 @pytest.mark.parametrize("suffix", [".txt", ".csv"])
 def test_other_formats_have_no_place_for_a_lane(tmp_path: Path, suffix: str) -> None:
     assert written_with_lanes(tmp_path / f"a{suffix}") == written(tmp_path / f"b{suffix}")
-
-
-def test_without_frames_only_a_heading_is_written(tmp_path: Path) -> None:
-    texts = [written(tmp_path / f"tracks{suffix}", []) for suffix in (".txt", ".csv", ".jsonl")]
-    assert texts == ["", HEADING, ""]
-
-
-def test_the_case_of_the_suffix_does_not_matter(tmp_path: Path) -> None:
-    assert written(tmp_path / "A.CSV") == written(tmp_path / "b.csv")
-
-
-@pytest.mark.parametrize("name", ["tracks.json", "tracks", "tracks.coco", ".csv", ".kitti.txt"])
-def test_an_unknown_suffix_names_those_that_are_known(tmp_path: Path, name: str) -> None:
-    output = Output("tracks", tmp_path / name)
-    with pytest.raises(OutputError, match=r"tracks are written as \.txt, \.csv, \.jsonl"):
-        check_sinks([output], overwrite=False)
-    with pytest.raises(OutputError, match="tracks are written as"):
-        write(output, RESULTS)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", track_suffixes())
