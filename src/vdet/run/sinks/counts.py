@@ -7,7 +7,6 @@ and the stays in zones that follow from them.
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
 
 import numpy as np
 
@@ -17,29 +16,26 @@ from vdet.errors import OutputError
 from vdet.lanes.road import Road
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.count_files import join_counts, write_counts
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.layout import Line
 from vdet.traffic.tables import SUFFIXES
 
 
-class CountsSink:
+class CountsSink(BaseSink):
     """Writes the counts at the end of the video."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        self._path = path
-        self._files = context.files
+        super().__init__(path, context)
         self._counter: VehicleCounter | None = None
         if not context.settings.counts:
             raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None and self._counter:
-            write_counts(self._files.stage(self._path), self._counter.counts())
+    def finish(self) -> None:
+        """Write the counts."""
+        if self._counter:
+            write_counts(self.context.files.stage(self.path), self._counter.counts())
 
     def write(self, result: FrameResult) -> None:
         """Keep the counter: at the end it has the counts of all frames."""

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
 
 from vdet.config.rendering import render
 from vdet.files import make_folder
@@ -12,7 +11,7 @@ from vdet.pages.index import write_index
 from vdet.pages.render import PAGE_NAME, jpeg_uri, write_page
 from vdet.pages.video import Player, Thumbnail, VideoPage
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.crops import BestCrops, Crop
 from vdet.traffic.heat import HeatMap
@@ -24,15 +23,13 @@ _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one tha
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
-class PageSink:
+class PageSink(BaseSink):
     """Collects what the page shows, and writes it at the end."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        assert context.video is not None  # `takes` says so
+        super().__init__(path, context)
         make_folder(path)
-        self._folder = path
-        self._context = context
-        self._video = video = context.video
+        video = self.video
         settings = context.settings
         self._records = VehicleRecords(video.width)
         self._crops = BestCrops(settings.crops)
@@ -45,14 +42,11 @@ class PageSink:
         self._frames = 0
         self._start = self._last = float(video.start)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None:
-            self._keep(self._crops.end())
-            target = self._context.files.stage(self._folder / PAGE_NAME)
-            write_page(self._page().html(), target)
+    def finish(self) -> None:
+        """Write the page."""
+        self._keep(self._crops.end())
+        target = self.context.files.stage(self.path / PAGE_NAME)
+        write_page(self._page().html(), target)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -76,28 +70,28 @@ class PageSink:
 
     def _page(self) -> VideoPage:
         return VideoPage(
-            video=self._video,
+            video=self.video,
             frames=self._frames,
             start=self._start,
-            end=self._last + float(1 / self._video.rate),
+            end=self._last + float(1 / self.video.rate),
             records=self._records.end(),
             thumbnails=self._thumbnails,
             levels=self._levels,
             still=None if self._still is None else self._heat.over(self._still),
             player=self._player(),
-            settings=render(self._context.settings),
+            settings=render(self.context.settings),
             counts=_by_minute(self._counter.finish()) if self._counter else {},
         )
 
     def _player(self) -> Player | None:
         """Return the video that this run writes; else the source, if it is a video file."""
-        for output in self._context.outputs:
+        for output in self.context.outputs:
             if output.sink == "video":
-                return Player.of(output.path, self._folder, is_drawn=True, start=self._start)
-        source = self._video.path
+                return Player.of(output.path, self.path, is_drawn=True, start=self._start)
+        source = self.video.path
         if source.is_file() and not is_picture_name(source):
-            start = float(self._video.start)
-            return Player.of(source, self._folder, is_drawn=False, start=start)
+            start = float(self.video.start)
+            return Player.of(source, self.path, is_drawn=False, start=start)
         return None
 
 

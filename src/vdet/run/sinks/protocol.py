@@ -95,6 +95,30 @@ class SinkContext:
     waits: Waits = field(default_factory=Waits)
 
 
+class BaseSink:
+    """What most sinks have in common: they finish where the run ends without an error."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self.path = path
+        self.context = context
+
+    @property
+    def video(self) -> VideoInfo:
+        """The video, for sinks that take no pictures."""
+        assert self.context.video is not None  # `SinkKind.takes` says so
+        return self.context.video
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: Any, *_: object) -> None:
+        if kind is None:
+            self.finish()
+
+    def finish(self) -> None:
+        """Write what is still to be written."""
+
+
 @dataclass(frozen=True, slots=True)
 class BatchTotal:
     """A file over all videos of a batch, made from the outputs of each.

@@ -1,7 +1,6 @@
 """The sink `stages`: a folder with a picture of every stage of one frame."""
 
 from pathlib import Path
-from typing import Self
 
 from vdet.config.places import RegionsSettings
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
@@ -11,42 +10,35 @@ from vdet.media.images import Image, encode_image
 from vdet.regions import Regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.overlay import PICTURE_LABEL, label_text
-from vdet.run.sinks.protocol import SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 
 _BOXES = "boxes"
 
 
-class StagesSink:
+class StagesSink(BaseSink):
     """Writes the pictures of the first searched frame at or after the time `SinkContext.at`."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        self._folder = path
-        self._context = context
+        super().__init__(path, context)
         start = context.video.start if context.video else 0
         self._time = start + context.at
         self._is_done = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Do nothing: the pictures are whole, or there was no such frame."""
 
     def write(self, result: FrameResult) -> None:
         """Write the pictures if it is the frame."""
         if self._is_done or not result.searched or result.frame.time < self._time:
             return
         self._is_done = True
-        make_folder(self._folder)
-        pictures = self._context.stage_pictures(result.frame.image, result.detections)
-        if self._context.settings.regions:
-            pictures["regions"] = _with_regions(result, self._context.settings.regions)
+        make_folder(self.path)
+        pictures = self.context.stage_pictures(result.frame.image, result.detections)
+        if self.context.settings.regions:
+            pictures["regions"] = _with_regions(result, self.context.settings.regions)
         pictures[_BOXES] = _with_boxes(result)
         if result.road:
             pictures |= result.road.pictures()
         for number, (name, picture) in enumerate(pictures.items(), start=1):
-            path = self._folder / f"{number}-{name}.png"
-            self._context.files.stage(path).write_bytes(encode_image(picture, path))
+            path = self.path / f"{number}-{name}.png"
+            self.context.files.stage(path).write_bytes(encode_image(picture, path))
 
 
 def _with_regions(result: FrameResult, settings: RegionsSettings) -> Image:

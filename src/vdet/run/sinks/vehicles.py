@@ -4,33 +4,27 @@ Times are in seconds and those of the input; pixels are those of the input frame
 """
 
 from pathlib import Path
-from typing import Any, Self
 
 from vdet.files import make_folder
 from vdet.media.images import encode_image
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import BatchTotal, SinkContext, SinkKind
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.crops import BestCrops, Crop
 from vdet.traffic.record_files import join_records, write_records
 from vdet.traffic.records import VehicleRecords
 from vdet.traffic.tables import SUFFIXES
 
 
-class VehicleSink:
+class VehicleSink(BaseSink):
     """Keeps a record of each vehicle, and writes all at the end."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        assert context.video is not None  # `takes` says so
-        self._path = path
-        self._context = context
-        self._records = VehicleRecords(context.video.width)
+        super().__init__(path, context)
+        self._records = VehicleRecords(self.video.width)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None:
-            write_records(self._records.end(), self._context.files.stage(self._path))
+    def finish(self) -> None:
+        """Write the records."""
+        write_records(self._records.end(), self.context.files.stage(self.path))
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""
@@ -48,22 +42,20 @@ VEHICLES = SinkKind(
 PATTERN = "vehicle-*-at-*s.*"
 
 
-class CropSink:
+class CropSink(BaseSink):
     """Writes the picture of a vehicle when it is gone, again where a better one follows."""
 
     def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
         make_folder(path)
         self._folder = context.files.stage_folder(path, PATTERN)
         self._suffix = f".{context.settings.crops.format}"
         self._best = BestCrops(context.settings.crops)
         self._written: dict[int, Path] = {}
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None:
-            self._write_all(self._best.end())
+    def finish(self) -> None:
+        """Write the pictures of the vehicles that are still shown."""
+        self._write_all(self._best.end())
 
     def write(self, result: FrameResult) -> None:
         """Look for better pictures in a frame."""

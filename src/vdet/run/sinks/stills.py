@@ -1,17 +1,46 @@
-"""The sink `json`: the vehicles of still pictures as one JSON list."""
+"""The sinks of still pictures: `picture` (vehicles drawn in) and `json` (a list of boxes)."""
 
 import json
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
+from vdet.errors import OutputError
 from vdet.files import print_now
 from vdet.lanes.lane import lane_record
+from vdet.media import Picture
+from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import STANDARD_OUTPUT, SinkContext, SinkKind
+from vdet.run.sinks.overlay import Overlay
+from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, SinkContext, SinkKind
 from vdet.track.track import Track
 
 
-class JsonSink:
+class PictureSink(BaseSink):
+    """Writes one picture."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._overlay = Overlay(context.settings, None)
+        self._is_done = False
+
+    def write(self, result: FrameResult) -> None:
+        """Draw the vehicles, and write the picture.
+
+        Raises `OutputError` for a second picture.
+        """
+        if self._is_done:
+            raise OutputError(
+                f"{self.path}: takes one picture; for several give the name of a folder"
+            )
+        self._is_done = True
+        data = encode_image(Picture(self._overlay.draw(result)).image, self.path)
+        self.context.files.stage(self.path).write_bytes(data)
+
+
+PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures", takes="pictures")
+
+
+class JsonSink(BaseSink):
     """Collects an item per picture, and writes the list at the end, if there is an item.
 
     Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
@@ -21,21 +50,18 @@ class JsonSink:
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
-        self._path = path
-        self._context = context
+        super().__init__(path, context)
         self._items: list[dict[str, Any]] = []
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is not None or not self._items:
+    def finish(self) -> None:
+        """Write the list."""
+        if not self._items:
             return
         text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
-        if self._path == STANDARD_OUTPUT:
+        if self.path == STANDARD_OUTPUT:
             print_now(text)
         else:
-            self._context.files.stage(self._path).write_text(text, encoding="utf-8")
+            self.context.files.stage(self.path).write_text(text, encoding="utf-8")
 
     def write(self, result: FrameResult) -> None:
         """Add the item of a picture."""
