@@ -116,17 +116,3 @@ def test_the_hog_features_of_a_window_give_its_probability(
     expected = model.probabilities(hogs)  # there are no other features
     np.testing.assert_allclose(found.probabilities[numbers], expected, atol=1e-5)
     assert len(np.unique(expected.round(4))) > len(grid) / 2
-
-
-def test_a_search_does_not_change_later_searches() -> None:
-    for _, size, step in GRIDS:
-        grid = WindowGrid(size, Fraction(step), Fraction(0), Fraction(0), 4, 3)
-        search = dense_search(texture_finder(1), grid)
-        first = search.search(FramePyramid(Picture(texture(256)), FEATURES))
-        kept = first.probabilities.copy()
-        hogs = first.hogs(np.arange(len(grid)))
-        search.search(FramePyramid(Picture(255 - texture(256)), FEATURES))
-        again = search.search(FramePyramid(Picture(texture(256)), FEATURES))
-        for found in (first, again):
-            np.testing.assert_array_equal(found.probabilities, kept)
-            np.testing.assert_array_equal(found.hogs(np.arange(len(grid))), hogs)

@@ -5,16 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from boxing import moved_to, rounded
-from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
-from vdet.boxes import Box, Boxes, Float32Array
-from vdet.config.schema import ScoreSettings, StillSettings, SvmSettings
+from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder, road
+from vdet.boxes import Box, Boxes
+from vdet.config.schema import StillSettings, SvmSettings
 from vdet.detect.svm.detector import SvmModel, horizon_of
 from vdet.detect.svm.heat import HotRegion
-from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
 from vdet.errors import FrameSizeError
@@ -63,15 +60,6 @@ def test_a_car_in_consecutive_frames_is_detected_by_a_box_around_it() -> None:
     assert box.contains((detections.data["centroid"][0, 0], detections.data["centroid"][0, 1]))
 
 
-def test_the_score_follows_from_the_strength_by_the_settings() -> None:
-    settings = but(ROWS, "score", middle=1.7, slope=3.0)
-    *_, detections = detect_video(road(CAR), road(CAR), settings=settings)
-    assert len(detections) == 1
-    np.testing.assert_array_equal(
-        detections.scores, detection_scores(detections.data["strength"], settings.score)
-    )
-
-
 def test_the_first_frame_alone_is_half_as_hot_as_two() -> None:
     first, second = (trace_of(each).heat for each in detect_video(road(CAR), road(CAR)))
     np.testing.assert_allclose(second.values, 2 * first.values, rtol=1e-5)
@@ -81,20 +69,6 @@ def test_the_heat_of_a_car_that_has_gone_is_forgotten() -> None:
     *_, detections = detect_video(road(CAR), road(), road())
     assert trace_of(detections).heat.peak == 0
     assert len(detections) == 0
-
-
-def test_hits_are_the_windows_of_at_least_the_probability() -> None:
-    (detections,) = detect_video(road(CAR))
-    windows, hits = trace_of(detections).windows, trace_of(detections).hits
-    expected = windows.probabilities >= ROWS.search.probability
-    assert 0 < expected.sum() < len(windows)
-    np.testing.assert_array_equal(hits.boxes, windows.boxes[expected])
-
-
-def test_only_hits_make_heat() -> None:
-    (detections,) = detect_video(road(CAR), settings=but(ROWS, "search", probability=1.0))
-    assert len(trace_of(detections).hits) == 0
-    assert trace_of(detections).heat.peak == 0
 
 
 def test_nothing_is_detected_on_an_empty_road() -> None:
@@ -202,14 +176,6 @@ class TestStillPictures:
         np.testing.assert_allclose(trace_of(still).heat.values, trace_of(video).heat.values)
         assert rounded(still) == rounded(video)
 
-    def test_by_votes_too_it_shows_what_the_video_shows(self) -> None:
-        *_, video = detect_video(*[road(CAR)] * DEFAULT.heat.frames, settings=DEFAULT)
-        still = detect_still(road(CAR), DEFAULT)
-        assert rounded(still) == rounded(video)
-        np.testing.assert_allclose(still.scores, video.scores, rtol=1e-5)
-        for name, column in still.data.items():
-            np.testing.assert_allclose(column, video.data[name], rtol=1e-5)
-
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
     def test_a_still_picture_is_searched_once(
         self, settings: SvmSettings, monkeypatch: pytest.MonkeyPatch
@@ -224,11 +190,6 @@ class TestStillPictures:
         monkeypatch.setattr(FrameSearch, "search", counted)
         detect_still(road(CAR), but(settings, "heat", frames=6))
         assert len(calls) == 1
-
-    def test_the_windows_of_a_still_picture_are_those_of_every_set(self) -> None:
-        trace = trace_of(detect_still(road(CAR), DEFAULT))
-        assert len(trace.windows) == sum(len(grid) for grid in trace.grids)
-        assert set(trace.hits.boxes[:, 2].tolist()) == {48, 64, 80}
 
     @pytest.mark.parametrize("settings", [ROWS, DEFAULT], ids=["rows", "default"])
     def test_a_detection_is_shown_if_it_is_large_and_strong_enough(
@@ -248,12 +209,6 @@ class TestStillPictures:
             found = detect_still(road(CAR), settings.model_copy(update={"stills": stills}))
             assert rounded(found) == ([box] if shown else [])
 
-    def test_the_least_size_is_a_share_of_the_picture(self) -> None:
-        wide = np.hstack([road(CAR), road(), road(), road()])
-        assert len(detect_still(wide, but(ROWS, "stills", width=0.0))) == 1
-        assert len(detect_still(road(CAR))) == 1
-        assert len(detect_still(wide)) == 0
-
     def test_weak_and_small_detections_are_left_out_of_still_pictures_only(self) -> None:
         settings = but(ROWS, "stills", strength=100.0)
         assert len(detect_still(road(CAR), settings)) == 0
@@ -272,20 +227,6 @@ class TestHorizon:
     ) -> None:
         monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
         horizon_of(ROWS, [road()])
-
-    def test_the_horizon_is_found_in_the_pictures_otherwise(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        images = [road(), road(CAR)]
-        found = {id(images): 0.4}  # in these pictures and no others
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda given: found[id(given)])
-        assert horizon_of(SvmSettings(), images) == 0.4
-
-    def test_each_still_picture_has_its_own_horizon(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        for horizon in (0.35, 0.45):
-            monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", lambda _, h=horizon: h)
-            first = trace_of(detect_still(road(CAR), by_perspective(None, 0.15, 0.2).svm)).grids[0]
-            assert float(first.top) == pytest.approx(horizon * HEIGHT - 0.1 * first.size, abs=1)
 
 
 @pytest.mark.parametrize("shape", [(240, 20, 3), (1, 1, 3), (2, 2, 3)])
@@ -319,55 +260,3 @@ def test_one_loaded_model_serves_frames_of_any_size() -> None:
 
 
 # What `detection_scores` makes of the strength of the evidence.
-positive = st.floats(1e-6, 1e6)
-slopes = st.floats(0.01, 100)
-
-
-def scores_of(*strengths: float, middle: float = 0.3, slope: float = 2) -> Float32Array:
-    settings = ScoreSettings(middle=middle, slope=slope)
-    return detection_scores(np.array(strengths, np.float32), settings)
-
-
-class TestScores:
-    def test_half_of_the_boxes_with_the_middle_strength_are_vehicles(self) -> None:
-        assert scores_of(0.3)[0] == pytest.approx(0.5)
-        assert scores_of(5, middle=5, slope=7)[0] == pytest.approx(0.5)
-
-    def test_the_score_is_a_sigmoid_of_the_logarithm_of_the_strength(self) -> None:
-        strength, middle, slope = 0.7, 0.3, 2.5
-        expected = 1 / (1 + np.exp(-slope * (np.log(strength) - np.log(middle))))
-        assert scores_of(strength, middle=middle, slope=slope)[0] == pytest.approx(
-            expected, rel=1e-6
-        )
-
-    @given(st.lists(st.floats(0, 2**100, width=32), min_size=2, max_size=20), positive, slopes)
-    def test_stronger_evidence_never_has_a_lower_score(
-        self, strengths: list[float], middle: float, slope: float
-    ) -> None:
-        scores = scores_of(*sorted(strengths), middle=middle, slope=slope)
-        assert (np.diff(scores) >= 0).all()
-        assert (scores >= 0).all()
-        assert (scores <= 1).all()
-
-    def test_no_evidence_has_the_score_0_and_much_evidence_a_score_near_1(self) -> None:
-        for slope in (0.5, 2, 100):
-            scores = scores_of(0, 1e-45, 1e38, slope=slope)
-            assert scores.tolist() == [0, pytest.approx(0), pytest.approx(1)]
-
-    def test_no_strengths_have_no_scores(self) -> None:
-        assert scores_of().shape == (0,)
-        assert scores_of().dtype == np.float32
-
-    @given(st.floats(0, 2**127, width=32), positive, slopes)
-    def test_no_strength_overflows_or_warns(
-        self, strength: float, middle: float, slope: float
-    ) -> None:
-        (score,) = scores_of(strength, middle=middle, slope=slope)  # warnings are errors here
-        assert np.isfinite(score)
-
-    def test_every_setting_gives_finite_scores(self) -> None:
-        for middle, slope in ((1e-300, 100), (1e6, 100), (1e6, 1e-300)):
-            settings = ScoreSettings(middle=middle, slope=slope)
-            assert np.isfinite(
-                scores_of(0, 1e-3, 1, 1e6, middle=settings.middle, slope=slope)
-            ).all()

@@ -1,6 +1,5 @@
 """The dense and the patch engine give nearly the same results for the same windows."""
 
-from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -16,12 +15,11 @@ from detect.svm.engine_comparison import (
     compare,
     fitted,
     grid_of,
-    log_odds,
     road,
     with_boxes,
 )
 from seed import SEED
-from vdet.boxes import iou_matrix
+from vdet.boxes import from_sizes, iou_matrix
 from vdet.config.schema import (
     FeatureSettings,
     HistogramSettings,
@@ -35,13 +33,10 @@ from vdet.detect.svm.dense_search import (
     PhasedSearch,
     dense_search,
 )
-from vdet.detect.svm.features import FeatureExtractor, Layout, to_patch
 from vdet.detect.svm.horizon import find_horizon
 from vdet.detect.svm.kind import shipped_model
-from vdet.detect.svm.model import BoxRegression, LinearModel, load_model
-from vdet.detect.svm.pyramid import FramePyramid
+from vdet.detect.svm.model import LinearModel, load_model
 from vdet.detect.svm.search import Engine, FrameSearch, lay_grids
-from vdet.detect.svm.strips import Strip, describe_blocks
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
@@ -129,17 +124,6 @@ def _a_car_cut_off(side: str) -> Image:
     return cars()[:, 280:440] if side == "left" else cars()[:, 160:320]
 
 
-def _right_of_the_middle(grids: list[WindowGrid]) -> list[WindowGrid]:
-    return [grid.every_nth(1, grid.columns * 2 // 5, 0) for grid in grids]  # the cars are there
-
-
-@pytest.mark.parametrize(("width", "height"), [(640, 360), (960, 540), (1920, 1080), (1277, 719)])
-def test_the_engines_agree_in_frames_of_other_sizes(width: int, height: int) -> None:
-    model = fitted(SEED_FEATURES)
-    grids = _right_of_the_middle(lay_grids(SEED.svm, model.features, width, height))
-    assert_agree(compare(model, grids, road(width, height)))
-
-
 @pytest.mark.parametrize(("width", "height"), [(853, 480), (960, 540), (1242, 375), (1920, 1080)])
 def test_the_engines_agree_for_the_default_sets_in_frames_of_any_size(
     width: int, height: int
@@ -196,17 +180,6 @@ def _vehicles(model: LinearModel, grid: WindowGrid, image: Image, engine: Engine
         return search.search(Picture(image))
 
 
-def _without_edges(model: LinearModel) -> LinearModel:
-    """Remove the blocks at the edges of a patch from the regression: there, engines differ."""
-    assert model.box_regression is not None
-    inner = np.zeros_like(model.box_regression.weights)
-    for part in Layout.of(model.features).hog:
-        blocks = model.box_regression.weights[:, part].reshape(4, 7, 7, -1).copy()
-        blocks[:, [0, -1]] = blocks[:, :, [0, -1]] = 0
-        inner[:, part] = blocks.reshape(4, -1)
-    return replace(model, box_regression=BoxRegression(inner, model.box_regression.biases))
-
-
 def _vehicles_by_both(model: LinearModel, kind: type) -> tuple[Windows, Windows]:
     """Search with a grid that reaches beyond the frame; return the results of dense and patch."""
     step = STEPS[kind]
@@ -237,51 +210,7 @@ def test_the_engines_agree_on_the_vehicles_in_hits(kind: type) -> None:
     dense, patch = _vehicles_by_both(with_boxes(fitted(FeatureSettings())), kind)
     hits = patch.probabilities >= PROBABILITY
     assert (patch.vehicles[hits] != patch.boxes[hits]).any(axis=1).all()
-    pair = (found.vehicles.astype(np.float64) for found in (dense, patch))
+    pair = (from_sizes(found.vehicles) for found in (dense, patch))
     assert np.diag(iou_matrix(*pair)).min() > 0.9
     for found in (dense, patch):
         np.testing.assert_array_equal(found.vehicles[~hits], found.boxes[~hits])
-
-
-@pytest.mark.parametrize("kind", [AlignedSearch, PhasedSearch])
-def test_the_vehicles_differ_only_because_of_the_edges_of_patches(kind: type) -> None:
-    dense, patch = _vehicles_by_both(_without_edges(with_boxes(fitted(FeatureSettings()))), kind)
-    np.testing.assert_allclose(dense.vehicles, patch.vehicles, atol=0.05)
-
-
-def _windows_of_blocks(model: LinearModel, grid: WindowGrid) -> tuple[np.ndarray, np.ndarray]:
-    """Return the blocks of each window, from its strip and from its patch, `(n, 7, 7, d)`."""
-    features, image = model.features, cars()
-    frame = FramePyramid(Picture(image), features)
-    every = describe_blocks(Strip(grid, features).cut(frame), features)
-    extractor, layout = FeatureExtractor(features), Layout.of(features)
-    by_strip, by_patch = [], []
-    for i, (x, y, w, h) in enumerate(grid.boxes.tolist()):
-        row, column = divmod(i, grid.columns)
-        by_strip.append(every[column : column + 7, row : row + 7])
-        vector = extractor.describe(to_patch(image[y : y + h, x : x + w], features.patch))
-        parts = [vector[part].reshape(7, 7, -1) for part in layout.hog]
-        by_patch.append(np.concatenate(parts, axis=-1))
-    return np.array(by_strip), np.array(by_patch)
-
-
-@pytest.mark.parametrize("size", [64, 128])
-@pytest.mark.parametrize("features", [SEED_FEATURES, FeatureSettings()], ids=["seed", "default"])
-def test_blocks_away_from_the_edge_of_a_patch_are_the_same(
-    features: FeatureSettings, size: int
-) -> None:
-    by_strip, by_patch = _windows_of_blocks(fitted(features), grid_of(size, step=1))
-    inner = np.s_[:, 1:-1, 1:-1]
-    np.testing.assert_allclose(by_strip[inner], by_patch[inner], atol=1e-4, rtol=0)
-    assert np.abs(by_patch).max() > 0.1
-
-
-def test_a_frame_is_searched_with_all_windows_of_all_sets_in_order() -> None:
-    model, image = fitted(FeatureSettings()), road()
-    search = FrameSearch(model, SvmSettings(), 1280, 720, horizon=HORIZON)
-    found = search.search(Picture(image))
-    grids = lay_grids(SvmSettings(), model.features, 1280, 720, horizon=HORIZON)
-    assert list(search.grids) == grids
-    np.testing.assert_array_equal(found.boxes, np.concatenate([grid.boxes for grid in grids]))
-    one_by_one = compare(model, grids, image)
-    np.testing.assert_allclose(log_odds(found.probabilities), one_by_one.dense, atol=1e-3)

@@ -40,13 +40,6 @@ def test_the_lines_of_a_straight_road_meet_at_the_horizon(horizon: float) -> Non
     assert find_horizon(road(horizon)) == pytest.approx(horizon, abs=STEP)
 
 
-@pytest.mark.parametrize("size", [(320, 180), (960, 540), (1242, 375), (640, 480)])
-@pytest.mark.parametrize("horizon", [0.4, 0.58])
-def test_frames_may_have_any_shape(size: tuple[int, int], horizon: float) -> None:
-    found = find_horizon(road(horizon, size=size))
-    assert found == pytest.approx(horizon, abs=2 * STEP)
-
-
 @pytest.mark.parametrize("curvature", [-1 / 600, 1 / 1000])
 @pytest.mark.parametrize(("lane", "lanes"), [(0, 2), (1, 2), (1, 3)])
 def test_the_road_may_bend_and_the_camera_be_in_any_lane(
@@ -60,20 +53,6 @@ def test_the_horizon_is_found_behind_traffic() -> None:
     scene = replace(demo_scene(1, width=640, height=360), frames=5)
     found = find_horizon([frame.image for frame in frames(scene)])
     assert found == pytest.approx(scene.camera.horizon / 360, abs=2 * STEP)
-
-
-def test_one_frame_may_be_enough() -> None:
-    assert find_horizon(road(0.45, count=1)) == pytest.approx(0.45, abs=STEP)
-
-
-def test_the_order_of_the_frames_does_not_matter() -> None:
-    images = road(0.62)
-    assert find_horizon(images[::-1]) == find_horizon(images)
-
-
-def test_a_mirrored_road_has_the_same_horizon() -> None:
-    images = [np.ascontiguousarray(image[:, ::-1]) for image in road(0.42, lane=2)]
-    assert find_horizon(images) == pytest.approx(0.42, abs=2 * STEP)
 
 
 @pytest.mark.parametrize(
@@ -90,10 +69,6 @@ def test_a_mirrored_road_has_the_same_horizon() -> None:
 )
 def test_without_lines_the_horizon_is_the_default_one(image: Image) -> None:
     assert find_horizon([image]) == DEFAULT_HORIZON
-
-
-def test_without_frames_the_horizon_is_the_default_one() -> None:
-    assert find_horizon([]) == DEFAULT_HORIZON
 
 
 def fan(*slopes: float, meeting: float = 0.45, upward: bool = False) -> Image:

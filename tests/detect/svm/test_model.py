@@ -140,10 +140,6 @@ def test_huge_decision_values_give_probabilities_of_0_and_1_without_overflow() -
     assert probabilities.tolist() == pytest.approx([0, 0.5, 1])
 
 
-def test_no_vectors_have_no_probabilities() -> None:
-    assert model_of(3).probabilities(np.empty((0, 24), np.float32)).shape == (0,)
-
-
 @pytest.mark.parametrize("members", [1, 3, 20])
 def test_a_saved_model_is_loaded_bit_for_bit(path: Path, members: int) -> None:
     model = model_of(members)
@@ -190,11 +186,6 @@ def test_the_regression_of_boxes_is_kept_bit_for_bit(path: Path) -> None:
         assert array.dtype == np.float32
 
 
-def test_a_model_without_boxes_is_loaded_without(path: Path) -> None:
-    save_model(replace(model_with_boxes(), box_regression=None), path)
-    assert load_model(path).box_regression is None
-
-
 @pytest.mark.parametrize(
     ("name", "array", "message"),
     [
@@ -224,14 +215,6 @@ def test_a_regression_with_one_of_its_two_arrays_is_damaged(path: Path, missing:
         load_model(write_npz(path, header_of(WITH_HOG), **arrays_of(model_with_boxes()), **arrays))
 
 
-def test_a_regression_written_by_hand_is_read(path: Path) -> None:
-    assert boxes_of(load_model(write_with_boxes(path))).weights.shape == (4, 32)
-
-
-def test_a_model_without_provenance_has_an_empty_one(path: Path) -> None:
-    assert load_model(write_npz(path, header_of(provenance=...))).provenance == {}
-
-
 def test_a_model_asked_for_other_features_says_which_differ(path: Path) -> None:
     save_model(model_of(1), path)
     asked = SMALL.model_copy(update={"color_space": "HSV", "patch": 48})
@@ -252,21 +235,10 @@ def test_a_missing_model_is_named(path: Path) -> None:
         load_model(path)
 
 
-def test_a_folder_is_no_model(tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match="cannot be read: Is a directory"):
-        load_model(tmp_path)
-
-
 @pytest.mark.parametrize("data", [b"", b"not a zip file", b"PK\x05\x06" + bytes(18)])
 def test_a_file_that_is_not_a_zip_file_is_no_model(path: Path, data: bytes) -> None:
     path.write_bytes(data)
     with pytest.raises(ModelError, match="is not a vdet model, or is damaged; make one with"):
-        load_model(path)
-
-
-def test_a_foreign_npz_is_no_model(path: Path) -> None:
-    np.savez(path, images=np.zeros(3))
-    with pytest.raises(ModelError, match="is not a vdet model"):
         load_model(path)
 
 
@@ -277,38 +249,6 @@ def test_a_model_cut_off_anywhere_is_damaged(path: Path) -> None:
         path.write_bytes(whole[:length])
         with pytest.raises(ModelError, match="damaged"):
             load_model(path)
-
-
-def test_a_mutated_model_is_refused_or_loads_with_all_its_parts(path: Path) -> None:
-    save_model(model_of(3), path)
-    whole = np.frombuffer(path.read_bytes(), np.uint8)
-    rng = np.random.default_rng(0)
-    refused = 0
-    for _ in range(300):
-        mutated = whole.copy()
-        mutated[rng.integers(len(whole), size=rng.integers(1, 4))] = rng.integers(256)
-        path.write_bytes(mutated.tobytes())
-        try:
-            model = load_model(path)
-        except ModelError:
-            refused += 1
-        else:  # what the mutation hit is not part of the model: a date, an attribute
-            np.testing.assert_array_equal(model.weights, model_of(3).weights)
-    assert refused > 200
-
-
-@pytest.mark.parametrize("method", [1, 12, 14, 99])
-def test_a_wrongly_declared_compression_is_damage(path: Path, method: int) -> None:
-    save_model(model_of(3), path)
-    data = bytearray(path.read_bytes())
-    for mark, offset in ((b"PK\x03\x04", 8), (b"PK\x01\x02", 10)):
-        at = data.find(mark)
-        while at >= 0:
-            data[at + offset] = method
-            at = data.find(mark, at + 1)
-    path.write_bytes(data)
-    with pytest.raises(ModelError):
-        load_model(path)
 
 
 @pytest.mark.parametrize(
@@ -342,22 +282,12 @@ def test_a_header_that_is_not_understood_is_refused(
         load_model(write_npz(path, header))
 
 
-def test_a_header_of_another_type_is_refused(path: Path) -> None:
-    members = members_of(model_of(2), header=npy(np.full(100, np.nan)))
-    with pytest.raises(ModelError, match="is not a vdet model"):
-        load_model(write_members(path, members))
-
-
 @pytest.mark.parametrize("missing", ["header", "weights", "biases", "slopes", "offsets"])
 def test_a_model_without_one_of_its_parts_is_damaged(path: Path, missing: str) -> None:
     members = members_of(model_of(2))
     del members[missing]
     with pytest.raises(ModelError, match="damaged"):
         load_model(write_members(path, members))
-
-
-def test_members_written_by_hand_are_a_model(path: Path) -> None:
-    assert load_model(write_members(path, members_of(model_of(2)))).biases.shape == (2,)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks.patch_search import PatchSearch
 
 import seed
 from vdet.boxes import Int32Array
@@ -19,7 +18,6 @@ from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.search import Engine, FrameSearch, lay_grids
 from vdet.detect.svm.windows import Windows
 from vdet.errors import FrameSizeError, ImageError
@@ -92,16 +90,6 @@ def search_all(search: FrameSearch, image: Image = FRAME) -> Windows:
 MEDIAN = float(np.median(search_all(search_of(SMALL)).probabilities))
 
 
-def rows_of(windows: Windows) -> list[tuple[float, ...]]:
-    """Return box, probability and vehicle of each window, in their order."""
-    columns = [windows.boxes, windows.probabilities[:, np.newaxis], windows.vehicles]
-    return [tuple(row) for row in np.hstack(columns).round(4).tolist()]
-
-
-def band(size: int, top: int, bottom: int) -> WindowSettings:
-    return WindowSettings(size=size, overlap=0.5, top=top, bottom=bottom)
-
-
 class TestLayingGrids:
     def test_the_seed_has_831_windows_on_a_720p_frame_the_large_ones_first(self) -> None:
         assert laid(1280, 720)[:, 2].tolist() == [128] * 423 + [64] * 408
@@ -111,19 +99,6 @@ class TestLayingGrids:
         grids = lay_grids(settings, settings.features, 1280, 720)
         shares = settings.search.perspective.sizes
         assert [grid.size for grid in grids] == [round(1280 * share) for share in shares]
-
-    def test_sets_over_fixed_rows_come_before_those_of_the_perspective(self) -> None:
-        perspective = PerspectiveSettings(sizes=(0.1, 0.2))
-        both = SvmSettings(
-            search=SearchSettings(windows=(band(64, 400, 500),), perspective=perspective)
-        )
-        grids = lay_grids(both, SMALL, 1280, 720, horizon=0.5)
-        assert [grid.size for grid in grids] == [64, 128, 256]
-        assert (
-            grids[0]
-            == lay_grids(SvmSettings(search=fixed(band(64, 400, 500))), SMALL, 1280, 720)[0]
-        )
-        assert grids[1:] == lay_perspective(perspective, SMALL, 1280, 720, horizon=0.5)
 
     def test_the_horizon_moves_only_the_sets_that_follow_the_perspective(self) -> None:
         assert laid(1280, 720, SEED).tolist() == laid(1280, 720, SEED, horizon=0.4).tolist()
@@ -153,18 +128,6 @@ class TestLayingGrids:
         assert (x + w <= width + beyond * w).all()
         assert (y + h <= height).all()
 
-    def test_steps_are_counted_in_cells_of_the_features(self) -> None:
-        settings = SvmSettings(search=fixed(WindowSettings(size=64, step=1, top=0, bottom=64)))
-        for cell, step in ((4, 8), (8, 16)):
-            features = FeatureSettings(patch=32, hog=HogSettings(cell=cell))
-            (grid,) = lay_grids(settings, features, 1280, 720)
-            assert grid.step == step
-
-    def test_windows_below_the_frame_are_left_out(self) -> None:
-        settings = SvmSettings(search=fixed(band(64, 600, 900), band(64, 700, 800)))
-        (grid,) = lay_grids(settings, COLOUR, 640, 720)
-        assert {y for _, y, _, _ in grid.boxes.tolist()} == {600, 632}
-
     def test_a_set_that_does_not_fit_leaves_the_others(self) -> None:
         # the large windows are wider than the frame, the small ones are not
         assert [grid.size for grid in lay_grids(SEED, COLOUR, 100, 720)] == [64]
@@ -185,12 +148,6 @@ class TestSearching:
         assert found.probabilities.dtype == found.shares.dtype == np.float32
         assert len(np.unique(found.probabilities)) > len(found) / 2
 
-    def test_the_engines_agree(self) -> None:
-        dense = search_all(search_of(SMALL))
-        patch = search_all(search_of(SMALL, PatchSearch))
-        np.testing.assert_array_equal(dense.boxes, patch.boxes)
-        assert np.corrcoef(dense.probabilities, patch.probabilities)[0, 1] > 0.9
-
     def test_nothing_outside_the_search_rows_matters(self) -> None:
         search = search_of(SMALL)
         other = FRAME.copy()
@@ -198,13 +155,6 @@ class TestSearching:
         np.testing.assert_array_equal(
             search_all(search, other).probabilities, search_all(search).probabilities
         )
-
-    def test_a_search_does_not_change_the_frame_or_later_searches(self) -> None:
-        search, frame = search_of(SMALL), FRAME.copy()
-        first = search_all(search, frame)
-        search_all(search, 255 - frame)
-        np.testing.assert_array_equal(frame, FRAME)
-        np.testing.assert_array_equal(search_all(search, frame).probabilities, first.probabilities)
 
     def test_what_lies_beyond_the_sides_repeats_the_outermost_columns(self) -> None:
         wide = np.pad(FRAME, ((0, 0), (24, 24), (0, 0)), mode="edge")
@@ -245,12 +195,6 @@ class TestVehicles:
         np.testing.assert_allclose(found.vehicles[hits], expected, rtol=1e-6)
         np.testing.assert_array_equal(found.vehicles[~hits], found.boxes[~hits])
 
-    def test_a_vehicle_may_reach_beyond_its_window(self) -> None:
-        found = search_all(with_sides((-1, -0.5, 1, 0.5)))
-        hits = found.probabilities >= MEDIAN
-        expected = found.boxes[hits] * [1, 1, 2, 1] - found.boxes[hits][:, 2:3] * [0.5, 0, 0, 0]
-        np.testing.assert_allclose(found.vehicles[hits], expected)
-
     @pytest.mark.parametrize("sides", [(0.3, 0.4, 0.1, 0.2), (0.2, 0.3, 0.2, 0.3)])
     def test_vehicles_have_a_least_size_whatever_the_regression_gives(self, sides: Sides) -> None:
         found = search_all(with_sides(sides))
@@ -262,10 +206,6 @@ class TestVehicles:
         np.testing.assert_allclose(middle[:, 0], x + size / 2 + 0.2 * size, rtol=1e-6)
         np.testing.assert_allclose(middle[:, 1], y + size / 2 + 0.3 * size, rtol=1e-6)
 
-    def test_without_hits_vehicles_are_the_windows(self) -> None:
-        found = search_all(with_sides((-1, -1, 1, 1), probability=1))
-        np.testing.assert_array_equal(found.vehicles, found.boxes)
-
 
 @pytest.mark.parametrize(("width", "height"), [(63, 720), (1, 1), (2, 2), (40, 2000)])
 def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int) -> None:
@@ -273,12 +213,6 @@ def test_a_frame_without_room_for_any_window_is_refused(width: int, height: int)
         FrameSizeError, match=rf"no search window fits .* {width}×{height} pixels; give"
     ):
         FrameSearch(model_of(COLOUR), SEED, width, height)
-
-
-def test_a_frame_that_ends_above_the_search_rows_is_refused() -> None:
-    settings = SvmSettings(search=fixed(band(64, 800, 900)))
-    with pytest.raises(FrameSizeError, match="no search window fits"):
-        FrameSearch(model_of(COLOUR), settings, 1280, 720)
 
 
 def test_a_frame_with_too_many_windows_is_refused() -> None:

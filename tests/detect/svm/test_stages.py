@@ -6,7 +6,7 @@ import pytest
 from boxing import moved_to
 from red_cars import CAR, HEIGHT, PERSPECTIVE, SCALE, SETTINGS, WIDTH, red_finder, road
 from vdet.boxes import Box
-from vdet.config.schema import FeatureSettings, SvmSettings, WindowSettings
+from vdet.config.schema import SvmSettings, WindowSettings
 from vdet.config.section import scale_lengths
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import Heat
@@ -20,7 +20,6 @@ NAMES = ["patches", "windows", "hits", "heat"]
 ROWS = SETTINGS.svm
 HOG = red_finder().features
 SMALLER_SET = scale_lengths(WindowSettings(size=24, overlap=0.5, top=100, bottom=160), SCALE)
-OUTSIDE = scale_lengths(WindowSettings(size=240, overlap=0.5, top=120, bottom=360), SCALE)
 
 
 def pictures_of(image: Image, settings: SvmSettings = ROWS) -> dict[str, Image]:
@@ -44,23 +43,10 @@ def test_there_are_four_pictures_in_the_order_of_the_stages(image: Image) -> Non
         assert pictures[name].dtype == np.uint8
 
 
-def test_a_video_frame_has_the_same_pictures_as_a_still_one() -> None:
-    detector = SvmModel(red_finder(), ROWS).for_video(WIDTH, HEIGHT, [road(CAR)])
-    for index in range(2):
-        detections = detector.detect(detector.search(Picture(road(CAR)), index))
-    still = pictures_of(road(CAR))
-    for name, picture in detector.stage_pictures(road(CAR), detections).items():
-        np.testing.assert_array_equal(picture, still[name])
-
-
 def test_the_frame_itself_is_not_drawn_on() -> None:
     image = road(CAR)
     pictures_of(image)
     np.testing.assert_array_equal(image, road(CAR))
-
-
-def test_without_hits_the_frame_is_shown_as_it_is() -> None:
-    np.testing.assert_array_equal(pictures_of(road())["hits"], road())
 
 
 def test_the_patches_are_the_likeliest_and_the_unlikeliest_window() -> None:
@@ -107,12 +93,6 @@ def test_every_window_set_has_a_grid_of_its_own_colour() -> None:
     assert sum(max(color) == 255 for color in two) > sum(max(color) == 255 for color in one)
 
 
-def test_a_set_without_room_in_the_frame_is_not_drawn() -> None:
-    plain = pictures_of(road(CAR))["windows"]
-    with_outside = pictures_of(road(CAR), with_windows(*ROWS.search.windows, OUTSIDE))["windows"]
-    np.testing.assert_array_equal(with_outside, plain)
-
-
 def beyond(share: float) -> SvmSettings:
     """Return settings with windows that reach beyond the frame's sides."""
     settings = PERSPECTIVE.svm
@@ -144,26 +124,11 @@ def test_the_likeliest_window_is_shown_with_the_columns_that_it_repeats() -> Non
     assert red.mean() > 0.85
 
 
-@pytest.mark.parametrize("space", ["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"])
-def test_patches_are_shown_with_the_features_of_the_model(space: str) -> None:
-    features = FeatureSettings.model_validate({"color_space": space})
-    detector = SvmModel(red_finder(), ROWS).for_video(WIDTH, HEIGHT, [road(CAR)])
-    trace = detector.detect(detector.search(Picture(road(CAR)), None)).trace
-    assert isinstance(trace, Trace)
-    sheet = stage_pictures(road(CAR), trace, features)["patches"]
-    assert sheet.shape[1] > pictures_of(road(CAR))["patches"].shape[1]
-
-
 def flat(value: float) -> Heat:
     return Heat(np.full((24, 32), value, np.float32))
 
 
 class TestHeat:
-    def test_without_heat_the_picture_is_only_darkened(self) -> None:
-        image = np.random.default_rng(0).integers(0, 256, (24, 32, 3), np.uint8)
-        blended = blend_heat(image, flat(0))
-        np.testing.assert_allclose(blended, image / 2, atol=1)
-
     def test_heat_is_white_at_its_peak_and_red_below(self) -> None:
         heat = flat(0)
         heat.values[5, 7], heat.values[9, 9] = 8.0, 2.0
@@ -172,17 +137,6 @@ class TestHeat:
         blue, green, red = blended[9, 9].tolist()
         assert red > 100 > green == blue == 0
         assert blended[0, 0].max() < 12
-
-    def test_the_unit_of_heat_does_not_matter(self) -> None:
-        rng = np.random.default_rng(0)
-        image = rng.integers(0, 256, (24, 32, 3), np.uint8)
-        values = rng.integers(0, 9, (24, 32)).astype(np.float32)
-        np.testing.assert_array_equal(
-            blend_heat(image, Heat(values)), blend_heat(image, Heat(values * 4))
-        )
-
-    def test_flat_heat_is_all_peak(self) -> None:
-        assert blend_heat(np.zeros((24, 32, 3), np.uint8), flat(3)).min() > 190
 
     @pytest.mark.parametrize("shrink", [2, 4, 8])
     def test_heat_of_a_shrunk_map_lies_in_its_place(self, shrink: int) -> None:
@@ -193,8 +147,3 @@ class TestHeat:
         rows, columns = np.nonzero(blended.min(axis=2) > 190)
         assert set(rows.tolist()) == set(range(shrink, min(21, 2 * shrink)))
         assert set(columns.tolist()) == set(range(2 * shrink, min(30, 3 * shrink)))
-
-    def test_the_picture_itself_is_not_changed(self) -> None:
-        image = np.full((24, 32, 3), 255, np.uint8)
-        blend_heat(image, flat(1))
-        assert image.min() == 255

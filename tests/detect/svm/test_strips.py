@@ -14,7 +14,6 @@ from vdet.detect.svm.features import (
     FeatureExtractor,
     Layout,
     halve,
-    resize,
     split,
     to_patch,
 )
@@ -29,8 +28,7 @@ from vdet.detect.svm.strips import (
     window_blocks,
 )
 from vdet.detect.svm.windows import WindowGrid
-from vdet.media import Picture, Planes
-from vdet.media.coding import Coding
+from vdet.media import Picture
 
 NO_HISTOGRAM = HistogramSettings(bins=None)
 FRAME = np.random.default_rng(0).integers(0, 256, (300, 400, 3), dtype=np.uint8)
@@ -90,25 +88,6 @@ def levels_apart(
     return apart
 
 
-@pytest.mark.parametrize(("size", "step"), [(64, 8), (64, 12), (128, 16), (128, 50), (32, 12)])
-@pytest.mark.parametrize(("left", "top"), [(6, 11), (7, 12), (0, 16)])
-def test_in_a_strip_of_planes_too_and_each_channel_is_resized(
-    size: int, step: int, left: int, top: int
-) -> None:
-    planes = Planes.of_image(FRAME, Coding(full_range=True))
-    whole = [planes.luma, *(each.repeat(2, 0).repeat(2, 1) for each in (planes.red, planes.blue))]
-    grid = WindowGrid(size, Fraction(step), Fraction(left), Fraction(top), 4, 3)
-    strip = Strip(grid, SEED_FEATURES).cut(FramePyramid(Picture(planes), SEED_FEATURES))
-    for i, (x, y, w, h) in enumerate(grid.boxes.tolist()):
-        row, column = divmod(i, grid.columns)
-        across, down = column * step * 64 // size, row * step * 64 // size
-        inner = np.s_[1:-1, 1:-1]  # enlarging uses pixels beyond the edge
-        for ours, channel in zip(strip, whole, strict=True):
-            expected = resize(channel[y : y + h, x : x + w], 64, 64)
-            window = ours[down : down + 64, across : across + 64]
-            np.testing.assert_array_equal(window[inner], expected[inner])
-
-
 def noise(height: int, width: int) -> Channels:
     """Return channels of a colour space, with random values."""
     rng = np.random.default_rng(height)
@@ -136,14 +115,6 @@ def test_the_sum_of_a_window_is_that_of_its_weighted_blocks(
         assert sums[m, x, y] == pytest.approx(expected, abs=1e-4)
 
 
-def test_every_block_of_a_strip_is_described_once() -> None:
-    assert describe_blocks(STRIP, SEED_FEATURES).shape == (19, 11, 3 * 4 * 8)
-    large = FeatureSettings(
-        halved=(), hog=HogSettings(cell=8, block=3, orientations=9, channels=(1,))
-    )
-    assert describe_blocks(STRIP, large).shape == (18, 10, 9 * 9)
-
-
 def test_a_block_equals_that_of_a_descriptor_around_it() -> None:
     blocks = describe_blocks(STRIP, SEED_FEATURES)
     block = cv2.HOGDescriptor((32, 32), (16, 16), (8, 8), (8, 8), 8)
@@ -154,13 +125,6 @@ def test_a_block_equals_that_of_a_descriptor_around_it() -> None:
             middle = np.reshape(block.compute(around), (3, 3, 32))[1, 1]
             ours = blocks[column, row, 32 * number : 32 * (number + 1)]
             np.testing.assert_allclose(ours, middle, atol=1e-5)
-
-
-def test_channels_are_described_in_the_order_of_the_settings() -> None:
-    every = describe_blocks(STRIP, SEED_FEATURES)
-    settings = FeatureSettings(halved=(), hog=HogSettings(cell=8, channels=(2, 0)))
-    some = describe_blocks(STRIP, settings)
-    np.testing.assert_array_equal(some, np.concatenate([every[..., 64:], every[..., :32]], axis=-1))
 
 
 @pytest.mark.parametrize(
@@ -176,22 +140,6 @@ def test_the_blocks_of_a_window_have_the_order_of_the_features(features: Feature
     (hog,) = window_blocks(blocks, origin, origin, features)
     expected = extractor.describe(patch)[: extractor.layout.hog_length]
     np.testing.assert_allclose(hog, expected, atol=1e-6)
-
-
-def test_the_blocks_of_a_window_are_those_at_its_position() -> None:
-    blocks = describe_blocks(STRIP, SEED_FEATURES)
-    columns, rows = np.array([0, 12, 5]), np.array([4, 0, 2])
-    windows = window_blocks(blocks, columns, rows, SEED_FEATURES)
-    for column, row, window in zip(columns, rows, windows, strict=True):
-        cut = blocks[column : column + 7, row : row + 7]
-        zero = np.zeros(1, np.intp)
-        np.testing.assert_array_equal(window, window_blocks(cut, zero, zero, SEED_FEATURES)[0])
-
-
-def test_blocks_do_not_depend_on_where_the_channels_lie_in_memory() -> None:
-    first, second, third = (np.pad(channel, 5)[5:-5, 5:-5] for channel in STRIP)
-    cut_out = describe_blocks((first, second, third), SEED_FEATURES)
-    np.testing.assert_array_equal(cut_out, describe_blocks(STRIP, SEED_FEATURES))
 
 
 SMALL_STRIP = noise(40, 70)
@@ -226,20 +174,6 @@ def test_a_window_sums_the_weights_of_its_histogram(bins: int, members: int) -> 
         assert sums[m, i, j] == pytest.approx(np.sum(counts * weights[m]), abs=2e-3)
 
 
-def test_tables_are_summed_for_a_list_of_windows_too() -> None:
-    features = features_of(16)
-    tables = weights_of(features, 2)[0].tables
-    grid = table_sums(SMALL_STRIP, tables, features, X, Y)
-    listed = table_sums(SMALL_STRIP, tables, features, np.array([38, 0]), np.array([7, 8]))
-    np.testing.assert_array_equal(listed, [[m[2, 2], m[0, 3]] for m in grid])
-
-
-def test_without_a_histogram_nothing_is_added() -> None:
-    features = features_of(None)
-    tables = weights_of(features, 2)[0].tables
-    assert not table_sums(SMALL_STRIP, tables, features, X, Y).any()
-
-
 class TestHalvedChannels:
     """A channel at half size has the blocks and windows of the strip at half their pixels."""
 
@@ -249,26 +183,6 @@ class TestHalvedChannels:
     def strip() -> Channels:
         luma, red, blue = STRIP
         return luma, halve(red), halve(blue)
-
-    def test_each_is_cut_at_its_size(self) -> None:
-        grid = WindowGrid(96, Fraction(12), Fraction(6), Fraction(11), 4, 3)
-        whole, halved = (
-            Strip(grid, each).cut(FramePyramid(Picture(FRAME), each))
-            for each in (SEED_FEATURES, self.FEATURES)
-        )
-        np.testing.assert_array_equal(halved[0], whole[0])
-        for ours, channel in zip(halved[1:], whole[1:], strict=True):
-            np.testing.assert_array_equal(ours, halve(channel))
-
-    def test_of_planes_too(self) -> None:
-        planes = Planes.of_image(FRAME, Coding(full_range=True))
-        grid = WindowGrid(128, Fraction(16), Fraction(0), Fraction(16), 4, 3)
-        luma, red, blue = Strip(grid, self.FEATURES).cut(
-            FramePyramid(Picture(planes), self.FEATURES)
-        )
-        assert luma.shape == (64 + 2 * 8, 64 + 3 * 8)
-        for ours, plane in ((red, planes.red), (blue, planes.blue)):
-            np.testing.assert_array_equal(ours, halve(plane[8:88, :88]))
 
     def test_their_blocks_are_those_of_cells_of_half_the_side(self) -> None:
         ours = describe_blocks(self.strip(), self.FEATURES)

@@ -1,5 +1,3 @@
-from fractions import Fraction
-
 import numpy as np
 import pytest
 from hypothesis import assume, given
@@ -8,7 +6,7 @@ from hypothesis import strategies as st
 from seed import SEED
 from vdet.boxes import Int32Array
 from vdet.config.schema import WindowSettings
-from vdet.detect.svm.windows import WindowGrid, Windows, lay_grid
+from vdet.detect.svm.windows import Windows, lay_grid
 
 LARGE, SMALL = SEED.svm.search.windows
 ROWS = 2000  # of a frame that is higher than all bands here
@@ -33,18 +31,6 @@ def test_the_seed_sets_have_423_and_408_windows_on_a_720p_frame() -> None:
     assert len(lay_grid(SMALL, 1280, 720)) == len(boxes_of(SMALL, 1280, 720)) == 408
 
 
-def test_the_large_set_lies_in_47_columns_and_9_rows() -> None:
-    x, y = boxes_of(LARGE, 1280)[:, :2].T
-    assert np.unique(x).tolist() == list(range(0, 47 * 25, 25))
-    assert np.unique(y).tolist() == list(range(380, 380 + 9 * 25, 25))
-
-
-def test_the_small_set_lies_in_102_columns_and_4_rows() -> None:
-    x, y = boxes_of(SMALL, 1280)[:, :2].T
-    assert np.unique(x).tolist() == list(range(0, 102 * 12, 12))
-    assert np.unique(y).tolist() == [400, 412, 424, 436]
-
-
 def test_windows_are_laid_row_by_row_from_the_top_left() -> None:
     boxes = boxes_of(band(10, 0.5, 7, 22), 20)
     expected = [[0, 7], [5, 7], [10, 7], [0, 12], [5, 12], [10, 12]]
@@ -52,43 +38,14 @@ def test_windows_are_laid_row_by_row_from_the_top_left() -> None:
     assert boxes.dtype == np.int32
 
 
-def test_without_overlap_windows_tile_the_band() -> None:
-    assert boxes_of(band(10, 0, 0, 20), 30)[:, :2].tolist() == [
-        [0, 0], [10, 0], [20, 0], [0, 10], [10, 10], [20, 10],
-    ]  # fmt: skip
-
-
 def test_step_and_buffer_are_truncated() -> None:
     # size 20, overlap 0.33: step int(13.4) = 13, buffer int(6.6) = 6, columns (100 - 6) // 13 = 7
     assert boxes_of(band(20, 0.33, 0, 20), 100)[:, 0].tolist() == [0, 13, 26, 39, 52, 65, 78]
 
 
-def test_a_frame_narrower_than_a_window_has_none() -> None:
-    boxes = boxes_of(band(64, 0.5, 0, 64), 63)
-    assert boxes.shape == (0, 4)
-    assert boxes.dtype == np.int32
-
-
 def test_a_band_that_lost_a_row_to_rounding_still_has_its_windows() -> None:
     low = band(64, 0.5, 0, 64).model_copy(update={"bottom": 63})  # as after scaling
     np.testing.assert_array_equal(boxes_of(low, 640), boxes_of(band(64, 0.5, 0, 64), 640))
-
-
-def test_a_band_ends_where_the_frame_does() -> None:
-    settings = band(10, 0.5, 0, 100)
-    np.testing.assert_array_equal(boxes_of(settings, 30, 42), boxes_of(band(10, 0.5, 0, 42), 30))
-    assert boxes_of(settings, 30, 9).shape == (0, 4)
-
-
-def test_a_window_scaled_down_to_nothing_is_not_laid() -> None:
-    nothing = band(64, 0.5, 0, 64).model_copy(update={"size": 0})
-    assert boxes_of(nothing, 640).shape == (0, 4)
-
-
-def test_a_window_that_would_end_a_pixel_beyond_the_frame_is_left_out() -> None:
-    # step 25 and buffer 102 are together a pixel short of 128, so 47 windows would end at 1278
-    boxes = boxes_of(LARGE, 1277)
-    assert (boxes[:, 0] + boxes[:, 2]).max() == 1253
 
 
 @given(
@@ -133,11 +90,6 @@ def test_windows_of_a_fractional_step_lie_at_whole_pixels_and_do_not_drift() -> 
     assert x.tolist() == [0, 12, 25, 38, 50, 62, 75, 88, 100]
 
 
-def test_a_step_fills_the_span_to_its_last_pixel() -> None:
-    assert boxes_of(stepped(64, 8, 0, 64), 128)[:, 0].tolist() == [0, 64]
-    assert boxes_of(stepped(64, 8, 0, 64), 127)[:, 0].tolist() == [0]
-
-
 @given(
     st.integers(8, 200),
     st.integers(1, 8),
@@ -169,20 +121,6 @@ def test_the_share_is_one_over_the_number_of_windows_that_cover_a_pixel() -> Non
         assert grid.share == 1 / 16
 
 
-def test_in_a_grid_of_few_rows_fewer_windows_cover_a_pixel() -> None:
-    grid = WindowGrid(64, Fraction(16), Fraction(0), Fraction(100), columns=17, rows=2)
-    covered = np.zeros((320, 320))
-    for x, y, w, h in grid.boxes.tolist():
-        covered[y : y + h, x : x + w] += 1
-    assert covered.max() == 8
-    assert grid.share == 1 / 8
-
-
-def test_without_overlap_the_share_is_one() -> None:
-    assert lay_grid(band(10, 0, 0, 20), 30, 20).share == 1
-    assert lay_grid(stepped(10, 12, 0, 20), 30, 20).share == 1  # with gaps between them
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 50])
 def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> None:
     grid = lay_grid(stepped(100, 1, 40, 300), 555, 720)  # of a fractional step
@@ -190,11 +128,6 @@ def test_the_grids_of_every_nth_window_together_are_the_whole_grid(n: int) -> No
     together = np.concatenate([part.boxes for part in parts])
     assert len(together) == sum(len(part) for part in parts) == len(grid)
     assert {tuple(box) for box in together.tolist()} == {tuple(b) for b in grid.boxes.tolist()}
-
-
-def test_every_nth_window_starts_at_the_given_column_and_row() -> None:
-    grid = lay_grid(band(10, 0.5, 0, 30), 30, 30).every_nth(2, 1, 1)
-    assert grid.boxes[:, :2].tolist() == [[5, 5], [15, 5], [5, 15], [15, 15]]
 
 
 def test_hits_are_the_windows_of_at_least_the_probability_in_order() -> None:

@@ -8,13 +8,12 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 
 from vdet.boxes import Boxes, are_nested
-from vdet.config.schema import StillSettings, SvmSettings
+from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.road_check import RoadCheck
-from vdet.detect.svm.scores import detection_scores
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace, stage_pictures
 from vdet.detect.svm.votes import Votes, split_regions
@@ -129,11 +128,10 @@ class SvmDetector:
         for _ in range(self._heat.frames if candidates.is_still else 1):
             heat = self._map.update(hits)
             self._recent.append(hits)
-        regions = self._regions(heat)
-        if candidates.is_still:
-            regions = self._shown_in_still(regions, self._settings.stills)
         trace = Trace(candidates.windows, hits, heat, self._search.grids)
-        detections = self._detections(regions, trace)
+        detections = self._detections(self._regions(heat), trace)
+        if candidates.is_still:
+            detections = self._shown_in_still(detections)
         if self._check and candidates.picture and self._check.is_due():
             self._check.compare(candidates.picture, self._as_still(candidates, detections))
         return detections
@@ -166,35 +164,25 @@ class SvmDetector:
         inside = (replace(region, box=region.box.clipped(*self._size)) for region in regions)
         return [region for region in inside if region.box.area]
 
-    def _shown_in_still(
-        self, regions: Sequence[HotRegion], stills: StillSettings
-    ) -> list[HotRegion]:
-        shown = [each for each in regions if self._is_shown(each, stills)]
-        boxes = [astuple(each.box) for each in shown]
-        strengths = [each.strength for each in shown]
-        dropped = are_nested(np.reshape(np.array(boxes, np.float64), (-1, 4)), strengths)
-        return [each for each, drop in zip(shown, dropped.tolist(), strict=True) if not drop]
-
-    def _is_shown(self, region: HotRegion, stills: StillSettings) -> bool:
-        width, height = self._size
-        return (
-            region.strength >= stills.strength
-            and region.box.width >= stills.width * width
-            and region.box.height >= stills.height * height
-        )
-
     def _detections(self, regions: Sequence[HotRegion], trace: Trace) -> Boxes:
-        strengths = np.array([region.strength for region in regions], np.float32)
-        boxes = [astuple(region.box) for region in regions]
+        strengths = np.array([region.strength for region in regions], np.float64)
         return Boxes(
-            np.reshape(boxes, (-1, 4)),
-            detection_scores(strengths, self._settings.score),
+            np.reshape([astuple(region.box) for region in regions], (-1, 4)),
+            [self._settings.score.of(strength) for strength in strengths.tolist()],
             data={
                 "centroid": np.reshape([region.centroid for region in regions], (-1, 2)),
                 "strength": strengths,
             },
             trace=trace,
         )
+
+    def _shown_in_still(self, found: Boxes) -> Boxes:
+        """Return the detections that are strong and large enough, without those inside another."""
+        stills, strengths = self._settings.stills, found.data["strength"]
+        least = np.array([stills.width, stills.height]) * self._size
+        sizes = found.sides[:, 2:] - found.sides[:, :2]
+        shown = found[(strengths >= stills.strength) & (sizes >= least).all(axis=1)]
+        return shown[~are_nested(shown.sides, shown.data["strength"])]
 
 
 def horizon_of(settings: SvmSettings, images: Sequence[Image]) -> float:

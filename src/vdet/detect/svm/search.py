@@ -10,11 +10,18 @@ from vdet.config.schema import FeatureSettings, SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.dense_search import dense_search
 from vdet.detect.svm.horizon import DEFAULT_HORIZON
-from vdet.detect.svm.limits import ALIGNMENT, limited_grid
 from vdet.detect.svm.model import LinearModel
-from vdet.detect.svm.perspective import lay_perspective
 from vdet.detect.svm.pyramid import FramePyramid
-from vdet.detect.svm.windows import GridResult, WindowGrid, Windows, join_windows, lay_grid
+from vdet.detect.svm.windows import (
+    ALIGNMENT,
+    GridResult,
+    WindowGrid,
+    Windows,
+    join_windows,
+    lay_grid,
+    lay_perspective,
+    limited_grid,
+)
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 from vdet.regions import SearchArea

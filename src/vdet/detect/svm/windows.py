@@ -1,9 +1,13 @@
-"""Windows: where they lie in a frame, and what the model says of them.
+"""Windows: where they lie in a frame, and their probabilities.
 
-Source of the overlap rule: seed section 2, "Sliding Windows"; the counts 423 + 408 = 831 for a
-1280×720 frame are the original's.
+Sets over fixed rows follow the overlap rule of the original system, which lays 423 + 408 = 831
+windows over a frame of 1280×720. Other sets follow the perspective: on a flat road, a vehicle of
+width w stands on the row horizon + w · (height of the camera) / (real width of the vehicle). The
+farther it is, the smaller it is, and the nearer to the horizon. So the horizon alone places the
+sets of all sizes.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,10 +15,22 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array, Int32Array
-from vdet.config.schema import WindowSettings
+from vdet.boxes import Float32Array, Int32Array, Int64Array, from_sizes
+from vdet.config.schema import FeatureSettings, PerspectiveSettings, WindowSettings
+from vdet.regions import SearchArea
 
 IndexArray = npt.NDArray[np.intp]
+
+_MARGIN = Fraction(1, 2)
+"""Windows this near the area are searched too, sides of a window: they show parts of the vehicles
+in the area, and add to their heat."""
+
+ALIGNMENT = 16
+"""The part begins so many pixels, or a multiple, after the set: then its strips are scaled as those
+of the whole set are, and its windows look the same."""
+
+_MAX_ASPECT = 16 / 9
+"""A frame that is wider shows more to the sides; its height times this counts as its width."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,3 +178,73 @@ def _step_and_buffer(settings: WindowSettings, cells: int) -> tuple[Fraction, Fr
     assert settings.overlap is not None  # the settings have one of the two
     step = Fraction(max(1, int(settings.size * (1 - settings.overlap))))
     return step, Fraction(int(settings.size * settings.overlap))
+
+
+def lay_perspective(
+    settings: PerspectiveSettings,
+    features: FeatureSettings,
+    width: int,
+    height: int,
+    *,
+    horizon: float,
+) -> list[WindowGrid]:
+    """Lay the sets over a frame of `width` × `height` pixels.
+
+    Windows lie inside the frame's rows, and may reach beyond its left and right. Sizes and first
+    rows are rounded so that a set's strip can be halved exactly until a window is about as large as
+    a patch.
+
+    Parameters
+    ----------
+    horizon
+        Row of the horizon, share of the frame's height.
+
+    Returns
+    -------
+    One grid for each size, in the order given. Sizes of which no window fits are left out; of
+    several sizes that are rounded to the same one, the first is laid.
+    """
+    cells = features.patch // features.hog.cell
+    grids: list[WindowGrid] = []
+    for share in settings.sizes:
+        side = share * settings.zoom * min(width, _MAX_ASPECT * height)
+        halvings = max(0, math.floor(math.log2(max(side, 1) / features.patch)))
+        unit = cells << halvings
+        size = unit * max(1, round(side / unit))
+        first = horizon * height + (settings.highest - 1) * size
+        top = max(0, round(first / (1 << halvings)) << halvings)
+        step = Fraction(settings.step * size, cells)
+        beyond = int(Fraction(settings.beyond) * size / step)
+        columns = (width + 2 * beyond * step - size) // step + 1
+        wanted = round((settings.lowest - settings.highest) * size / step) + 1
+        rows = min(wanted, (height - top - size) // step + 1)
+        if size <= width and min(columns, rows) >= 1 and size not in {grid.size for grid in grids}:
+            left = -beyond * step
+            grids.append(WindowGrid(size, step, left, Fraction(top), int(columns), int(rows)))
+    return grids
+
+
+def limited_grid(
+    grid: WindowGrid, area: SearchArea, features: FeatureSettings
+) -> WindowGrid | None:
+    """Return the smallest grid with all windows in or near an area; None where there are none.
+
+    The windows of the area have the same pixels, and so the same features, as those of `grid`.
+    """
+    margin = math.ceil(max(_MARGIN * grid.size, grid.step))
+    grown = from_sizes(grid.boxes) + np.array([-margin, -margin, margin, margin])
+    touched = area.touches(grown).reshape(grid.rows, grid.columns)
+    if not touched.any():
+        return None
+    cells = grid.step * features.patch / grid.size / features.hog.cell
+    period = math.lcm((grid.step / ALIGNMENT).denominator, cells.denominator)
+    row, rows = _span(np.flatnonzero(touched.any(axis=1)), period)
+    column, columns = _span(np.flatnonzero(touched.any(axis=0)), period)
+    left, top = grid.left + column * grid.step, grid.top + row * grid.step
+    return WindowGrid(grid.size, grid.step, left, top, columns, rows)
+
+
+def _span(numbers: Int64Array, period: int) -> tuple[int, int]:
+    """Return the first of some numbers, down to a multiple of `period`, and the count from it."""
+    first = int(numbers[0]) // period * period
+    return first, int(numbers[-1]) + 1 - first

@@ -12,9 +12,9 @@ from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.protocol import LimitableDetector
 from vdet.detect.svm.detector import SvmDetector, SvmModel
 from vdet.detect.svm.kind import shipped_model
-from vdet.detect.svm.limits import limited_grid
 from vdet.detect.svm.model import load_model
 from vdet.detect.svm.search import FrameSearch, lay_grids
+from vdet.detect.svm.windows import limited_grid
 from vdet.errors import ImageError
 from vdet.media import Picture
 from vdet.regions import SearchArea
