@@ -73,7 +73,7 @@ unseen: $(TOOLS)  ## measure the network on cameras that it has not seen (many h
 	$(BIN)/python -m benchmarks.leave_one_out $(ROADS) $(DATA)/project_video.mp4 $(TRUTH)
 
 picture: $(TOOLS)  ## draw the pictures of the README
-	$(BIN)/python -m docs.picture
+	$(BIN)/python -m docs.pictures
 
 # The versions in constraints.txt are the ones that the tests were last run with.
 $(READY): pyproject.toml constraints.txt

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from drawn_patches import write_patches
 from vdet.cli import main
 from vdet.config.schema import (
     AugmentationSettings,
@@ -24,7 +25,7 @@ from vdet.config.schema import (
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import train
-from vdet.synthetic import demo_scene, write_clip, write_patches
+from vdet.synthetic import demo_scene, write_clip
 from vdet.synthetic.scene import Scene
 
 # Seeded, so that a run of the tests says the same twice; and no test is a timing.

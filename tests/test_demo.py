@@ -6,17 +6,16 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from vdet.demo import DemoFiles, check_demo
+from vdet.demo import check_demo
 from vdet.errors import OutputError
 from vdet.media import VideoReader
 from vdet.synthetic import demo_scene
 from vdet.synthetic.scene import Scene
 
-PATCHES = 60
 FRAMES = 60
 NAMES = {
     *("road.mp4", "truth.txt", "lines.yaml", "found.mp4", "found.csv", "counts.csv", "page"),
-    *("patches", "model.npz", "model.json", "model.csv", "stages"),
+    *("training", "patches.zip", "model.npz", "model.json", "model.csv", "stages"),
 }
 
 
@@ -28,13 +27,13 @@ def short_clip(seed: int) -> Scene:
 def test_draws_finds_counts_trains_and_compares(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.demo.PATCHES", PATCHES)
+    monkeypatch.setattr("vdet.demo.ROADS", 1)
     monkeypatch.setattr("vdet.demo.demo_scene", short_clip)
     folder = tmp_path / "new" / "demo"
     result = run("demo", folder)
     assert result.code == 0, result.err
     assert {path.name for path in folder.iterdir()} == NAMES
-    assert len(list((folder / "patches").rglob("*.png"))) == 2 * PATCHES
+    assert len(list((folder / "training").iterdir())) == 2, "a road and its truth"
     with VideoReader(folder / "found.mp4") as reader:
         assert sum(1 for _ in reader) == FRAMES
     assert [step in result.err for step in ("1/4", "2/4", "3/4", "4/4")] == [True] * 4
@@ -53,12 +52,12 @@ def test_draws_finds_counts_trains_and_compares(
     assert again.err.count("\n") == 1
 
 
-@pytest.mark.parametrize("name", sorted(NAMES - {"page", "patches", "stages"}))
+@pytest.mark.parametrize("name", ["road.mp4", "truth.txt", "found.csv", "model.npz"])
 def test_an_earlier_demo_is_not_written_over(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     with pytest.raises(OutputError, match=f"{name}: is there already; give --overwrite"):
-        check_demo(DemoFiles(tmp_path), overwrite=False)
-    check_demo(DemoFiles(tmp_path), overwrite=True)
+        check_demo(tmp_path, overwrite=False)
+    check_demo(tmp_path, overwrite=True)
 
 
 def test_a_file_for_a_folder(run: Run, tmp_path: Path) -> None:

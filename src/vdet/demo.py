@@ -5,90 +5,47 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.evaluate.scores import Scores, score
-from vdet.files import check_output, make_folder, staged
+from vdet.files import any_file, check_output, make_folder, staged
 from vdet.labels.reading import read_predictions, read_tracks, read_truth
-from vdet.learn.svm.dataset import find_patches
-from vdet.learn.svm.metrics import TrainingMetrics
+from vdet.learn.svm.dataset import find_boxed, find_patches
+from vdet.learn.svm.mining import MiningJob, VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, check_job, run_video
-from vdet.synthetic import demo_scene, write_clip, write_patches, write_truth
-from vdet.synthetic.scene import Scene
+from vdet.synthetic import busy_road, demo_scene, write_clip, write_truth
 from vdet.traffic.counter import count_events
 from vdet.traffic.layout import lay_out
 
-PATCHES = 1200
-"""Of each class."""
+ROADS = 6
+"""Drawn roads that the linear model learns from."""
 
 SEED = 5
 """Of what is drawn where no other seed is given."""
 
-LINES = """\
+ROAD, TRUTH, LINE = "road.mp4", "truth.txt", "lines.yaml"
+"""The drawn video, its true boxes, and the line at which vehicles are counted."""
+
+PATCHES, MODEL, METRICS = "patches.zip", "model.npz", "model.json"
+"""The patches for the linear model, the model, and the metrics of its training."""
+
+_LINE = """\
 # The line of the demo: one vehicle overtakes the camera there, and one is overtaken.
 lines:
   - {name: right lanes, start: [0.45, 0.72], end: [0.99, 0.72], left: ahead, right: back}
 drawn: true
 """
-
-
-@dataclass(frozen=True, slots=True)
-class DemoFiles:
-    """The files of the demo in its folder."""
-
-    folder: Path
-
-    @property
-    def clip(self) -> Path:
-        """The road."""
-        return self.folder / "road.mp4"
-
-    @property
-    def truth(self) -> Path:
-        """The true boxes of the road, MOTChallenge columns."""
-        return self.folder / "truth.txt"
-
-    @property
-    def lines(self) -> Path:
-        """The line at which vehicles are counted."""
-        return self.folder / "lines.yaml"
-
-    @property
-    def found(self) -> VideoJob:
-        """The run of the network: the road with the vehicles, their tracks, counts and page."""
-        outputs = {"video": "found.mp4", "tracks": "found.csv", "counts": "counts.csv"}
-        return self._job(outputs | {"page": "page"})
-
-    @property
-    def patches(self) -> Path:
-        """Folder of the labelled patches."""
-        return self.folder / "patches"
-
-    @property
-    def model(self) -> Path:
-        """The linear model that is trained on the patches."""
-        return self.folder / "model.npz"
-
-    @property
-    def training(self) -> Path:
-        """The metrics of the training."""
-        return self.folder / "model.json"
-
-    @property
-    def found_by_model(self) -> VideoJob:
-        """The run of the linear model: its tracks, and pictures of every stage of one frame."""
-        return self._job({"tracks": "model.csv", "stages": "stages"})
-
-    def _job(self, outputs: dict[str, str]) -> VideoJob:
-        return VideoJob(
-            self.clip, tuple(Output(sink, self.folder / name) for sink, name in outputs.items())
-        )
+_BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv", "counts": "counts.csv", "page": "page"}
+_MINING = ("train.mine.per_vehicle=2", "train.mine.false_alarms=6", "train.mine.parts=3")
+_BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +63,6 @@ class DemoResult:
 
     rows: tuple[DemoRow, ...]
     crossings: int
-    training: TrainingMetrics
 
     def lines(self) -> Iterator[str]:
         """Yield the result as lines of text."""
@@ -121,18 +77,23 @@ class DemoResult:
             )
 
 
-def check_demo(files: DemoFiles, *, overwrite: bool) -> None:
+def check_demo(folder: Path, *, overwrite: bool) -> None:
     """Make the folder, and refuse to replace an earlier demo. Raises `OutputError`."""
-    make_folder(files.folder)
-    check_output(files.clip, overwrite=overwrite, may_replace=may_replace_video)
-    for path in (files.truth, files.lines, files.model, files.training):
-        check_output(path, overwrite=overwrite)
-    for job in (files.found, files.found_by_model):
-        check_job(replace(job, overwrite=overwrite))
+    make_folder(folder)
+    for name in (ROAD, TRUTH, LINE, PATCHES, MODEL, METRICS):
+        may_replace = may_replace_video if name == ROAD else any_file
+        check_output(folder / name, overwrite=overwrite, may_replace=may_replace)
+    for outputs in (_BY_NETWORK, _BY_MODEL):
+        check_job(_job(folder, outputs, overwrite=overwrite))
+
+
+def _job(folder: Path, outputs: dict[str, str], *, overwrite: bool) -> VideoJob:
+    paths = tuple(Output(sink, folder / name) for sink, name in outputs.items())
+    return VideoJob(folder / ROAD, paths, overwrite=overwrite)
 
 
 def run_demo(
-    files: DemoFiles,
+    folder: Path,
     *,
     seed: int = SEED,
     overwrite: bool = False,
@@ -141,7 +102,7 @@ def run_demo(
 ) -> DemoResult:
     """Draw a road, find its vehicles with both detectors, and compare them with the truth.
 
-    The linear model is trained on drawn patches first.
+    The linear model is first trained on patches that are mined from other drawn roads.
 
     Parameters
     ----------
@@ -154,51 +115,51 @@ def run_demo(
     steps
         Called at the start of each longer step.
     """
+    check_demo(folder, overwrite=overwrite)
     scene = demo_scene(seed)
     announce("1/4 drawing a road with vehicles …")
     steps("drawing", None)
-    write_clip(files.clip, scene, overwrite=overwrite)
-    write_truth(files.truth, scene, overwrite=overwrite)
-    with staged(files.lines, overwrite=overwrite) as temporary:
-        temporary.write_text(LINES, encoding="utf-8")
-    settings = load_settings(places={"counts": files.lines})
+    write_clip(folder / ROAD, scene, overwrite=overwrite)
+    write_truth(folder / TRUTH, scene, overwrite=overwrite)
+    with staged(folder / LINE, overwrite=overwrite) as temporary:
+        temporary.write_text(_LINE, encoding="utf-8")
+    settings = load_settings(places={"counts": folder / LINE})
+    layout = lay_out(settings.counts, scene.camera.width, scene.camera.height)
+    truth, rate = read_truth(folder / TRUTH), float(scene.rate)
 
-    def find(job: VideoJob, settings: Settings, model: Path | None = None) -> None:
+    def count(tracks: Path) -> int:
+        return len([*count_events(read_tracks(tracks, rate).frames, layout)])
+
+    def find(name: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> DemoRow:
+        job = _job(folder, outputs, overwrite=overwrite)
+        job = replace(job, at=scene.frames / scene.rate / 2)
         detector = load_detector(settings.detector, model)
-        job = replace(job, at=scene.frames / scene.rate / 2, overwrite=overwrite)
         run_video(job, detector, settings, progress=partial(steps, "frames"))
+        tracks = folder / outputs["tracks"]
+        return DemoRow(name, score(read_predictions(tracks), truth, rate=rate), count(tracks))
 
     announce("2/4 finding the vehicles with the network …")
-    find(files.found, settings)
-    announce(f"3/4 drawing {2 * PATCHES:,} patches, and training a linear model on them …")
-    steps("drawing", None)
-    write_patches(
-        files.patches, seed=seed, vehicles=PATCHES, non_vehicles=PATCHES, overwrite=overwrite
-    )
-    linear = load_settings(detector="svm")
-    model, training = train(find_patches([files.patches]), linear, steps=steps)
-    save_model(model, files.model, overwrite=overwrite)
-    training.write(files.training, overwrite=overwrite)
+    by_network = find("network", _BY_NETWORK, settings, None)
+    announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
+    linear = load_settings(None, _MINING, detector="svm")
+    sources = tuple(_draw_to_learn(folder / "training", seed, overwrite=overwrite))
+    mine(MiningJob(sources, folder / PATCHES, overwrite), linear, None, steps=steps)
+    patches = [folder / PATCHES]
+    model, metrics = train(find_patches(patches), linear, boxed=find_boxed(patches), steps=steps)
+    save_model(model, folder / MODEL, overwrite=overwrite)
+    metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
-    find(files.found_by_model, linear, files.model)
-    runs = {"network": files.found, f"linear model {files.model.name}": files.found_by_model}
-    rows = (
-        _row(name, output.path, files, scene, settings)
-        for name, job in runs.items()
-        for output in job.outputs
-        if output.sink == "tracks"
-    )
-    return DemoResult(tuple(rows), _count(files.truth, scene, settings), training)
+    by_model = find(f"linear model {MODEL}", _BY_MODEL, linear, folder / MODEL)
+    return DemoResult((by_network, by_model), count(folder / TRUTH))
 
 
-def _row(
-    detector: str, tracks: Path, files: DemoFiles, scene: Scene, settings: Settings
-) -> DemoRow:
-    scores = score(read_predictions(tracks), read_truth(files.truth), rate=float(scene.rate))
-    return DemoRow(detector, scores, _count(tracks, scene, settings))
-
-
-def _count(tracks: Path, scene: Scene, settings: Settings) -> int:
-    """Return how many vehicles of a file of tracks cross the line."""
-    layout = lay_out(settings.counts, scene.camera.width, scene.camera.height)
-    return len([*count_events(read_tracks(tracks, float(scene.rate)).frames, layout)])
+def _draw_to_learn(folder: Path, seed: int, *, overwrite: bool) -> Iterator[VideoSource]:
+    """Draw roads with dense traffic, each with its truth, into a folder."""
+    make_folder(folder)
+    rng = np.random.default_rng(seed)
+    for number in range(1, ROADS + 1):
+        scene = busy_road(rng)
+        video, truth = folder / f"road{number}.mp4", folder / f"road{number}.txt"
+        write_clip(video, scene, overwrite=overwrite)
+        write_truth(truth, scene, overwrite=overwrite)
+        yield VideoSource(video, truth, every=2)

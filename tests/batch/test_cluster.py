@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
+from drawn_patches import write_patches
 from running import Gate, frames_of, names, start, until, with_modules, write_drive
 from vdet.detect.svm.model import load_model
 from vdet.errors import ClusterError
-from vdet.synthetic import write_patches
 from vdet.workers import DaskCluster, WorkerKilledError
 
 distributed = pytest.importorskip("distributed")

@@ -20,18 +20,16 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     """Try the whole program on a drawn road.
 
     A road with vehicles is drawn. The network finds and counts them. Then a linear model is trained
-    on drawn patches and finds them too. Both are compared with the truth. All files are written
-    into DIR, by default into demo.
+    on patches of other drawn roads and finds them too. Both are compared with the truth. All files
+    are written into DIR, by default into demo.
     """
-    from vdet.demo import DemoFiles, check_demo, run_demo
+    from vdet.demo import METRICS, TRUTH, run_demo
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
-    files = DemoFiles(folder)
-    check_demo(files, overwrite=overwrite)
     with progress_steps("") as steps:
         result = run_demo(
-            files,
+            folder,
             seed=seed,
             overwrite=overwrite,
             announce=(lambda _: None) if is_quiet() else print_message,
@@ -43,8 +41,8 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
         "Look at",
         f"  {folder / 'found.mp4'}  the road with the vehicles that the network found",
         f"  {folder / 'page' / 'page.html'}  the page of this run",
-        f"  {folder / 'found.csv'}  the tracks; {files.truth} has the true ones",
+        f"  {folder / 'found.csv'}  the tracks; {folder / TRUTH} has the true ones",
         f"  {folder / 'stages'}/  every stage of the linear model in one frame",
-        f"  {files.training}  the metrics of the training",
+        f"  {folder / METRICS}  the metrics of the training",
         "Then try your own:  vdet detect-video in.mp4 out.mp4",
     )

@@ -107,6 +107,36 @@ def traffic_scene(
     return replace(scene, light=light or scene.light, vehicles=vehicles, rate=rate, frames=frames)
 
 
+def busy_road(rng: np.random.Generator) -> Scene:
+    """Return a road of 40 frames, each with its own vehicles, two in each lane, to learn from.
+
+    The camera is so fast that consecutive frames show different places.
+    """
+    lanes = int(rng.integers(2, 5))
+    lane = int(rng.integers(lanes))
+    seed = int(rng.integers(2**31))
+    camera = PinholeCamera(
+        width=960,
+        height=320,
+        focal=864.0,
+        horizon=120.0,
+        above_ground=float(rng.uniform(1.1, 1.6)),
+        curvature=float(rng.uniform(-1, 1) / 600),
+    )
+    road = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
+    scene = replace(road, frames=40, speed=400.0)
+    cars = [(random_paint(rng), random_body(rng)) for _ in range(50)]
+    vehicles: list[SceneVehicle] = []
+    for index in range(scene.frames):
+        for lateral in (np.arange(lanes) - lane) * LANE_WIDTH:
+            near = rng.uniform(6.5, 16) + abs(lateral)
+            for ahead in (near, near + rng.uniform(8, 24)):
+                place = Waypoint(scene.time(index), ahead, lateral + rng.uniform(-0.6, 0.6))
+                color, body = cars[rng.integers(len(cars))]
+                vehicles.append(SceneVehicle(len(vehicles) + 1, (place,), color, body))
+    return replace(scene, vehicles=tuple(vehicles))
+
+
 def empty_road(
     rng: np.random.Generator, camera: PinholeCamera, *, lane: int, lanes: int, seed: int
 ) -> Scene:

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from benchmarks.patch_search import PatchSearch
 
+from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings, WindowSettings
@@ -17,7 +18,7 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
 from vdet.media.images import Image
-from vdet.synthetic import demo_scene, draw_patches, render
+from vdet.synthetic import demo_scene, render
 
 Exact = npt.NDArray[np.float64]
 

@@ -7,7 +7,6 @@ is far too small for the patch).
 
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -16,10 +15,9 @@ import numpy as np
 from vdet.boxes import Box
 from vdet.files import make_folder
 from vdet.media.images import Image, write_image
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
+from vdet.synthetic.random_scenes import busy_road
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import PERIOD, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import PERIOD, Scene
 from vdet.synthetic.truth import TrueBox, true_boxes
 
 PATCH = 64
@@ -31,9 +29,6 @@ BACKGROUND_GROUPS: tuple[str, ...] = ("road", "roadside", "parts")
 _MAX_VEHICLE = 0.15  # largest share of a background patch that vehicles fill
 _FAR = 130  # windows narrower than this many pixels are `far`
 _SMALLEST = 32  # least side of a window, pixels of the frame
-_FRAMES = 40  # frames of each road
-_SPEED = 400.0  # m/s, so that consecutive frames show different places
-_CARS = 50  # different cars on each road
 _OBJECTS = 8  # most roadside objects taken from a frame
 
 
@@ -156,7 +151,7 @@ def _cut(image: Image, window: Box, rng: np.random.Generator) -> Image:
 def _labelled_frames(rng: np.random.Generator) -> Iterator[_Frame]:
     """Render frames of one random road after another, without end."""
     while True:
-        scene = _busy_road(rng)
+        scene = busy_road(rng)
         renderer = Renderer(scene)
         for index in range(scene.frames):
             image = _compressed(renderer.image(index), rng)
@@ -168,33 +163,6 @@ def _compressed(image: Image, rng: np.random.Generator) -> Image:
     quality = int(rng.integers(30, 95))
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR_BGR), np.uint8)
-
-
-def _busy_road(rng: np.random.Generator) -> Scene:
-    """Return a road on which each frame has its own vehicles, two in each lane."""
-    lanes = int(rng.integers(2, 5))
-    lane = int(rng.integers(lanes))
-    seed = int(rng.integers(2**31))
-    camera = PinholeCamera(
-        width=960,
-        height=320,
-        focal=864.0,
-        horizon=120.0,
-        above_ground=float(rng.uniform(1.1, 1.6)),
-        curvature=float(rng.uniform(-1, 1) / 600),
-    )
-    road = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
-    scene = replace(road, frames=_FRAMES, speed=_SPEED)
-    cars = [(random_paint(rng), random_body(rng)) for _ in range(_CARS)]
-    vehicles: list[SceneVehicle] = []
-    for index in range(_FRAMES):
-        for lateral in (np.arange(lanes) - lane) * LANE_WIDTH:
-            near = rng.uniform(6.5, 16) + abs(lateral)
-            for ahead in (near, near + rng.uniform(8, 24)):
-                place = Waypoint(scene.time(index), ahead, lateral + rng.uniform(-0.6, 0.6))
-                color, body = cars[rng.integers(len(cars))]
-                vehicles.append(SceneVehicle(len(vehicles) + 1, (place,), color, body))
-    return replace(scene, vehicles=tuple(vehicles))
 
 
 def _objects(scene: Scene, index: int) -> tuple[Box, ...]:

@@ -1,0 +1,97 @@
+"""Make docs/vdet.jpg, docs/counts.jpg and docs/stages.jpg: the program on drawn roads."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import cv2
+import numpy as np
+
+from vdet.media import VideoReader
+from vdet.media.images import Image, read_image
+from vdet.synthetic import write_clip
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road
+from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
+
+FOLDER = Path(__file__).parent
+COUNTED_FRAME = 172  # of the demo: a vehicle has overtaken on the right
+STAGES = ("2-windows", "3-hits", "4-heat", "5-boxes")
+
+_SEED = 11
+_VAN = Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12)
+_OFF_ROADER = Body(width=1.88, length=4.7, boot=0.12, slope=0.35, height=1.72, belt=1.04)
+_HATCHBACK = Body(length=4.2, boot=0.15, slope=0.5, height=1.48)
+_VEHICLES = (
+    (_OFF_ROADER, 14.5, -LANE_WIDTH, (120, 62, 28)),
+    (_HATCHBACK, 17.0, LANE_WIDTH, (22, 16, 130)),
+    (Body(), 27.0, 0.1, (228, 228, 226)),
+    (Body(), 42.0, LANE_WIDTH, (60, 54, 50)),
+    (_VAN, 40.0, -LANE_WIDTH, (225, 228, 230)),
+)
+"""Shape, metres ahead, metres to the right, and colour (BGR)."""
+
+
+def motorway() -> Scene:
+    """Return a road with three lanes and five vehicles, 22 frames."""
+    camera = PinholeCamera.dashboard(1280, 720, curvature=1 / 1500)
+    road = empty_road(np.random.default_rng(_SEED), camera, lane=1, lanes=3, seed=_SEED)
+    vehicles = tuple(
+        SceneVehicle(id=number, path=_steady(ahead, lateral), color=color, body=body)
+        for number, (body, ahead, lateral, color) in enumerate(_VEHICLES, start=1)
+    )
+    plants = tuple(each for each in road.roadside if each.kind in ("tree", "bush"))
+    light = replace(road.light, gain=1.1, noise=1.0, sun=0.5)
+    return replace(road, vehicles=vehicles, roadside=plants, light=light, frames=22)
+
+
+def _steady(ahead: float, lateral: float) -> tuple[Waypoint, Waypoint]:
+    return Waypoint(0, ahead, lateral), Waypoint(1, ahead + 0.3, lateral)
+
+
+def frame_with_vehicles(source: Path, index: int, *words: str) -> Image:
+    """Run `vdet detect-video` and return a frame of its video."""
+    found = source.with_name(f"{source.stem}_found.mp4")
+    words = (*words, *_settings("output.crf=6"))
+    program = (sys.executable, "-m", "vdet", "detect-video", str(source), str(found))
+    subprocess.run([*program, *words], check=True)
+    with VideoReader(found) as reader:
+        return next(frame.image for frame in reader if frame.index == index)
+
+
+def _settings(*assignments: str) -> list[str]:
+    return [word for each in assignments for word in ("--set", each)]
+
+
+def stages(folder: Path) -> Image:
+    """Return four stages of the linear model in one picture, 1200 pixels wide."""
+    tiles = [cv2.resize(read_image(folder / f"{name}.png"), (600, 338)) for name in STAGES]
+    return np.asarray(np.vstack([np.hstack(tiles[:2]), np.hstack(tiles[2:])]), np.uint8)
+
+
+def main() -> None:
+    """Write the pictures."""
+    with TemporaryDirectory() as name:
+        demo, road = Path(name) / "demo", Path(name) / "motorway.mp4"
+        subprocess.run([sys.executable, "-m", "vdet", "demo", demo], check=True)
+        write_clip(road, motorway())
+        label: tuple[str, ...] = ("--lanes", *_settings("draw.label=[id, score]"))
+        counts = (
+            "--lines",
+            str(demo / "lines.yaml"),
+            *_settings("draw.trails=3", "draw.time=true"),
+        )
+        pictures = {
+            "vdet": frame_with_vehicles(road, 21, *label),
+            "counts": frame_with_vehicles(demo / "road.mp4", COUNTED_FRAME, *counts),
+            "stages": stages(demo / "stages"),
+        }
+    for name, image in pictures.items():
+        _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 88])
+        (FOLDER / f"{name}.jpg").write_bytes(data.tobytes())
+
+
+if __name__ == "__main__":
+    main()
