@@ -1,7 +1,5 @@
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vdet.config.schema import AugmentationSettings
 from vdet.learn.svm.augmentation import Sample, augment, cut_off, mirrored, zoom_in
@@ -21,10 +19,6 @@ def augmented(
     return list(augment(sample or patch(), (seed,), settings))
 
 
-def test_with_everything_off_nothing_is_added() -> None:
-    assert augmented(OFF) == []
-
-
 def test_a_mirror_image_flips_the_picture_and_its_box() -> None:
     sample = mirrored(patch(-0.4, -0.3, 0.2, 0.1))
     np.testing.assert_array_equal(sample.image, NOISE[:, ::-1])
@@ -35,13 +29,6 @@ def test_an_unknown_side_is_the_opposite_side_in_the_mirror_image() -> None:
     np.testing.assert_array_equal(
         np.isnan(mirrored(patch(-0.4, -0.3, np.nan, 0.1)).sides), [True, False, False, False]
     )
-
-
-@given(st.tuples(*[st.floats(-2, 2, width=32)] * 4))
-def test_the_mirror_image_of_the_mirror_image_is_the_patch(sides: tuple[float, ...]) -> None:
-    twice = mirrored(mirrored(patch(*sides)))
-    np.testing.assert_array_equal(twice.image, NOISE)
-    np.testing.assert_array_equal(twice.sides, np.array(sides, np.float32))
 
 
 @pytest.mark.parametrize("vehicle", [True, False])
@@ -130,14 +117,3 @@ def test_zoomed_in_a_box_moves_and_grows_with_its_vehicle() -> None:
         edges = np.array([columns[0], rows[0], columns[-1] + 1, rows[-1] + 1])
         inside = (edges > 0) & (edges < side)
         np.testing.assert_allclose(sample.sides[inside], (edges / side - 0.5)[inside], atol=1e-5)
-
-
-def test_a_patch_need_not_be_square() -> None:
-    wide = Sample(
-        np.ascontiguousarray(NOISE[:32]), True, np.array([-0.5, -0.5, 0.5, 0.5], np.float32)
-    )
-    (sample,) = zoom_in(wide, (0,))
-    height, width = sample.image.shape[:2]
-    assert abs(width - 2 * height) <= 1
-    extent = sample.sides[2:] - sample.sides[:2]
-    np.testing.assert_allclose(extent, [64 / width, 32 / height], rtol=1e-5)

@@ -39,15 +39,6 @@ def test_each_side_is_fitted_on_its_own_rows_alone(column: int) -> None:
     np.testing.assert_allclose(together.biases[column], own.biases[column], atol=1e-4)
 
 
-def test_a_side_that_is_never_known_is_zero() -> None:
-    hogs, sides = scene()
-    sides[:, 1] = np.nan
-    found = fit_sides([BoxRows(hogs, sides)], penalty=0.1)
-    assert not found.weights[1].any()
-    assert found.biases[1] == 0
-    assert found.weights[0].any()
-
-
 @pytest.mark.parametrize("count", [400, 8])
 def test_the_penalty_is_per_patch_so_that_a_set_given_twice_gives_the_same(count: int) -> None:
     """A set of 8 patches has fewer rows than features; given twice, it has more."""

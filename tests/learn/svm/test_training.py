@@ -266,13 +266,6 @@ def test_more_broken_patches_than_are_tolerated_are_an_error(
     assert report.broken == 3
 
 
-def test_only_broken_patches_are_an_error_at_any_tolerance(
-    tmp_path: Path,
-) -> None:
-    with pytest.raises(DataError, match="patches"):
-        train(with_broken([], tmp_path, 5), but(max_broken=1), jobs=1)
-
-
 TAILS = np.array(["a"] * 10 + ["b"] * 5 + ["c"] * 3 + ["d"])
 
 
@@ -281,10 +274,6 @@ def test_the_tail_split_holds_out_the_last_of_each_group(seed: int) -> None:
     assert np.flatnonzero(hold_out(TAILS, "tail", 0.2, seed)).tolist() == [8, 9, 14, 17]
     scattered = hold_out(np.array(["a", "b"] * 5), "tail", 0.4, seed)
     assert np.flatnonzero(scattered).tolist() == [6, 7, 8, 9]
-
-
-def test_the_only_patch_of_a_group_is_not_held_out() -> None:
-    assert not hold_out(np.array(["a", "b", "c"]), "tail", 0.2, seed=0).any()
 
 
 def test_the_random_split_depends_on_the_seed_alone() -> None:
@@ -447,13 +436,6 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
     assert model.provenance["boxes_sha256"] != model.provenance["data_sha256"]
 
 
-def test_patches_of_boxes_are_not_learned_from_as_vehicles(mined: Path) -> None:
-    files = find_patches([mined])
-    with_them, _ = train(files, SETTINGS, boxed=find_boxed([mined]), jobs=1)
-    without, _ = train(files, SETTINGS, jobs=1)
-    np.testing.assert_array_equal(with_them.weights, without.weights)
-
-
 @pytest.mark.parametrize("assumed", [0.0, 0.5])
 def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     data: Path, mined: Path, tmp_path: Path, assumed: float
@@ -476,10 +458,3 @@ def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     else:
         assert (left, right) == pytest.approx((-0.2, 0.2), abs=0.02)
         assert (top, bottom) == pytest.approx((-0.1, 0.1), abs=0.02)
-
-
-def test_without_hog_no_sides_are_found(mined: Path) -> None:
-    colour = FeatureSettings(patch=SIZE, hog=HogSettings(channels=()))
-    settings = SETTINGS.model_copy(update={"detector": SvmSettings(features=colour)})
-    files, boxed = find_patches([mined]), find_boxed([mined])
-    assert train(files, settings, boxed=boxed, jobs=1)[0].box_regression is None

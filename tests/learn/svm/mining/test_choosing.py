@@ -99,12 +99,6 @@ def test_a_window_between_two_vehicles_belongs_to_the_nearer_one() -> None:
     assert kinds(chosen(windows(between), truth(CAR, beside))) == {between: "vehicle"}
 
 
-def test_a_part_in_an_ignore_region_is_not_taken() -> None:
-    part = about(465, 36)
-    assert kinds(chosen(windows(part), truth(CAR))) == {part: "part"}
-    assert chosen(windows(part), truth(CAR, ignored=(Box.sized(455, 280, 90, 90),))) == []
-
-
 def many() -> Windows:
     return windows(*(about(x, side) for x in range(60, 940, 5) for side in (36, 80, 100, 120)))
 
@@ -124,15 +118,6 @@ def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
     one, same, other = (chosen(many(), truth(CAR), settings, seed) for seed in (0, 0, 1))
     assert one == same
     assert set(one) != set(other)
-
-
-def test_a_window_that_two_sets_share_is_one_patch() -> None:
-    assert len(chosen(windows(about(450), about(450)), truth(CAR))) == 1
-
-
-def test_a_frame_without_vehicles_has_false_alarms_only() -> None:
-    assert {choice.kind for choice in chosen(many(), truth())} == {"false alarm"}
-    assert len(chosen(many(), truth())) == len(many())
 
 
 VEHICLE = (400, 300, 100, 70)  # x, y, width, height
@@ -203,11 +188,6 @@ def test_a_window_in_a_large_vehicle_shows_a_part_of_it() -> None:
     windows = (window(36, MIDDLE[0] + shift) for shift in (0, 15, 40, 48, 52))
     assert flags(*windows) == "part part part part -"
     assert flags(window(50, y=330), window(50, y=369), window(50, y=371)) == "shows+part part -"
-
-
-def test_a_window_shows_a_part_of_a_cut_off_vehicle_too() -> None:
-    for vehicle, x in ((RIGHT, 950), (LEFT, 50)):
-        assert flags(window(36, x), window(36, 500), vehicle=vehicle) == "part -"
 
 
 def test_a_window_too_high_or_too_low_shows_it_or_nothing() -> None:

@@ -129,24 +129,6 @@ def test_windows_on_a_wrong_detection_are_false_alarms_and_those_on_the_truth_ve
             assert red > green + 100, "the middle of a vehicle shows the car"
 
 
-def test_vehicles_do_not_depend_on_what_the_detector_finds(mined: Mine, tmp_path: Path) -> None:
-    without = mined(TREE)
-    vehicles = boxes_of(tmp_path / "mined.zip", "vehicles/mined_road")
-    (tmp_path / "mined.zip").unlink()
-    with_car = mined(CAR, TREE)
-    assert boxes_of(tmp_path / "mined.zip", "vehicles/mined_road") == vehicles
-    assert (without.vehicles, without.false_alarms) == (
-        with_car.vehicles,
-        with_car.false_alarms,
-    )
-
-
-def test_a_detector_without_errors_gives_no_false_alarms(mined: Mine) -> None:
-    result = mined(CAR)
-    assert (result.false_alarms, result.parts) == (0, 0)
-    assert result.vehicles > 0
-
-
 def test_a_detection_below_the_least_probability_is_no_false_alarm(mined: Mine) -> None:
     assert mined(TREE, score=0.3, probability=0.4).false_alarms == 0
 
