@@ -33,7 +33,7 @@ class Ground:
         bend = camera.curvature * distance**2 / 2
         self._lateral = (columns[None, :] * distance / camera.focal - bend).astype(np.float32)
         self._texture = _pyramid(_texture(scene))
-        self._maps = [self._map(level, rows) for level, rows in self._levels()]
+        self._maps = list(self._levels())
 
     def paint_base(self, image: Image) -> None:
         """Paint what is the same in all frames: colours of road and verge, solid lines."""
@@ -66,25 +66,23 @@ class Ground:
         ]
         return np.asarray(np.concatenate(parts), dtype=np.uint8)
 
-    def _map(self, level: int, rows: slice) -> tuple[int, Float32Array, Float32Array]:
-        """Return a texture level, and the columns and rows in it of image rows at station 0."""
-        x = (self._lateral[rows] + np.float32(_HALF_WIDTH)) / np.float32(_texel(level))
-        y = np.empty_like(x)
-        y[:] = self._distance[rows, None] / np.float32(_texel(level))
-        return level, x, y
+    def _levels(self) -> Iterator[tuple[int, Float32Array, Float32Array]]:
+        """Yield each texture level with the columns and rows in it of image rows at station 0.
 
-    def _levels(self) -> Iterator[tuple[int, slice]]:
-        """Choose a texture level for each run of image rows, so that no row skips texels."""
+        A run of image rows has the level at which no row skips texels.
+        """
         step = self._distance**2 / (self._scene.camera.focal * self._scene.camera.above_ground)
-        coarse = int(np.searchsorted(-step, -16 * _TEXEL))
-        fine = int(np.searchsorted(-step, -4 * _TEXEL))
-        runs = ((2, slice(0, coarse)), (1, slice(coarse, fine)), (0, slice(fine, None)))
-        return (run for run in runs if len(self._distance[run[1]]))
+        coarse, fine = np.searchsorted(-step, [-16 * _TEXEL, -4 * _TEXEL]).tolist()
+        for level, start, end in ((2, 0, coarse), (1, coarse, fine), (0, fine, len(step))):
+            if start < end:
+                x = (self._lateral[start:end] + np.float32(_HALF_WIDTH)) / _texel(level)
+                y = np.repeat(self._distance[start:end, None] / _texel(level), x.shape[1], axis=1)
+                yield level, x, y
 
 
-def _texel(level: int) -> float:
+def _texel(level: int) -> np.float32:
     """Return the metres of ground that a pixel of a level of the texture covers."""
-    return _TEXEL * float(4**level)
+    return np.float32(_TEXEL * 4**level)
 
 
 def _texture(scene: Scene) -> Image:

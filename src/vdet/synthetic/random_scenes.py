@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from fractions import Fraction
-from typing import Literal
 
 import numpy as np
 
@@ -37,12 +36,7 @@ _SHAPES: tuple[Body, ...] = (
     Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12),
     Body(width=1.82, length=4.8, boot=0.1, slope=0.7, height=1.46),
 )
-_LOOKALIKES: tuple[tuple[Literal["sign", "bin", "hut"], float, float], ...] = (
-    ("sign", 2.4, 2.6),
-    ("bin", 1.2, 1.3),
-    ("hut", 2.4, 2.0),
-    ("bin", 0.8, 1.1),
-)  # kind, width, height
+_BOXES = ((2.4, 2.6), (1.2, 1.3), (2.4, 2.0), (0.8, 1.1))  # width and height, metres
 
 
 def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
@@ -51,7 +45,7 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     The camera drives in the left lane. Vehicle 1 drives far ahead in the same lane, vehicle 2 two
     lanes to the right. The camera overtakes vehicle 3, which leaves at the right edge. Vehicle 4
     enters at the right edge, overtakes, and hides vehicle 2 for about two seconds. There are no
-    signs, bins and huts beside the road: drawn ones look like drawn vehicles.
+    boxes beside the road: they look like drawn vehicles.
     """
     rng = np.random.default_rng(seed)
     scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)
@@ -72,7 +66,7 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
         )
         for number, path in enumerate(paths, start=1)
     )
-    roadside = tuple(each for each in scene.roadside if each.kind in ("tree", "bush"))
+    roadside = tuple(each for each in scene.roadside if each.kind != "box")
     return replace(scene, roadside=roadside, vehicles=vehicles, rate=Fraction(25), frames=250)
 
 
@@ -213,7 +207,7 @@ def _random_roadside(
     rng: np.random.Generator, left: float, right: float
 ) -> tuple[RoadsideObject, ...]:
     trees = [_random_plant(rng, side, edge) for side, edge in ((-1, left), (1, right)) * 28]
-    others = [_random_lookalike(rng, right) for _ in range(14)]
+    others = [_random_box(rng, right) for _ in range(14)]
     return (*trees, *others)
 
 
@@ -231,10 +225,10 @@ def _random_plant(rng: np.random.Generator, side: int, edge: float) -> RoadsideO
     )
 
 
-def _random_lookalike(rng: np.random.Generator, edge: float) -> RoadsideObject:
-    kind, width, height = _LOOKALIKES[rng.integers(len(_LOOKALIKES))]
+def _random_box(rng: np.random.Generator, edge: float) -> RoadsideObject:
+    width, height = _BOXES[rng.integers(len(_BOXES))]
     return RoadsideObject(
-        kind=kind,
+        kind="box",
         station=float(rng.uniform(0, PERIOD)),
         lateral=edge + width + float(rng.uniform(0, 7)),
         width=width,

@@ -1,4 +1,4 @@
-"""The roadside: barriers, plants, and objects that look a little like vehicles."""
+"""The roadside: barriers, plants, and boxes that look a little like vehicles."""
 
 import cv2
 import numpy as np
@@ -16,24 +16,12 @@ _SPRITES = 6
 _Part = tuple[float, float, float, float]
 """Left, right, bottom and top of a part of an object, 0 to 1."""
 
-_CONTAINER = (
+_BOX: tuple[tuple[_Part, float], ...] = (
     ((0.0, 1.0, 0.0, 1.0), 1.0),
     ((0.0, 1.0, 0.9, 1.0), 1.3),
     ((0.15, 0.85, 0.55, 0.75), 0.35),
 )
-_PANELS: dict[str, tuple[tuple[_Part, float], ...]] = {
-    "sign": (
-        ((0.15, 0.2, 0.0, 0.5), 0.8),
-        ((0.8, 0.85, 0.0, 0.5), 0.8),
-        ((0.0, 1.0, 0.5, 1.0), 1.0),
-        ((0.12, 0.85, 0.82, 0.88), 3.0),
-        ((0.12, 0.7, 0.68, 0.74), 3.0),
-        ((0.12, 0.78, 0.58, 0.64), 3.0),
-    ),
-    "bin": _CONTAINER,
-    "hut": _CONTAINER,
-}
-"""The parts of each kind of object, with the brightness of their colour."""
+"""The front of a box, its lid and a dark slot, with the brightness of their colour."""
 
 
 class Roadside:
@@ -51,11 +39,11 @@ class Roadside:
         for ahead, item in sorted(placed, key=lambda pair: -pair[0]):
             if not _NEAREST < ahead < _FAR:
                 continue
-            if item.kind in ("tree", "bush"):
+            if item.kind != "box":
                 sprite = self._foliage[int(item.station * 10) % _SPRITES]
                 _draw_foliage(image, camera, item, ahead, sprite)
             else:
-                for part, factor in _PANELS[item.kind]:
+                for part, factor in _BOX:
                     panel = _panel(item, ahead, part)
                     camera.draw(image, panel, shaded(item.color, factor))
         for wall in self._scene.road.walls:

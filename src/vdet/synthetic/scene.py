@@ -80,9 +80,9 @@ class Light:
 
 @dataclass(frozen=True, slots=True)
 class RoadsideObject:
-    """An object beside the road. None is a vehicle, but some look similar to one."""
+    """An object beside the road; a `box` looks a little like a vehicle."""
 
-    kind: Literal["tree", "bush", "sign", "bin", "hut"]
+    kind: Literal["tree", "bush", "box"]
     station: float
     lateral: float
     width: float
