@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from vdet.boxes import Box, from_sizes
 from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
-from vdet.learn.svm.mining.choosing import (
+from vdet.learn.svm.choosing import (
     ChosenWindow,
     FrameLabels,
     PatchKind,

@@ -1,0 +1,293 @@
+"""Labelled videos and pictures → a zip file of patches for the training.
+
+Vehicles are cut out of the frames, and false alarms. `choosing` compares the windows of a frame
+with its vehicles and takes some of each kind. `vdet.learn.svm.dataset` reads the patches.
+
+Source of mining false alarms: Sung & Poggio, "Example-based Learning for View-based Human Face
+Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from vdet.boxes import Boxes, Float32Array, Float64Array, Int32Array, from_sizes
+from vdet.config.schema import Settings, SvmSettings
+from vdet.detect.protocol import DetectorModel
+from vdet.detect.svm.detector import SvmDetector, horizon_of
+from vdet.detect.svm.features import cut_window, to_patch
+from vdet.detect.svm.search import lay_grids
+from vdet.detect.svm.windows import Windows
+from vdet.errors import DataError, FrameSizeError, ImageError, TruthError, VideoError
+from vdet.labels.pictures import LabelledPicture
+from vdet.labels.reading import read_labelled_pictures, read_truth
+from vdet.labels.roles import Roles
+from vdet.labels.video import LabelledVideo
+from vdet.learn.svm.choosing import (
+    FrameLabels,
+    PatchKind,
+    choose_windows,
+    compare_windows,
+    cut_sides,
+)
+from vdet.learn.svm.dataset import patch_archive
+from vdet.media import Picture, VideoReader
+from vdet.media.images import Image
+from vdet.progress import Progress, Steps, no_steps
+from vdet.run.loop import peek
+
+PATCH = 64
+"""Side of the patches, pixels, as in the Udacity set."""
+
+_FOLDERS: dict[PatchKind, str] = {
+    "vehicle": "vehicles/mined_{}",
+    "box": "boxes/mined_{}",
+    "false alarm": "non-vehicles/mined_{}",
+    "part": "non-vehicles/mined_{}_parts",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledFrame:
+    """A frame or a picture with its windows.
+
+    Attributes
+    ----------
+    name
+        Beginning of the names of its patches.
+    number
+        It decides, with the seed of the settings, which windows are chosen.
+    """
+
+    name: str
+    number: int
+    image: Image
+    windows: Windows
+    labels: FrameLabels
+
+
+@dataclass(frozen=True, slots=True)
+class VideoSource:
+    """A labelled video.
+
+    The frames `first` to `last` are used, counted from 1: every `every`-th, and all that cut a
+    vehicle off. If `last` is None, the last frame is that of the truth.
+    """
+
+    path: Path
+    truth: Path
+    every: int = 4
+    first: int = 1
+    last: int | None = None
+
+    def frames(
+        self, model: DetectorModel | None, settings: Settings, progress: Progress
+    ) -> Iterator[LabelledFrame]:
+        """Yield the frames to use; `progress` gets the number of frames that are read.
+
+        Raises
+        ------
+        TruthError
+            The truth cannot be used, or has nothing about these frames.
+        VideoError
+            The video cannot be read or searched.
+        """
+        roles = Roles.from_settings(settings)
+        truth = read_truth(self.truth, roles)
+        last = self._last(truth)
+        number = 0
+        with VideoReader(self.path, frames=last, settings=settings.input) as reader:
+            info, advance = reader.info, progress(last)
+            images, frames = peek(reader)
+            try:
+                search = search_windows(model, info.width, info.height, images)
+            except ImageError as error:
+                raise VideoError(f"{self.path}: {error}") from error
+            for frame in frames:
+                number = frame.index + 1
+                labels = _frame_labels(truth.frame(number))
+                if self._uses(number, labels.vehicles, info.width):
+                    image, name = frame.image, f"frame{number:06}"
+                    yield LabelledFrame(name, frame.index, image, search(image), labels)
+                advance(1)
+        if number < last:
+            read_truth(self.truth, roles, frame_count=number)  # raises an error with the line
+
+    def _last(self, truth: LabelledVideo) -> int:
+        last = min(self.last or truth.last_frame, truth.last_frame)
+        if last < self.first:
+            raise TruthError(
+                f"{self.truth}: covers the frames up to {truth.last_frame}; mine some of these"
+            )
+        return last
+
+    def _uses(self, number: int, vehicles: Float64Array, width: int) -> bool:
+        """Tell whether a frame is used. One that cuts a vehicle off is rare and hard to learn."""
+        is_regular = (number - self.first) % self.every == 0
+        cuts_off = any(cut_sides(box, width).any() for box in vehicles)
+        return number >= self.first and (is_regular or cuts_off)
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSource:
+    """A set of labelled pictures: a folder, or a COCO file."""
+
+    path: Path
+
+    def frames(
+        self, model: DetectorModel | None, settings: Settings, progress: Progress
+    ) -> Iterator[LabelledFrame]:
+        """Yield all pictures; `progress` gets their number.
+
+        Raises
+        ------
+        TruthError
+            The labels cannot be used.
+        ImageError
+            A picture cannot be read or searched.
+        """
+        pictures = read_labelled_pictures(self.path, Roles.from_settings(settings)).pictures
+        advance = progress(len(pictures))
+        for number, labelled in enumerate(pictures):
+            image = labelled.read()
+            height, width = image.shape[:2]
+            try:
+                windows = search_windows(model, width, height, [image])(image)
+            except ImageError as error:
+                raise ImageError(f"{labelled.path}: {error}") from error
+            labels = _frame_labels(labelled)
+            yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labels)
+            advance(1)
+
+
+def _frame_labels(labelled: LabelledVideo | LabelledPicture) -> FrameLabels:
+    boxes, ignored = labelled.boxes, labelled.ignored
+    return FrameLabels(boxes[~ignored], boxes[ignored])
+
+
+@dataclass(frozen=True, slots=True)
+class MiningJob:
+    """What is mined, and the zip file to write; `overwrite`: replace one that is there."""
+
+    sources: tuple[VideoSource | PictureSource, ...]
+    output: Path
+    overwrite: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MiningResult:
+    """Number of frames searched, and of patches of each kind."""
+
+    frames: int
+    vehicles: int
+    boxes: int
+    false_alarms: int
+    parts: int
+
+
+def mine(
+    job: MiningJob, settings: Settings, model: DetectorModel | None, *, steps: Steps = no_steps
+) -> MiningResult:
+    """Search the labelled frames and write patches for the training.
+
+    Patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
+    `non-vehicles/`, those of parts in `non-vehicles/mined_video_parts/`; frame and window are in
+    their names.
+
+    Parameters
+    ----------
+    model
+        The detector whose false alarms are searched for; None: any window without a vehicle may be
+        taken.
+    steps
+        Called for each source with its name and its number of frames.
+
+    Raises
+    ------
+    TruthError
+        Labels cannot be used, or have nothing about the frames.
+    VideoError, ImageError
+        A video or a picture cannot be read or searched.
+    DataError
+        There is nothing to learn from these frames, or two sources have one name.
+    OutputError
+        The zip file cannot be written.
+    """
+    names = [source.path.resolve().stem for source in job.sources]
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise DataError(f"{count} sources are named {name}; rename them, or mine one at a time")
+    searched = 0
+    counts: Counter[PatchKind] = Counter()
+    with patch_archive(job.output, overwrite=job.overwrite) as archive:
+        for stem, source in zip(names, job.sources, strict=True):
+            progress = partial(steps, source.path.name)
+            for frame in source.frames(model, settings, progress):
+                searched += 1
+                rng = np.random.default_rng((settings.train.svm.seed, frame.number))
+                for each in choose_windows(
+                    frame.windows, frame.labels, frame.image.shape[1], settings.train.mine, rng
+                ):
+                    x, y, side, _ = each.box.xywh
+                    patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
+                    folder = _FOLDERS[each.kind].format(stem)
+                    name = f"{folder}/{frame.name}_x{x:04}_y{y:04}_s{side:04}.png"
+                    archive.add(name, patch, each.sides)
+                    counts[each.kind] += 1
+        if not counts:
+            shown = ", ".join(str(source.path) for source in job.sources)
+            raise DataError(f"{shown}: no window fits a vehicle or is a false alarm; try others")
+    return MiningResult(searched, *(counts[kind] for kind in _FOLDERS))
+
+
+def search_windows(
+    model: DetectorModel | None, width: int, height: int, images: Sequence[Image]
+) -> Callable[[Image], Windows]:
+    """Return a search of frames of this size, `images` are the first few, for their windows.
+
+    The windows of the linear model are its own. For another detector they are laid as the default
+    settings of the linear model say, and a window has the score of the detection that it fits.
+    Without a detector all windows have probability 1.
+
+    Raises
+    ------
+    ImageError
+        Such frames cannot be searched.
+    """
+    detector = model.for_video(width, height, images) if model else None
+    if isinstance(detector, SvmDetector):
+        return lambda image: detector.search(Picture(image), None).windows
+    svm = SvmSettings()
+    grids = lay_grids(svm, svm.features, width, height, horizon=horizon_of(svm, images))
+    if not grids:
+        raise FrameSizeError(
+            f"no window fits into a frame of {width}×{height} pixels; give a larger one"
+        )
+    boxes = np.concatenate([grid.boxes for grid in grids])
+
+    def search(image: Image) -> Windows:
+        if model is None:
+            return _scored(boxes, np.ones(len(boxes), np.float32))
+        still = model.for_video(width, height, [image])
+        found = still.detect(still.search(Picture(image), None))
+        return _scored(boxes, _scores(boxes, found, width))
+
+    return search
+
+
+def _scores(boxes: Int32Array, detections: Boxes, frame_width: int) -> Float32Array:
+    """Return the highest score of the detections that each window fits; 0 where none fits."""
+    scores = np.zeros(len(boxes), np.float32)
+    squares = from_sizes(boxes)
+    for box, score in zip(detections.sides, detections.scores.tolist(), strict=True):
+        fits = compare_windows(squares, box, frame_width).fits
+        scores[fits] = np.maximum(scores[fits], score)
+    return scores
+
+
+def _scored(boxes: Int32Array, scores: Float32Array) -> Windows:
+    return Windows(boxes, scores, np.ones_like(scores), boxes.astype(np.float32))
