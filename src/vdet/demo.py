@@ -80,9 +80,11 @@ class DemoResult:
 def check_demo(folder: Path, *, overwrite: bool) -> None:
     """Make the folder, and refuse to replace an earlier demo. Raises `OutputError`."""
     make_folder(folder)
-    for name in (ROAD, TRUTH, LINE, PATCHES, MODEL, METRICS):
-        may_replace = may_replace_video if name == ROAD else any_file
-        check_output(folder / name, overwrite=overwrite, may_replace=may_replace)
+    names = (ROAD, TRUTH, LINE, PATCHES, MODEL, METRICS)
+    learnt = [path for each in _roads_to_learn(folder) for path in (each.path, each.truth)]
+    for path in (*(folder / name for name in names), *learnt):
+        may_replace = may_replace_video if path.suffix == ".mp4" else any_file
+        check_output(path, overwrite=overwrite, makes_folder=True, may_replace=may_replace)
     for outputs in (_BY_NETWORK, _BY_MODEL):
         check_job(_job(folder, outputs, overwrite=overwrite))
 
@@ -142,7 +144,12 @@ def run_demo(
     by_network = find("network", _BY_NETWORK, settings, None)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
     linear = load_settings(None, _MINING, detector="svm")
-    sources = tuple(_draw_to_learn(folder / "training", seed, overwrite=overwrite))
+    sources, rng = _roads_to_learn(folder), np.random.default_rng(seed)
+    make_folder(folder / "training")
+    for source in sources:
+        busy = busy_road(rng)
+        write_clip(source.path, busy, overwrite=overwrite)
+        write_truth(source.truth, busy, overwrite=overwrite)
     mine(MiningJob(sources, folder / PATCHES, overwrite), linear, None, steps=steps)
     patches = [folder / PATCHES]
     model, metrics = train(find_patches(patches), linear, boxed=find_boxed(patches), steps=steps)
@@ -153,13 +160,9 @@ def run_demo(
     return DemoResult((by_network, by_model), count(folder / TRUTH))
 
 
-def _draw_to_learn(folder: Path, seed: int, *, overwrite: bool) -> Iterator[VideoSource]:
-    """Draw roads with dense traffic, each with its truth, into a folder."""
-    make_folder(folder)
-    rng = np.random.default_rng(seed)
-    for number in range(1, ROADS + 1):
-        scene = busy_road(rng)
-        video, truth = folder / f"road{number}.mp4", folder / f"road{number}.txt"
-        write_clip(video, scene, overwrite=overwrite)
-        write_truth(truth, scene, overwrite=overwrite)
-        yield VideoSource(video, truth, every=2)
+def _roads_to_learn(folder: Path) -> tuple[VideoSource, ...]:
+    training = folder / "training"
+    return tuple(
+        VideoSource(training / f"road{number}.mp4", training / f"road{number}.txt", every=2)
+        for number in range(1, ROADS + 1)
+    )
