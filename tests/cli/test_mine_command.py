@@ -17,7 +17,6 @@ from vdet.boxes import Box
 from vdet.config.schema import InputSettings
 from vdet.detect.svm.model import load_model
 from vdet.labels.coco import COCO
-from vdet.labels.label import Corners
 from vdet.labels.mot import read_mot
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
@@ -89,11 +88,6 @@ def test_mines_patches_that_train_learns_from(
     assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
 
 
-def box_of(corners: Corners) -> Box:
-    x, y, right, bottom = map(int, corners)
-    return Box(x, y, right - x, bottom - y)
-
-
 def test_the_same_truth_in_another_format_gives_the_same_patches(
     run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
 ) -> None:
@@ -105,7 +99,7 @@ def test_the_same_truth_in_another_format_gives_the_same_patches(
             tuple(
                 car(
                     each.id,
-                    box_of(each.box),
+                    Box(*each.box),
                     class_name="ignore" if each.ignored else "car",
                 )
                 for each in rows
