@@ -2,9 +2,8 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
 
 from vdet.labels.formats import Format, LineWriter
 from vdet.labels.label import Label, from_size, limited, line_error
@@ -16,8 +15,6 @@ _PLACE = ("x", "y", "width", "height")
 _NEEDED = ("frame", "time", "id", *_PLACE)
 _OPTIONAL = ("score", "predicted", "class", "foot_x", "foot_y", "distance", "lane")
 _YES, _NO = {"1", "true"}, {"0", "false", ""}
-
-T = TypeVar("T")
 
 
 def _line(cells: Iterable[object]) -> str:
@@ -90,7 +87,8 @@ def _label(line: int, header: Sequence[str], cells: Sequence[str]) -> tuple[Labe
     score = parse_number(cell.get("score", "1"))
     if not 0 <= score <= 1:
         raise ValueError(f"the score {score:g} is not between 0 and 1")
-    foot = _known(cell, "foot_x", parse_number), _known(cell, "foot_y", parse_number)
+    foot_x, foot_y = _known(cell, "foot_x"), _known(cell, "foot_y")
+    lane = cell.get("lane", "").strip()
     label = Label(
         line,
         from_size(x, y, width, height),
@@ -99,16 +97,16 @@ def _label(line: int, header: Sequence[str], cells: Sequence[str]) -> tuple[Labe
         parse_whole(cell["id"]),
         score,
         predicted=_parse_flag(cell.get("predicted", "0")),
-        foot=None if foot[0] is None or foot[1] is None else (foot[0], foot[1]),
-        distance=_known(cell, "distance", parse_number),
-        lane=_known(cell, "lane", parse_whole),
+        foot=None if foot_x is None or foot_y is None else (foot_x, foot_y),
+        distance=_known(cell, "distance"),
+        lane=parse_whole(lane) if lane else None,
     )
     return label, parse_number(cell["time"])
 
 
-def _known(cell: Mapping[str, str], name: str, parse: Callable[[str], T]) -> T | None:
+def _known(cell: Mapping[str, str], name: str) -> float | None:
     text = cell.get(name, "").strip()
-    return parse(text) if text else None
+    return parse_number(text) if text else None
 
 
 def _parse_flag(text: str) -> bool:
