@@ -125,10 +125,6 @@ class TestFirstFrames:
         for index, image in enumerate(images):
             np.testing.assert_array_equal(image, road(car_at(index)))
 
-    def test_a_horizon_that_is_set_is_not_looked_for(self, asked: list[list[Image]]) -> None:
-        list(follow(drive(6), PERSPECTIVE))
-        assert asked == []
-
     @pytest.mark.parametrize("frames", [0, 1, 4])
     def test_a_clip_may_be_shorter(self, asked: list[list[Image]], frames: int) -> None:
         results = list(follow(drive(frames), self.FREE))

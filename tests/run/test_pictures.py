@@ -69,12 +69,6 @@ class TestPlan:
         expected = PictureJob(source, (Output("picture", out),))
         assert plan_pictures([source], out, None, overwrite=False) == [expected]
 
-    def test_one_picture_goes_into_a_folder_that_is_named(self, tmp_path: Path) -> None:
-        out = tmp_path / "new" / "out"
-        (job,) = plan_pictures([tmp_path / "a.png"], out, None, overwrite=False)
-        assert job.outputs == (Output("picture", out / "a.png"),)
-        assert out.is_dir()
-
     def test_several_keep_their_names_in_the_folder(self, tmp_path: Path) -> None:
         sources = [tmp_path / "a.png", tmp_path / "b.jpg"]
         jobs = plan_pictures(sources, tmp_path / "out", None, overwrite=False)
@@ -91,15 +85,6 @@ class TestPlan:
         sources = [tmp_path / "a.png", tmp_path / "a.jpg"]
         with pytest.raises(OutputError, match="is wanted by two inputs"):
             plan_pictures(sources, None, tmp_path / "stages", overwrite=False)
-
-    def test_earlier_stages_are_kept(self, tmp_path: Path) -> None:
-        (tmp_path / "5-boxes.png").write_text("precious")
-        with pytest.raises(OutputError, match="--overwrite"):
-            plan_pictures([tmp_path / "a.png"], None, tmp_path, overwrite=False)
-
-    def test_stages_of_one_picture_go_into_the_folder_itself(self, tmp_path: Path) -> None:
-        (job,) = plan_pictures([tmp_path / "a.png"], None, tmp_path / "stages", overwrite=False)
-        assert job.outputs == (Output("stages", tmp_path / "stages"),)
 
     def test_stages_of_several_go_into_a_folder_each(self, tmp_path: Path) -> None:
         sources = [tmp_path / "a.png", tmp_path / "b.png"]
