@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from vdet.boxes import Box
 from vdet.draw.boxes import draw_box, draw_label
-from vdet.draw.counts import DrawnLine, DrawnZone, draw_counts
 from vdet.draw.paint import (
     Color,
     Surface,
@@ -23,6 +22,7 @@ from vdet.draw.paint import (
     fill,
     write_text,
 )
+from vdet.draw.places import DrawnLine, DrawnZone, draw_counts
 from vdet.draw.trails import draw_trail
 from vdet.media.coding import Coding
 from vdet.media.images import Image

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.draw.counts import DrawnLine, DrawnZone, draw_counts
 from vdet.draw.paint import Surface
+from vdet.draw.places import DrawnLine, DrawnZone, draw_counts
 from vdet.errors import OutputError
 from vdet.lanes.road import Road
 from vdet.polygons import Point

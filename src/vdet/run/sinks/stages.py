@@ -4,7 +4,7 @@ from pathlib import Path
 
 from vdet.config.places import RegionsSettings
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
-from vdet.draw.regions import draw_regions
+from vdet.draw.places import draw_regions
 from vdet.files import make_folder
 from vdet.media.images import Image, encode_image
 from vdet.regions import Regions

@@ -4,7 +4,7 @@ Source: seed section 3, "Define a Car class".
 """
 
 from collections import deque
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass, field, replace
 from statistics import fmean, multimode
 
 import cv2
@@ -17,29 +17,23 @@ from vdet.media.images import Image
 Point = tuple[float, float]
 
 
+_NO_IMAGE: Image = np.empty((0, 0, 3), np.uint8)
+
+
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A detection inside the frame, in whole pixels; `peak` is its strength."""
+    """A detection inside the frame, in whole pixels; `peak` is its strength.
+
+    `image` is the part of the frame that it shows, once a car is detected there. A detection by
+    match has the score and the class of the one before it.
+    """
 
     box: Box
     centroid: Point
     peak: float
     score: float = 1.0
     class_name: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class CarDetection:
-    """A car in one frame: its rectangle and centroid in full-frame pixels, and that cut-out.
-
-    A detection by match has the score and the class of the one before it.
-    """
-
-    box: Box
-    centroid: Point
-    image: Image
-    score: float
-    class_name: str | None
+    image: Image = field(default_factory=lambda: _NO_IMAGE, compare=False)
 
 
 @dataclass(eq=False, slots=True)
@@ -79,7 +73,7 @@ class Car:
     count: int = 0
     matches: int = 0
     misses: int = 0
-    detections: deque[CarDetection] = field(init=False)
+    detections: deque[Region] = field(init=False)
 
     def __post_init__(self, history: int) -> None:
         self.detections = deque(maxlen=history)
@@ -160,10 +154,7 @@ class Car:
         return x + box.x1 - last.box.x1, y + box.y1 - last.box.y1
 
     def _add(self, region: Region, image: Image) -> None:
-        cutout = region.box.cut(image).copy()
-        self.detections.append(
-            CarDetection(region.box, region.centroid, cutout, region.score, region.class_name)
-        )
+        self.detections.append(replace(region, image=region.box.cut(image).copy()))
         self.detected = True
         self.in_a_row += 1
         self.count += 1
