@@ -88,7 +88,7 @@ class TestFollowFrames:
         assert [result.tracks for result in many] == [result.tracks for result in one]
         assert [result.frame.index for result in many] == list(range(20))
         for first, second in zip(one, many, strict=True):
-            for name in ("boxes", "scores", "centroids", "strengths"):
+            for name in ("sides", "scores"):
                 np.testing.assert_array_equal(
                     getattr(first.detections, name), getattr(second.detections, name)
                 )
