@@ -64,8 +64,7 @@ net: $(TOOLS)  ## train the shipped network on (hours): sets of pictures in ROAD
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check torch --constraint constraints.txt
 	$(BIN)/vdet train-net $(sort $(wildcard $(ROADS)/*/)) -o build/net/net.onnx --overwrite \
 		--video $(DATA)/project_video.mp4 $(TRUTH) --base src/vdet/models/net.onnx \
-		$(addprefix --set train.net.,steps=5200 width=640 height=352 small=0.35 rate=0.001 warm_up=200 \
-		every=4 least_side=8 scales=[0.5,2.0] 'weights={"traffic_cams":3,"overpass":2.2}')
+		--set 'train.net.weights={"traffic_cams":3,"overpass":2.2}'
 	cp build/net/net.onnx src/vdet/models/
 
 unseen: $(TOOLS)  ## measure the network on cameras that it has not seen (many hours)

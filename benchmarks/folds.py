@@ -41,7 +41,6 @@ BLOCKS = 5
 LEAST = 0.2  # probability of the windows that are kept for the sweeps
 SETTINGS = (
     f"detector.search.probability={LEAST}",
-    "train.svm.calibration.folds=2",
     "train.svm.augmentation.mirror=false",  # half the memory, a third of the time
 )
 SWEEPS = {

@@ -152,7 +152,7 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     settings = load_settings(None, [f"train.net.steps={arguments.steps}", *_UNCALIBRATED])
-    clip = LabelledClip(arguments.video, arguments.truth, settings.train.net.every)
+    clip = LabelledClip(arguments.video, arguments.truth)
     sets = split_sets(arguments.roads, arguments.work / "sets")
     results = []
     for group in GROUPS:

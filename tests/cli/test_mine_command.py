@@ -191,12 +191,7 @@ def _patches(path: Path) -> dict[str, bytes]:
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (("--truth", "a.txt", "--truth", "b.txt"), 2, "1 videos, 2 --truth; give one for each"),
-        (("--set", "train.mine.parts=-1"), 1, "train.mine.parts"),
-        (
-            ("--set", "train.mine={false_alarms: 0, parts: 0, per_vehicle: 0}"),
-            1,
-            "no window fits a vehicle",
-        ),
+        (("--set", "train.mine.probability=-1"), 1, "train.mine.probability"),
         (("--set", BELOW), 1, "road.mp4: no search window fits into a frame of 320×180 pixels"),
     ],
 )

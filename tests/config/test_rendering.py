@@ -19,6 +19,7 @@ from vdet.config.schema import (
     HistogramSettings,
     HogSettings,
     MotionTrackerSettings,
+    NetworkSettings,
     RulesTrackerSettings,
     SearchSettings,
     Section,
@@ -195,3 +196,19 @@ def test_no_line_is_longer_than_100_characters(settings: Settings) -> None:
 def test_what_is_printed_is_plain_yaml(folder: Path) -> None:
     loaded: Any = yaml.safe_load(render(Settings()))
     assert read_back(yaml.safe_dump(loaded), folder) == Settings()
+
+
+def test_there_are_few_settings() -> None:
+    """Each key of a section of every kind counts once; a list counts as one setting."""
+    kinds = [NetworkSettings, SvmSettings, MotionTrackerSettings, RulesTrackerSettings]
+    sections = [Settings(detector=d(), tracker=t()) for d in kinds[:2] for t in kinds[2:]]
+    keys = {key for each in sections for key in leaves(each.model_dump())}
+    assert 80 < len(keys) <= 110
+
+
+def leaves(values: dict[str, Any], prefix: str = "") -> Iterator[str]:
+    for name, value in values.items():
+        if isinstance(value, dict) and value:
+            yield from leaves(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name

@@ -96,8 +96,8 @@ class TestFilesOfASection:
             "counts: {size: [9, 9], confirmed: 0.3, lines: [{name: a, start: [0, 0], end: [9, 9]}]}"
         )
         lines.write_text("zones: [{name: z, points: [[0, 0], [1, 0], [1, 1]]}]")
-        counts = load_settings(config, ["counts.gap=2"], {"counts": lines}).counts
-        assert (counts.size, counts.lines, counts.confirmed, counts.gap) == (None, (), 0.3, 2)
+        counts = load_settings(config, ["counts.drawn=true"], {"counts": lines}).counts
+        assert (counts.size, counts.lines, counts.confirmed, counts.drawn) == (None, (), 0.3, True)
         assert [zone.name for zone in counts.zones] == ["z"]
 
     def test_a_mistake_has_its_place_in_the_file(self, tmp_path: Path) -> None:

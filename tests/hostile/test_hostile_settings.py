@@ -48,7 +48,7 @@ tracker:
   kind: motion
   smallest: 0.03
   needed: 0.25
-  overlap: 5e-1
+  leak: 1e-1
   carried: 1
 input: {max_damaged: 0.1, frame_rate: 30}
 output: {scores: true}

@@ -4,20 +4,18 @@ import numpy as np
 
 from traffic.passing import HEIGHT, WIDTH, frame, track
 from vdet.boxes import Box
-from vdet.config.schema import CropSettings
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.track import Track
 from vdet.traffic.crops import BestCrops, Crop
 
-BARE = CropSettings(padding=0)
 ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
 PICTURE = Picture(ROAD)
 
 
-def crops(*shown: list[Track], settings: CropSettings = BARE) -> dict[int, Crop]:
+def crops(*shown: list[Track], padding: float = 0) -> dict[int, Crop]:
     """Return the picture of each vehicle that was given back last."""
-    best = BestCrops(settings)
+    best = BestCrops(padding=padding)
     found = [crop for n, each in enumerate(shown) for crop in best.add(frame(n, *each), PICTURE)]
     return {crop.id: crop for crop in (*found, *best.end())}
 
@@ -49,15 +47,14 @@ def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
 
 
 def test_padding_shows_what_is_around_as_far_as_the_frame_goes() -> None:
-    settings = CropSettings(padding=0.5)
     inside, corner = Box.sized(100, 100, 40, 30), Box.sized(0, 0, 40, 30)
-    found = crops([track(1, inside), track(2, corner)], settings=settings)
+    found = crops([track(1, inside), track(2, corner)], padding=0.5)
     np.testing.assert_array_equal(found[1].image, cut(Box.sized(80, 85, 80, 60)))
     np.testing.assert_array_equal(found[2].image, cut(Box.sized(0, 0, 60, 45)))
 
 
 def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:
-    best = BestCrops(BARE)
+    best = BestCrops(padding=0)
     assert best.add(frame(0, track(1, box(40))), PICTURE) == []
     assert [crop.id for crop in best.add(frame(1), PICTURE)] == [1]
     assert best.add(frame(2), PICTURE) == []
@@ -68,7 +65,7 @@ def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better(
 
 
 def test_memory_holds_only_vehicles_that_are_shown() -> None:
-    best = BestCrops(BARE)
+    best = BestCrops(padding=0)
     for number in range(1, 200):
         best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), PICTURE)
     assert len(best.end()) == 2

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @options.output_file_option("Network to write, .onnx.")
 @option(
     "--video CLIP TRUTH",
-    "Learn from every N-th frame of a labelled video too (train.net.every). Can be repeated.",
+    "Learn from every fourth frame of a labelled video too. Can be repeated.",
     options.PATH,
     name="clips",
     nargs=2,
@@ -64,7 +64,7 @@ def train_net(
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
-    labelled = tuple(LabelledClip(video, truth, settings.every) for video, truth in clips)
+    labelled = tuple(LabelledClip(video, truth) for video, truth in clips)
     job = NetworkJob(data, labelled, output, base, overwrite, Roles.from_settings(base_settings))
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     for path in (job.output, job.metrics):

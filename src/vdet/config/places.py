@@ -172,13 +172,6 @@ class CountSettings(PlacedSection):
         le=10,
         description="Ignore vehicles that are detected over a shorter time, in seconds.",
     )
-    gap: float = Field(
-        1.0,
-        ge=0,
-        le=10,
-        description="Join a track to one that ended near its start at most this long before, in "
-        "seconds.",
-    )
 
     def __bool__(self) -> bool:
         return bool(self.lines or self.zones)

@@ -8,8 +8,6 @@ from pydantic import Field, SerializeAsAny
 from vdet.config.detector import DetectorSettings, NetworkSettings
 from vdet.config.labels import LabelSettings
 from vdet.config.lanes import LaneSettings
-from vdet.config.mining import MiningSettings
-from vdet.config.network import NetworkTrainingSettings
 from vdet.config.places import (
     CountSettings,
     LineSettings,
@@ -32,20 +30,18 @@ from vdet.config.svm import (
     WindowSettings,
 )
 from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
-from vdet.config.train import TrainSettings
-from vdet.config.training import (
+from vdet.config.train import (
     AugmentationSettings,
-    BoxSettings,
-    CalibrationSettings,
+    MiningSettings,
+    NetworkTrainingSettings,
     SvmTrainingSettings,
+    TrainSettings,
 )
 from vdet.config.video import CropSettings, DrawSettings, InputSettings, OutputSettings
 from vdet.errors import ConfigError
 
 __all__ = [
     "AugmentationSettings",
-    "BoxSettings",
-    "CalibrationSettings",
     "ColorSpace",
     "CountSettings",
     "CropSettings",

@@ -37,11 +37,6 @@ class MotionTrackerSettings(TrackerSettings):
         description="Evidence that a vehicle loses in a second. Detections with lower scores never "
         "add up.",
     )
-    overlap: Share = Field(
-        0.3,
-        description="Least intersection over union of a detection with the expected box of its "
-        "vehicle.",
-    )
     carried: Seconds = Field(
         0.35, description="Show a vehicle that is not detected for this long, by prediction."
     )

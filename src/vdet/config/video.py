@@ -38,18 +38,6 @@ class OutputSettings(Section):
 class CropSettings(Section):
     """The best picture of each vehicle."""
 
-    padding: float = Field(
-        0.1,
-        ge=0,
-        le=2,
-        description="Margin around the box, as a share of its width and height.",
-    )
-    least: int = Field(
-        24,
-        ge=1,
-        le=10_000,
-        description="Ignore boxes with a shorter side, in pixels.",
-    )
     format: Literal["jpg", "png"] = Field("jpg", description="File format.")
 
 

@@ -15,7 +15,7 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
 6. Vehicles that are seen for less than `counts.confirmed` do not count. Once a vehicle is
    confirmed, what it did before counts too.
 7. The class of a vehicle is that with the highest sum of scores over all its frames.
-8. A vehicle that is first seen within `counts.gap` seconds of the end of another, and where that
+8. A vehicle that is first seen within a second of the end of another, and where that
    one would be, is taken for the same: it takes over its side and whether it was counted. An event
    that rests on this is `stitched`. A vehicle that moves out at the edge of the frame has no such
    successor.

@@ -16,6 +16,8 @@ from vdet.traffic.totals import Counts, Event
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
 
+_GAP = 1.0
+"""Most seconds from the end of a track to that of another one that goes on from it."""
 _SETTLED = 0.1
 """Seconds after which a vehicle off a border's band has changed the side."""
 _LEAVES = 0.1
@@ -154,7 +156,7 @@ class VehicleCounter:
             number in each.entered
             for each in self._vehicles.values()
             if not each.is_taken_over
-            and self._now - each.shown <= self.layout.settings.gap
+            and self._now - each.shown <= _GAP
             and self._is_confirmed(each)
         )
 
@@ -187,13 +189,12 @@ class VehicleCounter:
 
     def _before(self, sighting: Sighting, shown: set[int]) -> _Vehicle | None:
         """Return the vehicle that has ended where a new one begins."""
-        gap = self.layout.settings.gap
         near = []
         for vehicle in self._vehicles.values():
             if vehicle.id in shown or vehicle.is_taken_over or vehicle.is_leaving:
                 continue
             heights = vehicle.last.height, sighting.height
-            if sighting.time - vehicle.shown > gap or max(heights) > _MOST_GROWTH * min(heights):
+            if sighting.time - vehicle.shown > _GAP or max(heights) > _MOST_GROWTH * min(heights):
                 continue
             places = vehicle.last.point, vehicle.expected(sighting.time)
             distance = min(math.dist(place, sighting.point) for place in places)

@@ -3,13 +3,17 @@
 from dataclasses import dataclass
 
 from vdet.boxes import Box
-from vdet.config.video import CropSettings
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.track import FrameTracks, Track
 
 _Merit = tuple[bool, float]
 """Whether the vehicle is whole in the frame; its area in pixels times its score."""
+
+PADDING = 0.1
+"""Margin around the box, as a share of its width and height."""
+LEAST = 24
+"""Shortest side of a box that gets a picture, pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +35,9 @@ class BestCrops:
     back, so the memory does not grow with the length of the video.
     """
 
-    def __init__(self, settings: CropSettings) -> None:
-        self._settings = settings
+    def __init__(self, *, padding: float = PADDING, least: int = LEAST) -> None:
+        self._padding = padding
+        self._least = least
         self._best: dict[int, Crop] = {}
         self._merits: dict[int, _Merit] = {}
 
@@ -60,7 +65,7 @@ class BestCrops:
     def _merit(self, track: Track, picture: Picture) -> _Merit | None:
         """Return None where the vehicle was not seen, or is too small."""
         box = track.box.rounded
-        if track.predicted or min(box.width, box.height) < self._settings.least:
+        if track.predicted or min(box.width, box.height) < self._least:
             return None
         inside = box.x2 < picture.width and box.y2 < picture.height
         is_whole = inside and min(box.x1, box.y1) > 0
@@ -68,5 +73,5 @@ class BestCrops:
 
     def _cut(self, box: Box, picture: Picture) -> Image:
         box = box.rounded
-        x, y = (round(side * self._settings.padding) for side in (box.width, box.height))
+        x, y = (round(side * self._padding) for side in (box.width, box.height))
         return Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y).cut(picture.image).copy()

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from learn.net.blocks import block_picture, block_source
-from vdet.config.network import NetworkTrainingSettings
-from vdet.learn.net.augmentation import Drawing, SampleDrawer, _turned
+from vdet.config.train import NetworkTrainingSettings
+from vdet.learn.net.augmentation import LEAST_SIDE, Drawing, SampleDrawer, _turned
 from vdet.learn.net.sources import MAX_PIXELS, Sample, Source
 from vdet.learn.net.weather import with_weather
 
@@ -64,7 +64,7 @@ def test_vehicles_that_are_too_small_are_ignored() -> None:
     for seed in range(20):
         sample = draw(seed, MOSAIC)
         sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
-        small = sides.max(axis=1) < SETTINGS.least_side
+        small = sides.max(axis=1) < LEAST_SIDE
         assert sample.ignored[small].all()
 
 

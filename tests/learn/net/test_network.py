@@ -12,8 +12,8 @@ torch = pytest.importorskip(
 from torch import Tensor  # noqa: E402
 
 from learn.net.blocks import block_picture, block_source  # noqa: E402
-from vdet.config.network import NetworkTrainingSettings  # noqa: E402
 from vdet.config.schema import NetworkSettings  # noqa: E402
+from vdet.config.train import NetworkTrainingSettings  # noqa: E402
 from vdet.detect.onnx.detector import NetworkModel  # noqa: E402
 from vdet.detect.onnx.layouts import cell_centers as runtime_cells  # noqa: E402
 from vdet.detect.onnx.recognition import Header  # noqa: E402
@@ -32,10 +32,7 @@ from vdet.learn.net.training import TrainingState, train_network  # noqa: E402
 from vdet.media import Picture  # noqa: E402
 from vdet.testing import check_detector  # noqa: E402
 
-QUICK = NetworkTrainingSettings(
-    steps=120, batch=4, width=256, height=128, small=0.0, warm_up=10, average=0.9, checkpoint=40,
-    rate=3e-3, scales=(0.8, 1.2),
-)  # fmt: skip
+QUICK = NetworkTrainingSettings(steps=120, batch=4, width=256, height=128, rate=3e-3)
 CLASSES = ("car", "bus")
 
 
@@ -137,7 +134,7 @@ def test_a_training_goes_on_from_the_weights_of_an_exported_network(
 ) -> None:
     path = tmp_path / "base.onnx"
     export_network(trained[0], Header(classes=CLASSES), path)
-    settings = QUICK.model_copy(update={"steps": 3, "warm_up": 0, "rate": 1e-6})
+    settings = QUICK.model_copy(update={"steps": 3, "rate": 1e-6})
     losses: list[float] = []
     train_network(
         [block_source()], 2, settings, tmp_path / "a.ckpt", base=path,
@@ -179,8 +176,11 @@ def test_what_was_learnt_is_found_again(
     check_detector(model, [block_picture(7).image, block_picture(8).image])
 
 
-def test_a_stopped_training_goes_on_and_ends_the_same(tmp_path: Path) -> None:
-    settings = QUICK.model_copy(update={"steps": 12, "checkpoint": 4})
+def test_a_stopped_training_goes_on_and_ends_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.learn.net.training.CHECKPOINT", 4)
+    settings = QUICK.model_copy(update={"steps": 12})
     source = [block_source(8)]
     whole = train_network(source, 2, settings, tmp_path / "whole.ckpt")
 
@@ -203,7 +203,7 @@ def test_a_stopped_training_goes_on_and_ends_the_same(tmp_path: Path) -> None:
 
 
 def test_a_checkpoint_of_another_training_is_refused(tmp_path: Path) -> None:
-    settings = QUICK.model_copy(update={"steps": 2, "checkpoint": 1})
+    settings = QUICK.model_copy(update={"steps": 2})
     source, path = [block_source(4)], tmp_path / "net.ckpt"
     train_network(source, 2, settings, path)
     other = settings.model_copy(update={"rate": 1e-4})

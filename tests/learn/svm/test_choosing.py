@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Box, from_sizes
-from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
 from vdet.learn.svm.choosing import (
     ChosenWindow,
     FrameLabels,
+    Most,
     PatchKind,
     WindowComparison,
     choose_windows,
@@ -21,7 +21,7 @@ from vdet.learn.svm.choosing import (
 WIDTH = 1000
 CAR = Box.sized(400, 300, 100, 70)
 OTHER = Box.sized(700, 300, 100, 70)
-GENEROUS = MiningSettings(probability=0.2, per_vehicle=1000, false_alarms=1000, parts=1000)
+GENEROUS = Most(per_vehicle=1000, false_alarms=1000, parts=1000)
 
 
 def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> FrameLabels:
@@ -48,9 +48,14 @@ def windows(*boxes: Box, probability: float = 1.0) -> Windows:
 
 
 def chosen(
-    found: Windows, labels: FrameLabels, settings: MiningSettings = GENEROUS, seed: int = 0
+    found: Windows,
+    labels: FrameLabels,
+    most: Most = GENEROUS,
+    seed: int = 0,
+    probability: float = 0.2,
 ) -> list[ChosenWindow]:
-    return list(choose_windows(found, labels, WIDTH, settings, np.random.default_rng(seed)))
+    rng = np.random.default_rng(seed)
+    return list(choose_windows(found, labels, WIDTH, rng, probability=probability, most=most))
 
 
 def kinds(choices: list[ChosenWindow]) -> dict[Box, str]:
@@ -104,8 +109,8 @@ def many() -> Windows:
 
 
 def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> None:
-    settings = MiningSettings(probability=0, per_vehicle=4, false_alarms=7, parts=3)
-    choices = chosen(many(), truth(CAR, OTHER), settings)
+    most = Most(per_vehicle=4, false_alarms=7, parts=3)
+    choices = chosen(many(), truth(CAR, OTHER), most, probability=0)
     counted = [choice.kind for choice in choices]
     kinds_in_order: tuple[PatchKind, ...] = ("vehicle", "box", "false alarm", "part")
     assert [counted.count(kind) for kind in kinds_in_order] == [8, 8, 7, 3]
@@ -114,8 +119,8 @@ def test_each_vehicle_and_the_frame_give_no_more_than_the_settings_allow() -> No
 
 
 def test_the_same_seed_takes_the_same_windows_and_another_seed_others() -> None:
-    settings = MiningSettings(per_vehicle=4, false_alarms=7)
-    one, same, other = (chosen(many(), truth(CAR), settings, seed) for seed in (0, 0, 1))
+    most = Most(per_vehicle=4, false_alarms=7)
+    one, same, other = (chosen(many(), truth(CAR), most, seed) for seed in (0, 0, 1))
     assert one == same
     assert set(one) != set(other)
 

@@ -14,7 +14,6 @@ from sklearn.svm import LinearSVC
 
 from vdet.boxes import BoolArray, Float32Array
 from vdet.config.schema import (
-    CalibrationSettings,
     FeatureSettings,
     HistogramSettings,
     HogSettings,
@@ -51,8 +50,7 @@ def fit(
     **changes: object,
 ) -> LinearModel:
     """Fit to copies of vectors; without origins, all rows are patches."""
-    calibration = CalibrationSettings(ensemble=ensemble)
-    training = SvmTrainingSettings(C=0.01, calibration=calibration).model_copy(update=changes)
+    training = SvmTrainingSettings(C=0.01, ensemble=ensemble).model_copy(update=changes)
     rows = Rows.of_patches(vectors.copy(), vehicle)
     if origins is not None:
         rows = replace(rows, origins=origins)
@@ -94,8 +92,8 @@ def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, ot
     vehicle = np.array([True] * vehicles + [False] * others, bool)
     vectors = np.ones((len(vehicle), 24), np.float32)
     message = (
-        rf"a class has {min(vehicles, others)} training patches, train\.svm\.calibration\.folds "
-        "needs 3; give more patches"
+        rf"a class has {min(vehicles, others)} training patches, calibration needs 3; "
+        "give more patches"
     )
     with pytest.raises(DataError, match=message):
         fit(vectors, vehicle)
@@ -103,11 +101,12 @@ def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, ot
 
 @pytest.mark.parametrize("most", [1, 1000])
 def test_an_svm_that_has_not_converged_is_reported_by_a_warning(
-    caplog: pytest.LogCaptureFixture, most: int
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, most: int
 ) -> None:
+    monkeypatch.setattr("vdet.learn.svm.fitting.MAX_ITERATIONS", most)
     with caplog.at_level(logging.WARNING, "vdet"):
-        fit(*clouds(), max_iterations=most, C=1e6 if most == 1 else 0.01)
-    warning = "the SVM has not converged; raise train.svm.max_iterations"
+        fit(*clouds(), C=1e6 if most == 1 else 0.01)
+    warning = "the SVM has not converged; lower train.svm.C"
     assert (warning in caplog.text) is (most == 1)
 
 
@@ -169,14 +168,15 @@ def test_the_svm_copies_no_data() -> None:
     assert peak_memory(lambda: svm.fit(np.arange(4000), vehicle)) < vectors.nbytes / 2
 
 
-def test_a_fit_has_the_training_part_in_memory_once() -> None:
+def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("vdet.learn.svm.fitting.MAX_ITERATIONS", 5)
     rng = np.random.default_rng(0)
     origins = np.concatenate([np.arange(3000), rng.integers(0, 3000, 4500)])
     vectors = rng.normal(size=(7500, 768)).astype(np.float32)
     vehicle = (vectors[:, 0] > 0)[origins]
     rows = Rows(vectors, vehicle, np.zeros((7500, 4), np.float32), origins)
     features = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=256))
-    training = SvmTrainingSettings(max_iterations=5)
+    training = SvmTrainingSettings()
     settings = Settings(detector=SvmSettings(features=features), train=TrainSettings(svm=training))
     peak = peak_memory(lambda: fit_rows(rows.of(np.ones(3000, bool)), settings))
     assert peak < 1.5 * vectors.nbytes

@@ -13,6 +13,7 @@ import pytest
 from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import MiningSettings, OutputSettings, Settings, TrainSettings
 from vdet.errors import DataError, VideoError
+from vdet.learn.svm.choosing import MOST, Most
 from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
 from vdet.learn.svm.mining import MiningJob, MiningResult, PictureSource, VideoSource, mine
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
@@ -75,7 +76,7 @@ Mine = Callable[..., MiningResult]
 
 
 @pytest.fixture
-def mined(clip: Path, tmp_path: Path) -> Mine:
+def mined(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mine:
     """Mine the clip, in which the truth has the car, with a detector that finds these boxes."""
     truth = tmp_path / "gt.txt"
     box = f"{CAR.x1 + 1},{CAR.y1 + 1},{CAR.width},{CAR.height}"
@@ -85,11 +86,14 @@ def mined(clip: Path, tmp_path: Path) -> Mine:
         *boxes: Box,
         score: float = 0.9,
         detector: type[FixedBoxes] = FixedBoxes,
-        **settings: float,
+        probability: float = 0.2,
+        **most: int,
     ) -> MiningResult:
         model = detector(found(*boxes, score=score))
         job = MiningJob((VideoSource(clip, truth, every=2),), tmp_path / "mined.zip")
-        return mine(job, Settings(train=TrainSettings(mine=MiningSettings(**settings))), model)
+        monkeypatch.setattr("vdet.learn.svm.mining.MOST", Most(**most))
+        settings = Settings(train=TrainSettings(mine=MiningSettings(probability=probability)))
+        return mine(job, settings, model)
 
     return run
 
@@ -214,7 +218,7 @@ class TestPictures:
         job = MiningJob((PictureSource(folder),), tmp_path / "mined.zip")
         result = mine(job, Settings(), None)
         assert result.vehicles > 0
-        assert result.false_alarms == Settings().train.mine.false_alarms
+        assert result.false_alarms == MOST.false_alarms
         for box in boxes_of(job.output, "non-vehicles/mined_city"):
             assert box.iou(CAR) < 0.5
 

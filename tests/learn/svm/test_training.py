@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 import vdet
 from vdet.config.schema import (
     AugmentationSettings,
-    BoxSettings,
     FeatureSettings,
     HistogramSettings,
     HogSettings,
@@ -31,7 +30,14 @@ from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import Augmenter, augment
 from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
-from vdet.learn.svm.extraction import MAX_NAMED, LabelledVectors, Rows, extract, hold_out
+from vdet.learn.svm.extraction import (
+    MAX_NAMED,
+    TEST_SHARE,
+    LabelledVectors,
+    Rows,
+    extract,
+    hold_out,
+)
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.training import train
 from vdet.media.images import Image, read_image, write_image
@@ -322,7 +328,7 @@ def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_he
     settings = but(split=name, augmentation=NO_AUGMENTATION)
     model, report = train(files, settings, jobs=1)
     data = describe(files)
-    held = hold_out(data.groups, name, settings.train.svm.test_fraction, settings.train.svm.seed)
+    held = hold_out(data.groups, name, TEST_SHARE, settings.train.svm.seed)
     expected = fit(data.rows.of(~held), settings)
     np.testing.assert_array_equal(model.weights, expected.weights)
     assert [split.train_augmented for split in report.splits] == [0, 0]
@@ -339,7 +345,7 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
     shutil.copytree(mined, spoilt)
     for files in lists:
         groups = np.array([file.group for file in files])
-        held = hold_out(groups, name, settings.train.svm.test_fraction, settings.train.svm.seed)
+        held = hold_out(groups, name, TEST_SHARE, settings.train.svm.seed)
         for row in np.flatnonzero(held):
             flat = np.full((SIZE, SIZE, 3), row, np.uint8)
             write_image(spoilt / files[row].name, flat, overwrite=True)
@@ -415,8 +421,11 @@ def test_without_boxes_a_model_finds_no_sides(files: list[PatchFile]) -> None:
     assert {split.box_error for split in report.splits} == {None}
 
 
-def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
-    settings = but(split="tail", boxes=BoxSettings(penalty=1e-3))
+def test_with_boxes_a_model_finds_the_sides_of_vehicles(
+    mined: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.learn.svm.box_regression.PENALTY", 1e-3)  # the patches are few
+    settings = but(split="tail")
     files, boxed = find_patches([mined]), find_boxed([mined])
     model, report = train(files, settings, boxed=boxed, jobs=1)
     assert model.box_regression is not None
@@ -438,14 +447,15 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(mined: Path) -> None:
 
 @pytest.mark.parametrize("assumed", [0.0, 0.5])
 def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
-    data: Path, mined: Path, tmp_path: Path, assumed: float
+    data: Path, mined: Path, tmp_path: Path, assumed: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The boxes of the mined vehicles are small; the other set makes the boxes larger."""
+    monkeypatch.setattr("vdet.learn.svm.box_regression.PENALTY", 100)
     small = tmp_path / "small"
     shutil.copytree(mined, small)
     table = small / "boxes.csv"
     table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,-0.1,0.2,0.1"))
-    settings = but(boxes=BoxSettings(penalty=100, assumed=assumed))
+    settings = but(assumed=assumed)
     files = find_patches([small, data])
     model, _ = train(files, settings, jobs=1)
     assert model.box_regression is not None

@@ -40,17 +40,13 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
     assert red > blue + 50
 
 
-def test_pictures_have_the_size_and_the_format_that_is_set(tmp_path: Path) -> None:
-    png = SETTINGS.model_copy(update={"crops": CropSettings(format="png", padding=0.25, least=60)})
-    small = Box.sized(10, 150, 59, 70)
-    write(Output("crops", tmp_path), [result_of(CAR, small)], settings=png)
-    assert names(tmp_path) == []
-    png = SETTINGS.model_copy(update={"crops": CropSettings(format="png", padding=0.25, least=48)})
+def test_pictures_have_the_format_that_is_set(tmp_path: Path) -> None:
+    png = SETTINGS.model_copy(update={"crops": CropSettings(format="png")})
     write(Output("crops", tmp_path), [result_of(CAR)], settings=png)
     assert names(tmp_path) == ["vehicle-0001-at-0.000s.png"]
     picture = read_image(tmp_path / "vehicle-0001-at-0.000s.png")
-    assert picture.shape == (72, 96, 3)
-    assert (picture[12:-12, 16:-16] == (0, 0, 255)).all()
+    assert picture.shape == (58, 76, 3)
+    assert (picture[5:-5, 6:-6] == (0, 0, 255)).all()
 
 
 def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Path) -> None:

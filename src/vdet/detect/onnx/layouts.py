@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from vdet.boxes import Float32Array, Int32Array
-from vdet.config.network import NetworkScoreSettings
+from vdet.config.train import NetworkScoreSettings
 from vdet.detect.onnx.session import Array
 
 STRIDES = (8, 16, 32)

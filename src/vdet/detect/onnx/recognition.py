@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
-from vdet.config.network import NetworkScoreSettings
 from vdet.config.section import Section
+from vdet.config.train import NetworkScoreSettings
 from vdet.detect.onnx.layouts import (
     CenterRows,
     FinalRows,

@@ -8,12 +8,18 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array
-from vdet.config.network import NetworkTrainingSettings
+from vdet.config.train import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
 from vdet.learn.net.sources import Sample, Source, join
 from vdet.learn.net.weather import with_weather
 from vdet.media.images import Image
 
+LEAST_SIDE = 8.0
+"""Vehicles whose longer side is shorter are ignored, pixels."""
+_SCALES = 0.5, 2.0
+"""Least and largest scale of a picture; at 1 its width fits."""
+_MOSAIC_SCALES = 0.5, 1.5
+"""Least and largest scale of the four pictures of a mosaic."""
 _LEAST_VISIBLE = 0.25  # share of a vehicle that is left after cropping, else it is ignored
 _ASPECT = 0.1  # most change of the width relative to the height
 _TILTED = 0.25  # share of pictures that are turned
@@ -44,18 +50,16 @@ class SampleDrawer:
 
     def __init__(self, sources: Sequence[Source], settings: NetworkTrainingSettings) -> None:
         self._sources = sources
-        self._settings = settings
         counts = [len(source.samples) for source in sources]
         weights = np.sqrt(counts) * [settings.weights.get(source.name, 1.0) for source in sources]
         self._shares = weights / weights.sum()
 
     def draw(self, rng: np.random.Generator, drawing: Drawing) -> Sample:
         """Return one training picture with the vehicles that are left in it."""
-        settings = self._settings
         if rng.random() < drawing.mosaics:
             sample = self._mosaic(rng, drawing)
         else:
-            low, high = np.log(settings.scales)
+            low, high = np.log(_SCALES)
             scale = drawing.magnified * np.exp(rng.uniform(low, high))
             sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
@@ -63,7 +67,7 @@ class SampleDrawer:
         visible = sample.boxes[~sample.ignored]
         image = with_weather(rng, _recolored(rng, sample.image), visible)
         image = _with_noise(rng, image)
-        return _cleaned(replace(sample, image=image), settings.least_side)
+        return _cleaned(replace(sample, image=image), LEAST_SIDE)
 
     def _pick(self, rng: np.random.Generator) -> Sample:
         source = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
@@ -82,7 +86,7 @@ class SampleDrawer:
             (0, y, x, height),
             (x, y, width, height),
         ):
-            low, high = np.log(self._settings.mosaic_scales)
+            low, high = np.log(_MOSAIC_SCALES)
             scale = drawing.magnified * np.exp(rng.uniform(low, high))
             fit = width / (right - left)  # the scale refers to the width of the whole picture
             part = _place(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)

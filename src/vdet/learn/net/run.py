@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from vdet.config.network import NetworkTrainingSettings
+from vdet.config.train import NetworkTrainingSettings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.files import write_json

@@ -23,6 +23,9 @@ MAX_PIXELS = 640_000
 UNKNOWN = -1
 """The class of a vehicle whose kind is not known."""
 
+EVERY = 4
+"""Every N-th frame of a labelled video is learnt: neighbours are nearly equal."""
+
 _VEHICLE = "vehicle"
 
 
@@ -88,11 +91,10 @@ class Source:
 
 @dataclass(frozen=True, slots=True)
 class LabelledClip:
-    """A video and the file with its true boxes; every `every`-th frame is used."""
+    """A video and the file with its true boxes; every `EVERY`-th frame is used."""
 
     video: Path
     truth: Path
-    every: int
 
 
 def image_source(path: Path, roles: Roles = DEFAULT_ROLES) -> Source:
@@ -126,7 +128,7 @@ def clip_source(clip: LabelledClip, roles: Roles = DEFAULT_ROLES) -> Source:
     samples = []
     with VideoReader(clip.video, frames=truth.last_frame) as reader:
         for number, frame in enumerate(reader, start=1):
-            if number % clip.every == 0:
+            if number % EVERY == 0:
                 rows = truth.frame(number)
                 samples.append(_sample(frame.image, rows.boxes, ["car"] * len(rows), rows.ignored))
     return Source(clip.video.name, samples)

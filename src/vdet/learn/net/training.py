@@ -13,7 +13,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from vdet.config.network import NetworkTrainingSettings
+from vdet.config.train import NetworkTrainingSettings
 from vdet.errors import DataError
 from vdet.files import OutputFiles
 from vdet.learn.net.architecture import Network, cell_centers, decode, flatten
@@ -24,6 +24,24 @@ from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_
 from vdet.learn.net.sources import UNKNOWN, Sample, Source, join
 from vdet.run.threads import prefetch
 
+CHECKPOINT = 500
+"""Steps between two checkpoints."""
+_SEED = 0
+"""Seed of the weights and the pictures."""
+_SMALL = 0.35
+"""Share of the steps, the first ones, with pictures of half the size."""
+_PLAIN = 0.12
+"""Share of the steps, the last ones, without mosaics."""
+_MOSAICS = 0.35
+"""Share of pictures put together of four."""
+_WARM_UP = 200
+"""Steps in which the learning rate rises, or a tenth of all if that is less."""
+_LAST_RATE = 0.02
+"""Last learning rate, as a share of the highest."""
+_WEIGHT_DECAY = 0.02
+_LONGEST_GRADIENT = 10.0
+_AVERAGE = 0.998
+"""Share that the moving average of the weights keeps at each step."""
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
 
 
@@ -54,19 +72,19 @@ def _batches(
     """Yield the batches from step `first` on; each depends on the step and the seed alone."""
     drawer = SampleDrawer(sources, settings)
     for step in range(first, settings.steps):
-        rng = np.random.default_rng((settings.seed, step))
+        rng = np.random.default_rng((_SEED, step))
         drawing = _drawing(settings, step)
         yield _to_batch([drawer.draw(rng, drawing) for _ in range(settings.batch)])
 
 
 def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
-    is_small = step < settings.small * settings.steps
-    is_plain = step >= (1 - settings.plain) * settings.steps
+    is_small = step < _SMALL * settings.steps
+    is_plain = step >= (1 - _PLAIN) * settings.steps
     return Drawing(
         width=settings.width // 2 if is_small else settings.width,
         height=settings.height // 64 * 32 if is_small else settings.height,
         magnified=_MAGNIFIED if is_small else 1.0,
-        mosaics=0.0 if is_plain else settings.mosaics,
+        mosaics=0.0 if is_plain else _MOSAICS,
     )
 
 
@@ -115,7 +133,7 @@ def train_network(
             for batch in batches:
                 loss = run.learn(batch)
                 progress(TrainingState(run.step, loss, run.rate))
-                if run.step % settings.checkpoint == 0 or run.step == settings.steps:
+                if run.step % CHECKPOINT == 0 or run.step == settings.steps:
                     run.save(checkpoint)
     return run.averaged.eval()
 
@@ -150,7 +168,7 @@ class _Run:
     def __init__(
         self, class_count: int, settings: NetworkTrainingSettings, learnt_with: dict[str, Any]
     ) -> None:
-        torch.manual_seed(settings.seed)
+        torch.manual_seed(_SEED)
         self._settings = settings
         self._learnt_with = learnt_with
         self._network = Network(class_count).to(memory_format=torch.channels_last).train()
@@ -159,7 +177,7 @@ class _Run:
         others = [each for each in self._network.parameters() if each.ndim <= 1]
         self._optimizer = torch.optim.AdamW(
             [
-                {"params": weights, "weight_decay": settings.weight_decay},
+                {"params": weights, "weight_decay": _WEIGHT_DECAY},
                 {"params": others, "weight_decay": 0.0},
             ],
             lr=settings.rate,
@@ -175,10 +193,11 @@ class _Run:
     def rate(self) -> float:
         """The learning rate of the next step: it rises, stays, and falls as a cosine."""
         settings, step = self._settings, self.step
-        if step < settings.warm_up:
-            return settings.rate * (step + 1) / settings.warm_up
+        warm_up = min(_WARM_UP, settings.steps // 10)
+        if step < warm_up:
+            return settings.rate * (step + 1) / warm_up
         share = max(0.0, 2 * step / settings.steps - 1)  # of the second half
-        low = settings.last_rate
+        low = _LAST_RATE
         return settings.rate * (low + (1 - low) * (1 + math.cos(math.pi * share)) / 2)
 
     def learn(self, batch: Batch) -> float:
@@ -188,7 +207,7 @@ class _Run:
         loss = _loss(self._network, batch)
         self._optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self._network.parameters(), self._settings.gradient)
+        torch.nn.utils.clip_grad_norm_(self._network.parameters(), _LONGEST_GRADIENT)
         self._optimizer.step()
         self.step += 1
         self._average()
@@ -196,7 +215,7 @@ class _Run:
 
     @torch.no_grad()
     def _average(self) -> None:
-        keep = min(self._settings.average, self.step / (self.step + 10))
+        keep = min(_AVERAGE, self.step / (self.step + 10))
         averages = self.averaged.state_dict()
         for name, value in self._network.state_dict().items():
             if value.dtype.is_floating_point:

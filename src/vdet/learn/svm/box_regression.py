@@ -19,6 +19,9 @@ from vdet.workers import Workers
 _ASSUMED_SIDES: Sides = (-0.47, -0.40, 0.47, 0.42)
 """Typical sides of the vehicle in a patch of the Udacity set."""
 
+PENALTY = 1.0
+"""Ridge penalty of the weights of scaled features, for each patch."""
+
 _LEAST_SPREAD = 0.05
 """Added to each feature's spread, share of the mean spread: limits the weights of features that
 hardly vary."""
@@ -83,7 +86,7 @@ def extract_box_patches(
     assumed = [
         replace(file, sides=_ASSUMED_SIDES)
         for file in files
-        if file.vehicle and file.source not in with_boxes and training.boxes.assumed
+        if file.vehicle and file.source not in with_boxes and training.assumed
     ]
     return BoxPatches(
         describe(boxed, augmenter, "describing patches with boxes"),
@@ -144,16 +147,16 @@ def fit_boxes(
 
     Returns None if no side is known.
     """
-    boxes = settings.train.svm.boxes
+    assumed_weight = settings.train.svm.assumed
     length = Layout.of(settings.svm.features).hog_length
     rows = [BoxRows(each.vectors[:, :length], each.sides) for each in sets]
     count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in sets)
     if not count:
         return None
     if assumed is not None:
-        weight = boxes.assumed * count / len(assumed.sides)
+        weight = assumed_weight * count / len(assumed.sides)
         rows.append(BoxRows(assumed.vectors[:, :length], assumed.sides, weight))
-    return fit_sides(rows, boxes.penalty)
+    return fit_sides(rows, PENALTY)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,6 @@ from typing import Literal
 import numpy as np
 
 from vdet.boxes import BoolArray, Box, Float64Array, coverage, from_sizes
-from vdet.config.schema import MiningSettings
 from vdet.detect.svm.windows import Windows
 from vdet.learn.svm.dataset import Sides
 
@@ -20,6 +19,23 @@ PatchKind = Literal["vehicle", "box", "false alarm", "part"]
 """`vehicle`: the window fits a vehicle. `box`: it shows one off its centre or of another size.
 `false alarm`: it is taken for a vehicle, but there is none. `part`: it is taken for a vehicle, but
 shows only a part of one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Most:
+    """Most windows that are chosen.
+
+    `per_vehicle` windows that fit a vehicle and as many others that show it; of the frame,
+    `false_alarms` where no vehicle is and `parts` that show only a part of one: with many parts,
+    fewer vehicles are found as a whole.
+    """
+
+    per_vehicle: int = 16
+    false_alarms: int = 15
+    parts: int = 10
+
+
+MOST = Most()
 
 _MAX_COVERED = 0.3
 """Largest share of a false alarm that a vehicle or an ignore region may cover."""
@@ -51,10 +67,12 @@ def choose_windows(
     windows: Windows,
     labels: FrameLabels,
     frame_width: int,
-    settings: MiningSettings,
     rng: np.random.Generator,
+    *,
+    probability: float,
+    most: Most,
 ) -> Iterator[ChosenWindow]:
-    """Choose from the windows of a frame, of each kind as many as the settings allow.
+    """Choose from the windows of a frame, of each kind at most as many as `most` says.
 
     Parameters
     ----------
@@ -62,10 +80,12 @@ def choose_windows(
         All windows of the frame, with the probabilities of the model that is to be improved.
     frame_width
         Width of the frame, pixels.
+    probability
+        Least one of a false alarm or a part.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
     boxes = from_sizes(windows.boxes[first])
-    is_hit = windows.probabilities[first] >= settings.probability
+    is_hit = windows.probabilities[first] >= probability
     comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in labels.vehicles]
     distances = [np.full(len(boxes), np.inf)]  # of no vehicle
     distances += [np.where(each.near, each.distances, np.inf) for each in comparisons]
@@ -84,10 +104,10 @@ def choose_windows(
     for number, each in enumerate(comparisons):
         own = nearest == number
         is_part |= is_hit & each.part & ~np.delete(is_covered, number, axis=1).any(axis=1)
-        yield from some("vehicle", each.fits & own, settings.per_vehicle, each.sides)
-        yield from some("box", each.shows & own, settings.per_vehicle, each.sides)
-    yield from some("false alarm", is_alarm, settings.false_alarms)
-    yield from some("part", is_part, settings.parts)
+        yield from some("vehicle", each.fits & own, most.per_vehicle, each.sides)
+        yield from some("box", each.shows & own, most.per_vehicle, each.sides)
+    yield from some("false alarm", is_alarm, most.false_alarms)
+    yield from some("part", is_part, most.parts)
 
 
 def _sides(row: Float64Array) -> Sides:

@@ -248,6 +248,10 @@ def _digest(files: Sequence[PatchFile], checksums: Sequence[int]) -> str:
     return digest.hexdigest()
 
 
+TEST_SHARE = 0.2
+"""Share of the patches that is held out for the test."""
+
+
 def hold_out(
     groups: npt.NDArray[np.str_], name: SplitName, fraction: float, seed: int
 ) -> BoolArray:

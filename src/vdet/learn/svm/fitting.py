@@ -28,6 +28,10 @@ from vdet.learn.svm.extraction import RowNumbers, Rows
 
 log = logging.getLogger("vdet")
 
+FOLDS = 3
+"""Folds of the cross-validation that calibrates."""
+MAX_ITERATIONS = 1000
+"""Most iterations of the solver."""
 _BLOCK = 1024  # rows that are scaled or scored at a time
 _CORRECTIONS = 20  # of L-BFGS
 _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
@@ -50,22 +54,20 @@ def fit(rows: Rows, settings: Settings) -> LinearModel:
         A class has fewer patches than there are calibration folds.
     """
     training = settings.train.svm
-    folds = training.calibration.folds
     labels = rows.vehicle[: rows.patches]
     fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
-    if fewest < folds:
+    if fewest < FOLDS:
         raise DataError(
-            f"a class has {fewest} training patches, train.svm.calibration.folds needs {folds}; "
-            "give more patches"
+            f"a class has {fewest} training patches, calibration needs {FOLDS}; give more patches"
         )
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])
     calibrated = CalibratedClassifierCV(
-        LinearSvm(scaler.transform(rows.vectors), C=training.C, max_iter=training.max_iterations),
+        LinearSvm(scaler.transform(rows.vectors), C=training.C, max_iter=MAX_ITERATIONS),
         method="sigmoid",
         cv=list(_folds(rows, training)),
-        ensemble=training.calibration.ensemble,
+        ensemble=training.ensemble,
     )
     numbers = np.arange(len(rows.vehicle))
     weights = (rows.origins == numbers).astype(float)  # samples do not count for the sigmoid
@@ -74,15 +76,13 @@ def fit(rows: Rows, settings: Settings) -> LinearModel:
         warnings.simplefilter("always", ConvergenceWarning)
         calibrated.fit(numbers, rows.vehicle, weights)
     if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
-        log.warning(
-            "the SVM has not converged; raise train.svm.max_iterations or lower train.svm.C"
-        )
+        log.warning("the SVM has not converged; lower train.svm.C")
     return _to_model(calibrated.calibrated_classifiers_, scaler, settings.svm.features)
 
 
 def _folds(rows: Rows, training: SvmTrainingSettings) -> Iterator[tuple[RowNumbers, RowNumbers]]:
     """Yield the rows to fit on and those to calibrate on."""
-    splitter = StratifiedKFold(training.calibration.folds, shuffle=True, random_state=training.seed)
+    splitter = StratifiedKFold(FOLDS, shuffle=True, random_state=training.seed)
     patches = np.arange(rows.patches)
     for _, tested in splitter.split(patches, rows.vehicle[patches]):
         inside = np.isin(rows.origins, tested)

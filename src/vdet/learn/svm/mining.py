@@ -28,6 +28,7 @@ from vdet.labels.reading import read_labelled_pictures, read_truth
 from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.choosing import (
+    MOST,
     FrameLabels,
     PatchKind,
     choose_windows,
@@ -230,7 +231,12 @@ def mine(
                 searched += 1
                 rng = np.random.default_rng((settings.train.svm.seed, frame.number))
                 for each in choose_windows(
-                    frame.windows, frame.labels, frame.image.shape[1], settings.train.mine, rng
+                    frame.windows,
+                    frame.labels,
+                    frame.image.shape[1],
+                    rng,
+                    probability=settings.train.mine.probability,
+                    most=MOST,
                 ):
                     x, y, side, _ = each.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)

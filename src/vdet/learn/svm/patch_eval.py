@@ -19,7 +19,7 @@ from vdet.evaluate.output import RunName, run_lines, share, table
 from vdet.evaluate.tiles import Tile
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
+from vdet.learn.svm.extraction import TEST_SHARE, LabelledVectors, extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.metrics import CONFUSION_HEADINGS, Classification, Rate
 from vdet.pages.charts import FILL, SOFT, Axis, Line, Plot, curve, number_axis
@@ -121,7 +121,7 @@ def evaluate_patches(
         meaning = _SAME if model.provenance.get("data_sha256") == data.digest else _OTHER
     else:
         steps("fitting the model", None)
-        tested = hold_out(data.groups, "tail", training.test_fraction, training.seed)
+        tested = hold_out(data.groups, "tail", TEST_SHARE, training.seed)
         if not tested.any():
             raise DataError("nothing can be held out; give more patches")
         model, meaning = fit(data.rows.of(~tested), settings), _SPLIT

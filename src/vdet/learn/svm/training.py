@@ -14,7 +14,7 @@ from vdet.errors import DataError
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.box_regression import BoxPatches, extract_box_patches, fit_split_boxes
 from vdet.learn.svm.dataset import PatchFile
-from vdet.learn.svm.extraction import LabelledVectors, SplitName, extract, hold_out
+from vdet.learn.svm.extraction import TEST_SHARE, LabelledVectors, SplitName, extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.metrics import Classification, SplitMetrics, TrainingMetrics
 from vdet.progress import Steps, no_steps
@@ -101,7 +101,7 @@ def _fit_split(
 ) -> tuple[LinearModel, SplitMetrics]:
     def held_of(some: LabelledVectors) -> BoolArray:
         training = settings.train.svm
-        return hold_out(some.groups, name, training.test_fraction, training.seed)
+        return hold_out(some.groups, name, TEST_SHARE, training.seed)
 
     held = held_of(data)
     if not held.any():

@@ -30,9 +30,8 @@ class PageSink(BaseSink):
         super().__init__(path, context)
         make_folder(path)
         video = self.video
-        settings = context.settings
         self._records = VehicleRecords(video.width)
-        self._crops = BestCrops(settings.crops)
+        self._crops = BestCrops()
         self._heat = HeatMap(video.width, video.height)
         self._levels = Levels()
         self._thumbnails: dict[int, Thumbnail] = {}

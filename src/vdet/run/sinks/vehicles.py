@@ -50,7 +50,7 @@ class CropSink(BaseSink):
         make_folder(path)
         self._folder = context.files.stage_folder(path, PATTERN)
         self._suffix = f".{context.settings.crops.format}"
-        self._best = BestCrops(context.settings.crops)
+        self._best = BestCrops()
         self._written: dict[int, Path] = {}
 
     def finish(self) -> None:

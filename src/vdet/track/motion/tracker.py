@@ -24,6 +24,9 @@ from vdet.track.track import Track
 FIRST_STEP = 0.04
 """Seconds that the first frame counts for."""
 
+_OVERLAP = 0.3
+"""Least intersection over union of a detection with the expected box of its vehicle."""
+
 SHORTEST_STEP = 0.001
 """Seconds between frames at least, also where two have the same time or the clock goes back."""
 
@@ -143,7 +146,7 @@ class MotionTracker:
         boxes = np.reshape([observation.box for observation in observations], (-1, 4))
         buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
         values = buffered_iou(expected, buffers, boxes)
-        values[values < self._settings.overlap] = 0
+        values[values < _OVERLAP] = 0
         weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
         scores = np.array([observation.score for observation in observations])
