@@ -22,9 +22,9 @@ class LabelSettings(Section):
     roles: dict[str, Role] = Field(
         _ROLES,
         max_length=1000,
-        description="vehicle: must be found; ignored: detections there are neither right nor "
-        "wrong; other: left out. Without a role, car, truck, bus, motorcycle and vehicle are "
-        "vehicles if the detector looks for them, else ignored",
+        description="vehicle: must be found. ignored: detections there are not judged. "
+        "other: left out. Without a role, car, truck, bus, motorcycle and vehicle are vehicles if "
+        "the detector looks for them, and ignored if not.",
     )
 
     @field_validator("roles")

@@ -81,7 +81,7 @@ __all__ = [
 class StepSettings(Section):
     """Steps of other packages, between the tracker and the outputs."""
 
-    names: tuple[str, ...] = Field((), description="the steps, in their order")
+    names: tuple[str, ...] = Field((), description="Names of the steps, in order.")
 
 
 class Settings(Section):

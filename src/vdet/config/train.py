@@ -48,13 +48,6 @@ class SvmTrainingSettings(Section):
         description="true: keep an SVM for each fold of the calibration and average their "
         "probabilities. false: fit one SVM to everything.",
     )
-    assumed: float = Field(
-        0.5,
-        ge=0,
-        le=100,
-        description="Weight of vehicle patches without boxes, relative to those with boxes, in the "
-        "regression of boxes. Their vehicle is assumed to fill the patch.",
-    )
     augmentation: AugmentationSettings = AugmentationSettings()
 
 

@@ -19,6 +19,9 @@ from vdet.workers import Workers
 _ASSUMED_SIDES: Sides = (-0.47, -0.40, 0.47, 0.42)
 """Typical sides of the vehicle in a patch of the Udacity set."""
 
+ASSUMED = 0.5
+"""Weight of vehicle patches from sources without boxes, relative to patches with boxes."""
+
 PENALTY = 1.0
 """Ridge penalty of the weights of scaled features, for each patch."""
 
@@ -86,7 +89,7 @@ def extract_box_patches(
     assumed = [
         replace(file, sides=_ASSUMED_SIDES)
         for file in files
-        if file.vehicle and file.source not in with_boxes and training.assumed
+        if file.vehicle and file.source not in with_boxes
     ]
     return BoxPatches(
         describe(boxed, augmenter, "describing patches with boxes"),
@@ -147,14 +150,13 @@ def fit_boxes(
 
     Returns None if no side is known.
     """
-    assumed_weight = settings.train.svm.assumed
     length = Layout.of(settings.svm.features).hog_length
     rows = [BoxRows(each.vectors[:, :length], each.sides) for each in sets]
     count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in sets)
     if not count:
         return None
     if assumed is not None:
-        weight = assumed_weight * count / len(assumed.sides)
+        weight = ASSUMED * count / len(assumed.sides)
         rows.append(BoxRows(assumed.vectors[:, :length], assumed.sides, weight))
     return fit_sides(rows, PENALTY)
 
