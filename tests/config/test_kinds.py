@@ -10,7 +10,6 @@ from vdet.config.loading import load_settings
 from vdet.config.rendering import render
 from vdet.config.schema import (
     MotionTrackerSettings,
-    NetworkSettings,
     RulesTrackerSettings,
     Settings,
 )
@@ -37,15 +36,6 @@ def refusal(path: Path, text: str, *assignments: str) -> list[str]:
 
 
 class TestLayers:
-    def test_by_default_the_detector_is_the_network_and_the_tracker_follows_motion(self) -> None:
-        settings = load_settings()
-        assert settings.detector == NetworkSettings()
-        assert settings.tracker == MotionTrackerSettings()
-
-    def test_a_file_chooses_a_kind_and_changes_its_keys(self, path: Path) -> None:
-        tracker = load(path, "tracker:\n  history: 12\n  kind: rules\n").tracker
-        assert tracker == RulesTrackerSettings(history=12)
-
     def test_assignments_change_the_kind_that_the_file_chose(self, path: Path) -> None:
         tracker = load(path, "tracker: {kind: rules, history: 12}", "tracker.young=3").tracker
         assert tracker == RulesTrackerSettings(history=12, young=3)
@@ -82,10 +72,6 @@ class TestLayers:
     def test_assignments_are_one_layer_in_any_order(self, assignments: tuple[str, ...]) -> None:
         assert load_settings(None, assignments).tracker == RulesTrackerSettings(history=5)
 
-    def test_of_two_kinds_in_assignments_the_last_one_counts(self) -> None:
-        both = ["tracker.kind=rules", "tracker.kind=motion"]
-        assert load_settings(None, both) == Settings()
-
     def test_settings_can_be_sent_to_another_process(self) -> None:
         settings = load_settings(None, ["tracker.kind=rules", "tracker.history=5"])
         assert pickle.loads(pickle.dumps(settings)) == settings
@@ -106,10 +92,6 @@ class TestRefused:
         assert refusal(path, "tracker: {kind: rules}", "tracker.kind=motion",
                        "tracker.history=3") == [RULES]  # fmt: skip
 
-    def test_a_key_of_no_kind_is_no_setting(self, path: Path) -> None:
-        (line,) = refusal(path, "tracker: {kind: rules, histroy: 3}")
-        assert line == "my.yaml:1:24: tracker.histroy: is no setting; did you mean history?"
-
     @pytest.mark.parametrize(
         ("text", "message"),
         [
@@ -129,12 +111,6 @@ class TestRefused:
     def test_a_kind_that_is_not_known(self, path: Path, text: str, message: str) -> None:
         (line,) = refusal(path, text)
         assert line.startswith(message)
-
-    def test_an_unknown_kind_is_answered_with_the_known_ones(self) -> None:
-        with pytest.raises(ConfigError, match=r"is no tracker; known are motion, rules$"):
-            load_settings(None, ["tracker.kind=best"])
-        with pytest.raises(ConfigError, match=r"is no detector; known are svm"):
-            load_settings(None, ["detector.kind=best"])
 
     def test_all_mistakes_are_given_beside_an_unknown_kind(self, path: Path) -> None:
         text = "tracker: {kind: best, level: 3}\ndetector: {kind: none}\noutput: {crf: 99}"

@@ -44,10 +44,6 @@ def scaled(rows: int, settings: Settings = BOTH) -> Settings:
     return scale_lengths(settings, rows / 720)
 
 
-def test_at_the_reference_height_nothing_changes() -> None:
-    assert scaled(720) == BOTH
-
-
 def test_every_frame_length_is_scaled_and_nothing_else() -> None:
     before, after = leaves(BOTH.model_dump()), leaves(scaled(1440).model_dump())
     assert {key for key in before if before[key] != after[key]} == LENGTHS
@@ -75,10 +71,3 @@ def test_windows_keep_their_place_in_a_frame_of_another_height(
 @pytest.mark.parametrize(("blur", "factor", "expected"), [(15, 0.5, 8), (5, 0.5, 3), (1, 0.4, 0)])
 def test_products_are_rounded_halves_up(blur: int, factor: float, expected: int) -> None:
     assert scale_lengths(HeatSettings(blur=blur), factor).blur == expected
-
-
-def test_a_part_of_the_settings_is_scaled_alone() -> None:
-    window = WindowSettings(size=10, overlap=0.5, top=20, bottom=40)
-    (result,) = scale_lengths(SearchSettings(windows=(window,)), 3).windows
-    assert result == WindowSettings(size=30, overlap=0.5, top=60, bottom=120)
-    assert window.size == 10

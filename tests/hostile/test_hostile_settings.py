@@ -135,17 +135,11 @@ ALIAS_BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 HOSTILE = {
     "alias bomb": (ALIAS_BOMB, r"2:8: is not YAML: aliases \(\*name\) are not accepted"),
-    "alias to itself": ("detector: &a [*a]", "aliases"),
     "merge key": ("lanes: &a {frames: 2}\ndetector: {<<: *a}", "aliases"),
     "python object": ("detector: !!python/object/apply:os.system [id]", r"1:11: .*tags \(!name\)"),
-    "binary": ("detector: !!binary aGVhdA==", r"tags \(!name\) are not accepted"),
     "deep list": ("[" * 90_000, "is nested too deeply"),
-    "deep map": ("{a: " * 20_000, "is nested too deeply"),
     "deep block": ("- " * 45_000, "is nested too deeply"),
-    "deep keys": ("? " * 45_000, "is nested too deeply"),
     "huge number": ("input: {x: " + "9" * 90_000 + "}", "1:12: .*the number is too large"),
-    "huge hexadecimal": ("input: {x: 0x" + "f" * 90_000 + "}", "the number is too large"),
-    "huge base 60": ("input: {x: " + "1:" * 40_000 + "1}", "the number is too large"),
     "base 60 fraction": ("input: {x: " + "1:" * 40_000 + "1.5}", "cannot be understood"),
     "huge version": ("%YAML " + "1" * 5000 + ".1\n---\nheat: {}", "is not YAML"),
     "no such character": (r'heat: "\UFFFFFFFF"', "is not YAML"),
@@ -157,15 +151,8 @@ HOSTILE = {
         r'detector: {kind: "\ud800"}',
         r"detector\.kind: .*\\ud800.*: is no detector",
     ),
-    "half a character as key": (r'detector: {"\ud800": 1}', "detector"),
-    "time before time": (
-        "detector: {heat: {frames: 0001-01-01T00:00:00+23:59}}",
-        "should be a valid integer",
-    ),
-    "infinity": ("input: {max_damaged: .inf}", "input.max_damaged: should be a finite number"),
     "not a number": ("input: {max_damaged: .nan}", "input.max_damaged: should be a finite number"),
     "NUL": ("input: {x: \0}", "is not YAML: unacceptable character #x0000"),
-    "several documents": ("input: {x: 2}\n---\ninput: {x: 3}\n", "but found another doc"),
     "one key 12,000 times": ("heat: 1\n" * 12_000, "is given twice"),
     "9,000 unknown keys": ("".join(f"k{i}: 1\n" for i in range(9000)), "k0: is no setting"),
     "15,000 wrong items": (
@@ -173,7 +160,6 @@ HOSTILE = {
         "should be a section",
     ),
     "control characters": (r'"a\n\e[2J": 1', r"a\\n\\x1b\[2J: is no setting"),
-    "a long key": ("k" * 90_000 + ": 1", "mapping values are not allowed here"),
     "a long quoted key": ('? "' + "k" * 90_000 + '"\n: 1', "k…: is no setting"),
     "too large": ("#" * (MAX_BYTES + 1), "is larger than 100,000 bytes; that is no settings file"),
 }

@@ -48,12 +48,6 @@ def test_both_lines_are_fitted_where_they_are() -> None:
         assert fit.curves.width == pytest.approx(3.7, abs=0.03)
 
 
-def test_a_dash_of_four_metres_is_enough_to_see_a_line() -> None:
-    fit = fit_new(masked(LAST, right=DASHED), TOP_VIEW, SETTINGS)
-    assert fit is not None
-    assert fit.seen == (True, True)
-
-
 @pytest.mark.parametrize(
     ("hidden", "rows", "seen"),
     [
@@ -117,7 +111,3 @@ def test_a_lane_that_jumps_sideways_is_not_the_last_lane() -> None:
     mask = masked(moved(left=-1.38, right=2.32))
     assert fit_near(mask, TOP_VIEW, LAST, SETTINGS) is None
     assert fit_new(mask, TOP_VIEW, SETTINGS) is not None
-
-
-def test_a_new_lane_must_contain_the_camera() -> None:
-    assert fit_new(masked(moved(left=0.4, right=4.1)), TOP_VIEW, SETTINGS) is None

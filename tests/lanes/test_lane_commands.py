@@ -200,18 +200,6 @@ class TestVideo:
         for record in records:
             check_lane(record["lane"], road.camera)
 
-    def test_metres_have_three_decimals_and_pixels_one(self, records: list[dict[str, Any]]) -> None:
-        lane = records[0]["lane"]
-        for key in ("radius", "offset", "width"):
-            assert lane[key] == round(lane[key], 3)
-        points = np.array(lane["left"] + lane["right"])
-        assert (points == points.round(1)).all()
-
-    def test_boxes_are_in_pixels_of_the_input(self, records: list[dict[str, Any]]) -> None:
-        boxes = [box_of(track) for record in records for track in record["tracks"]]
-        assert len(boxes) > COUNT // 2
-        assert all(sits_on(box, CAR) for box in boxes)
-
     def test_boxes_are_drawn_in_pixels_of_the_undistorted_frame(
         self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
     ) -> None:
@@ -223,38 +211,6 @@ class TestVideo:
         car = red_in(undistorter.image(video_images(files.clip)[-1]))
         assert sits_on(placed, car)
         assert reported.x2 < car.x2 - 15, "an unchanged box would miss a quarter of the car"
-
-    def test_the_video_is_the_undistorted_one(
-        self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
-    ) -> None:
-        before, after = video_images(files.clip), video_images(folder / "out.mp4")
-        assert len(after) == len(records) == COUNT
-        for old, new in zip(before, after, strict=True):
-            straight = undistorter.image(old)[CORNER].astype(int)
-            assert np.abs(new[CORNER] - straight).mean() < 2
-            assert np.abs(new[CORNER] - old[CORNER].astype(int)).mean() > 8
-
-    def test_the_lane_is_drawn(
-        self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
-    ) -> None:
-        lane = records[0]["lane"]
-        (x0, y), (x1, _) = lane["left"][6], lane["right"][6]
-        row, middle = int(y), int((x0 + x1) / 2)
-        before = undistorter.image(video_images(files.clip)[0])[row, middle].astype(int)
-        blue, green, red = video_images(folder / "out.mp4")[0][row, middle].astype(int) - before
-        assert green > 15
-        assert green > max(blue, red)
-
-    def test_the_number_of_threads_changes_nothing(
-        self, run: Run, files: Files, tmp_path: Path
-    ) -> None:
-        for threads in ("1", "3"):
-            outputs = (tmp_path / f"{threads}.mp4", "--tracks", tmp_path / f"{threads}.jsonl")
-            options = (*files.lanes, "--threads", threads)
-            assert run("detect-video", files.clip, *outputs, *options).code == 0
-        assert (tmp_path / "1.jsonl").read_bytes() == (tmp_path / "3.jsonl").read_bytes()
-        for one, three in zip(*(video_images(tmp_path / f"{n}.mp4") for n in "13"), strict=True):
-            assert (one == three).all()
 
     def test_without_lanes_records_differ_only_by_lanes_and_distances(
         self, run: Run, files: Files, records: list[dict[str, Any]], tmp_path: Path
@@ -327,16 +283,6 @@ class TestPictures:
         assert result.err.count("warning") == 1
         assert "--lanes without --camera: pictures are taken as undistorted" in result.err
         assert (read_image(out / "bare.png") == read_image(files.bare)).all()
-
-    def test_without_lanes_no_lane_is_reported(self, run: Run, files: Files) -> None:
-        (item,) = self.json_of(run("detect-image", files.plain, "--json", "-", *files.red))
-        assert "lane" not in item
-
-    def test_lane_stages_are_written(self, run: Run, files: Files, tmp_path: Path) -> None:
-        stages = tmp_path / "s"
-        assert run("detect-image", files.picture, "--stages", stages, *files.lanes).code == 0
-        assert sorted(path.name for path in stages.iterdir()) == STAGES
-        assert read_image(stages / "6-road.png").shape == (HEIGHT, WIDTH, 3)
 
     def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
         self, run: Run, files: Files, tmp_path: Path

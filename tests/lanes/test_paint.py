@@ -55,21 +55,11 @@ def test_yellow_is_paint_even_if_it_is_not_lighter_than_the_road() -> None:
     assert found[:, 149:152].all()
 
 
-def test_a_line_in_shadow_is_paint() -> None:
-    image = painted(asphalt(90), WHITE)
-    image[20:60] = (image[20:60] * 0.3).astype(np.uint8)
-    assert mask_of(image)[:, 149:152].all()
-
-
 @pytest.mark.parametrize("levels", [(40, 120), (120, 40), (130, 190)])
 def test_the_edge_of_a_shadow_or_of_another_surface_is_not_paint(levels: tuple[int, int]) -> None:
     image = asphalt(levels[0])
     image[:, 150:] = levels[1]
     assert not mask_of(image).any()
-
-
-def test_a_dark_stripe_is_not_paint() -> None:
-    assert not mask_of(painted(asphalt(150), (40, 40, 40))).any()
 
 
 def test_a_stripe_much_wider_than_a_line_is_not_paint() -> None:
@@ -79,11 +69,6 @@ def test_a_stripe_much_wider_than_a_line_is_not_paint() -> None:
 def test_sensor_noise_gives_almost_no_paint() -> None:
     noise = np.random.default_rng(0).normal(90, 4, (80, 300, 3))
     assert np.count_nonzero(mask_of(noise.clip(0, 255).astype(np.uint8))) < 20
-
-
-def test_noise_in_the_dark_is_not_paint() -> None:
-    noise = np.random.default_rng(0).integers(0, 6, (80, 300, 3), dtype=np.uint8)
-    assert not mask_of(noise).any()
 
 
 def test_paint_at_the_border_is_left_out() -> None:
@@ -111,11 +96,6 @@ def constant(top_view: TopView, *laterals: float) -> list[Float64Array]:
     return [np.full(len(top_view.distances), lateral) for lateral in laterals]
 
 
-def test_the_base_is_where_both_lines_start(top_view: TopView) -> None:
-    mask = drawn(top_view, *constant(top_view, -1.6, 2.0))
-    assert find_base(mask, top_view, SETTINGS) == pytest.approx((-1.6, 2.0), abs=0.05)
-
-
 def test_the_base_is_the_pair_of_lines_around_the_camera(top_view: TopView) -> None:
     mask = drawn(top_view, *constant(top_view, -3.9, -0.4, 3.3))
     assert find_base(mask, top_view, SETTINGS) == pytest.approx((-0.4, 3.3), abs=0.05)
@@ -123,10 +103,6 @@ def test_the_base_is_the_pair_of_lines_around_the_camera(top_view: TopView) -> N
 
 def test_lines_too_close_together_have_no_base(top_view: TopView) -> None:
     assert find_base(drawn(top_view, *constant(top_view, -1.0, 1.0)), top_view, SETTINGS) is None
-
-
-def test_an_empty_mask_has_no_base(top_view: TopView) -> None:
-    assert find_base(drawn(top_view), top_view, SETTINGS) is None
 
 
 def test_sliding_windows_follow_a_bend(top_view: TopView) -> None:
@@ -151,17 +127,6 @@ def test_paint_along_a_line_is_the_middle_of_each_row(top_view: TopView) -> None
     paint = paint_along(drawn(top_view, line), top_view, line + 0.1, margin=0.3)
     assert (paint.z == top_view.distances).all()
     assert np.abs(paint.x - line).max() < 0.02
-
-
-def test_paint_along_a_line_leaves_out_empty_rows(top_view: TopView) -> None:
-    line = constant(top_view, 1.0)[0]
-    paint = paint_along(drawn(top_view, line, rows=slice(10, 30)), top_view, line, margin=0.3)
-    assert (paint.z == top_view.distances[10:30]).all()
-
-
-def test_paint_along_a_line_leaves_out_what_is_beyond_the_margin(top_view: TopView) -> None:
-    mask = drawn(top_view, *constant(top_view, 1.0))
-    assert len(paint_along(mask, top_view, constant(top_view, 1.5)[0], margin=0.3).z) == 0
 
 
 @pytest.mark.parametrize("lateral", [-4.8, 4.8, -20.0, 20.0])

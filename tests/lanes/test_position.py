@@ -74,25 +74,6 @@ class TestGeometry:
         if abs(share - np.floor(share) - 0.5) > 0.01:  # not on a line
             assert position.lane == round(share)
 
-    def test_distances_are_measured_from_below_the_lens(self) -> None:
-        for metres in (5.0, 10.0, 40.0):
-            rows = CAMERA.focal * CAMERA.above_ground / metres  # a pinhole camera, by similarity
-            position = place((640, CAMERA.horizon + rows))
-            assert position is not None
-            assert position.distance == pytest.approx(metres, rel=1e-4)
-
-    @pytest.mark.parametrize("radius", [120.0, -120.0])
-    def test_lanes_follow_the_bend(self, radius: float) -> None:
-        bend = replace(STRAIGHT, bend=0.5 / radius)
-        camera = replace(CAMERA, curvature=1 / radius)
-        for lane in (-1, 0, 1):
-            position = place(pixel_of(40, 3.7 * lane, camera), bend)
-            assert position is not None
-            assert position.lane == lane
-        straight = place(pixel_of(40, 0, camera))
-        assert straight is not None
-        assert straight.lane == np.sign(radius) * 2, "40 m ahead, the bend has moved by 6.7 m"
-
     def test_lanes_are_counted_in_the_width_of_the_own_one(self) -> None:
         narrow = replace(STRAIGHT, left=-1.5, right=1.5)
         for lateral, lane in ((1.4, 0), (1.6, 1), (4.4, 1), (4.6, 2), (-1.6, -1)):
@@ -105,11 +86,6 @@ class TestWhatIsNotKnown:
     @pytest.mark.parametrize("row", [-1e6, 0.0, CAMERA.horizon - 30, CAMERA.horizon])
     def test_nothing_stands_above_the_horizon(self, row: float) -> None:
         assert place((640, row)) is None
-
-    def test_the_horizon_moves_with_the_pitch(self) -> None:
-        foot = (640.0, CAMERA.horizon + 30)
-        assert place(foot) is not None
-        assert place(foot, replace(STRAIGHT, pitch=30 / (CAMERA.focal * 1.2))) is None
 
     def test_the_lane_reaches_a_quarter_farther_than_it_is_fitted(self) -> None:
         assert place(pixel_of(1.25 * FAR - 0.5, 0)) is not None
@@ -128,10 +104,6 @@ class TestWhatIsNotKnown:
             assert position is not None
             assert position.lane == lane
             assert position.distance == pytest.approx(20, rel=0.01)
-
-    @pytest.mark.parametrize("foot", [(np.nan, 500.0), (640.0, np.nan)])
-    def test_a_foot_that_is_nowhere_is_not_on_the_road(self, foot: tuple[float, float]) -> None:
-        assert place(foot) is None
 
 
 @pytest.fixture(scope="module")
