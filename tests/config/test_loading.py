@@ -144,7 +144,6 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
         ),
         ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, regions, "),
         ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
-        ("output: {scores: true}", "1:10: output.scores: is now draw.label, as in draw.label: ["),
         ("draw: {label: score}", "1:8: draw.label: should be a list, "),
         ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'id', 'class', 'score' or "),
         ("draw: {trails: 0}", "1:8: draw.trails: should be greater than 0 (got 0)"),

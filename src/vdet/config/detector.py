@@ -40,9 +40,8 @@ class DetectorSettings(Section):
 
     kind: str
     searches: Searches = None
-    stride: int | None = Field(
-        None, ge=1, le=100, description="Search every N-th frame. Overrides searches."
-    )
+    stride: int | None = Field(None, ge=1, le=100)
+    """Search every N-th frame. Overrides searches."""
     foot: Foot = 0.0
 
     def stride_at(self, rate: float | Fraction) -> int:
@@ -78,29 +77,23 @@ class NetworkSettings(DetectorSettings):
 
     model_suffix: ClassVar[str | None] = ".onnx"
 
-    kind: Literal["net"] = Field("net", description="net: a network.")
+    kind: Literal["net"] = "net"
+    """net: a network."""
     searches: Searches = 12.0
-    least: float = Field(0.1, gt=0, lt=1, description="Ignore boxes with a lower score.")
-    overlap: Share = Field(
-        0.55,
-        description="Remove a box if its intersection over union with a better one is higher.",
-    )
-    still_score: Share = Field(
-        0.4,
-        description="Least score of a vehicle in a still picture. In video, the tracker decides.",
-    )
+    least: float = Field(0.1, gt=0, lt=1)
+    """Ignore boxes with a lower score."""
+    overlap: Share = 0.55
+    """Remove a box if its intersection over union with a better one is higher."""
+    still_score: Share = 0.4
+    """Least score of a vehicle in a still picture. In video, the tracker decides."""
     classes: tuple[str, ...] = Field(
-        ("car", "truck", "bus", "vehicle"),
-        min_length=1,
-        max_length=100,
-        description="Classes that count: car, truck, bus, motorcycle, vehicle (of unknown kind), "
-        "or any other that the network knows.",
+        ("car", "truck", "bus", "vehicle"), min_length=1, max_length=100
     )
-    names: tuple[str, ...] | None = Field(
-        None,
-        max_length=10_000,
-        description="Names of the classes in the network's order. null: those in its file.",
-    )
+    """Classes that count: car, truck, bus, motorcycle, vehicle (of unknown kind), or any other that
+    the network knows.
+    """
+    names: tuple[str, ...] | None = Field(None, max_length=10_000)
+    """Names of the classes in the network's order. null: those in its file."""
 
     @property
     def search_key(self) -> Hashable:

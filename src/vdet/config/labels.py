@@ -19,13 +19,11 @@ _ROLES = {word: role for role, words in _WORDS.items() for word in words}
 class LabelSettings(Section):
     """What the labels of videos and pictures mean."""
 
-    roles: dict[str, Role] = Field(
-        _ROLES,
-        max_length=1000,
-        description="vehicle: must be found. ignored: detections there are not judged. "
-        "other: left out. Without a role, car, truck, bus, motorcycle and vehicle are vehicles if "
-        "the detector looks for them, and ignored if not.",
-    )
+    roles: dict[str, Role] = Field(_ROLES, max_length=1000)
+    """vehicle: must be found. ignored: detections there are not judged. other: left out. Without a
+    role, car, truck, bus, motorcycle and vehicle are vehicles if the detector looks for them, and
+    ignored if not.
+    """
 
     @field_validator("roles")
     @classmethod

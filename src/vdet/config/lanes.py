@@ -13,32 +13,25 @@ class LaneSettings(Section):
     at which the lines of the vehicle's lane cross them.
     """
 
-    top: Share = Field(0.63, description="Farther row, as a share of the frame's height.")
-    bottom: Share = Field(0.93, description="Nearer row, as a share of the frame's height.")
-    top_left: float = Field(
-        0.4602,
-        ge=-2,
-        le=3,
-        description="Column of the left line in the farther row, as a share of the frame's width.",
-    )
-    top_right: float = Field(
-        0.5382, ge=-2, le=3, description="Column of the right line in the farther row."
-    )
-    bottom_left: float = Field(
-        0.2086, ge=-2, le=3, description="Column of the left line in the nearer row."
-    )
-    bottom_right: float = Field(
-        0.7898, ge=-2, le=3, description="Column of the right line in the nearer row."
-    )
-    lane_width: float = Field(3.7, gt=0, le=20, description="Width of the lane in metres.")
-    length: float = Field(
-        37.0,
-        gt=1,
-        le=200,
-        description="Distance between the two rows on the road, in metres. Measure it by dashes of "
-        "known length, or compute focal length × lane_width × (1 / lane width in the farther row "
-        "− 1 / lane width in the nearer row), all but lane_width in pixels.",
-    )
+    top: Share = 0.63
+    """Farther row, as a share of the frame's height."""
+    bottom: Share = 0.93
+    """Nearer row, as a share of the frame's height."""
+    top_left: float = Field(0.4602, ge=-2, le=3)
+    """Column of the left line in the farther row, as a share of the frame's width."""
+    top_right: float = Field(0.5382, ge=-2, le=3)
+    """Column of the right line in the farther row."""
+    bottom_left: float = Field(0.2086, ge=-2, le=3)
+    """Column of the left line in the nearer row."""
+    bottom_right: float = Field(0.7898, ge=-2, le=3)
+    """Column of the right line in the nearer row."""
+    lane_width: float = Field(3.7, gt=0, le=20)
+    """Width of the lane in metres."""
+    length: float = Field(37.0, gt=1, le=200)
+    """Distance between the two rows on the road, in metres. Measure it by dashes of known length,
+    or compute focal length × lane_width × (1 / lane width in the farther row − 1 / lane width in
+    the nearer row), all but lane_width in pixels.
+    """
 
     @model_validator(mode="after")
     def _is_a_trapezoid(self) -> "LaneSettings":

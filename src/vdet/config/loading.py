@@ -202,10 +202,6 @@ def _describe(detail: ErrorDetails, merged: Document, chosen: Chosen) -> str:
 _KIND_KEYS: dict[Key, SectionKinds] = {
     (name, kinds.key): kinds for name, kinds in SECTIONS_WITH_KINDS.items()
 }
-_RENAMED: dict[Key, str] = {
-    ("output", "scores"): "draw.label, as in draw.label: [id, score]",
-    ("lanes", "place", "foot"): "detector.foot",
-}
 _EXPECTED = {
     "model_type": "should be a section, key: value",
     "tuple_type": "should be a list, or in --set the number of an item that it has, from 0",
@@ -216,8 +212,6 @@ def _expected(detail: ErrorDetails, chosen: Chosen) -> str:
     key = tuple(detail["loc"])
     match detail["type"]:
         case "extra_forbidden" | "invalid_key":
-            if key in _RENAMED:
-                return f"is now {_RENAMED[key]}"
             return _other_kind(key, chosen) or f"is no setting{_suggestion(key, chosen)}"
         case "missing":
             return "is missing"

@@ -15,9 +15,7 @@ from vdet.polygons import Point, area_of, crosses_itself, unclosed
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Place = tuple[Coordinate, Coordinate]
 Side = Annotated[int, Field(ge=1, le=100_000)]
-Name = Annotated[
-    str, Field(min_length=1, max_length=80, description="Name, different from all others.")
-]
+Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 MOST_CORNERS = 100
 MOST_SHAPES = 100
@@ -28,12 +26,10 @@ _SAME_ASPECT = 0.01
 class PlacedSection(Section):
     """A section with places in the frame."""
 
-    size: tuple[Side, Side] | None = Field(
-        None,
-        description="Width and height in pixels of the frames that the points are for. Frames of "
-        "another size are fine if they have the same shape. null: points are shares of the frame, "
-        "0 to 1.",
-    )
+    size: tuple[Side, Side] | None = None
+    """Width and height in pixels of the frames that the points are for. Frames of another size are
+    fine if they have the same shape. null: points are shares of the frame, 0 to 1.
+    """
 
     def scales(self, width: int, height: int) -> tuple[float, float]:
         """Return the factors that turn x and y into pixels of a frame of `width` × `height`.
@@ -79,10 +75,9 @@ class PolygonSection(Section):
     """A named polygon."""
 
     name: Name
-    points: tuple[Place, ...] = Field(
-        max_length=MOST_CORNERS,
-        description="Corners in order, x and y. The last one is joined to the first.",
-    )
+    """Name, different from all others."""
+    points: tuple[Place, ...] = Field(max_length=MOST_CORNERS)
+    """Corners in order, x and y. The last one is joined to the first."""
 
     @field_validator("points")
     @classmethod
@@ -100,11 +95,8 @@ class PolygonSection(Section):
 class RegionSettings(PolygonSection):
     """A polygon in which vehicles are shown, or not."""
 
-    kind: Literal["include", "exclude"] = Field(
-        "include",
-        description="include: vehicles in it are shown. exclude: they are not, even inside an "
-        "included polygon.",
-    )
+    kind: Literal["include", "exclude"] = "include"
+    """include: vehicles in it are shown. exclude: they are not, even inside an included polygon."""
 
 
 class RegionsSettings(PlacedSection):
@@ -114,16 +106,12 @@ class RegionsSettings(PlacedSection):
     mask, the whole frame counts, except for excluded polygons.
     """
 
-    polygons: tuple[RegionSettings, ...] = Field(
-        (), max_length=MOST_SHAPES, description="Polygons."
-    )
-    mask: str | None = Field(
-        None,
-        min_length=1,
-        max_length=4096,
-        description="Picture of the frame's shape: vehicles are shown where it is white, and not "
-        "where it is black.",
-    )
+    polygons: tuple[RegionSettings, ...] = Field((), max_length=MOST_SHAPES)
+    """Polygons."""
+    mask: str | None = Field(None, min_length=1, max_length=4096)
+    """Picture of the frame's shape: vehicles are shown where it is white, and not where it is
+    black.
+    """
 
     def __bool__(self) -> bool:
         return bool(self.polygons or self.mask)
@@ -140,10 +128,15 @@ class LineSettings(Section):
     """A line; crossings are counted by direction."""
 
     name: Name
-    start: Place = Field(description="Start, x and y.")
-    end: Place = Field(description="End, x and y.")
-    left: Name = Field("left", description="Name of the direction to the left, from the start.")
-    right: Name = Field("right", description="Name of the direction to the right.")
+    """Name, different from all others."""
+    start: Place
+    """Start, x and y."""
+    end: Place
+    """End, x and y."""
+    left: Name = "left"
+    """Name of the direction to the left, from the start."""
+    right: Name = "right"
+    """Name of the direction to the right."""
 
     @model_validator(mode="after")
     def _has_a_length_and_two_directions(self) -> "LineSettings":
@@ -161,17 +154,14 @@ class ZoneSettings(PolygonSection):
 class CountSettings(PlacedSection):
     """Lines and zones at which vehicles are counted (`vdet.traffic` explains the rule)."""
 
-    lines: tuple[LineSettings, ...] = Field((), max_length=MOST_SHAPES, description="Lines.")
-    zones: tuple[ZoneSettings, ...] = Field((), max_length=MOST_SHAPES, description="Zones.")
-    drawn: bool = Field(
-        False, description="Draw the lines and zones with their running counts into the video."
-    )
-    confirmed: float = Field(
-        0.2,
-        ge=0,
-        le=10,
-        description="Ignore vehicles that are detected over a shorter time, in seconds.",
-    )
+    lines: tuple[LineSettings, ...] = Field((), max_length=MOST_SHAPES)
+    """Lines."""
+    zones: tuple[ZoneSettings, ...] = Field((), max_length=MOST_SHAPES)
+    """Zones."""
+    drawn: bool = False
+    """Draw the lines and zones with their running counts into the video."""
+    confirmed: float = Field(0.2, ge=0, le=10)
+    """Ignore vehicles that are detected over a shorter time, in seconds."""
 
     def __bool__(self) -> bool:
         return bool(self.lines or self.zones)

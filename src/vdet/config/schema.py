@@ -3,7 +3,7 @@
 The defaults are those of `configs/default.yaml`, which is their printed form.
 """
 
-from pydantic import Field, SerializeAsAny
+from pydantic import SerializeAsAny
 
 from vdet.config.detector import DetectorSettings, NetworkSettings
 from vdet.config.labels import LabelSettings
@@ -40,48 +40,12 @@ from vdet.config.train import (
 from vdet.config.video import CropSettings, DrawSettings, InputSettings, OutputSettings
 from vdet.errors import ConfigError
 
-__all__ = [
-    "AugmentationSettings",
-    "ColorSpace",
-    "CountSettings",
-    "CropSettings",
-    "DetectorSettings",
-    "DrawSettings",
-    "FeatureSettings",
-    "HeatSettings",
-    "HistogramSettings",
-    "HogSettings",
-    "InputSettings",
-    "LabelSettings",
-    "LaneSettings",
-    "LineSettings",
-    "MiningSettings",
-    "MotionTrackerSettings",
-    "NetworkSettings",
-    "NetworkTrainingSettings",
-    "OutputSettings",
-    "PerspectiveSettings",
-    "RegionSettings",
-    "RegionsSettings",
-    "RulesTrackerSettings",
-    "ScoreSettings",
-    "SearchSettings",
-    "Section",
-    "Settings",
-    "StillSettings",
-    "SvmSettings",
-    "SvmTrainingSettings",
-    "TrackerSettings",
-    "TrainSettings",
-    "WindowSettings",
-    "ZoneSettings",
-]
-
 
 class StepSettings(Section):
     """Steps of other packages, between the tracker and the outputs."""
 
-    names: tuple[str, ...] = Field((), description="Names of the steps, in order.")
+    names: tuple[str, ...] = ()
+    """Names of the steps, in order."""
 
 
 class Settings(Section):

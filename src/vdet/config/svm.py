@@ -24,36 +24,34 @@ ChannelNumbers = Annotated[tuple[Literal[0, 1, 2], ...], AfterValidator(_are_dis
 class HogSettings(Section):
     """Histograms of oriented gradients (Dalal & Triggs 2005), as cv2.HOGDescriptor gives them."""
 
-    orientations: int = Field(
-        8, ge=2, le=32, description="Number of bins for gradient directions of 0 to 180°."
-    )
-    cell: int = Field(4, ge=2, le=64, description="Side of a cell, in pixels of the patch.")
-    block: int = Field(2, ge=1, le=8, description="Side of a block, in cells.")
-    channels: ChannelNumbers = Field(
-        (0, 1, 2), description="Channels of the colour space that have HOG features."
-    )
+    orientations: int = Field(8, ge=2, le=32)
+    """Number of bins for gradient directions of 0 to 180°."""
+    cell: int = Field(4, ge=2, le=64)
+    """Side of a cell, in pixels of the patch."""
+    block: int = Field(2, ge=1, le=8)
+    """Side of a block, in cells."""
+    channels: ChannelNumbers = (0, 1, 2)
+    """Channels of the colour space that have HOG features."""
 
 
 class HistogramSettings(Section):
     """Colour histogram of each channel."""
 
-    bins: Literal[8, 16, 32, 64, 128, 256] | None = Field(
-        32, description="Number of equal bins for values of 0 to 255. null: no histogram."
-    )
+    bins: Literal[8, 16, 32, 64, 128, 256] | None = 32
+    """Number of equal bins for values of 0 to 255. null: no histogram."""
 
 
 class FeatureSettings(Section):
     """Features of a patch; they must be those that the model was trained with."""
 
-    patch: int = Field(32, ge=16, le=256, description="Side of a patch, in pixels.")
-    color_space: ColorSpace = Field(
-        "YCrCb", description="Colour space: YCrCb, HSV, LUV, HLS, YUV or RGB."
-    )
-    halved: ChannelNumbers = Field(
-        (1, 2),
-        description="Channels that are described at half their size, with HOG cells of half the "
-        "side. Video has chroma at half size.",
-    )
+    patch: int = Field(32, ge=16, le=256)
+    """Side of a patch, in pixels."""
+    color_space: ColorSpace = "YCrCb"
+    """Colour space: YCrCb, HSV, LUV, HLS, YUV or RGB."""
+    halved: ChannelNumbers = (1, 2)
+    """Channels that are described at half their size, with HOG cells of half the side. Video has
+    chroma at half size.
+    """
     hog: HogSettings = HogSettings()
     histogram: HistogramSettings = HistogramSettings()
 
@@ -80,22 +78,16 @@ class FeatureSettings(Section):
 class WindowSettings(Section):
     """A set of square windows over a band of rows and the whole width of the frame."""
 
-    size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH] = Field(
-        description="Side of a window, in pixels."
-    )
-    overlap: float | None = Field(
-        None,
-        ge=0,
-        lt=1,
-        description="Share of a window that the next one covers too. Give either overlap or step.",
-    )
-    step: int | None = Field(
-        None,
-        ge=1,
-        description="Distance to the next window, in cells of the patch. Faster than overlap.",
-    )
-    top: Pixels = Field(description="First row of the band.")
-    bottom: Pixels = Field(description="First row below the band.")
+    size: Annotated[int, Field(ge=8, le=100_000), FRAME_LENGTH]
+    """Side of a window, in pixels."""
+    overlap: float | None = Field(None, ge=0, lt=1)
+    """Share of a window that the next one covers too. Give either overlap or step."""
+    step: int | None = Field(None, ge=1)
+    """Distance to the next window, in cells of the patch. Faster than overlap."""
+    top: Pixels
+    """First row of the band."""
+    bottom: Pixels
+    """First row below the band."""
 
     @model_validator(mode="after")
     def _fits_its_band(self) -> "WindowSettings":
@@ -112,42 +104,28 @@ class PerspectiveSettings(Section):
     """Window sets whose rows follow from their size, because vehicles stand on a flat road."""
 
     sizes: tuple[Annotated[float, Field(gt=0, le=1)], ...] = Field(
-        (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3),
-        max_length=32,
-        description="Side of the windows of each set, as a share of the frame's width. In frames "
-        "wider than 16:9, as a share of 16/9 of the height.",
+        (0.05, 0.0625, 0.0875, 0.125, 0.175, 0.25, 0.3), max_length=32
     )
-    zoom: float = Field(
-        1.0, ge=0.1, le=10, description="Factor of all sizes. Above 1 for a longer lens."
-    )
-    horizon: float | None = Field(
-        None,
-        ge=-1,
-        le=1,
-        description="Row of the horizon, as a share of the frame's height. null: where the lines "
-        "of the road meet in the first frames.",
-    )
-    highest: float = Field(
-        0.6,
-        ge=0,
-        le=10,
-        description="Distance from the horizon down to the bottom of a set's highest windows, in "
-        "sides of a window.",
-    )
-    lowest: float = Field(
-        1.1,
-        ge=0,
-        le=10,
-        description="Distance from the horizon down to the bottom of a set's lowest windows, in "
-        "sides of a window.",
-    )
-    beyond: Share = Field(
-        0.7,
-        description="Share of a window that may lie beyond the left or right of the frame.",
-    )
-    step: int = Field(
-        1, ge=1, le=64, description="Distance to the next window, in cells of the patch."
-    )
+    """Side of the windows of each set, as a share of the frame's width. In frames wider than 16:9,
+    as a share of 16/9 of the height.
+    """
+    zoom: float = Field(1.0, ge=0.1, le=10)
+    """Factor of all sizes. Above 1 for a longer lens."""
+    horizon: float | None = Field(None, ge=-1, le=1)
+    """Row of the horizon, as a share of the frame's height. null: where the lines of the road meet
+    in the first frames.
+    """
+    highest: float = Field(0.6, ge=0, le=10)
+    """Distance from the horizon down to the bottom of a set's highest windows, in sides of a
+    window.
+    """
+    lowest: float = Field(1.1, ge=0, le=10)
+    """Distance from the horizon down to the bottom of a set's lowest windows, in sides of a window.
+    """
+    beyond: Share = 0.7
+    """Share of a window that may lie beyond the left or right of the frame."""
+    step: int = Field(1, ge=1, le=64)
+    """Distance to the next window, in cells of the patch."""
 
     @model_validator(mode="after")
     def _is_in_order(self) -> "PerspectiveSettings":
@@ -159,12 +137,10 @@ class PerspectiveSettings(Section):
 class SearchSettings(Section):
     """Which windows of a frame are searched."""
 
-    probability: Share = Field(
-        0.3, description="Least probability of a hit: a window that counts as evidence."
-    )
-    windows: tuple[WindowSettings, ...] = Field(
-        (), max_length=32, description="Window sets over fixed rows."
-    )
+    probability: Share = 0.3
+    """Least probability of a hit: a window that counts as evidence."""
+    windows: tuple[WindowSettings, ...] = Field((), max_length=32)
+    """Window sets over fixed rows."""
     perspective: PerspectiveSettings = PerspectiveSettings()
 
     @model_validator(mode="after")
@@ -177,30 +153,24 @@ class SearchSettings(Section):
 class HeatSettings(Section):
     """How the hits of consecutive frames are summed into a heatmap, and become detections."""
 
-    frames: int = Field(
-        2, ge=1, le=100, description="Number of searched frames whose hits are summed."
-    )
-    weight: Literal["none", "coverage"] = Field(
-        "coverage",
-        description="none: a hit adds its probability. coverage: a hit adds its probability "
-        "divided by the number of windows of its set that cover a pixel, so the threshold does not "
-        "depend on their overlap.",
-    )
-    shrink: Literal[1, 2, 4, 8] = Field(
-        4, description="Pixels across and down that one value of the heatmap covers."
-    )
-    blur: Annotated[int, Field(ge=1, le=100_000), FRAME_LENGTH] = Field(
-        15, description="Side of the Gaussian kernel that blurs the heat, in pixels."
-    )
-    threshold: float = Field(0.075, ge=0, description="A region is hot where the heat is higher.")
-    regions: Literal["outline", "votes"] = Field(
-        "votes",
-        description="outline: each hot region is a detection, with its bounding box. votes: the "
-        "boxes of the hits in a region decide how many vehicles it shows, and where.",
-    )
-    votes: float = Field(
-        0.12, ge=0, description="Least weight of hits that agree on a vehicle, with votes."
-    )
+    frames: int = Field(2, ge=1, le=100)
+    """Number of searched frames whose hits are summed."""
+    weight: Literal["none", "coverage"] = "coverage"
+    """none: a hit adds its probability. coverage: a hit adds its probability divided by the number
+    of windows of its set that cover a pixel, so the threshold does not depend on their overlap.
+    """
+    shrink: Literal[1, 2, 4, 8] = 4
+    """Pixels across and down that one value of the heatmap covers."""
+    blur: Annotated[int, Field(ge=1, le=100_000), FRAME_LENGTH] = 15
+    """Side of the Gaussian kernel that blurs the heat, in pixels."""
+    threshold: float = Field(0.075, ge=0)
+    """A region is hot where the heat is higher."""
+    regions: Literal["outline", "votes"] = "votes"
+    """outline: each hot region is a detection, with its bounding box. votes: the boxes of the hits
+    in a region decide how many vehicles it shows, and where.
+    """
+    votes: float = Field(0.12, ge=0)
+    """Least weight of hits that agree on a vehicle, with votes."""
 
 
 class ScoreSettings(Section):
@@ -209,12 +179,10 @@ class ScoreSettings(Section):
     It is the share of such boxes that show a vehicle. Fitted on frames that the model has not seen.
     """
 
-    middle: float = Field(
-        0.5, gt=0, le=1e6, description="Evidence, heat or weight of hits, at which it is 0.5."
-    )
-    slope: float = Field(
-        3.25, gt=0, le=100, description="Steepness of the score as the evidence grows."
-    )
+    middle: float = Field(0.5, gt=0, le=1e6)
+    """Evidence, heat or weight of hits, at which it is 0.5."""
+    slope: float = Field(3.25, gt=0, le=100)
+    """Steepness of the score as the evidence grows."""
 
     def of(self, evidence: float) -> float:
         """Return the score, 0 to 1, of a box with this evidence."""
@@ -227,15 +195,12 @@ class ScoreSettings(Section):
 class StillSettings(Section):
     """Which detections are shown in a still picture; in video, the tracker decides."""
 
-    strength: float = Field(
-        0.84, ge=0, description="Least evidence: heat, or with votes the weight of the hits."
-    )
-    width: Share = Field(
-        0.028, description="Least width of a box, as a share of the picture's width."
-    )
-    height: Share = Field(
-        0.0, description="Least height of a box, as a share of the picture's height."
-    )
+    strength: float = Field(0.84, ge=0)
+    """Least evidence: heat, or with votes the weight of the hits."""
+    width: Share = 0.028
+    """Least width of a box, as a share of the picture's width."""
+    height: Share = 0.0
+    """Least height of a box, as a share of the picture's height."""
 
 
 class SvmSettings(DetectorSettings):
@@ -243,7 +208,8 @@ class SvmSettings(DetectorSettings):
 
     model_suffix: ClassVar[str | None] = ".npz"
 
-    kind: Literal["svm"] = Field("svm", description="svm: a linear SVM on HOG and colour features.")
+    kind: Literal["svm"] = "svm"
+    """svm: a linear SVM on HOG and colour features."""
     searches: Searches = 8.0
     foot: Foot = 0.04
     features: FeatureSettings = FeatureSettings()
