@@ -255,7 +255,7 @@ def test_input_settings_apply(
         given.append(settings)
         return VideoReader(*arguments, settings=settings, **others)
 
-    monkeypatch.setattr("vdet.learn.svm.mining.sources.VideoReader", reader)
+    monkeypatch.setattr("vdet.learn.svm.mining.VideoReader", reader)
     tolerant = ("--set", "input.max_damaged=0.5")
     assert (
         run(
