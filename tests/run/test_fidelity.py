@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, road
 from run.red_runs import outputs, read, run_red, video_info, with_search
-from vdet.config.schema import MotionTrackerSettings, OutputSettings, Settings, WindowSettings
+from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.config.video import DrawSettings
 from vdet.media import ColorTags, Picture, VideoReader, VideoWriter
 from vdet.media.coding import Coding
@@ -254,10 +254,9 @@ class TestFidelity:
 
     def test_a_car_in_a_rotated_clip_is_found_upright(self, red_clip: Path, tmp_path: Path) -> None:
         source = _remuxed(red_clip, tmp_path / "in.mp4", rotation=180)
-        whole = (WindowSettings(size=32, overlap=0.75, top=0, bottom=HEIGHT),)
+        whole = (WindowSettings(size=96, overlap=0.75, top=0, bottom=720),)
         job = VideoJob(source, outputs(tracks=tmp_path / "out.jsonl"), frames=15)
-        motion = {"tracker": MotionTrackerSettings()}  # the rules look only low in the frame
-        run_red(job, with_search(SETTINGS, windows=whole).model_copy(update=motion))
+        run_red(job, with_search(SETTINGS, windows=whole))
         last = json.loads((tmp_path / "out.jsonl").read_text().splitlines()[-1])
         (track,) = last["tracks"]
         car = car_at(14)
