@@ -1,7 +1,6 @@
 """One file of a batch."""
 
 import logging
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -102,10 +101,3 @@ def test_a_file_whose_process_was_killed_has_a_record(job: VideoJob) -> None:
     record = record_of_killed(job)
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: its process was killed")
-
-
-def test_a_model_that_cannot_be_loaded_is_an_error_of_the_file(job: VideoJob, work: Work) -> None:
-    missing = replace(work, model=job.source.with_name("none.npz"))
-    record = process_file(job, work=missing)
-    assert record.error is not None
-    assert record.error.startswith(f"{missing.model}: cannot be read")

@@ -89,10 +89,6 @@ def test_a_video_cut_off_in_the_middle_gives_what_is_left(
         assert 5 < sum(1 for _ in container.decode(video=0)) < 30
 
 
-def test_a_part_without_frames(run: Run, clip_path: Path, out: Path) -> None:
-    assert "60.00 s is beyond its end" in _failure(run, clip_path, out, "--start", "1:00")
-
-
 Damage = Callable[[Path, Path], None]
 
 
@@ -160,8 +156,3 @@ def test_settings_that_ask_for_other_features(
         "was trained with other features (detector.features.color_space: YCrCb, asked for HSV)"
         in line
     )
-
-
-def test_an_unknown_setting(run: Run, clip_path: Path, out: Path) -> None:
-    line = _failure(run, clip_path, out, "--set", "tracker.neded=3")
-    assert "tracker.neded: is no setting; did you mean needed?" in line

@@ -84,18 +84,6 @@ def test_without_an_output_the_vehicles_are_printed(
         assert row == f"  vehicle  {box['score']:.2f}  {place}"
 
 
-def test_keeps_what_is_there(run: Run, picture: Path, model_path: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out.png"
-    out.write_bytes(b"precious")
-    result = run("detect-image", picture, "-o", out, "--model", model_path)
-    assert result.code == 1
-    assert "is there already; give --overwrite" in result.err
-    assert out.read_bytes() == b"precious"
-    again = run("detect-image", picture, "-o", out, "--model", model_path, "--overwrite")
-    assert again.code == 0
-    assert read_image(out).shape == (180, 320, 3)
-
-
 def test_never_writes_over_its_input(run: Run, picture: Path) -> None:
     result = run("detect-image", picture, "-o", picture, "--overwrite")
     assert result.code == 1
@@ -159,20 +147,6 @@ def test_a_file_that_is_no_picture(run: Run, tmp_path: Path, content: bytes) -> 
     assert result.code == 1
     assert "is not a picture, or is damaged" in result.err
     assert not (tmp_path / "out.png").exists()
-
-
-def test_a_picture_that_is_not_there(run: Run, tmp_path: Path) -> None:
-    result = run("detect-image", tmp_path / "none.png", "-o", tmp_path / "out.png")
-    assert result.code == 1
-    assert "no such file or folder" in result.err
-
-
-def test_boxes_never_go_over_the_input(run: Run, picture: Path) -> None:
-    before = picture.read_bytes()
-    result = run("detect-image", picture, "--json", picture, "--overwrite")
-    assert result.code == 1
-    assert "is the input itself" in result.err
-    assert picture.read_bytes() == before
 
 
 def test_boxes_lie_in_the_picture_whatever_its_size(

@@ -32,14 +32,6 @@ def test_writes_a_video_of_the_same_frames(
     assert [path.name for path in tmp_path.iterdir()] == ["out.mp4"]
 
 
-def test_runs_with_the_shipped_model_and_settings(
-    run: Run, clip_path: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "out.mp4"
-    assert run("detect-video", clip_path, out, "--frames", "2").code == 0
-    assert len(_times(out)) == 2
-
-
 def test_tracks_agree_in_every_format(
     run: Run, clip_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
@@ -65,15 +57,6 @@ def test_tracks_agree_in_every_format(
     lines = [line.split(",") for line in (tmp_path / "t.txt").read_text().splitlines()]
     shifted = [(f + 1, i, x + 1, y + 1, w, h) for f, i, x, y, w, h in boxes]
     assert [tuple(map(int, line[:6])) for line in lines] == shifted
-
-
-def test_two_runs_give_the_same_tracks(
-    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
-) -> None:
-    for name in ("a.csv", "b.csv"):
-        options = ("--no-video", "--tracks", tmp_path / name, "--model", model_path, *QUICK_OPTIONS)
-        assert run("detect-video", clip_path, *options).code == 0
-    assert (tmp_path / "a.csv").read_bytes() == (tmp_path / "b.csv").read_bytes()
 
 
 def test_stride_is_the_setting_of_the_detector(
@@ -206,12 +189,6 @@ def test_an_output_that_cannot_be(
     assert not list(tmp_path.iterdir())
 
 
-def test_tracks_of_unknown_kind(run: Run, clip_path: Path, tmp_path: Path) -> None:
-    result = run("detect-video", clip_path, "--no-video", "--tracks", tmp_path / "t.json")
-    assert result.code == 1
-    assert "tracks are written as .txt, .csv, .jsonl" in result.err
-
-
 def test_tracks_of_no_frames_are_an_error_too(run: Run, clip_path: Path, tmp_path: Path) -> None:
     tracks = tmp_path / "t.csv"
     tracks.write_text("precious")
@@ -237,10 +214,3 @@ def test_stages_of_a_time_without_a_frame_are_an_error(
     assert result.code == 1
     assert f"{clip_path}: {words}" in result.err
     assert list(tmp_path.iterdir()) == []
-
-
-def test_earlier_stages_are_kept(run: Run, clip_path: Path, tmp_path: Path) -> None:
-    (tmp_path / "5-boxes.png").write_text("precious")
-    result = run("detect-video", clip_path, "--no-video", "--stages", tmp_path, "--at", "0")
-    assert result.code == 1
-    assert "--overwrite" in result.err

@@ -1,19 +1,17 @@
 """The program as a whole: help, versions, errors as text, exit codes."""
 
 import logging
+import sys
+from importlib.metadata import EntryPoint
 from pathlib import Path
+from types import SimpleNamespace
 
+import click
 import pytest
 
 import vdet
 from conftest import Run
-
-
-def test_help_lists_every_command(run: Run) -> None:
-    result = run("--help")
-    assert result.code == 0
-    for command in ("train", "detect-image", "detect-video", "config", "demo"):
-        assert command in result.out
+from vdet.cli.messages import print_lines
 
 
 def test_version(run: Run) -> None:
@@ -91,3 +89,30 @@ def test_numbers_that_are_too_large_are_wrong_usage(
     result = run("detect-video", "in.mp4", "out.mp4", *map(str, options))
     assert (result.code, words in result.err) == (2, True)
     assert run("eval", "tracks", "a.txt", "b.txt", "--until", str(10**30)).code == 2
+
+
+def test_another_package_adds_a_command_and_a_broken_one_breaks_only_itself(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @click.command()
+    def hello() -> None:
+        print_lines("hello from outside")
+
+    points = [
+        EntryPoint(name, f"{module}:hello", "vdet.commands")
+        for name, module in (("hello", "their_package"), ("broken", "no_such_package"))
+    ]
+
+    def entry_points(group: str, name: str | None = None) -> list[EntryPoint]:
+        return [each for each in points if each.group == group and name in (None, each.name)]
+
+    monkeypatch.setattr("vdet.plugins.entry_points", entry_points)
+    monkeypatch.setitem(sys.modules, "their_package", SimpleNamespace(hello=hello))
+    listed = run("--help").out
+    assert "  hello " in listed
+    assert "  broken " in listed
+    assert run("hello").out == "hello from outside\n"
+    broken = run("broken")
+    assert (broken.code, broken.err.count("\n")) == (1, 1)
+    assert "broken: cannot be loaded from no_such_package:hello" in broken.err
+    assert run("config").code == 0

@@ -177,17 +177,6 @@ class TestTogether:
             ("patches", "windows", "hits", "heat", "boxes"), start=1)]  # fmt: skip
         assert names(out) == ["a.csv", "a.mp4", "b.txt", *stages]
 
-    def test_earlier_outputs_are_kept_where_a_sink_fails(
-        self, run: Run, clip: Path, out: Path, red: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        command = ("detect-video", clip, out / "a.mp4", "--tracks", out / "a.csv", *red)
-        for name in ("a.mp4", "a.csv"):
-            (out / name).write_text("precious")
-
-        monkeypatch.setattr(TrackSink, "__exit__", failing_exit(TrackSink, FULL))
-        assert run(*command, "--overwrite").code == 1
-        assert [(out / name).read_text() for name in names(out)] == ["precious"] * 2
-
     def test_no_output_is_there_before_the_end(
         self, run: Run, clip: Path, out: Path, red: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
     ) -> None:
