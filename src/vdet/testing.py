@@ -1,17 +1,18 @@
-"""Checks that every detector, tracker and sink passes; for those of other packages too.
+"""Checks that every detector, tracker and sink should pass, also those of other packages.
 
-Each check raises `AssertionError` with what is wrong.
+Each check raises `AssertionError`, which says what is wrong.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import astuple, dataclass
+from contextlib import suppress
+from dataclasses import astuple
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import NO_BOXES, Box, Boxes
+from vdet.boxes import NO_BOXES, Box, Boxes, visible
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.files import OutputFiles
@@ -26,106 +27,76 @@ from vdet.track.track import Track
 RATE = 25
 """Frames a second of the scenes that the checks make."""
 
+WIDTH, HEIGHT = 640, 360
+"""Size of their frames, pixels."""
+
 
 def check_detector(model: DetectorModel, images: Sequence[Image]) -> None:
-    """Check a detector on consecutive frames of one video, BGR uint8 `(H, W, 3)`, two or more.
+    """Check a detector on two or more consecutive frames of one video, BGR uint8 `(H, W, 3)`.
 
-    * Detections lie in the frame, and the frame is left as it is.
-    * A second detector gives the same for the same frames, also when frames are searched in
-      threads and another video is searched in between: nothing is shared.
-    * A still picture, and a frame of one colour, can be searched.
+    * Detections lie in the frame, and the frame is not changed.
+    * A second detector finds the same in the same frames, also when frames are searched in
+      threads: detectors share nothing.
+    * A still picture can be searched.
     * Stage pictures are BGR uint8 images.
     """
-    assert len(images) > 1, "give two frames or more"
-    before = [image.copy() for image in images]
     height, width = images[0].shape[:2]
-    alone = _detect_all(model.for_video(width, height, images), images)
-    for image, copy in zip(images, before, strict=True):
-        assert np.array_equal(image, copy), "the detector changed a frame"
-    for found in alone:
-        _check_detections(found, width, height)
-    detector, other = (model.for_video(width, height, images) for _ in range(2))
+    first, second = (model.for_video(width, height, images) for _ in range(2))
     with ThreadPoolExecutor(2) as pool:
-        pictures = [Picture(image) for image in images]
-        candidates = list(pool.map(detector.search, pictures, range(len(images))))
-    for index, (one, image, expected) in enumerate(zip(candidates, images, alone, strict=True)):
-        other.detect(other.search(Picture(255 - image), index))
-        _check_equal(detector.detect(one), expected)
-    still = model.for_video(width, height, images[:1])
-    found = still.detect(still.search(Picture(images[0]), None))
-    _check_detections(found, width, height)
-    for name, picture in stage_pictures_of(still)(images[0], found).items():
-        assert picture.dtype == np.uint8, f"stage picture {name} is {picture.dtype}, not uint8"
-        assert picture.ndim == 3, f"stage picture {name} has the shape {picture.shape}"
-    plain = np.full_like(images[0], 128)
-    blank = model.for_video(width, height, [plain])
-    _check_detections(blank.detect(blank.search(Picture(plain), 0)), width, height)
+        pictures = [Picture(image.copy()) for image in images]
+        candidates = list(pool.map(second.search, pictures, range(len(images))))
+    for index, (image, searched) in enumerate(zip(images, candidates, strict=True)):
+        found, again = _found(first, image, index), second.detect(searched)
+        is_same = len(found) == len(again) and np.allclose(found.sides, again.sides, atol=1e-4)
+        assert is_same, "boxes differ between two detectors: they share something"
+    image = images[0]
+    still = model.for_video(width, height, [image])
+    for name, picture in stage_pictures_of(still)(image, _found(still, image, None)).items():
+        is_image = picture.dtype == np.uint8 and picture.ndim == 3
+        assert is_image, f"stage picture {name} is not uint8 of shape (H, W, 3)"
 
 
-def _detect_all(detector: VideoDetector, images: Sequence[Image]) -> list[Boxes]:
-    return [
-        detector.detect(detector.search(Picture(image), index))
-        for index, image in enumerate(images)
-    ]
-
-
-def _check_detections(found: Boxes, width: int, height: int) -> None:
-    assert isinstance(found, Boxes), f"detect returned {type(found).__name__}"
-    inside = (found.sides >= 0).all() and (found.sides <= [width, height, width, height]).all()
-    assert inside, "a box lies outside the frame"
-
-
-def _check_equal(found: Boxes, expected: Boxes) -> None:
-    for name in ("sides", "scores"):
-        assert np.allclose(getattr(found, name), getattr(expected, name), atol=1e-4), (
-            f"{name} differ from those of the first detector for the same frame"
-        )
+def _found(detector: VideoDetector, image: Image, index: int | None) -> Boxes:
+    before = image.copy()
+    found = detector.detect(detector.search(Picture(image), index))
+    assert np.array_equal(image, before), "the detector changed a frame"
+    inside = visible(found.sides, (image.shape[1], image.shape[0]))
+    assert np.array_equal(inside, found.sides), "a box lies outside the frame"
+    return found
 
 
 def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     """Check a tracker; `make` returns a new one for frames of a width and height.
 
-    * Two vehicles that are always detected keep one id each, boxes lie in the frame, ids are
-      positive and in order, scores are 0 to 1, what is detected is not `predicted`.
-    * The detections and the frame are left as they are.
-    * Without detections there is nothing to show after some seconds.
-    * Ids belong to a tracker: a second one gives the same, also in between.
-    * If it has `carry`: in frames that are not searched the same vehicles are shown, as predicted.
+    * Two vehicles that are always detected keep one id each. Boxes lie in the frame, ids are
+      positive and in order, scores are 0 to 1, and what is detected is not `predicted`.
+    * The frame is not changed.
+    * A second tracker shows the same: trackers share nothing.
+    * Nothing is shown some seconds after the last detection.
+    * `carry`, if there is one, shows the same vehicles as predicted.
     """
-    first, second = make(640, 360), make(640, 360)
-    shown: list[list[Track]] = []
-    for index in range(3 * RATE):
-        image = _scene(index)
-        found, before = _detections(index), image.copy()
-        shown.append(list(first.update(found, index / RATE, Picture(image))))
-        again = list(second.update(_detections(index), index / RATE, Picture(image)))
-        assert again == shown[-1], "two trackers with the same input differ: they share something"
-        assert np.array_equal(image, before), "the tracker changed the frame"
-        _check_tracks(shown[-1])
-    last = shown[-1]
-    assert len(last) == len(_boxes(0)), f"{len(last)} of {len(_boxes(0))} vehicles are shown"
-    assert not any(track.predicted for track in last), "a detected vehicle is called predicted"
-    ids = {track.id for tracks in shown for track in tracks}
-    assert ids == {track.id for track in last}, "a vehicle that is always detected changed its id"
-    if isinstance(first, CarryingTracker):
-        _check_carrying(make(640, 360))
-    for index in range(3 * RATE, 30 * RATE):
-        last = list(first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2)))
-    assert last == [], "vehicles are shown long after the last detection"
-
-
-def _check_carrying(tracker: VideoTracker) -> None:
-    assert isinstance(tracker, CarryingTracker)
+    first, second = make(WIDTH, HEIGHT), make(WIDTH, HEIGHT)
+    ids: set[int] = set()
     for index in range(3 * RATE):
         time, picture = index / RATE, Picture(_scene(index))
-        if index % 2 == 0:
-            shown = tracker.update(_detections(index), time, picture)
-            continue
-        carried = tracker.carry(time, picture)
+        tracks = list(first.update(_detections(index), time, picture))
+        _check_tracks(tracks)
+        assert list(second.update(_detections(index), time, picture)) == tracks, (
+            "two trackers with the same input differ: they share something"
+        )
+        assert np.array_equal(picture.image, _scene(index)), "the tracker changed the frame"
+        ids |= {track.id for track in tracks}
+    assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
+    assert not any(track.predicted for track in tracks), "a detected vehicle is called predicted"
+    assert len(ids) == 2, "a vehicle that is always detected changed its id"
+    if isinstance(second, CarryingTracker):
+        carried = second.carry(3.0, Picture(_scene(3 * RATE)))
         _check_tracks(carried)
-        ids = [track.id for track in carried]
-        assert ids == [track.id for track in shown], "a vehicle that was not looked for is missed"
-        assert all(track.predicted for track in carried), "what was not looked for is predicted"
+        assert {track.id for track in carried} == ids, "carry lost a vehicle"
+        assert all(track.predicted for track in carried), "a carried vehicle is not predicted"
+    for index in range(3 * RATE, 30 * RATE):
+        tracks = first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2))
+    assert not tracks, "vehicles are shown long after the last detection"
 
 
 def _check_tracks(tracks: Sequence[Track]) -> None:
@@ -135,30 +106,7 @@ def _check_tracks(tracks: Sequence[Track]) -> None:
         assert track.id > 0, f"id {track.id} is not positive"
         assert 0 <= track.score <= 1, f"score {track.score} is not in 0 to 1"
         assert track.box.area, "a track has a box without an area"
-        assert track.box == track.box.clipped(640, 360), "a track's box lies outside the frame"
-
-
-def _boxes(index: int) -> list[Box]:
-    """Return two vehicles that drive in lanes of their own."""
-    return [
-        Box.sized(60 + 2 * index, 180, 90, 70),
-        Box.sized(500 - 3 * index, 40, 80, 60),
-    ]
-
-
-def _detections(index: int) -> Boxes:
-    boxes = [astuple(box) for box in _boxes(index)]
-    return Boxes(boxes, [0.9, 0.95], data={"strength": [9.0, 9.5]})
-
-
-def _scene(index: int) -> Image:
-    """Draw the vehicles with a texture of their own on a grey road."""
-    image = np.full((360, 640, 3), 90, np.uint8)
-    for number, box in enumerate(_boxes(index)):
-        x, y, width, height = box.xywh
-        texture = np.random.default_rng(number).integers(0, 256, (height, width, 3))
-        image[y : y + height, x : x + width] = texture
-    return image
+        assert track.box == track.box.clipped(WIDTH, HEIGHT), "a track lies outside the frame"
 
 
 def check_sink(
@@ -170,79 +118,74 @@ def check_sink(
 
     * Nothing is there before the run ends, nor after a run that ends with an error.
     * After a run that ends well the output is there, and no temporary file is left.
-    * The frame's image is left as it is.
-    * The same output can be written again after a failed run.
+    * The frame's image is not changed.
+    * The same output can be written after a failed run.
     """
-    run = _SinkRun(kind, path, settings or Settings(), still)
-    try:
-        run.write(error=ZeroDivisionError())
-    except ZeroDivisionError:
-        pass
-    else:
-        raise AssertionError("the sink hid the error that ended the run")
+    folder = path if kind.marker else path.parent
+    folder.mkdir(parents=True, exist_ok=True)
+    with suppress(_RunFailsError):
+        _write(kind, path, settings or Settings(), still=still, fails=True)
     assert not _content(path), "a failed run left its output"
-    run.write()
+    _write(kind, path, settings or Settings(), still=still)
     assert _content(path), "a run that ended well left no output"
+    left = [file.name for file in folder.iterdir() if ".vdet-" in file.name]
+    assert not left, f"temporary files are left: {', '.join(left)}"
 
 
-@dataclass(frozen=True)
-class _SinkRun:
-    kind: SinkKind
-    path: Path
-    settings: Settings
-    still: bool
+class _RunFailsError(Exception):
+    """The error that ends a run."""
 
-    def write(self, error: Exception | None = None) -> None:
-        """Write a picture or some frames through the sink; raise `error` after them."""
-        folder = self.path if self.kind.marker else self.path.parent
-        folder.mkdir(parents=True, exist_ok=True)
-        try:
-            with OutputFiles() as files, self.kind.open(self.path, self._context(files)) as sink:
-                for result in self._results():
-                    before = result.frame.image.copy()
-                    sink.write(result)
-                    assert np.array_equal(result.frame.image, before), "the sink changed the frame"
-                assert not _content(self.path), "the output is there before the run has ended"
-                if error is not None:
-                    raise error
-        finally:
-            left = [path.name for path in folder.iterdir() if ".vdet-" in path.name]
-            assert not left, f"temporary files are left: {', '.join(left)}"
 
-    @property
-    def _video(self) -> VideoInfo | None:
-        rate = Fraction(RATE)
-        video = VideoInfo(Path("check.mp4"), 640, 360, rate, 1 / rate, frames=3)
-        return None if self.still else video
-
-    def _results(self) -> Iterator[FrameResult]:
-        steps = make_steps(StepContext(self.settings, 640, 360, self._video))
-        for index in range(1 if self.still else 3):
-            result = _result(index)
-            for step in steps:
-                result = step.apply(result)
-            yield result
-
-    def _context(self, files: OutputFiles) -> SinkContext:
-        return SinkContext(
-            files,
-            self.settings,
-            self._video,
-            stage_pictures=lambda image, _: {"frame": image},
-        )
+def _write(
+    kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool = False
+) -> None:
+    """Write a picture or three frames through the sink."""
+    rate = Fraction(RATE)
+    video = VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
+    given = None if still else video
+    steps = make_steps(StepContext(settings, WIDTH, HEIGHT, given))
+    with OutputFiles() as files:
+        context = SinkContext(files, settings, given, stage_pictures=lambda i, _: {"frame": i})
+        with kind.open(path, context) as sink:
+            for index in range(1 if still else 3):
+                result = _result(index)
+                for step in steps:
+                    result = step.apply(result)
+                sink.write(result)
+                is_same = np.array_equal(result.frame.image, _scene(index))
+                assert is_same, "the sink changed the frame"
+            assert not _content(path), "the output is there before the run has ended"
+            if fails:
+                raise _RunFailsError
 
 
 def _content(path: Path) -> list[Path]:
     """Return the files that an output consists of, temporary ones left out."""
-    if path.is_dir():
-        return [inside for inside in path.iterdir() if ".vdet-" not in inside.name]
-    return [path] if path.exists() else []
+    files = path.iterdir() if path.is_dir() else [path]
+    return [file for file in files if file.exists() and ".vdet-" not in file.name]
+
+
+def _boxes(index: int) -> list[Box]:
+    """Return two vehicles that drive in lanes of their own."""
+    return [Box.sized(60 + 2 * index, 180, 90, 70), Box.sized(500 - 3 * index, 40, 80, 60)]
+
+
+def _detections(index: int) -> Boxes:
+    sides = [astuple(box) for box in _boxes(index)]
+    return Boxes(sides, [0.9, 0.95], data={"strength": [9.0, 9.5]})
+
+
+def _scene(index: int) -> Image:
+    """Draw the vehicles with a texture of their own on a grey road."""
+    image = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
+    for number, box in enumerate(_boxes(index)):
+        part = box.cut(image)
+        part[:] = np.random.default_rng(number).integers(0, 256, part.shape)
+    return image
 
 
 def _result(index: int) -> FrameResult:
     frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
-    tracks = tuple(
-        Track(number, box, 0.9, predicted=number == 2)
-        for number, box in enumerate(_boxes(index), start=1)
-    )
+    left, right = _boxes(index)
+    tracks = (Track(1, left, 0.9, predicted=False), Track(2, right, 0.9, predicted=True))
     return FrameResult(Path("check.mp4"), frame, _detections(index), tracks)
