@@ -29,7 +29,7 @@ _NOUNS = {
     COMMANDS: "command",
 }
 _BUILT_IN: dict[str, dict[str, str]] = {
-    DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.kind:NET"},
+    DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
     SINKS: {
         "video": "vdet.run.sinks.video:VIDEO",

@@ -71,7 +71,7 @@ def _network(path: Path) -> Facts:
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session
 
-    found = recognize(Session(path), path).for_frames(1280, 720)
+    found = recognize(Session(path)).for_frames(1280, 720)
     known = {name: our_name(name) for name in found.names}
     return {
         "kind": "network",

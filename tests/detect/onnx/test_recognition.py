@@ -83,7 +83,7 @@ def test_a_centred_letterbox_in_rgb(
     assert class_names(found) == ["car"]
     assert len(detect(path, frame_with_red(64, 64))) == 1  # the dark grey of 60 has 0.24
     assert detect(path, frame_with_red(64, 64)).scores == pytest.approx([60 / 255], abs=0.01)
-    assert recognize(Session(path), path).name == name
+    assert recognize(Session(path)).name == name
 
 
 def test_the_metadata_tell_the_size_of_an_input_of_any_size(tmp_path: Path) -> None:
@@ -103,7 +103,7 @@ def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(raw: bool, tmp_path: Pat
     # 64 of the 128 columns are the frame: the part beyond it does not count.
     assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
-    assert recognize(Session(path), path).name == "YOLOX"
+    assert recognize(Session(path)).name == "YOLOX"
 
 
 def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:
@@ -111,7 +111,7 @@ def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:
     found = detect(path, frame_with_red(128, 128))
     assert found.sides == pytest.approx(np.array([[112, 112, 144, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
-    assert recognize(Session(path), path).name == "RT-DETR"
+    assert recognize(Session(path)).name == "RT-DETR"
 
 
 def test_only_the_classes_that_are_asked_for_count(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import pytest
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import load_detector, model_file
-from vdet.detect.onnx.kind import SHIPPED
+from vdet.detect.onnx.detector import SHIPPED
 from vdet.testing import check_detector
 
 MOST_BYTES = 1_500_000

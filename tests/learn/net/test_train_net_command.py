@@ -81,7 +81,7 @@ def test_a_stopped_training_goes_on_and_other_scores_need_no_step(
         trained.setattr("vdet.learn.net.training._Run.learn", stop)
         result = run(*command, "--set", "train.net.score.slope=2")
     assert result.code == 0, result.err
-    header = recognize(Session(tmp_path / "net.onnx"), tmp_path / "net.onnx").header
+    header = recognize(Session(tmp_path / "net.onnx")).header
     assert header is not None
     assert header.calibration.slope == 2
 

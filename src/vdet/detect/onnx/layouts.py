@@ -1,8 +1,8 @@
 """The forms in which networks give boxes: each turns the outputs into boxes, scores and classes."""
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -30,94 +30,68 @@ class RawBoxes:
     classes: Int32Array
 
 
-class Layout(Protocol):
-    """One form of outputs."""
-
-    def decode(self, outputs: list[Array], least: float) -> RawBoxes:
-        """Return the boxes with scores of at least `least`."""
+Layout = Callable[[Sequence[Array], float], RawBoxes]
+"""One form of outputs: returns the boxes whose scores are at least a number."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OurCells:
-    """Our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.architecture`.
+def our_cells(
+    outputs: Sequence[Array], least: float, *, cells: Cells, score: NetworkScoreSettings
+) -> RawBoxes:
+    """Read our own networks: `(1, cells, 5 + classes)`; see `vdet.learn.net.architecture`.
 
     `cells` are those of the input, from `cell_centers`.
     """
-
-    cells: Cells
-    score: NetworkScoreSettings
-
-    def decode(self, outputs: list[Array], least: float) -> RawBoxes:
-        """Return the boxes with scores of at least `least`."""
-        table = outputs[0][0]
-        logits = self.score.slope * table[:, 0] + self.score.offset
-        rows = np.flatnonzero(logits >= math.log(least / (1 - least)))
-        centers, strides = self.cells
-        lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
-        middle = centers[rows]
-        boxes = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
-        scores = 1 / (1 + np.exp(-logits[rows]))
-        return _raw(boxes, scores, table[rows, 5:].argmax(axis=1))
+    table = outputs[0][0]
+    logits = score.slope * table[:, 0] + score.offset
+    rows = np.flatnonzero(logits >= math.log(least / (1 - least)))
+    centers, strides = cells
+    lengths = np.logaddexp(0, table[rows, 1:5] + 1) * strides[rows, np.newaxis]
+    middle = centers[rows]
+    boxes = np.concatenate([middle - lengths[:, :2], middle + lengths[:, 2:]], axis=1)
+    return _raw(boxes, 1 / (1 + np.exp(-logits[rows])), table[rows, 5:].argmax(axis=1))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CenterRows:
-    """Rows of middle, size, and a score for each class: `(1, n, 4 + nc)`, or with objectness.
+def center_columns(outputs: Sequence[Array], least: float) -> RawBoxes:
+    """Read Ultralytics v8 and v11: `(1, 4 + nc, n)`, columns of middle, size and class scores."""
+    table = outputs[0][0].T
+    classes = table[:, 4:].argmax(axis=1)
+    scores = table[np.arange(len(table)), 4 + classes]
+    rows = np.flatnonzero(scores >= least)
+    return _raw(_around(table[rows, :2], table[rows, 2:4]), scores[rows], classes[rows])
 
-    Ultralytics v5 and YOLOX give `(1, n, 5 + nc)`, v8 and v11 `(1, 4 + nc, n)` (`is_turned`).
+
+def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = None) -> RawBoxes:
+    """Read Ultralytics v5 and YOLOX: rows of middle, size, objectness and class scores.
+
     `grid` are the cells of the input where middles and sizes are relative to those, as in YOLOX.
     """
-
-    has_objectness: bool
-    is_turned: bool = False
-    grid: Cells | None = None
-
-    def decode(self, outputs: list[Array], least: float) -> RawBoxes:
-        """Return the boxes with scores of at least `least`."""
-        table = outputs[0][0].T if self.is_turned else outputs[0][0]
-        first = 5 if self.has_objectness else 4
-        classes = table[:, first:].argmax(axis=1)
-        scores = table[np.arange(len(table)), first + classes]
-        if self.has_objectness:
-            scores = scores * table[:, 4]
-        rows = np.flatnonzero(scores >= least)
-        middle, size = table[rows, :2], table[rows, 2:4]
-        if self.grid is not None:
-            centers, strides = self.grid
-            stride = strides[rows, np.newaxis]
-            middle = centers[rows] + (middle - 0.5) * stride  # offsets from the cell's corner
-            size = np.exp(np.minimum(size, 20)) * stride
-        boxes = np.concatenate([middle - size / 2, middle + size / 2], axis=1)
-        return _raw(boxes, scores[rows], classes[rows])
+    table = outputs[0][0]
+    classes = table[:, 5:].argmax(axis=1)
+    scores = table[:, 4] * table[np.arange(len(table)), 5 + classes]
+    rows = np.flatnonzero(scores >= least)
+    middle, size = table[rows, :2], table[rows, 2:4]
+    if grid is not None:
+        centers, strides = grid
+        stride = strides[rows, np.newaxis]
+        middle = centers[rows] + (middle - 0.5) * stride  # offsets from the cell's corner
+        size = np.exp(np.minimum(size, 20)) * stride
+    return _raw(_around(middle, size), scores[rows], classes[rows])
 
 
-@dataclass(frozen=True, slots=True)
-class FinalRows:
-    """Rows of x1, y1, x2, y2, score, class, after suppression: `(1, n, 6)`."""
-
-    def decode(self, outputs: list[Array], least: float) -> RawBoxes:
-        """Return the boxes with scores of at least `least`; empty rows have score 0."""
-        table = outputs[0][0]
-        table = table[table[:, 4] >= least]
-        return _raw(table[:, :4], table[:, 4], table[:, 5])
+def final_rows(outputs: Sequence[Array], least: float) -> RawBoxes:
+    """Read rows of x1, y1, x2, y2, score, class after suppression; empty rows have score 0."""
+    table = outputs[0][0]
+    table = table[table[:, 4] >= least]
+    return _raw(table[:, :4], table[:, 4], table[:, 5])
 
 
-@dataclass(frozen=True, slots=True)
-class NamedColumns:
-    """RT-DETR: outputs `labels`, `boxes` and `scores`; `order` has their places in this order."""
-
-    order: tuple[int, int, int]
-
-    def decode(self, outputs: list[Array], least: float) -> RawBoxes:
-        """Return the boxes with scores of at least `least`."""
-        labels, boxes, scores = (outputs[place][0] for place in self.order)
-        rows = np.flatnonzero(scores >= least)
-        return _raw(boxes[rows], scores[rows], labels[rows])
-
-
-def cell_count(width: int, height: int) -> int:
-    """Return the number of cells of all levels."""
-    return sum((width // stride) * (height // stride) for stride in STRIDES)
+def named_columns(
+    outputs: Sequence[Array], least: float, *, order: tuple[int, int, int]
+) -> RawBoxes:
+    """Read RT-DETR; `order` has the places of the outputs labels, boxes and scores."""
+    labels, boxes, scores = (outputs[place][0] for place in order)
+    rows = np.flatnonzero(scores >= least)
+    return _raw(boxes[rows], scores[rows], labels[rows])
 
 
 def cell_centers(width: int, height: int) -> Cells:
@@ -128,6 +102,10 @@ def cell_centers(width: int, height: int) -> Cells:
         centers.append((np.stack([x.ravel(), y.ravel()], axis=1) + 0.5) * stride)
         strides.append(np.full(x.size, stride))
     return np.concatenate(centers).astype(np.float32), np.concatenate(strides).astype(np.float32)
+
+
+def _around(middle: Array, size: Array) -> Array:
+    return np.concatenate([middle - size / 2, middle + size / 2], axis=1)
 
 
 def _raw(boxes: Array, scores: Array, classes: Array) -> RawBoxes:

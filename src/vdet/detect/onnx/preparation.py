@@ -1,13 +1,13 @@
 """From a frame to the input of a network, and from boxes in the input back to the frame."""
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array
+from vdet.boxes import Float32Array, Float64Array
 from vdet.media import Picture
 from vdet.media.images import Image
 
@@ -47,54 +47,49 @@ class InputForm:
     dtype: type[np.generic] = np.float32
 
     def prepare(self, picture: Picture) -> tuple[npt.NDArray[Any], "Placement"]:
-        """Return the input that shows a frame, and where it lies in it."""
-        place = self._place(picture.width, picture.height)
-        scaled = _scaled_picture(picture, *place.size)
-        if place.size != (self.width, self.height):
-            canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
-            left, top = place.left, place.top
-            canvas[top : top + place.size[1], left : left + place.size[0]] = scaled
-            scaled = canvas
+        """Return the input that shows a frame, and where the frame lies in it."""
+        image, place = self.scaled(picture)
         if self.is_rgb:
-            scaled = scaled[..., ::-1]
-        values = scaled if self.rows_first else scaled.transpose(2, 0, 1)
+            image = image[..., ::-1]
+        values = image if self.rows_first else image.transpose(2, 0, 1)
         if self.dtype is not np.uint8:
             values = np.multiply(values, self.factor, dtype=np.float32).astype(self.dtype)
         return np.ascontiguousarray(values[np.newaxis]), place
 
-    def picture(self, values: npt.NDArray[Any]) -> Image:
-        """Return what `prepare` has made as a picture, BGR uint8."""
-        image = values[0] if self.rows_first else values[0].transpose(1, 2, 0)
-        image = np.clip(image / self.factor + 0.5, 0, 255).astype(np.uint8)
-        return np.ascontiguousarray(image[..., ::-1] if self.is_rgb else image)
+    def scaled(self, picture: Picture) -> tuple[Image, "Placement"]:
+        """Return the input as a picture, BGR uint8, and where the frame lies in it."""
+        place = self._place(picture.width, picture.height)
+        scaled = _scaled_picture(picture, *place.size)
+        if place.size == (self.width, self.height):
+            return scaled, place
+        canvas = np.full((self.height, self.width, 3), GREY, np.uint8)
+        (width, height), left, top = place.size, place.left, place.top
+        canvas[top : top + height, left : left + width] = scaled
+        return canvas, place
 
     def _place(self, columns: int, rows: int) -> "Placement":
-        if self.fit == "stretch":
-            size = self.width, self.height
-        else:
+        size = self.width, self.height
+        if self.fit != "stretch":
             factor = min(self.width / columns, self.height / rows)
             size = max(1, round(columns * factor)), max(1, round(rows * factor))
         is_centered = self.fit == "center"
         left = (self.width - size[0]) // 2 * is_centered
         top = (self.height - size[1]) // 2 * is_centered
-        return Placement(size, left, top, size[0] / columns, size[1] / rows)
+        return Placement(size, left, top, (size[0] / columns, size[1] / rows))
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
-    """Where a frame lies in the input: its size there, its top left pixel, and its two scales."""
+class Placement(NamedTuple):
+    """Where a frame lies in the input: its size there, its top left pixel, its scales x and y."""
 
     size: tuple[int, int]
     left: int
     top: int
-    x_scale: float
-    y_scale: float
+    scales: tuple[float, float]
 
-    def to_frame(self, boxes: Float32Array) -> Float32Array:
+    def to_frame(self, boxes: Float32Array) -> Float64Array:
         """Return boxes of the input, `(n, 4)` x1, y1, x2, y2, in pixels of the frame."""
         offset = np.array([self.left, self.top] * 2, np.float32)
-        scale = np.array([self.x_scale, self.y_scale] * 2, np.float32)
-        return np.asarray((boxes - offset) / scale, np.float32)
+        return np.asarray((boxes - offset) / np.array(self.scales * 2, np.float32), np.float64)
 
 
 def scaled_to(image: Image, width: int, height: int) -> Image:

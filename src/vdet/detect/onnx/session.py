@@ -1,20 +1,16 @@
 """An ONNX file as it is loaded by onnxruntime, with what it says of itself."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from vdet.errors import ModelError
 from vdet.files import read_whole
-
-if TYPE_CHECKING:
-    import onnxruntime
 
 Array = npt.NDArray[Any]
 
@@ -28,8 +24,7 @@ _TYPES: dict[str, type[np.generic]] = {
     "tensor(int64)": np.int64,
     "tensor(int32)": np.int32,
 }
-_WARNINGS_OFF = 3  # errors only
-_TELEMETRY = "ORT_DISABLE_TELEMETRY"
+_ERRORS_ONLY = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +46,23 @@ class Session:
     """
 
     def __init__(self, path: Path) -> None:
-        self._session = _load(path)
+        data = read_whole(path, most=MAX_BYTES, what="model", error=ModelError)
+        # Keeps onnxruntime from reporting to its maker and from writing into the home folder.
+        os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = options.inter_op_num_threads = 1  # frames run in parallel
+        options.log_severity_level = _ERRORS_ONLY
+        providers = ["CPUExecutionProvider"]
+        try:
+            self._session = onnxruntime.InferenceSession(data, options, providers=providers)
+        except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
+            reason = first_line(error)
+            raise ModelError(f"{path}: cannot be loaded by onnxruntime: {reason:.200}") from error
+        self.path = path
         self.inputs = tuple(_slot(path, each) for each in self._session.get_inputs())
-        self.output_names: Sequence[str] = [each.name for each in self._session.get_outputs()]
+        self.output_names = [each.name for each in self._session.get_outputs()]
         self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
 
     def run(self, inputs: Mapping[str, Array]) -> list[Array]:
@@ -61,38 +70,9 @@ class Session:
         return [np.asarray(each) for each in self._session.run(None, dict(inputs))]
 
 
-def _load(path: Path) -> "onnxruntime.InferenceSession":
-    data = read_whole(path, most=MAX_BYTES, what="model", error=ModelError)
-    with _without_telemetry():
-        import onnxruntime
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = options.inter_op_num_threads = 1  # frames run in parallel
-    options.log_severity_level = _WARNINGS_OFF
-    try:
-        return onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
-        reason = first_line(error)
-        raise ModelError(f"{path}: cannot be loaded by onnxruntime: {reason:.200}") from error
-
-
-@contextmanager
-def _without_telemetry() -> Iterator[None]:
-    """Keep onnxruntime from reporting to its maker and from writing into the home folder.
-
-    It reads the variable when it is imported.
-    """
-    was_set = _TELEMETRY in os.environ
-    os.environ.setdefault(_TELEMETRY, "1")
-    try:
-        yield
-    finally:
-        if not was_set:
-            del os.environ[_TELEMETRY]
-
-
 def first_line(error: Exception) -> str:
     """Return the first line of what onnxruntime says of an error."""
-    return (str(error).splitlines() or [""])[0]
+    return str(error).partition("\n")[0]
 
 
 def _slot(path: Path, value: Any) -> InputSlot:

@@ -103,7 +103,7 @@ def train_to_file(
     began = time.monotonic()
     base = {}
     if job.base:
-        header = read_header(Session(job.base), job.base)
+        header = read_header(Session(job.base))
         base["base"] = header.provenance if header else {}
     sources = [image_source(path, job.roles) for path in job.pictures]
     sources += [clip_source(clip, job.roles) for clip in job.clips]
