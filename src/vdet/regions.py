@@ -1,5 +1,6 @@
 """Regions: the parts of the frames of one video in which vehicles are shown."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -9,7 +10,7 @@ from vdet.boxes import BoolArray, Float64Array, visible
 from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError
 from vdet.media.images import Image, read_header, read_image
-from vdet.polygons import Outline, Point
+from vdet.polygons import Point
 
 _WHITE = 128
 """Least value of a pixel of a mask that is included."""
@@ -42,9 +43,10 @@ class Regions:
     Attributes
     ----------
     included, excluded
-        Outlines of the polygons, by name.
-    mask
-        bool `(H, W)`: the mask in the size of the frames; None where there is none.
+        The corners of the polygons, pixels, by name.
+    pixels
+        bool `(H, W)`: the pixels in which a vehicle may stand. Excluded polygons, like included
+        ones, have the pixels of their sides.
 
     Raises
     ------
@@ -55,51 +57,45 @@ class Regions:
     """
 
     def __init__(self, settings: RegionsSettings, width: int, height: int) -> None:
-        self._size = width, height
         try:
             across, down = settings.scales(width, height)
         except ConfigError as error:
             raise ConfigError(f"regions.{error}") from error
-        self.included: dict[str, Outline] = {}
-        self.excluded: dict[str, Outline] = {}
+        self.included: dict[str, list[Point]] = {}
+        self.excluded: dict[str, list[Point]] = {}
         for each in settings.polygons:
-            outline = Outline.laid([(x * across, y * down) for x, y in each.points], self._size)
             named = self.included if each.kind == "include" else self.excluded
-            named[each.name] = outline
-        self.mask = _read_mask(settings.mask, width, height) if settings.mask else None
+            named[each.name] = [(x * across, y * down) for x, y in each.points]
+        self._numbers = np.zeros((height, width), np.uint8)
+        for number, corners in reversed(list(enumerate(self.included.values(), start=1))):
+            _fill(self._numbers, corners, number)  # of two over one another, the first counts
+        shown = self._numbers.copy() if self.included else np.ones_like(self._numbers)
+        for corners in self.excluded.values():
+            _fill(shown, corners, 0)
+        self.pixels: BoolArray = shown > 0
+        if settings.mask:
+            self.pixels &= _read_mask(settings.mask, width, height)
 
     def contains(self, point: Point) -> bool:
         """Tell whether a vehicle whose foot is at a point, x and y in pixels, is shown.
 
         A point outside the frame counts as at its edge.
         """
-        if any(each.contains(point) for each in self.excluded.values()):
-            return False
-        if self.included and not any(each.contains(point) for each in self.included.values()):
-            return False
-        if self.mask is None:
-            return True
-        height, width = self.mask.shape
-        x, y = min(max(int(point[0]), 0), width - 1), min(max(int(point[1]), 0), height - 1)
-        return bool(self.mask[y, x])
+        return bool(self.pixels[self._place(point)])
 
-    def name_at(self, point: Point) -> str | None:
-        """Return the name of the first included polygon around a point; None in none of them."""
-        return next((name for name, each in self.included.items() if each.contains(point)), None)
+    def number_at(self, point: Point) -> int:
+        """Return the number, from 1, of the first included polygon around a point; 0 in none."""
+        return int(self._numbers[self._place(point)])
 
     def area(self) -> SearchArea:
         """Return all pixels that they contain."""
-        return SearchArea(self.pixels())
+        return SearchArea(self.pixels)
 
-    def pixels(self) -> BoolArray:
-        """Return which pixels they contain, bool `(H, W)`; those on a border count as inside."""
-        width, height = self._size
-        pixels = np.full((height, width), not self.included)
-        for each in self.included.values():
-            pixels |= _filled(each, self._size)
-        for each in self.excluded.values():
-            pixels &= ~_eroded(_filled(each, self._size))
-        return pixels if self.mask is None else pixels & self.mask
+    def _place(self, point: Point) -> tuple[int, int]:
+        """Return the row and the column of a point."""
+        height, width = self.pixels.shape
+        x, y = min(max(int(point[0]), 0), width - 1), min(max(int(point[1]), 0), height - 1)
+        return y, x
 
 
 def lay_regions(settings: RegionsSettings, width: int, height: int) -> Regions | None:
@@ -131,18 +127,6 @@ def _read_mask(path: str, width: int, height: int) -> BoolArray:
     return np.asarray(scaled >= _WHITE)
 
 
-def _filled(outline: Outline, size: tuple[int, int]) -> BoolArray:
-    canvas = np.zeros((size[1], size[0]), np.uint8)
-    corners = np.floor(np.array(outline.corners)).astype(np.int32)
-    cv2.fillPoly(canvas, [corners], 1)  # with the pixels of its sides
-    return canvas > 0
-
-
-def _eroded(pixels: BoolArray) -> BoolArray:
-    """Return the pixels without those at their border."""
-    kernel = np.ones((3, 3), np.uint8)
-    inner: Image = np.asarray(
-        cv2.erode(pixels.astype(np.uint8), kernel, borderValue=1, borderType=cv2.BORDER_CONSTANT),
-        np.uint8,
-    )
-    return inner > 0
+def _fill(canvas: Image, corners: Sequence[Point], value: int) -> None:
+    """Fill a polygon with the pixels of its sides."""
+    cv2.fillPoly(canvas, [np.floor(np.array(corners)).astype(np.int32)], value)

@@ -11,19 +11,17 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vdet.boxes import Box
-from vdet.draw.boxes import draw_box, draw_label
+from vdet.draw.boxes import BLACK, draw_box, draw_label, draw_line, draw_zone
 from vdet.draw.paint import (
     Color,
     Surface,
-    TextStyle,
     blend,
     draw_arrow,
     draw_lines,
+    draw_trail,
     fill,
     write_text,
 )
-from vdet.draw.places import DrawnLine, DrawnZone, draw_counts
-from vdet.draw.trails import draw_trail
 from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes
@@ -72,7 +70,7 @@ STROKES: dict[str, Draw] = {
     "line between pixels": lambda surface: draw_lines(surface, 16 * CORNERS + 5, RED, 4, shift=4),
     "arrow": lambda surface: draw_arrow(surface, (20.4, 30.2), (200, 133), RED, 3, tip=0.2),
     "text": lambda surface: write_text(
-        surface, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=Box.sized(30, 60, 250, 90)
+        surface, "#12 car", (41, 121), 1.2, RED, within=Box.sized(30, 60, 250, 90)
     ),
     "box": lambda surface: draw_box(surface, Box.sized(51, 61, 101, 83), RED, "#1 0.9"),
     "dashed box": lambda surface: draw_box(surface, Box.sized(50, 60, 100, 80), RED, dashed=True),
@@ -81,11 +79,8 @@ STROKES: dict[str, Draw] = {
     ),
     "label": lambda surface: draw_label(surface, "0:01:02.500", (0, HEIGHT), RED),
     "trail": lambda surface: draw_trail(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
-    "counts": lambda surface: draw_counts(
-        surface,
-        [DrawnLine("a", (20, 200), (300, 180), ("in", 3), ("out", 2))],
-        [DrawnZone("z", ((-20, 20), (150, 30), (90, 120)), 4)],
-    ),
+    "zone": lambda surface: draw_zone(surface, [(-20, 20), (150, 30), (90, 120)], "z: 4"),
+    "counts": lambda surface: draw_line(surface, (20, 200), (300, 180), ("a in: 3", "a out: 2")),
 }
 """Drawings that are mostly edges, where 4:2:0 has less of the colour than an image."""
 DRAWINGS = AREAS | STROKES
@@ -112,35 +107,17 @@ def grown(mask: Mask) -> Mask:
 
 @each_coding
 @pytest.mark.parametrize("name", DRAWINGS)
-def test_luma_is_that_of_the_same_drawing_in_an_image(name: str, coding: Coding) -> None:
-    planes = ground(coding)
-    image = planes.to_image()
-    DRAWINGS[name](planes)
-    DRAWINGS[name](image)
+def test_planes_look_like_the_same_drawing_in_an_image(name: str, coding: Coding) -> None:
+    """Nothing else is changed: of chroma, only values next to those that are drawn on."""
+    draw, before, after = DRAWINGS[name], ground(coding), ground(coding)
+    image = before.to_image()
+    draw(after)
+    draw(image)
     expected = Planes.of_image(image, coding).luma.astype(int)
-    assert np.abs(planes.luma - expected).max() <= 5
-
-
-@each_coding
-@pytest.mark.parametrize("name", DRAWINGS)
-def test_colours_are_nearly_those_of_the_same_drawing_in_an_image(
-    name: str, coding: Coding
-) -> None:
-    planes = ground(coding)
-    image = planes.to_image()
-    DRAWINGS[name](planes)
-    DRAWINGS[name](image)
-    differences = np.abs(planes.to_image().astype(int) - image).max(axis=2)
-    assert differences[covered(DRAWINGS[name])].mean() < (4 if name in AREAS else 50)
-
-
-@each_coding
-@pytest.mark.parametrize("name", DRAWINGS)
-def test_nothing_else_is_changed(name: str, coding: Coding) -> None:
-    """Luma to the pixel; of chroma, only the values next to those that are drawn on."""
-    before, after = ground(coding), ground(coding)
-    DRAWINGS[name](after)
-    drawn = covered(DRAWINGS[name])
+    assert np.abs(after.luma - expected).max() <= 5
+    drawn = covered(draw)
+    differences = np.abs(after.to_image().astype(int) - image).max(axis=2)
+    assert differences[drawn].mean() < (4 if name in AREAS else 50)
     changed = after.luma != before.luma
     assert changed.any()
     assert not (changed & ~drawn).any()
@@ -186,7 +163,7 @@ class TestText:
     @pytest.mark.parametrize("within", [Box.sized(60, 100, 40, 20), Box.sized(61, 101, 41, 21)])
     def test_no_stroke_lies_outside_its_box(self, within: Box) -> None:
         planes = ground(Coding())
-        write_text(planes, "#12 car", (41, 121), TextStyle(1.2, 2), RED, within=within)
+        write_text(planes, "#12 car", (41, 121), 1.2, RED, within=within)
         changed = planes.luma != ground(Coding()).luma
         rows, columns = np.nonzero(changed)
         assert within.x1 <= columns.min() <= columns.max() < within.x2
@@ -198,3 +175,41 @@ def _coded(color: Color) -> list[int]:
     planes = ground(Coding(), 2, 2)
     fill(planes, Box.sized(0, 0, 2, 2), color)
     return [int(layer[0, 0]) for layer in planes.layers]
+
+
+STRAIGHT = [(20.0 + 5 * n, 60.0) for n in range(40)]
+
+
+def trail(points: list[tuple[float, float]], width: int = 6) -> Image:
+    image = np.full((120, 240, 3), 255, np.uint8)
+    draw_trail(image, points, BLACK, width)
+    return image
+
+
+def heights(image: Image) -> list[int]:
+    """Return how many rows are dark in each column."""
+    dark: list[int] = (image.max(axis=2) < 128).sum(axis=0).tolist()
+    return dark
+
+
+def test_a_trail_goes_through_its_points_without_a_gap() -> None:
+    rows = heights(trail(STRAIGHT))
+    assert all(rows[20:215])
+    assert not any(rows[:15] + rows[222:])
+
+
+def test_it_grows_thinner_into_the_past() -> None:
+    rows = heights(trail(STRAIGHT, width=8))
+    assert rows[30] < rows[90] < rows[150] < rows[205]
+
+
+def test_points_that_tremble_give_a_smooth_line() -> None:
+    shaken = [(x, y + 8 * (-1) ** number) for number, (x, y) in enumerate(STRAIGHT)]
+    middle = trail(shaken, width=2)[:, 60:180].max(axis=2) < 128
+    rows = np.nonzero(middle)[0]
+    assert max(abs(rows - 60)) <= 3
+
+
+def test_points_may_lie_far_outside_the_picture() -> None:
+    image = trail([(-1e9, 60.0), (120.0, 60.0), (1e9, 60.0)])
+    assert all(heights(image)[130:230])

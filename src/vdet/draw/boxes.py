@@ -1,23 +1,44 @@
-"""Boxes with labels."""
+"""Boxes with labels, lines and zones with their counts, and regions."""
 
 import colorsys
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.draw.paint import Color, Surface, TextStyle, fill, text_size, write_text
+from vdet.draw.paint import (
+    Color,
+    Surface,
+    draw_arrow,
+    draw_lines,
+    fill,
+    shade,
+    text_size,
+    write_text,
+)
+from vdet.media.images import Image
+from vdet.polygons import Point
+from vdet.regions import Regions
 
 GREEN: Color = (80, 220, 60)
 WHITE: Color = (255, 255, 255)
 BLACK: Color = (0, 0, 0)
+LINE: Color = (0, 200, 255)
+ZONE: Color = (255, 170, 60)
+RED: Color = (60, 60, 230)
 _GOLDEN_RATIO = 0.618034
 _SMALLEST_TEXT = 0.35
 """Font scale; smaller digits cannot be read."""
 _DASH = 4
 """Length of a dash and of the gap after it, in line widths."""
+_DARK = 0.3
+"""Brightness outside the regions."""
+_SHADE = 0.18
+"""Opacity of the colour over a zone."""
+_ARROW = 0.035
+"""Length of the arrows, share of the surface's height."""
 
 
 def color_of(number: int) -> Color:
@@ -73,38 +94,30 @@ def draw_label(surface: Surface, text: str, corner: tuple[float, float], color: 
     The corner is `(x, y)` in pixels. The tag is moved so that it lies in the surface. A text that
     is wider than the surface becomes smaller; if it still does not fit, its end is cut off.
     """
-    label = _lay_out(surface, text, corner)
-    fill(surface, label.tag, color)
-    write_text(surface, text, label.origin, label.style, text_color(color), within=label.tag)
-    return label.tag
+    tag, origin, scale = _lay_out(surface, text, corner)
+    fill(surface, tag, color)
+    write_text(surface, text, origin, scale, text_color(color), within=tag)
+    return tag
 
 
 def label_tag(surface: Surface, text: str, corner: tuple[float, float]) -> Box:
     """Return the tag that `draw_label` would draw."""
-    return _lay_out(surface, text, corner).tag
+    return _lay_out(surface, text, corner)[0]
 
 
-@dataclass(frozen=True, slots=True)
-class _Label:
-    """Where a label's tag is, and how its text is written; `origin` is its lower left corner."""
-
-    tag: Box
-    origin: tuple[int, int]
-    style: TextStyle
-
-
-def _lay_out(surface: Surface, text: str, corner: tuple[float, float]) -> _Label:
+def _lay_out(
+    surface: Surface, text: str, corner: tuple[float, float]
+) -> tuple[Box, tuple[float, float], float]:
+    """Return the tag of a label, the lower left corner of its text, and the scale of its font."""
     rows, columns = surface.shape[:2]
-    scale = _text_scale(surface, text)
-    style = TextStyle(scale, max(1, round(1.5 * scale)))
+    scale = max(_SMALLEST_TEXT, min(rows / 1200, columns / (text_size(text, 1)[0] + 20)))
     margin = max(3, round(6 * scale))
-    width, height, baseline = text_size(text, style)
+    width, height, baseline = text_size(text, scale)
     tag_width, tag_height = width + 2 * margin, height + baseline + margin + (margin + 1) // 2
     left, bottom = (math.floor(value + 0.5) for value in corner)
     x = max(0, min(left, columns - tag_width))
     y = max(0, min(bottom, rows) - tag_height)
-    tag = Box.sized(x, y, tag_width, tag_height)
-    return _Label(tag, (x + margin, y + margin + height), style)
+    return Box.sized(x, y, tag_width, tag_height), (x + margin, y + margin + height), scale
 
 
 def text_color(background: Color) -> Color:
@@ -114,13 +127,6 @@ def text_color(background: Color) -> Color:
     luminance = float(linear @ (0.0722, 0.7152, 0.2126))
     on_black, on_white = (luminance + 0.05) / 0.05, 1.05 / (luminance + 0.05)
     return BLACK if on_black > on_white else WHITE
-
-
-def _text_scale(surface: Surface, text: str) -> float:
-    """Return the font scale that fits the surface's height, or less so that the text fits in."""
-    rows, columns = (int(side) for side in surface.shape[:2])
-    width, _, _ = text_size(text, TextStyle(1, 1))
-    return max(_SMALLEST_TEXT, min(rows / 1200, columns / (width + 20)))
 
 
 def _sides(box: Box, width: int) -> Iterator[Box]:
@@ -142,3 +148,46 @@ def _dashes(side: Box, dash: int) -> Iterator[Box]:
             yield Box.sized(side.x1 + start, side.y1, dash, side.height)
         else:
             yield Box.sized(side.x1, side.y1 + start, side.width, dash)
+
+
+def draw_zone(surface: Surface, corners: Sequence[Point], label: str) -> None:
+    """Draw a zone with a label at its highest corner; corners are in pixels."""
+    shade(surface, np.round(np.array(corners)).astype(np.int32), ZONE, _SHADE)
+    draw_outline(surface, corners, ZONE, label)
+
+
+def draw_line(surface: Surface, start: Point, end: Point, labels: tuple[str, str]) -> None:
+    """Draw a line from `start` to `end`, pixels, with an arrow at its end.
+
+    At its start, where no vehicle crosses it, an arrow points to the left and one to the right,
+    each with its label.
+    """
+    width, reach = line_width(surface), _ARROW * surface.shape[0]
+    length = math.dist(start, end)
+    draw_arrow(surface, start, end, LINE, width, tip=min(1.0, reach / length))
+    x, y = (end[1] - start[1]) / length, (start[0] - end[0]) / length  # to the left
+    for label, way in zip(labels, ((x, y), (-x, -y)), strict=True):
+        tip = start[0] + reach * way[0], start[1] + reach * way[1]
+        draw_arrow(surface, start, tip, LINE, width, tip=0.4)
+        tag = label_tag(surface, label, (0, 0))  # its middle lies beyond the tip
+        left = tip[0] + (way[0] - 1) * tag.width / 2
+        draw_label(surface, label, (left, tip[1] + (way[1] + 1) * tag.height / 2), LINE)
+
+
+def draw_regions(image: Image, regions: Regions) -> Image:
+    """Return a copy of an image that is dark outside the regions, with outlines and names."""
+    dark = (image * _DARK).astype(np.uint8)
+    picture = np.ascontiguousarray(np.where(regions.pixels[..., np.newaxis], image, dark))
+    for polygons, color in ((regions.included, GREEN), (regions.excluded, RED)):
+        for name, corners in polygons.items():
+            draw_outline(picture, corners, color, name)
+    return picture
+
+
+def draw_outline(surface: Surface, corners: Sequence[Point], color: Color, label: str) -> None:
+    """Draw the sides of a polygon, and write a label at its highest corner."""
+    points = np.round(np.array(corners)).astype(np.int32)
+    draw_lines(surface, points, color, line_width(surface), closed=True)
+    left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
+    height = label_tag(surface, label, (0, 0)).height
+    draw_label(surface, label, (round(left), round(top) + height), color)

@@ -3,16 +3,15 @@
 On planes, colours are drawn at half the resolution, as 4:2:0 has it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from functools import cache
+from itertools import pairwise
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from vdet.boxes import Box, Int32Array
-from vdet.media.coding import LUMA_SHARES, Coding
+from vdet.boxes import Box, Float64Array, Int32Array
+from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes
 
@@ -20,32 +19,28 @@ Color = tuple[int, int, int]
 """Blue, green, red, 0 to 255."""
 
 Surface = Image | Planes
-"""An image, BGR uint8 `(H, W, 3)`, or planes of their own; what is drawn into is changed."""
+"""An image, BGR uint8 `(H, W, 3)`, or planes of their own; drawing changes it."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
+_TRAIL_PARTS = 4
+"""Pieces of a trail, each of one width."""
+_TRAIL_REACH = 1 / 8
+"""Share of a trail, on both sides of a point, over which the point is averaged."""
+_SHIFT = 4
+"""Bits of the fraction of a pixel that OpenCV draws with."""
+_FARTHEST = 2**15
+"""Pixels from the picture's corner; OpenCV takes no coordinates much larger."""
 
-
-@dataclass(frozen=True, slots=True)
-class TextStyle:
-    """Size of a text, as OpenCV counts it, and the width of its strokes, pixels."""
-
-    scale: float
-    stroke: int
+_Layer = tuple[Image, Sequence[int], int]
+"""A layer of a surface, the value of a colour in it, and how often its sides are halved."""
 
 
 def fill(surface: Surface, box: Box, color: Color) -> None:
     """Fill the part of a box that lies in the surface."""
-    height, width = surface.shape[:2]
-    x1, y1, x2, y2 = box.clipped(width, height).pixels
-    rows, columns = slice(y1, y2), slice(x1, x2)
-    if not isinstance(surface, Planes):
-        surface[rows, columns] = color
-        return
-    luma, blue, red = _coded(color, surface.coding)
-    surface.luma[rows, columns] = luma
+    x1, y1, x2, y2 = corners = _visible(surface, box)
     if x1 < x2 and y1 < y2:
-        half = _half(rows), _half(columns)
-        surface.blue[half], surface.red[half] = blue, red
+        for layer, value, halved in _layers(surface, color):
+            _part(layer, corners, halved)[:] = value
 
 
 def draw_lines(
@@ -58,14 +53,9 @@ def draw_lines(
     shift: int = 0,
 ) -> None:
     """Draw a smooth line from point to point, int32 `(n, 2)` of x and y in pixels / 2**shift."""
-    if not isinstance(surface, Planes):
-        cv2.polylines(surface, [points], closed, color, width, cv2.LINE_AA, shift)
-        return
-    values, widths = _coded(color, surface.coding), (width, *[max(1, round(width / 2))] * 2)
-    for layer, value, thickness, more in zip(
-        surface.layers, values, widths, (0, 1, 1), strict=True
-    ):
-        cv2.polylines(layer, [points], closed, value, thickness, cv2.LINE_AA, shift + more)
+    for layer, value, halved in _layers(surface, color):
+        thickness = max(1, round(width / 2**halved))
+        cv2.polylines(layer, [points], closed, value, thickness, cv2.LINE_AA, shift + halved)
 
 
 def draw_arrow(
@@ -86,32 +76,76 @@ def draw_arrow(
         draw_lines(surface, np.rint(line).astype(np.int32), color, width)
 
 
+def draw_trail(
+    surface: Surface, points: Sequence[tuple[float, float]], color: Color, width: int
+) -> None:
+    """Draw a smooth line along points, the oldest first; it ends at the newest.
+
+    Parameters
+    ----------
+    points
+        x, y in pixels; they may lie outside the surface.
+    width
+        Width of the newest part of the line, pixels. The oldest part is the thinnest.
+    """
+    if len(points) < 2:
+        return
+    line = _smoothed(np.clip(np.asarray(points, np.float64), -_FARTHEST, _FARTHEST))
+    fixed = np.rint(line * 2**_SHIFT).astype(np.int32)
+    ends = np.linspace(0, len(fixed) - 1, _TRAIL_PARTS + 1).round().astype(int).tolist()
+    for part, (first, last) in enumerate(pairwise(ends), start=1):
+        if last > first:
+            thickness = max(1, round(width * part / _TRAIL_PARTS))
+            draw_lines(surface, fixed[first : last + 1], color, thickness, shift=_SHIFT)
+
+
+def _smoothed(points: Float64Array) -> Float64Array:
+    """Average each point `(n, 2)` with as many before it as behind it, fewer near the ends."""
+    numbers = np.arange(len(points))
+    reach = np.minimum(numbers, numbers[::-1]).clip(max=round(_TRAIL_REACH * len(points)))
+    sums = np.concatenate([np.zeros((1, 2)), points.cumsum(axis=0)])
+    totals = sums[numbers + reach + 1] - sums[numbers - reach]
+    return np.asarray(totals / (2 * reach + 1)[:, np.newaxis])
+
+
 def write_text(
     surface: Surface,
     text: str,
-    origin: tuple[int, int],
-    style: TextStyle,
+    origin: tuple[float, float],
+    scale: float,
     color: Color,
     *,
     within: Box,
 ) -> None:
-    """Write a line of text from its lower left corner on; no stroke lies outside `within`."""
-    if not isinstance(surface, Planes):
-        cv2.putText(surface, text, origin, _FONT, style.scale, color, style.stroke, cv2.LINE_AA)
-        return
-    height, width = surface.shape
-    x1, y1, x2, y2 = within.clipped(width, height).pixels
+    """Write a line of text with its lower left corner at `origin`, and only inside `within`.
+
+    `scale` is the size as OpenCV counts it.
+    """
+    x1, y1, x2, y2 = _visible(surface, within)
     mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
     if mask.size:
-        place = origin[0] - x1, origin[1] - y1
-        cv2.putText(mask, text, place, _FONT, style.scale, 255, style.stroke, cv2.LINE_AA)
+        place = round(origin[0]) - x1, round(origin[1]) - y1
+        cv2.putText(mask, text, place, _FONT, scale, 255, _stroke(scale), cv2.LINE_AA)
         blend(surface, mask, (x1, y1), color)
 
 
-def text_size(text: str, style: TextStyle) -> tuple[int, int, int]:
+def text_size(text: str, scale: float) -> tuple[int, int, int]:
     """Return width, height above the baseline and depth below it of a line of text, pixels."""
-    (width, height), baseline = cv2.getTextSize(text, _FONT, style.scale, style.stroke)
+    (width, height), baseline = cv2.getTextSize(text, _FONT, scale, _stroke(scale))
     return width, height, baseline
+
+
+def _stroke(scale: float) -> int:
+    return max(1, round(1.5 * scale))
+
+
+def shade(surface: Surface, corners: Int32Array, color: Color, opacity: float) -> None:
+    """Mix a colour into a polygon, int32 `(n, 2)` of x and y in pixels."""
+    x1, y1, x2, y2 = _visible(surface, Box.sized(*cv2.boundingRect(corners)))
+    mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
+    if mask.size:
+        cv2.fillPoly(mask, [corners - np.array([x1, y1], np.int32)], 255)
+        blend(surface, mask, (x1, y1), color, opacity)
 
 
 def blend(
@@ -126,47 +160,52 @@ def blend(
     Parameters
     ----------
     mask
-        uint8 `(h, w)`: how much of a pixel is covered, 0 to 255. It lies in the surface.
+        uint8 `(h, w)`, not empty: how much of a pixel is covered, 0 to 255. It lies in the surface.
     corner
         x and y of its first pixel.
     """
     x, y = corner
     height, width = mask.shape
-    if not mask.size:
-        return
-    rows, columns = slice(y, y + height), slice(x, x + width)
-    if not isinstance(surface, Planes):
-        _mix(surface[rows, columns], mask[..., np.newaxis], color, opacity)
-        return
-    luma, blue, red = _coded(color, surface.coding)
-    _mix(surface.luma[rows, columns], mask, luma, opacity)
+    for layer, value, halved in _layers(surface, color):
+        part = _part(layer, (x, y, x + width, y + height), halved)
+        covered = _halved(mask, x, y) if halved else mask
+        shares = covered.reshape(part.shape[:2] + (1,) * (part.ndim - 2)) * np.float32(
+            opacity / 255
+        )
+        part[:] = np.rint(part + (np.array(value, np.float32) - part) * shares)
+
+
+def _halved(mask: Image, x: int, y: int) -> Image:
+    """Return the mean of the 2 × 2 pixels of a mask at `(x, y)` for which a value of chroma is."""
+    height, width = mask.shape
     around = y % 2, (y + height) % 2, x % 2, (x + width) % 2
     even = cv2.copyMakeBorder(mask, *around, cv2.BORDER_CONSTANT)
     size = even.shape[1] // 2, even.shape[0] // 2
-    small = np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
-    half = _half(rows), _half(columns)
-    _mix(surface.blue[half], small, blue, opacity)
-    _mix(surface.red[half], small, red, opacity)
+    return np.asarray(cv2.resize(even, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
-def _mix(part: Image, mask: Image, color: npt.ArrayLike, opacity: float) -> None:
-    shares = mask * np.float32(opacity / 255)
-    part[:] = np.rint(part + (np.asarray(color, np.float32) - part) * shares)
+def _visible(surface: Surface, box: Box) -> tuple[int, int, int, int]:
+    """Return the sides of the part of a box that lies in the surface."""
+    height, width = surface.shape[:2]
+    return box.clipped(width, height).pixels
 
 
-def _half(pixels: slice) -> slice:
-    """Return the values of chroma that stand for some of these pixels."""
-    return slice(pixels.start // 2, -(-pixels.stop // 2))
+def _layers(surface: Surface, color: Color) -> Iterator[_Layer]:
+    if isinstance(surface, Planes):
+        yield from zip(surface.layers, _coded(color, surface.coding), (0, 1, 1), strict=True)
+    else:
+        yield surface, color, 0
+
+
+def _part(layer: Image, corners: tuple[int, int, int, int], halved: int) -> Image:
+    """Return the values of a layer that stand for some of the pixels between these sides."""
+    x1, y1, x2, y2 = corners
+    rows = slice(y1 >> halved, (y2 + halved) >> halved)
+    return layer[rows, x1 >> halved : (x2 + halved) >> halved]
 
 
 @cache
-def _coded(color: Color, coding: Coding) -> tuple[int, int, int]:
+def _coded(color: Color, coding: Coding) -> list[tuple[int]]:
     """Return luma, blue and red chroma of a colour."""
-    blue, green, red = (value / 255 for value in color)
-    of_red, of_blue = LUMA_SHARES[coding.matrix]
-    luma = of_red * red + (1 - of_red - of_blue) * green + of_blue * blue
-    chroma = (blue - luma) / (2 - 2 * of_blue), (red - luma) / (2 - 2 * of_red)
-    base, luma_span, chroma_span = (0, 255, 255) if coding.full_range else (16, 219, 224)
-    values = base + luma_span * luma, *(128 + chroma_span * each for each in chroma)
-    first, second, third = (min(255, round(value)) for value in values)
-    return first, second, third
+    planes = Planes.of_image(np.full((2, 2, 3), color, np.uint8), coding)
+    return [(int(layer[0, 0]),) for layer in planes.layers]

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vdet.draw.boxes import draw_line, draw_zone
 from vdet.draw.paint import Surface
-from vdet.draw.places import DrawnLine, DrawnZone, draw_counts
 from vdet.errors import OutputError
 from vdet.lanes.road import Road
 from vdet.polygons import Point
@@ -19,7 +19,6 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.count_files import join_counts, write_counts
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.layout import Line
 from vdet.traffic.tables import SUFFIXES
 
 
@@ -52,18 +51,15 @@ def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | 
 
     In an undistorted picture they lie on the same places of the road.
     """
-
-    def drawn(line: Line) -> DrawnLine:
+    for zone in counter.layout.zones:
+        label = f"{zone.name}: {counter.present(zone)}"
+        draw_zone(surface, _placed(zone.outline.corners, road), label)
+    for line in counter.layout.lines:
+        left, right = (
+            f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions
+        )
         start, end = _placed((line.start, line.end), road)
-        left, right = ((way, counter.count(line.name, way)) for way in line.directions)
-        return DrawnLine(line.name, start, end, left, right)
-
-    layout = counter.layout
-    zones = [
-        DrawnZone(zone.name, tuple(_placed(zone.outline.corners, road)), counter.present(zone))
-        for zone in layout.zones
-    ]
-    draw_counts(surface, [drawn(line) for line in layout.lines], zones)
+        draw_line(surface, start, end, (left, right))
 
 
 def _placed(points: Sequence[Point], road: Road | None) -> list[Point]:

@@ -19,8 +19,7 @@ from vdet.draw.boxes import (
     draw_label,
     line_width,
 )
-from vdet.draw.paint import Color, Surface
-from vdet.draw.trails import draw_trail
+from vdet.draw.paint import Color, Surface, draw_trail
 from vdet.lanes.drawing import draw_lane
 from vdet.lanes.road import Road
 from vdet.media import Picture, VideoInfo
@@ -143,8 +142,8 @@ class Overlay:
         """Return the colour of the first polygon in which a vehicle stands; white in none."""
         if self._regions is None:
             self._regions = Regions(self._region_settings, picture.width, picture.height)
-        name = self._regions.name_at(track.foot)
-        return WHITE if name is None else color_of(list(self._regions.included).index(name) + 1)
+        number = self._regions.number_at(track.foot)
+        return color_of(number) if number else WHITE
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:

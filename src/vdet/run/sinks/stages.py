@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-from vdet.config.places import RegionsSettings
-from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label
-from vdet.draw.places import draw_regions
+from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.files import make_folder
 from vdet.media.images import Image, encode_image
 from vdet.regions import Regions
@@ -31,24 +29,16 @@ class StagesSink(BaseSink):
         self._is_done = True
         make_folder(self.path)
         pictures = self.context.stage_pictures(result.frame.image, result.detections)
-        if self.context.settings.regions:
-            pictures["regions"] = _with_regions(result, self.context.settings.regions)
+        if settings := self.context.settings.regions:
+            height, width = result.frame.image.shape[:2]
+            regions = Regions(settings, width, height)
+            pictures["regions"] = draw_regions(result.frame.image, regions)
         pictures[_BOXES] = _with_boxes(result)
         if result.road:
             pictures |= result.road.pictures()
         for number, (name, picture) in enumerate(pictures.items(), start=1):
             path = self.path / f"{number}-{name}.png"
             self.context.files.stage(path).write_bytes(encode_image(picture, path))
-
-
-def _with_regions(result: FrameResult, settings: RegionsSettings) -> Image:
-    picture = result.frame.picture
-    regions = Regions(settings, picture.width, picture.height)
-    included, excluded = (
-        {name: each.corners for name, each in outlines.items()}
-        for outlines in (regions.included, regions.excluded)
-    )
-    return draw_regions(result.frame.image, regions.pixels(), included, excluded)
 
 
 def _with_boxes(result: FrameResult) -> Image:
