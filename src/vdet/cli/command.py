@@ -1,15 +1,14 @@
-"""Commands whose help groups its options, and groups that import a command when it is called."""
+"""Commands whose help groups its options, and the program, which other packages extend."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from difflib import get_close_matches
-from importlib import import_module
 from typing import Any
 
 import click
 
 from vdet.cli.messages import set_up_logs
 from vdet.errors import ConfigError
+from vdet.plugins import COMMANDS, load_plugin, plugin_names
 
 _OTHERS = "What is processed"
 
@@ -71,39 +70,14 @@ def command(*examples: str) -> Callable[[Callable[..., Any]], Command]:
     return make
 
 
-class LazyGroup(click.Group):
-    """A group that imports a command when it is called, and not to list it.
+class Program(click.Group):
+    """The program; other packages register commands as entry points (`vdet.plugins`)."""
 
-    Parameters
-    ----------
-    summaries
-        The summary of each command, by its name.
-    place
-        Format of the module of a command, as "vdet.cli.{}". In it the command has its own name,
-        with underscores.
-    plugins
-        The group of entry points in which other packages register commands; empty for none.
-    """
-
-    def __init__(
-        self,
-        *arguments: Any,
-        summaries: Mapping[str, str],
-        place: str,
-        plugins: str = "",
-        **options: Any,
-    ) -> None:
-        super().__init__(*arguments, **options)
-        self._summaries = summaries
-        self._place = place
-        self._plugins = plugins
-
-    def list_commands(self, context: click.Context) -> list[str]:
+    def list_commands(self, _: click.Context) -> list[str]:
         """Return the names of all commands in alphabetical order."""
-        own = {*super().list_commands(context), *self._summaries}
-        return sorted(own | set(self._plugin_names()))
+        return sorted({*self.commands, *plugin_names(COMMANDS)})
 
-    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+    def get_command(self, _: click.Context, name: str) -> click.Command | None:
         """Return a command, None if there is none of that name.
 
         Raises
@@ -111,48 +85,19 @@ class LazyGroup(click.Group):
         ConfigError
             It belongs to another package, and cannot be loaded.
         """
-        if name in self._summaries:
-            word = name.replace("-", "_")
-            command: click.Command = getattr(import_module(self._place.format(word)), word)
-            return command
-        return super().get_command(context, name) or self._plugin(name)
-
-    def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write all names with their summaries; nothing is imported."""
-        own = {name: command.short_help or "" for name, command in self.commands.items()}
-        others = dict.fromkeys(self._plugin_names(), "Added by an installed package.")
-        with formatter.section("Commands"):
-            formatter.write_dl(sorted((others | own | {**self._summaries}).items()))
-
-    def resolve_command(
-        self, context: click.Context, words: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command that the words begin with; an unknown name gets a suggestion."""
-        try:
-            return super().resolve_command(context, words)
-        except click.UsageError as error:
-            close = get_close_matches(words[0], self.list_commands(context), 1)
-            if not close:
-                raise
-            message = f"No such command '{words[0]}'. Did you mean '{close[0]}'?"
-            raise click.UsageError(message, context) from error
-
-    def _plugin_names(self) -> list[str]:
-        if not self._plugins:
-            return []
-        from vdet.plugins import plugin_names
-
-        return plugin_names(self._plugins)
-
-    def _plugin(self, name: str) -> click.Command | None:
-        if name not in self._plugin_names():
-            return None
-        from vdet.plugins import load_plugin
-
-        command = load_plugin(self._plugins, name)
+        if name in self.commands or name not in plugin_names(COMMANDS):
+            return self.commands.get(name)
+        command = load_plugin(COMMANDS, name)
         if not isinstance(command, click.Command):
             raise ConfigError(f"{name}: is no click command; repair or reinstall that package")
         return command
+
+    def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write all names with their summaries; commands of other packages are not imported."""
+        own = {name: command.short_help or "" for name, command in self.commands.items()}
+        others = dict.fromkeys(plugin_names(COMMANDS), "Added by an installed package.")
+        with formatter.section("Commands"):
+            formatter.write_dl(sorted((others | own).items()))
 
 
 def verbosity_options() -> list[click.Parameter]:

@@ -8,59 +8,35 @@ from typing import NoReturn
 
 import click
 
-from vdet.cli.command import LazyGroup, verbosity_options
+from vdet.cli.calibrate import calibrate
+from vdet.cli.command import Program, verbosity_options
+from vdet.cli.config import config
+from vdet.cli.count import count
+from vdet.cli.demo import demo
+from vdet.cli.detect_image import detect_image
+from vdet.cli.detect_video import detect_video
+from vdet.cli.doctor import doctor
+from vdet.cli.evaluate import evaluate
+from vdet.cli.info import info
 from vdet.cli.messages import print_lines, set_up_logs
+from vdet.cli.mine import mine
+from vdet.cli.train import train
+from vdet.cli.train_net import train_net
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
 from vdet.files import escaped
 from vdet.version import __version__
 
-_COMMANDS = {
-    "calibrate": "Measure a camera with photographs of a chessboard.",
-    "config": "Print the effective settings as commented YAML.",
-    "count": "Count the vehicles of track files at lines and in zones.",
-    "demo": "Try the whole program on a drawn road.",
-    "detect-image": "Find vehicles in pictures.",
-    "detect-video": "Find and follow vehicles in one video, or in many.",
-    "doctor": "Check whether vdet works on this machine.",
-    "info": "Describe a video, a picture or a model file.",
-    "mine": "Cut patches for vdet train out of labelled videos and pictures.",
-    "train": "Train a linear model on labelled patches or pictures.",
-    "train-net": "Train a network on labelled pictures.",
-}
-"""A line for each command: its name and the first sentence of its help."""
-
-_EVALUATIONS = {
-    "images": "Measure detection in labelled pictures.",
-    "patches": "Measure the classifier on labelled patches.",
-    "tracks": "Compare a file of tracks with the truth.",
-    "video": "Measure detection and tracking in labelled video.",
-}
-
-
-@click.group(
-    cls=LazyGroup,
-    summaries=_COMMANDS,
-    place="vdet.cli.{}",
-    plugins="vdet.commands",
+cli = Program(
+    "vdet",
+    [
+        *(calibrate, config, count, demo, detect_image, detect_video, doctor, evaluate, info),
+        *(mine, train, train_net),
+    ],
+    help="Find and follow vehicles in road video on an ordinary CPU.",
+    params=verbosity_options(),
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-@click.version_option(__version__, prog_name="vdet")
-def cli() -> None:
-    """Find and follow vehicles in road video on an ordinary CPU."""
-
-
-cli.params += verbosity_options()
-
-
-@cli.group(
-    "eval",
-    cls=LazyGroup,
-    summaries=_EVALUATIONS,
-    place="vdet.cli.eval_{}",
-    short_help="Measure detection, tracking or the classifier.",
-)
-def evaluate() -> None:
-    """Measure detection, tracking or the classifier."""
+click.version_option(__version__, prog_name="vdet")(cli)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

@@ -1,0 +1,240 @@
+"""`vdet eval`: measure detection, tracking or the classifier."""
+
+from functools import partial
+from pathlib import Path
+
+import click
+
+from vdet.cli import options
+from vdet.cli.command import command
+from vdet.cli.messages import progress_steps
+from vdet.cli.options import option
+from vdet.cli.results import Results, results_options
+from vdet.version import __version__
+
+
+@command(
+    "vdet eval images pictures/",
+    "vdet eval images city/ motorway/ --model their.onnx --least-width 0.03",
+)
+@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
+@option(
+    "--score SCORE",
+    "Count boxes with at least this score, 0 to 1.",
+    options.SHARE,
+    show_default="what vdet detect-image shows",
+)
+@option(
+    "--least-width options.SHARE",
+    "Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
+    options.SHARE,
+    default=0.0,
+)
+@options.settings_options("detector.still_score=0.5", options.model_option)
+@results_options
+def images(
+    data: tuple[Path, ...],
+    score: float | None,
+    least_width: float,
+    choice: options.SettingsChoice,
+    results: Results,
+) -> None:
+    """Measure detection in labelled pictures.
+
+    Each DATA is a folder in COCO, KITTI, YOLO or Pascal VOC form, or a COCO file. Each picture is
+    searched on its own, and compared with its labels.
+    """
+    settings = choice.read_for_whole_frames()
+    detector = settings.detector
+    from vdet.detect.factory import model_file
+    from vdet.evaluate.images.evaluate import evaluate_images
+    from vdet.evaluate.images.page import images_page
+    from vdet.evaluate.images.scores import Counting
+    from vdet.evaluate.images.text import lines, plain
+    from vdet.evaluate.output import run_name
+    from vdet.labels.reading import read_labelled_pictures
+    from vdet.labels.roles import Roles
+    from vdet.workers import core_count
+
+    model = choice.load_detector(detector.showing_all())
+    file = model_file(detector, choice.model_path)
+    results.check([*data, *([file] if file else [])])
+    roles = Roles.from_settings(settings)
+    sets = [read_labelled_pictures(path, roles) for path in data]
+    counting = Counting(
+        score=detector.shown_score if score is None else score,
+        least_width=least_width,
+    )
+    with progress_steps(" pictures") as steps:
+        progress = partial(steps, "")
+        result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
+    run = run_name(detector, choice.model_path, choice.config_name, choice.assignments)
+    results.print(lines(result, run), plain(result, run), lambda: images_page(result, run))
+
+
+@command(
+    "vdet eval patches vehicles.zip non-vehicles.zip --page page",
+    "vdet eval patches patches/ --model model.npz",
+)
+@click.argument("data", nargs=-1, required=True, type=options.PATH, metavar="DATA...")
+@option(
+    "--model FILE",
+    "Test this model on all of DATA.",
+    name="model_path",
+    show_default="a new model, tested on the last patches of each folder",
+)
+@options.settings_options("train.svm.C=1e-4")
+@options.jobs_option()
+@results_options
+def patches(
+    data: tuple[Path, ...],
+    choice: options.SettingsChoice,
+    jobs: int | None,
+    results: Results,
+) -> None:
+    """Measure the classifier on labelled patches.
+
+    Each DATA is a folder or a zip file, as vdet train takes it.
+    """
+    settings = choice.read(detector="svm")
+    from vdet.detect.svm.kind import requested_features, trained_on
+    from vdet.detect.svm.model import load_model
+    from vdet.evaluate.output import RunName, plain_run, run_lines
+    from vdet.learn.svm.dataset import find_patches
+    from vdet.learn.svm.patch_eval import evaluate_patches, lines, patch_page, values
+
+    model_path = choice.model_path
+    model = load_model(model_path, requested_features(settings.svm)) if model_path else None
+    results.check([*data, *([model_path] if model_path else [])])
+    files = find_patches(data)
+    with progress_steps("") as steps:
+        result = evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
+    sources = trained_on(model_path) if model_path else ()
+    name = RunName("svm", model_path, choice.config_name, choice.assignments, sources)
+    results.print(
+        [*run_lines(name), *lines(result)],
+        plain_run(name) | values(result),
+        lambda: patch_page(result, name),
+    )
+
+
+@command(
+    "vdet eval tracks out.txt gt.txt --page page",
+)
+@click.argument("prediction", type=options.PATH, metavar="PRED")
+@click.argument("truth", type=options.PATH, metavar="TRUTH")
+@options.until_option
+@option(
+    "--rate FPS",
+    "Frames per second, for the number of false tracks per minute.",
+    options.RATE,
+    show_default="from the times in PRED",
+)
+@options.settings_options("labels.roles.motorcycle=vehicle")
+@results_options
+def tracks(
+    prediction: Path,
+    truth: Path,
+    until: int | None,
+    rate: float | None,
+    choice: options.SettingsChoice,
+    results: Results,
+) -> None:
+    """Compare a file of tracks with the truth.
+
+    PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
+    labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
+    """
+    from vdet.evaluate.clips.evaluate import score_files
+    from vdet.evaluate.clips.page import video_page
+    from vdet.evaluate.clips.text import plain_clip, result_lines
+    from vdet.labels.roles import Roles
+
+    roles = Roles.from_settings(choice.read())
+    results.check([prediction, truth])
+    with progress_steps("") as steps:
+        steps("comparing", None)
+        run = score_files(prediction, truth, roles, until=until, rate=rate)
+    results.print(
+        result_lines([run]),
+        plain_clip(run.clips[0]),
+        lambda: video_page([run], f"compared with {truth} by vdet {__version__}"),
+    )
+
+
+@command(
+    "vdet eval video in.mp4 --truth gt.txt --page page",
+    "vdet eval video in.mp4 --truth gt.txt --sweep tracker.needed=0.1,0.3",
+)
+@click.argument("videos", nargs=-1, required=True, type=options.PATH, metavar="IN...")
+@options.truth_option
+@options.until_option
+@option(
+    "--sweep KEY=VALUE,VALUE",
+    "Compare values of one setting, for example tracker.needed=0.1,0.3. Repeated, all "
+    "combinations are compared.",
+    name="sweeps",
+    multiple=True,
+)
+@options.sink_option
+@options.settings_options("tracker.needed=0.3", options.model_option)
+@results_options
+def video(
+    videos: tuple[Path, ...],
+    truths: tuple[Path, ...],
+    until: int | None,
+    sweeps: tuple[str, ...],
+    choice: options.SettingsChoice,
+    results: Results,
+) -> None:
+    """Measure detection and tracking in labelled video.
+
+    Vehicles are found and followed in each video IN, and compared with its truth.
+    """
+    if len(videos) != len(truths):
+        raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
+    base = choice.read_for_whole_frames()
+    from vdet.detect.factory import model_file
+    from vdet.evaluate.clips.clip import Variant, open_clip
+    from vdet.evaluate.clips.evaluate import evaluate_clips
+    from vdet.evaluate.clips.page import video_page
+    from vdet.evaluate.clips.sweep import grid, with_values_in_force
+    from vdet.evaluate.clips.text import plain, result_lines
+    from vdet.evaluate.output import run_lines, run_name
+    from vdet.labels.roles import Roles
+    from vdet.run.sinks.protocol import check_sinks
+
+    swept = grid(with_values_in_force(sweeps, base))
+    outputs = options.as_outputs(options.wanted_outputs())
+    if outputs and (len(swept) > 1 or len(videos) > 1):
+        raise click.UsageError("--sink is for one video under one setting; leave out the others")
+    variants = []
+    for extra in swept:
+        settings = choice.read_for_whole_frames(*extra)
+        model = choice.load_detector(settings.detector)
+        variants.append(Variant(settings, model, extra))
+    detectors = [variant.settings.detector for variant in variants]
+    files = [path for each in detectors if (path := model_file(each, choice.model_path))]
+    inputs = [*videos, *truths, *files]
+    results.check(inputs)
+    check_sinks(outputs, overwrite=results.overwrite, inputs=inputs)
+    roles = Roles.from_settings(base)
+    clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
+    with progress_steps(" frames") as steps:
+        runs = evaluate_clips(
+            clips, variants, partial(steps, ""), outputs=outputs, overwrite=results.overwrite
+        )
+    name = run_name(detectors[0], choice.model_path, choice.config_name, choice.assignments)
+    results.print(
+        [*run_lines(name), *result_lines(runs)],
+        plain(runs, name),
+        lambda: video_page(runs, "; ".join(run_lines(name))),
+    )
+
+
+evaluate = click.Group(
+    "eval",
+    [images, patches, tracks, video],
+    help="Measure detection, tracking or the classifier.",
+    short_help="Measure detection, tracking or the classifier.",
+)
