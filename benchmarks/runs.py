@@ -30,7 +30,9 @@ from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, run_video
 
 FRAMES = 250
-CAMERA = CalibratedCamera(1280, 720, (1157, 1153), (668, 388), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0)
+CAMERA = CalibratedCamera(
+    1280, 720, ((1157, 0, 668), (0, 1153, 388), (0, 0, 1)), (-0.25, 0.0, 0.0, 0.0, 0.0), 0.0
+)
 """Similar to the project video's camera; the numbers do not change the time of undistortion."""
 
 

@@ -31,7 +31,7 @@ from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError
 from vdet.evaluate.clips.evaluate import score_files
 from vdet.evaluate.scores import Scores
-from vdet.lanes.camera_file import load_camera
+from vdet.lanes.camera import load_camera
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import Image

@@ -7,8 +7,7 @@ import pytest
 
 from conftest import Run
 from lanes.chessboards import photographs
-from vdet.lanes.camera import CalibratedCamera
-from vdet.lanes.camera_file import load_camera
+from vdet.lanes.camera import CalibratedCamera, load_camera
 from vdet.media.images import read_image, write_image
 
 
@@ -16,7 +15,9 @@ from vdet.media.images import read_image, write_image
 def boards(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of six photographs of a board and one of a wall."""
     folder = tmp_path_factory.mktemp("boards")
-    camera = CalibratedCamera(640, 480, (560, 558), (322, 236), (-0.25, 0.06, 0, 0, 0), 0)
+    camera = CalibratedCamera(
+        640, 480, ((560, 0, 322), (0, 558, 236), (0, 0, 1)), (-0.25, 0.06, 0, 0, 0), 0
+    )
     for number, image in enumerate(photographs(camera, 6)):
         write_image(folder / f"board{number}.png", image)
     write_image(folder / "wall.png", np.full((480, 640, 3), 99, np.uint8))
@@ -29,7 +30,7 @@ def test_makes_a_camera_of_a_folder_and_names_what_it_skipped(
     result = run("calibrate", boards, "-o", tmp_path / "camera.yaml")
     assert result.code == 0, result.err
     camera = load_camera(tmp_path / "camera.yaml")
-    assert camera.focal == pytest.approx((560, 558), rel=0.01)
+    assert camera.matrix[0][0] == pytest.approx(560, rel=0.01)
     assert "wall.png: not used: no board of 9×6 inner corners is seen" in result.err
     assert "640×480, focal length 56" in result.out
     assert "6 of 7 photographs used" in result.out

@@ -14,7 +14,7 @@ from quick import only_windows
 from vdet.config.document import MAX_BYTES, MAX_MISTAKES
 from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
-from vdet.lanes.camera_file import load_camera
+from vdet.lanes.camera import load_camera
 
 SETTINGS = """\
 # for one picture

@@ -31,7 +31,9 @@ def _photograph(
     to_board = np.linalg.inv(np.column_stack([rotation[:, 0], rotation[:, 1], shift]))
     columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     pixels = np.stack([columns.ravel(), rows.ravel()], axis=1).astype(np.float64)
-    rays = cv2.undistortPoints(pixels[:, None], camera.matrix, np.array(camera.distortion))[:, 0]
+    rays = cv2.undistortPoints(
+        pixels[:, None], np.array(camera.matrix), np.array(camera.distortion)
+    )[:, 0]
     board = np.column_stack([rays, np.ones(len(rays))]) @ to_board.T
     places = (board[:, :2] / board[:, 2:] + 2) * _TEXELS - 0.5
     x, y = (places[:, i].reshape(camera.height, camera.width).astype(np.float32) for i in (0, 1))

@@ -6,8 +6,7 @@ import pytest
 
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera
-from vdet.lanes.lane import Lane
-from vdet.lanes.road import LaneRequest, RoadFinder
+from vdet.lanes.road import Lane, LaneRequest, RoadFinder
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Carriageway, Light, Line, Scene
@@ -69,9 +68,13 @@ def drive(
     return find
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def wide_camera() -> CalibratedCamera:
     """A camera with visible lens distortion."""
     return CalibratedCamera(
-        640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5
+        640,
+        480,
+        ((560.0, 0, 322.0), (0, 558.0, 236.0), (0, 0, 1)),
+        (-0.25, 0.06, 0.0005, -0.0004, 0.0),
+        0.5,
     )

@@ -1,38 +1,28 @@
-"""A calibrated camera at other frame sizes, and undistortion of frames and boxes."""
+"""A calibrated camera, its file, and the undistortion of frames and boxes."""
+
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+import yaml
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
-from vdet.errors import ConfigError
-from vdet.lanes.camera import CalibratedCamera, Undistorter
+from vdet.errors import ConfigError, OutputError
+from vdet.lanes.camera import CalibratedCamera, Undistorter, load_camera, save_camera
 from vdet.media.images import Image
 
-CAMERA = CalibratedCamera(
-    640, 480, (560.0, 558.0), (322.0, 236.0), (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5
-)
-
-
-def test_scaling_to_twice_the_size_doubles_all_lengths() -> None:
-    scaled = CAMERA.scaled_to(1280, 960)
-    assert scaled.focal == (1120, 1116)
-    assert scaled.center == (644.5, 472.5)  # scaled about the frame's corner
-    assert scaled.distortion == CAMERA.distortion
-    assert (scaled.width, scaled.height, scaled.rms) == (1280, 960, 1.0)
-
-
-def test_scaling_accepts_an_aspect_ratio_that_differs_by_rounding() -> None:
-    camera = CalibratedCamera(1280, 720, (1150, 1150), (640, 360), (0, 0, 0, 0, 0), 1)
-    assert camera.scaled_to(854, 480).width == 854
-
-
-@pytest.mark.parametrize("size", [(640, 360), (480, 640), (660, 480)])
-def test_scaling_to_another_aspect_ratio_is_refused(size: tuple[int, int]) -> None:
-    with pytest.raises(ConfigError, match=r"calibrated for 640×480 .* another aspect ratio"):
-        CAMERA.scaled_to(*size)
+MATRIX = ((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0))
+CAMERA = CalibratedCamera(640, 480, MATRIX, (-0.25, 0.06, 0.0005, -0.0004, 0.0), 0.5)
+GOOD = {
+    "width": 640,
+    "height": 480,
+    "matrix": [[560.0, 0, 322.0], [0, 558.0, 236.0], [0, 0, 1]],
+    "distortion": [-0.25, 0.06, 0.0, 0.0, 0.0],
+    "rms": 0.5,
+}
 
 
 @pytest.fixture(scope="module")
@@ -40,24 +30,31 @@ def undistorter() -> Undistorter:
     return Undistorter(CAMERA, 640, 480)
 
 
-def marked(box: Box) -> Image:
-    image = np.zeros((480, 640, 3), np.uint8)
-    box.cut(image)[:] = 255
-    return image
+def test_a_frame_of_twice_the_size_is_undistorted_in_the_same_way(undistorter: Undistorter) -> None:
+    assert (CAMERA.matrix_for(640, 480) == MATRIX).all()
+    doubled = [[1120, 0, 644.5], [0, 1116, 472.5], [0, 0, 1]]  # scaled about the frame's corner
+    assert CAMERA.matrix_for(1280, 960).tolist() == doubled
+    small = undistorter.points(np.array([[100.0, 80.0]]))
+    large = Undistorter(CAMERA, 1280, 960).points(np.array([[200.5, 160.5]]))
+    assert (large + 0.5) / 2 - 0.5 == pytest.approx(small)
 
 
-def extent(image: Image) -> Box:
-    """Return the box around the pixels that are at least half white."""
-    x, y, width, height = cv2.boundingRect((image[..., 0] > 127).astype(np.uint8))
-    return Box.sized(x, y, width, height)
+def test_an_aspect_ratio_may_differ_by_rounding_only() -> None:
+    matrix = ((1150, 0, 640), (0, 1150, 360), (0, 0, 1))
+    camera = CalibratedCamera(1280, 720, matrix, (0, 0, 0, 0, 0), 1)
+    assert camera.matrix_for(854, 480)[0, 0] == pytest.approx(767, abs=1)
+    for size in ((640, 480), (720, 1280), (1320, 720)):
+        with pytest.raises(ConfigError, match=r"calibrated for 1280×720 .* another aspect ratio"):
+            Undistorter(camera, *size)
 
 
 def test_lines_bent_by_the_lens_become_straight(undistorter: Undistorter) -> None:
+    matrix = np.array(MATRIX)
     for row in (20.0, 460.0):
-        ideal = np.column_stack([np.linspace(60, 580, 30), np.full(30, row)])
-        rays = np.column_stack([ideal, np.ones(30)]) @ np.linalg.inv(CAMERA.matrix).T
+        ideal = np.column_stack([np.linspace(60, 580, 30), np.full(30, row), np.ones(30)])
+        rays = ideal @ np.linalg.inv(matrix).T
         seen, _ = cv2.projectPoints(
-            rays, np.zeros(3), np.zeros(3), CAMERA.matrix, np.array(CAMERA.distortion)
+            rays, np.zeros(3), np.zeros(3), matrix, np.array(CAMERA.distortion)
         )
         image = np.zeros((480, 640, 3), np.uint8)
         points = np.rint(seen[:, 0] * 16).astype(np.int32)
@@ -68,27 +65,19 @@ def test_lines_bent_by_the_lens_become_straight(undistorter: Undistorter) -> Non
         assert np.abs(rows - row).max() < 1
 
 
-EDGE_BOXES = [
-    Box.sized(90, 60, 60, 50),
-    Box.sized(480, 40, 80, 60),
-    Box.sized(70, 380, 90, 50),
-    Box.sized(510, 360, 60, 60),
-]
+def marked(box: Box) -> Image:
+    image = np.zeros((480, 640, 3), np.uint8)
+    box.cut(image)[:] = 255
+    return image
 
 
-@pytest.mark.parametrize("box", [*EDGE_BOXES, Box.sized(300, 220, 40, 40)])
+@pytest.mark.parametrize(
+    "box", [Box.sized(90, 60, 60, 50), Box.sized(510, 360, 60, 60), Box.sized(300, 220, 40, 40)]
+)
 def test_an_undistorted_box_encloses_the_same_content(undistorter: Undistorter, box: Box) -> None:
-    seen = extent(undistorter.image(marked(box)))
+    half_white = undistorter.image(marked(box))[..., 0] > 127
+    seen = Box.sized(*cv2.boundingRect(half_white.astype(np.uint8)))
     assert undistorter.box(box).iou(seen) > 0.94
-
-
-def test_a_box_is_clipped_to_the_frame(undistorter: Undistorter) -> None:
-    moved = undistorter.box(Box.sized(0, 0, 640, 480))
-    assert moved == Box.sized(0, 0, 640, 480)
-
-
-def test_a_box_outside_the_undistorted_frame_has_no_area(undistorter: Undistorter) -> None:
-    assert undistorter.box(Box.sized(0, 0, 12, 12)).area == 0
 
 
 @given(
@@ -105,13 +94,89 @@ def test_an_undistorted_box_holds_all_points_of_the_box(
     columns, rows = np.meshgrid(np.arange(x, x + width), np.arange(y, y + height))
     points = undistorter.points(np.column_stack([columns.ravel(), rows.ravel()]).astype(float))
     inside = ((points >= 0) & (points <= (639, 479))).all(axis=1)
-    for point in points[inside]:
-        assert box.x1 - 1 <= point[0] <= box.x2
-        assert box.y1 - 1 <= point[1] <= box.y2
+    assert (
+        (points[inside] >= (box.x1 - 1, box.y1 - 1)) & (points[inside] <= (box.x2, box.y2))
+    ).all()
 
 
-def test_a_frame_of_another_size_is_undistorted_in_the_same_way(undistorter: Undistorter) -> None:
-    double = Undistorter(CAMERA, 1280, 960)
-    small = undistorter.points(np.array([[100.0, 80.0]]))
-    large = double.points(np.array([[200.5, 160.5]]))
-    assert (large + 0.5) / 2 - 0.5 == pytest.approx(small)
+def test_a_box_is_clipped_to_the_frame(undistorter: Undistorter) -> None:
+    assert undistorter.box(Box.sized(0, 0, 640, 480)) == Box.sized(0, 0, 640, 480)
+    assert undistorter.box(Box.sized(0, 0, 12, 12)).area == 0
+
+
+@pytest.mark.parametrize("camera", [None, CalibratedCamera(640, 480, MATRIX, (0, 0, 0, 0, 0), 0)])
+def test_without_distortion_nothing_changes(camera: CalibratedCamera | None) -> None:
+    undistorter = Undistorter(camera, 640, 480)
+    image = np.random.default_rng(0).integers(0, 256, (480, 640, 3), dtype=np.uint8)
+    assert (undistorter.image(image) == image).all()
+    assert undistorter.box(Box.sized(3, 5, 20, 10)) == Box.sized(3, 5, 20, 10)
+    assert undistorter.points(np.array([[3.0, 5.0]])) == pytest.approx(np.array([[3.0, 5.0]]))
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "camera.yaml"
+
+
+def refusal(path: Path, values: object) -> str:
+    path.write_text(yaml.safe_dump(values, sort_keys=False), encoding="utf-8")
+    with pytest.raises(ConfigError) as error:
+        load_camera(path)
+    return str(error.value).replace(str(path), "camera.yaml")
+
+
+small = st.floats(-10, 10)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
+@given(
+    focal=st.tuples(st.floats(64, 64000), st.floats(64, 64000)),
+    center=st.tuples(st.floats(0, 639), st.floats(0, 479)),
+    distortion=st.tuples(small, small, small, small, small),
+    rms=st.floats(0, 100),
+)
+def test_every_camera_is_read_with_all_its_digits(
+    path: Path,
+    focal: tuple[float, float],
+    center: tuple[float, float],
+    distortion: tuple[float, float, float, float, float],
+    rms: float,
+) -> None:
+    matrix = ((focal[0], 0.0, center[0]), (0.0, focal[1], center[1]), (0.0, 0.0, 1.0))
+    camera = CalibratedCamera(640, 480, matrix, distortion, rms)
+    save_camera(camera, path, overwrite=True)
+    assert load_camera(path) == camera
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("width", "wide", "camera.yaml:1:1: width: should be a valid integer"),
+        ("height", 0, "camera.yaml:2:1: height: should be greater than or equal to 16"),
+        ("matrix", [[1, 2], [3, 4]], "camera.yaml:4:3: matrix[0][2]: is missing"),
+        ("matrix", 7, "camera.yaml:3:1: matrix: should be a valid tuple"),
+        ("matrix", [[560, 3, 322], [0, 558, 236], [0, 0, 1]], "should be [[fx, 0, cx], [0, fy, cy"),
+        ("matrix", [[1, 0, 322], [0, 558, 236], [0, 0, 1]], "3:1: matrix: focal lengths should be"),
+        ("matrix", [[560, 0, 322], [0, 1e6, 236], [0, 0, 1]], "should be 64 to 64000 px at this"),
+        ("matrix", [[560, 0, 322], [0, 558, 500], [0, 0, 1]], "in the frame (is 322, 500)"),
+        ("distortion", [0, 0, 0, 0, float("nan")], "distortion[4]: should be a finite number"),
+        ("rms", -1, "rms: should be greater than or equal to 0"),
+        ("colour", "red", "colour: is not a key of camera files"),
+    ],
+)
+def test_each_mistake_is_named_with_its_place(
+    path: Path, key: str, value: object, message: str
+) -> None:
+    assert message in refusal(path, GOOD | {key: value})
+
+
+def test_all_mistakes_are_named_at_once(path: Path) -> None:
+    assert len(refusal(path, GOOD | {"width": "wide", "rms": -1}).split("\n")) == 2
+    assert "1:1: matrix: is missing; `vdet calibrate`" in refusal(path, {"width": 640})
+
+
+def test_files_that_cannot_be_read_or_written_are_named(path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"camera\.yaml: cannot be read"):
+        load_camera(path)
+    with pytest.raises(OutputError, match="cannot be written"):
+        save_camera(CAMERA, path.parent / "none" / "camera.yaml")

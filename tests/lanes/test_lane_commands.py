@@ -20,8 +20,7 @@ from vdet.config.schema import OutputSettings, Settings, WindowSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
-from vdet.lanes.camera import CalibratedCamera, Undistorter
-from vdet.lanes.camera_file import save_camera
+from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera
 from vdet.media import Frame, Picture, VideoInfo, VideoReader, VideoWriter
 from vdet.media.images import Image, read_image, write_image
 from vdet.synthetic.camera import PinholeCamera
@@ -29,7 +28,9 @@ from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene
 
 WIDTH, HEIGHT, COUNT = 640, 480, 10
-LENS = CalibratedCamera(WIDTH, HEIGHT, (480, 480), (320, 240), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+LENS = CalibratedCamera(
+    WIDTH, HEIGHT, ((480, 0, 320), (0, 480, 240), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
+)
 CAR = Box.sized(500, 300, 64, 56)  # in the distorted frame, near its edge
 CORNER = np.s_[400:, 600:]
 """Pixels without drawings that undistortion moves far."""
@@ -135,10 +136,6 @@ def video_images(path: Path) -> list[Image]:
         return [frame.image for frame in reader]
 
 
-def read_records(path: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in path.read_text().splitlines()]
-
-
 def box_of(item: dict[str, Any]) -> Box:
     return Box.sized(item["x"], item["y"], item["width"], item["height"])
 
@@ -177,152 +174,115 @@ def has_outline(image: Image, box: Box, color: tuple[int, int, int]) -> bool:
     return bool((np.abs(side - color).max(axis=1) < 90).mean() > 0.8)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of the outputs of `TestVideo.records`."""
-    return tmp_path_factory.mktemp("out")
+def read_json(result: Outcome) -> list[dict[str, Any]]:
+    assert result.code == 0, result.err
+    items: list[dict[str, Any]] = json.loads(result.out)
+    return items
 
 
-class TestVideo:
-    @pytest.fixture
-    def records(self, run: Run, files: Files, folder: Path) -> list[dict[str, Any]]:
-        """The records of one run, which also wrote `out.mp4`."""
-        if not (folder / "t.jsonl").exists():
-            outputs = (folder / "out.mp4", "--tracks", folder / "t.jsonl")
-            result = run("detect-video", files.clip, *outputs, *files.lanes)
-            assert result.code == 0, result.err
-        return read_records(folder / "t.jsonl")
-
-    def test_every_record_has_the_lane_of_the_undistorted_frame(
-        self, records: list[dict[str, Any]], road: Scene
-    ) -> None:
-        assert len(records) == COUNT
-        for record in records:
-            check_lane(record["lane"], road.camera)
-
-    def test_boxes_are_drawn_in_pixels_of_the_undistorted_frame(
-        self, records: list[dict[str, Any]], folder: Path, files: Files, undistorter: Undistorter
-    ) -> None:
-        (track,) = records[-1]["tracks"]
-        reported, placed = box_of(track), undistorter.box(box_of(track))
-        drawn = video_images(folder / "out.mp4")[-1]
-        assert has_outline(drawn, placed, color_of(track["id"]))
-        assert not has_outline(drawn, reported, color_of(track["id"]))
-        car = red_in(undistorter.image(video_images(files.clip)[-1]))
-        assert sits_on(placed, car)
-        assert reported.x2 < car.x2 - 15, "an unchanged box would miss a quarter of the car"
-
-    def test_without_lanes_records_differ_only_by_lanes_and_distances(
-        self, run: Run, files: Files, records: list[dict[str, Any]], tmp_path: Path
-    ) -> None:
-        path = tmp_path / "t.jsonl"
-        options = ("--no-video", "--tracks", path, *files.red)
-        assert run("detect-video", files.clip, *options).code == 0
-        without = [
-            {key: value for key, value in record.items() if key != "lane"} for record in records
-        ]
-        for record in without:
-            record["tracks"] = [
-                {**track, "distance": None, "lane": None} for track in record["tracks"]
-            ]
-        assert read_records(path) == without
-
-    def test_lane_stages_are_written(self, run: Run, files: Files, tmp_path: Path) -> None:
-        options = ("--no-video", "--stages", tmp_path / "s", "--at", "0.2", "--frames", "7")
-        assert run("detect-video", files.clip, *options, *files.lanes).code == 0
-        assert sorted(path.name for path in (tmp_path / "s").iterdir()) == STAGES
-
-    def test_a_camera_of_another_aspect_ratio_is_refused(
-        self, run: Run, files: Files, tmp_path: Path
-    ) -> None:
-        wide = tmp_path / "wide.yaml"
-        save_camera(CalibratedCamera(1280, 720, (960, 960), (640, 360), (0, 0, 0, 0, 0), 0), wide)
-        out, tracks = tmp_path / "out.mp4", tmp_path / "t.csv"
-        options = ("--tracks", tracks, *files.red, "--lanes", "--camera", wide)
-        result = run("detect-video", files.clip, out, *options)
-        assert result.code == 1
-        assert f"{files.clip}: the camera was calibrated for 1280×720" in result.err
-        assert "another aspect ratio" in result.err
-        assert list(tmp_path.iterdir()) == [wide]
+def test_a_video_is_undistorted_with_its_lane_and_boxes(
+    run: Run, files: Files, tmp_path: Path, road: Scene, undistorter: Undistorter
+) -> None:
+    out, tracks = tmp_path / "out.mp4", tmp_path / "t.jsonl"
+    result = run("detect-video", files.clip, out, "--tracks", tracks, *files.lanes)
+    assert result.code == 0, result.err
+    records = [json.loads(line) for line in tracks.read_text().splitlines()]
+    for record in records:
+        check_lane(record["lane"], road.camera)
+    boxes = [box_of(track) for record in records for track in record["tracks"]]
+    assert len(boxes) > COUNT // 2
+    assert all(sits_on(box, CAR) for box in boxes), "in pixels of the input"
+    before, after = video_images(files.clip), video_images(out)
+    assert len(before) == len(after) == len(records) == COUNT
+    for old, new in zip(before, after, strict=True):
+        straight = undistorter.image(old)[CORNER].astype(int)
+        assert np.abs(new[CORNER] - straight).mean() < 2
+        assert np.abs(new[CORNER] - old[CORNER].astype(int)).mean() > 8
+    (track,) = records[-1]["tracks"]
+    reported, placed = box_of(track), undistorter.box(box_of(track))
+    assert has_outline(after[-1], placed, color_of(track["id"]))
+    assert not has_outline(after[-1], reported, color_of(track["id"]))
+    car = red_in(undistorter.image(before[-1]))
+    assert sits_on(placed, car)
+    assert reported.x2 < car.x2 - 15, "an unchanged box would miss a quarter of the car"
 
 
-class TestPictures:
-    def json_of(self, result: Outcome) -> list[dict[str, Any]]:
-        assert result.code == 0, result.err
-        items: list[dict[str, Any]] = json.loads(result.out)
-        return items
-
-    def test_the_lane_and_the_boxes_are_reported_and_drawn(
-        self, run: Run, files: Files, tmp_path: Path, road: Scene, undistorter: Undistorter
-    ) -> None:
-        out = tmp_path / "out.png"
-        options = ("-o", out, "--json", "-", *files.lanes)
-        (item,) = self.json_of(run("detect-image", files.picture, *options))
-        check_lane(item["lane"], road.camera)
-        (reported,) = map(box_of, item["boxes"])
-        assert sits_on(reported, CAR)
-        [[x, y]] = undistorter.points(np.array([[reported.center[0], reported.y2]]) - 0.5).tolist()
-        camera = road.camera
-        metres = camera.focal * camera.above_ground / (y - camera.horizon)
-        assert item["boxes"][0]["distance"] == pytest.approx(metres, rel=0.1)
-        assert item["boxes"][0]["lane"] == round((x - 320) * metres / camera.focal / 3.7)
-        drawn = read_image(out)
-        assert has_outline(drawn, undistorter.box(reported), color_of(1))
-        assert not has_outline(drawn, reported, color_of(1))
-        straight = undistorter.image(read_image(files.picture))
-        assert (drawn[CORNER] == straight[CORNER]).all()
-
-    def test_without_a_camera_pictures_count_as_undistorted_with_one_warning(
-        self, run: Run, files: Files, road: Scene, tmp_path: Path
-    ) -> None:
-        pictures, out = (files.plain, files.bare), tmp_path / "out"
-        result = run("detect-image", *pictures, "-o", out, "--json", "-", *files.red, "--lanes")
-        plain, bare = self.json_of(result)
-        check_lane(plain["lane"], road.camera)
-        assert bare["lane"] is None
-        assert result.err.count("warning") == 1
-        assert "--lanes without --camera: pictures are taken as undistorted" in result.err
-        assert (read_image(out / "bare.png") == read_image(files.bare)).all()
-
-    def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
-        self, run: Run, files: Files, tmp_path: Path
-    ) -> None:
-        other = tmp_path / "other.png"
-        write_image(other, read_image(files.plain)[:400])
-        out = tmp_path / "out"
-        result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
-        assert result.code == 3
-        assert "other.png: the camera was calibrated for 640×480" in result.err
-        assert [path.name for path in out.iterdir()] == ["frame.png"]
+def test_the_lane_and_the_boxes_of_a_picture_are_reported_and_drawn(
+    run: Run, files: Files, tmp_path: Path, road: Scene, undistorter: Undistorter
+) -> None:
+    out = tmp_path / "out.png"
+    options = ("-o", out, "--json", "-", *files.lanes)
+    (item,) = read_json(run("detect-image", files.picture, *options))
+    check_lane(item["lane"], road.camera)
+    (reported,) = map(box_of, item["boxes"])
+    assert sits_on(reported, CAR)
+    [[x, y]] = undistorter.points(np.array([[reported.center[0], reported.y2]]) - 0.5).tolist()
+    camera = road.camera
+    metres = camera.focal * camera.above_ground / (y - camera.horizon)
+    assert item["boxes"][0]["distance"] == pytest.approx(metres, rel=0.1)
+    assert item["boxes"][0]["lane"] == round((x - 320) * metres / camera.focal / 3.7)
+    drawn = read_image(out)
+    assert has_outline(drawn, undistorter.box(reported), color_of(1))
+    straight = undistorter.image(read_image(files.picture))
+    assert (drawn[CORNER] == straight[CORNER]).all()
 
 
-class TestWrongUse:
-    @pytest.mark.parametrize("command", ["detect-video", "detect-image"])
-    def test_a_camera_without_lanes_is_refused(self, run: Run, files: Files, command: str) -> None:
-        outputs = ("out.mp4",) if command == "detect-video" else ("-o", "out.png")
-        result = run(command, files.clip, *outputs, "--camera", files.camera)
-        assert result.code == 2
-        assert "--camera goes with --lanes" in result.err
+def test_without_a_camera_pictures_are_taken_as_undistorted_with_one_warning(
+    run: Run, files: Files, road: Scene, tmp_path: Path
+) -> None:
+    pictures, out = (files.plain, files.bare), tmp_path / "out"
+    result = run("detect-image", *pictures, "-o", out, "--json", "-", *files.red, "--lanes")
+    plain, bare = read_json(result)
+    check_lane(plain["lane"], road.camera)
+    assert bare["lane"] is None
+    assert result.err.count("warning") == 1
+    assert "--lanes without --camera: pictures are taken as undistorted" in result.err
+    assert (read_image(out / "bare.png") == read_image(files.bare)).all()
 
-    @pytest.mark.parametrize(
-        ("text", "words"),
-        [
-            (None, "cannot be read"),
-            ("width: [", "my-camera.yaml:1"),
-            ("width: 640\nheight: 480\n", "matrix: is missing"),
-        ],
-    )
-    @pytest.mark.parametrize("command", ["detect-video", "detect-image"])
-    def test_a_file_that_is_not_a_camera_is_refused(
-        self, run: Run, files: Files, tmp_path: Path, text: str | None, words: str, command: str
-    ) -> None:
-        path = tmp_path / "my-camera.yaml"
-        if text:
-            path.write_text(text)
-        source = files.clip if command == "detect-video" else files.picture
-        out = tmp_path / f"out{source.suffix}"
-        outputs = (out,) if command == "detect-video" else ("-o", out)
-        result = run(command, source, *outputs, "--lanes", "--camera", path)
-        assert result.code == 1
-        assert words in result.err
-        assert not out.exists()
+
+def test_without_lanes_no_lane_is_reported(run: Run, files: Files) -> None:
+    (item,) = read_json(run("detect-image", files.plain, "--json", "-", *files.red))
+    assert "lane" not in item
+
+
+def test_pictures_of_the_stages_are_written(run: Run, files: Files, tmp_path: Path) -> None:
+    assert run("detect-image", files.picture, "--stages", tmp_path / "s", *files.lanes).code == 0
+    assert sorted(path.name for path in (tmp_path / "s").iterdir()) == STAGES
+
+
+def test_a_picture_of_another_aspect_ratio_does_not_stop_the_others(
+    run: Run, files: Files, tmp_path: Path
+) -> None:
+    other, out = tmp_path / "other.png", tmp_path / "out"
+    write_image(other, read_image(files.plain)[:400])
+    result = run("detect-image", other, files.picture, "-o", out, *files.lanes)
+    assert result.code == 3
+    assert "other.png: the camera was calibrated for 640×480" in result.err
+    assert [path.name for path in out.iterdir()] == ["frame.png"]
+
+
+def test_a_video_of_another_aspect_ratio_is_refused(run: Run, files: Files, tmp_path: Path) -> None:
+    wide = tmp_path / "wide.yaml"
+    matrix = ((960, 0, 640), (0, 960, 360), (0, 0, 1))
+    save_camera(CalibratedCamera(1280, 720, matrix, (0, 0, 0, 0, 0), 0), wide)
+    outputs = (tmp_path / "out.mp4", "--tracks", tmp_path / "t.csv")
+    result = run("detect-video", files.clip, *outputs, *files.red, "--lanes", "--camera", wide)
+    assert result.code == 1
+    assert f"{files.clip}: the camera was calibrated for 1280×720" in result.err
+    assert list(tmp_path.iterdir()) == [wide]
+
+
+@pytest.mark.parametrize("command", ["detect-video", "detect-image"])
+def test_wrong_cameras_are_refused(run: Run, files: Files, tmp_path: Path, command: str) -> None:
+    path, out = tmp_path / "my-camera.yaml", tmp_path / "out.mp4"
+    source, outputs = files.clip, [out]
+    if command == "detect-image":
+        source, outputs = files.picture, [Path("-o"), tmp_path / "out.png"]
+    result = run(command, source, *outputs, "--camera", files.camera)
+    assert result.code == 2
+    assert "--camera goes with --lanes" in result.err
+    path.write_text("width: 640\nheight: 480\n")
+    result = run(command, source, *outputs, "--lanes", "--camera", path)
+    assert result.code == 1
+    assert "matrix: is missing" in result.err
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,6 +1,5 @@
 """Painted pixels in the top view, and those that may belong to both lines."""
 
-import cv2
 import numpy as np
 import pytest
 
@@ -20,7 +19,7 @@ from vdet.lanes.paint import (
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
-SETTINGS = LaneSettings()
+VIEW = TopView(LaneSettings(), 1280, 720)
 WHITE, YELLOW = (215, 215, 215), (60, 180, 225)
 
 
@@ -35,146 +34,131 @@ def painted(image: Image, color: tuple[int, int, int], left: int = 148, width: i
     return image
 
 
-def mask_of(image: Image) -> Image:
-    return paint_mask(image)
-
-
-@pytest.mark.parametrize("gray", [30, 60, 90, 130])
+@pytest.mark.parametrize("gray", [30, 60, 130])
 @pytest.mark.parametrize("color", [WHITE, YELLOW])
 def test_lines_are_paint_and_the_road_is_not(gray: int, color: tuple[int, int, int]) -> None:
-    found = mask_of(painted(asphalt(gray), color))
+    found = paint_mask(painted(asphalt(gray), color))
     assert found.dtype == np.uint8
-    assert (found[:, 149:152] == 255).all()
+    assert (found[:, 149:152] == PAINT).all()
     assert not found[:, :144].any()
     assert not found[:, 157:].any()
 
 
 def test_yellow_is_paint_even_if_it_is_not_lighter_than_the_road() -> None:
-    pale = asphalt((168, 172, 176))
-    found = mask_of(painted(pale, (100, 170, 195)))
-    assert found[:, 149:152].all()
+    assert paint_mask(painted(asphalt((168, 172, 176)), (100, 170, 195)))[:, 149:152].all()
 
 
-@pytest.mark.parametrize("levels", [(40, 120), (120, 40), (130, 190)])
-def test_the_edge_of_a_shadow_or_of_another_surface_is_not_paint(levels: tuple[int, int]) -> None:
-    image = asphalt(levels[0])
-    image[:, 150:] = levels[1]
-    assert not mask_of(image).any()
+def test_a_line_in_shadow_is_paint() -> None:
+    image = painted(asphalt(90), WHITE)
+    image[20:60] = (image[20:60] * 0.3).astype(np.uint8)
+    assert paint_mask(image)[:, 149:152].all()
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        painted(asphalt(40), (120, 120, 120), 150, 150),  # the edge of a shadow
+        painted(asphalt(120), (40, 40, 40), 150, 150),
+        painted(asphalt(150), (40, 40, 40)),  # a dark stripe
+        painted(asphalt(90), WHITE, 0),  # at the border
+        np.random.default_rng(0).integers(0, 6, (80, 300, 3), dtype=np.uint8),  # noise in the dark
+    ],
+)
+def test_what_is_not_lighter_than_both_sides_is_not_paint(image: Image) -> None:
+    assert not paint_mask(image).any()
 
 
 def test_a_stripe_much_wider_than_a_line_is_not_paint() -> None:
-    assert not mask_of(painted(asphalt(80), WHITE, left=120, width=60))[:, 130:170].any()
+    assert not paint_mask(painted(asphalt(80), WHITE, left=120, width=60))[:, 130:170].any()
 
 
 def test_sensor_noise_gives_almost_no_paint() -> None:
     noise = np.random.default_rng(0).normal(90, 4, (80, 300, 3))
-    assert np.count_nonzero(mask_of(noise.clip(0, 255).astype(np.uint8))) < 20
+    assert np.count_nonzero(paint_mask(noise.clip(0, 255).astype(np.uint8))) < 20
 
 
-def test_paint_at_the_border_is_left_out() -> None:
-    image = asphalt(90)
-    cv2.rectangle(image, (0, 0), (4, 80), WHITE, cv2.FILLED)
-    assert not mask_of(image).any()
-
-
-@pytest.fixture
-def top_view() -> TopView:
-    return TopView(SETTINGS, 1280, 720)
-
-
-def drawn(top_view: TopView, *lines: Float64Array, rows: slice = slice(None)) -> Image:
+def drawn(*lines: Float64Array, rows: slice = slice(None)) -> Image:
     """Draw lines, given by x at each row, five columns wide."""
-    mask = np.zeros((len(top_view.distances), len(top_view.laterals)), np.uint8)
+    mask = np.zeros((len(VIEW.distances), len(VIEW.laterals)), np.uint8)
     for line in lines:
-        columns = np.rint(top_view.columns(line)).astype(int)
+        columns = np.rint(VIEW.columns(line)).astype(int)
         for row in range(len(mask))[rows]:
-            mask[row, max(0, columns[row] - 2) : columns[row] + 3] = 255
+            mask[row, max(0, columns[row] - 2) : columns[row] + 3] = PAINT
     return mask
 
 
-def constant(top_view: TopView, *laterals: float) -> list[Float64Array]:
-    return [np.full(len(top_view.distances), lateral) for lateral in laterals]
+def constant(*laterals: float) -> list[Float64Array]:
+    return [np.full(len(VIEW.distances), lateral) for lateral in laterals]
 
 
-def test_the_base_is_the_pair_of_lines_around_the_camera(top_view: TopView) -> None:
-    mask = drawn(top_view, *constant(top_view, -3.9, -0.4, 3.3))
-    assert find_base(mask, top_view, SETTINGS) == pytest.approx((-0.4, 3.3), abs=0.05)
+@pytest.mark.parametrize(
+    ("lines", "base"),
+    [
+        ((-1.6, 2.0), (-1.6, 2.0)),
+        ((-3.9, -0.4, 3.3), (-0.4, 3.3)),  # the pair around the camera
+        ((-1.0, 1.0), None),  # too close together
+        ((), None),
+    ],
+)
+def test_the_base_is_where_both_lines_start(
+    lines: tuple[float, ...], base: tuple[float, float] | None
+) -> None:
+    assert find_base(drawn(*constant(*lines)), VIEW) == pytest.approx(base, abs=0.05)
 
 
-def test_lines_too_close_together_have_no_base(top_view: TopView) -> None:
-    assert find_base(drawn(top_view, *constant(top_view, -1.0, 1.0)), top_view, SETTINGS) is None
-
-
-def test_sliding_windows_follow_a_bend(top_view: TopView) -> None:
-    lines = LaneCurves(bend=1 / 500, heading=-0.02, left=-1.85, right=1.85, pitch=0).at(
-        top_view.distances
-    )
-    base = float(lines[0][-1]), float(lines[1][-1])
-    positions = slide_windows(drawn(top_view, *lines), top_view, base)
-    for found, line in zip(positions, lines, strict=True):
+@pytest.mark.parametrize("rows", [slice(None), slice(-40, None)])
+def test_sliding_windows_follow_a_bend_by_both_lines_or_one(rows: slice) -> None:
+    left, right = LaneCurves(1 / 500, -0.02, -1.85, 1.85, 0).at(VIEW.distances)
+    mask = drawn(left) | drawn(right, rows=rows)
+    positions = slide_windows(mask, VIEW, (float(left[-1]), float(right[-1])))
+    for found, line in zip(positions, (left, right), strict=True):
         assert np.abs(found - line).max() < MARGIN
 
 
-def test_a_window_without_paint_moves_with_the_other_line(top_view: TopView) -> None:
-    left, right = LaneCurves(1 / 500, 0, -1.85, 1.85, 0).at(top_view.distances)
-    mask = drawn(top_view, left) | drawn(top_view, right, rows=slice(-40, None))
-    positions = slide_windows(mask, top_view, (float(left[-1]), float(right[-1])))
-    assert np.abs(positions[1] - right).max() < MARGIN
+def test_paint_along_a_line_is_the_middle_of_each_painted_row() -> None:
+    line = np.linspace(1.0, 2.0, len(VIEW.distances))
+    paint = paint_along(drawn(line, rows=slice(10, 90)), VIEW, line + 0.1, margin=0.3)
+    assert (paint.z == VIEW.distances[10:90]).all()
+    assert np.abs(paint.x - line[10:90]).max() < 0.02
+    assert len(paint_along(drawn(line), VIEW, line + 0.5, margin=0.3).z) == 0
 
 
-def test_paint_along_a_line_is_the_middle_of_each_row(top_view: TopView) -> None:
-    line = np.linspace(1.0, 2.0, len(top_view.distances))
-    paint = paint_along(drawn(top_view, line), top_view, line + 0.1, margin=0.3)
-    assert (paint.z == top_view.distances).all()
-    assert np.abs(paint.x - line).max() < 0.02
+@pytest.mark.parametrize("lateral", [-4.8, 20.0])
+def test_paint_along_a_line_outside_the_top_view_stays_inside_it(lateral: float) -> None:
+    mask = np.full((len(VIEW.distances), len(VIEW.laterals)), PAINT, np.uint8)
+    paint = paint_along(mask, VIEW, constant(lateral)[0], margin=0.3)
+    assert ((paint.x >= VIEW.laterals[0]) & (paint.x <= VIEW.laterals[-1])).all()
 
 
-@pytest.mark.parametrize("lateral", [-4.8, 4.8, -20.0, 20.0])
-def test_paint_along_a_line_outside_the_top_view_stays_inside_it(
-    top_view: TopView, lateral: float
-) -> None:
-    mask = np.full((len(top_view.distances), len(top_view.laterals)), 255, np.uint8)
-    paint = paint_along(mask, top_view, constant(top_view, lateral)[0], margin=0.3)
-    assert ((paint.x >= top_view.laterals[0]) & (paint.x <= top_view.laterals[-1])).all()
+def box_from(left: float, right: float, distance: float) -> Box:
+    """Return the box of a thing on the road that rises far above the horizon."""
+    ends = np.array([left, right]), np.array([distance, distance])
+    [[x0, y0], [x1, _]] = VIEW.ground_to_frame(*ends)
+    return Box.sized(round(x0), 100, round(x1 - x0), round(y0) - 100)
 
 
-class TestHiddenPaint:
-    VIEW = TopView(SETTINGS, 1280, 720)
+def test_a_vehicle_hides_the_road_behind_it_and_nothing_else() -> None:
+    before = drawn(*constant(-1.85, 1.85))
+    after = hide(before, VIEW, [box_from(0.5, 2.5, 20)])
+    changed = (after != before).any(axis=1)
+    assert set(np.unique(after[after != before])) == {HIDDEN}
+    assert not changed[VIEW.distances < 19.5].any()
+    assert changed[VIEW.distances > 20.5].all()
 
-    def box_from(self, left: float, right: float, distance: float) -> Box:
-        """Return the box of a thing on the road that rises far above the horizon."""
-        ends = np.array([left, right]), np.array([distance, distance])
-        [[x0, y0], [x1, _]] = self.VIEW.ground_to_frame(*ends)
-        return Box.sized(round(x0), 100, round(x1 - x0), round(y0) - 100)
 
-    def mask(self) -> Image:
-        mask = np.zeros((len(self.VIEW.distances), len(self.VIEW.laterals)), np.uint8)
-        for lateral in (-1.85, 1.85):
-            mask[:, np.abs(self.VIEW.laterals - lateral) < 0.1] = PAINT
-        return mask
+def test_above_the_farthest_row_a_vehicle_hides_nothing() -> None:
+    above = Box.sized(600, 0, 100, int(VIEW.outline[:, 1].min()) - 2)
+    mask = drawn(*constant(-1.85, 1.85))
+    assert (hide(mask, VIEW, [above]) == mask).all()
 
-    def test_a_vehicle_hides_the_road_behind_it_and_nothing_else(self) -> None:
-        before = self.mask()
-        after = hide(before, self.VIEW, [self.box_from(0.5, 2.5, 20)])
-        changed = (after != before).any(axis=1)
-        assert set(np.unique(after[after != before])) == {HIDDEN}
-        assert not changed[self.VIEW.distances < 19.5].any()
-        assert changed[self.VIEW.distances > 20.5].all()
-        assert (before == self.mask()).all(), "the mask that was given stays"
 
-    def test_above_the_farthest_row_a_vehicle_hides_nothing(self) -> None:
-        box = self.box_from(0.5, 2.5, 20)
-        above = Box.sized(box.x1, 0, box.width, int(self.VIEW.outline[:, 1].min()) - 2)
-        assert (hide(self.mask(), self.VIEW, [above]) == self.mask()).all()
-
-    def test_rows_of_which_a_part_is_hidden_are_left_out(self) -> None:
-        whole = np.full(len(self.VIEW.distances), 1.85)
-        # from 20 m on, the box hides the inner half of the right line's paint
-        half = hide(self.mask(), self.VIEW, [self.box_from(-0.5, 1.85, 20)])
-        paint = paint_along(half, self.VIEW, whole, 0.2)
-        assert paint.z.max() < 20.5
-        assert paint.x == pytest.approx(1.85, abs=0.02)
-        assert paint.visible == pytest.approx(len(paint.z) / len(whole))
-        other = paint_along(half, self.VIEW, -whole, 0.2)
-        assert len(other.z) == len(whole)
-        assert other.visible == 1
+def test_rows_that_are_hidden_in_part_are_left_out() -> None:
+    mask = drawn(*constant(-1.85, 1.85))
+    # from 20 m on, the box hides the inner half of the right line's paint
+    half = hide(mask, VIEW, [box_from(-0.5, 1.85, 20)])
+    hidden, free = (paint_along(half, VIEW, x, 0.2) for x in constant(1.85, -1.85))
+    assert hidden.z.max() < 20.5
+    assert hidden.x == pytest.approx(1.85, abs=0.02)
+    assert hidden.visible == pytest.approx(len(hidden.z) / len(mask))
+    assert len(free.z) == len(mask)
+    assert free.visible == 1

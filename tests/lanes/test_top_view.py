@@ -7,38 +7,39 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from vdet.config.lanes import LaneSettings
-from vdet.lanes.top_view import ALONG, TopView
+from vdet.lanes.top_view import ACROSS, ALONG, TopView
 from vdet.synthetic.camera import PinholeCamera
 
 SettingsFor = Callable[[PinholeCamera], LaneSettings]
+CAMERA = PinholeCamera.dashboard(1280, 720)
 
 
 @pytest.fixture
-def camera() -> PinholeCamera:
-    return PinholeCamera.dashboard(1280, 720)
+def top_view(settings_for: SettingsFor) -> TopView:
+    return TopView(settings_for(CAMERA), CAMERA.width, CAMERA.height)
 
 
-@pytest.fixture
-def top_view(camera: PinholeCamera, settings_for: SettingsFor) -> TopView:
-    return TopView(settings_for(camera), camera.width, camera.height)
-
-
-def test_ground_points_lie_where_the_camera_sees_them(
-    top_view: TopView, camera: PinholeCamera
-) -> None:
+def test_ground_points_lie_where_the_camera_sees_them(top_view: TopView) -> None:
     x, z = np.array([-1.85, 0, 1.85, 4.0]), np.array([6.0, 20.0, 42.0, 9.0])
-    expected = camera.project(np.column_stack([x, np.zeros(4), z]))
+    expected = CAMERA.project(np.column_stack([x, np.zeros(4), z]))
     assert top_view.ground_to_frame(x, z) == pytest.approx(expected, abs=0.01)
 
 
-def test_a_line_on_the_road_is_upright_and_at_its_position(
-    top_view: TopView, camera: PinholeCamera
-) -> None:
+def test_rows_run_from_far_to_near_and_columns_are_symmetric(top_view: TopView) -> None:
+    assert len(top_view.distances) == 36 * 8
+    assert top_view.distances[[0, -1]] == pytest.approx([42 - 1 / 16, 6 + 1 / 16], abs=0.01)
+    assert len(top_view.laterals) == round(9.7 * 30)
+    assert top_view.laterals[0] == pytest.approx(-top_view.laterals[-1])
+    assert top_view.columns(top_view.laterals) == pytest.approx(np.arange(len(top_view.laterals)))
+
+
+def test_a_line_on_the_road_is_upright_and_at_its_position(top_view: TopView) -> None:
     frame = np.zeros((720, 1280, 3), np.uint8)
     ground = np.array([[0.9, 0, 5], [0.9, 0, 60], [1.1, 0, 60], [1.1, 0, 5]], float)
-    cv2.fillPoly(frame, [np.rint(camera.project(ground)).astype(np.int32)], (255, 255, 255))
+    cv2.fillPoly(frame, [np.rint(CAMERA.project(ground)).astype(np.int32)], (255, 255, 255))
     lit = top_view.image(frame)[..., 0] > 127
     middle = (lit * top_view.laterals).sum(axis=1) / lit.sum(axis=1)
     assert np.abs(middle - 1.0).max() < 0.05
@@ -52,25 +53,38 @@ def test_frame_and_top_view_pixels_show_the_same_ground(x: float, z: float) -> N
     assert row == pytest.approx((top_view.distances[0] - z) * ALONG, abs=1e-6)
 
 
+def test_outline_is_the_border_of_the_top_view_in_the_frame(top_view: TopView) -> None:
+    half = len(top_view.laterals) / 2 / ACROSS
+    corners = [[-half, 0, 42], [half, 0, 42], [half, 0, 6], [-half, 0, 6]]
+    assert top_view.outline == pytest.approx(CAMERA.project(np.array(corners)), abs=0.5)
+
+
 def test_the_trapezoid_may_be_measured_away_from_the_middle_of_the_lane(
-    camera: PinholeCamera, settings_for: SettingsFor
+    settings_for: SettingsFor,
 ) -> None:
-    middle = settings_for(camera)
-    shift = 0.5 * camera.focal / camera.width  # half a metre; divide by the distance
-    moved = middle.model_copy(
-        update={
-            "top_left": middle.top_left - shift / 42,
-            "top_right": middle.top_right - shift / 42,
-            "bottom_left": middle.bottom_left - shift / 6,
-            "bottom_right": middle.bottom_right - shift / 6,
-        }
+    middle = settings_for(CAMERA)
+    shift = 0.5 * CAMERA.focal / CAMERA.width  # half a metre; divide by the distance
+    sides = {"top_left": 42, "top_right": 42, "bottom_left": 6, "bottom_right": 6}
+    moved = {name: getattr(middle, name) - shift / metres for name, metres in sides.items()}
+    x, z = np.array([-1.0, 2.0]), np.array([10.0, 30.0])
+    one, other = (
+        TopView(settings, 1280, 720).ground_to_frame(x, z)
+        for settings in (middle, middle.model_copy(update=moved))
     )
-    x, z = np.array([-1.0, 2.0]), np.array([10.0, 30.0])
-    views = [TopView(settings, 1280, 720) for settings in (middle, moved)]
-    assert views[0].ground_to_frame(x, z) == pytest.approx(views[1].ground_to_frame(x, z), abs=0.01)
+    assert one == pytest.approx(other, abs=0.01)
 
 
-def test_the_same_settings_fit_frames_of_any_size() -> None:
-    x, z = np.array([-1.0, 2.0]), np.array([10.0, 30.0])
-    small, large = (TopView(LaneSettings(), 640 * n, 360 * n).ground_to_frame(x, z) for n in (1, 3))
-    assert small * 3 == pytest.approx(large, abs=0.01)
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"top": 0.95}, "bottom must be below top"),
+        ({"top_left": 0.6}, "closer together at top"),
+        ({"bottom_left": 0.46, "bottom_right": 0.54}, "closer together at top"),
+        ({"length": float("nan")}, "finite"),
+    ],
+)
+def test_settings_that_are_not_a_trapezoid_are_refused(
+    changes: dict[str, float], message: str
+) -> None:
+    with pytest.raises(ValidationError, match=message):
+        LaneSettings(**(LaneSettings().model_dump() | changes))

@@ -12,7 +12,9 @@ from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.road import LaneRequest
 from vdet.media.images import Image
 
-LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+LENS = CalibratedCamera(
+    WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
+)
 COUNT = 40
 
 

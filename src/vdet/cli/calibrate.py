@@ -48,7 +48,7 @@ def calibrate(
     Take ten or more, of the whole flat board, from different sides.
     """
     from vdet.lanes import calibration
-    from vdet.lanes.camera_file import save_camera
+    from vdet.lanes.camera import save_camera
     from vdet.run.pictures import find_images
 
     options.check_suffix(output, ".yaml", ".yml", what="cameras")
@@ -59,13 +59,13 @@ def calibrate(
     with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)
         result = calibration.calibrate(found, pattern)
-    for skip in result.skipped:
-        log.warning("%s: not used: %s", skip.path, skip.reason)
+    for path, reason in result.skipped.items():
+        log.warning("%s: not used: %s", path, reason)
     save_camera(result.camera, output, overwrite=overwrite)
     if preview:
         calibration.write_previews(preview, result, pattern, overwrite=overwrite)
     camera = result.camera
     print_lines(
-        f"{output}: {camera.width}×{camera.height}, focal length {camera.focal[0]:.0f} px, "
+        f"{output}: {camera.width}×{camera.height}, focal length {camera.matrix[0][0]:.0f} px, "
         f"RMS error {camera.rms:.2f} px, {len(result.photos)} of {len(found)} photographs used"
     )

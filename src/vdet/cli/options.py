@@ -317,7 +317,7 @@ class LaneChoice:
             raise click.UsageError("--camera goes with --lanes")
         if not self.lanes:
             return None
-        from vdet.lanes.camera_file import load_camera
+        from vdet.lanes.camera import load_camera
         from vdet.lanes.road import LaneRequest
 
         if self.camera_path is None:

@@ -2,14 +2,12 @@
 
 The modules in the order in which data flows through them:
 
-1. `calibration` fits a camera to photographs of a chessboard. `camera_file` writes and reads it.
-2. `camera` describes the camera, and removes its lens distortion from frames and boxes.
+1. `calibration` fits a camera to photographs of a chessboard.
+2. `camera` is this camera and its file. It removes the lens distortion from frames and boxes.
 3. `top_view` warps an undistorted frame to the road as seen from above, in metres.
 4. `paint` marks the painted pixels of this view, and finds those that may belong to the lane.
-5. `curves` fits the two lines of the lane to painted pixels, by least squares.
-6. `frame_fit` does steps 4 and 5 for one frame, and checks that the result can be a lane.
-7. `road` does steps 2 to 6 for all frames of a video, and smooths the lane over time.
-
-`lane` is the result for one frame and its JSON form. `drawing` draws it. `position` tells where on
-the road a vehicle is.
+5. `curves` fits the two lines of the lane to them by least squares, and checks the result.
+6. `road` does steps 2 to 5 for all frames of a video, smooths the lane over time, and computes
+   where on the road a vehicle is.
+7. `drawing` draws the lane.
 """

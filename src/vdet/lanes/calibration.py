@@ -6,12 +6,13 @@ were found, and whether straight lines become straight.
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 import numpy as np
+from pydantic import ValidationError
 
 from vdet.boxes import Float32Array, Float64Array
 from vdet.errors import ImageError, OutputError
@@ -46,22 +47,13 @@ class BoardPhoto:
 
 
 @dataclass(frozen=True, slots=True)
-class SkippedPhoto:
-    """A photograph that was not used, and the reason."""
-
-    path: Path
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
 class Calibration:
     """A camera, and the photographs that it was fitted to."""
 
     camera: CalibratedCamera
-    photos: tuple[BoardPhoto, ...]
-    errors: tuple[float, ...]
-    """Root mean square distance of the corners to the model's, pixels, for each of `photos`."""
-    skipped: tuple[SkippedPhoto, ...]
+    photos: list[BoardPhoto]
+    skipped: dict[Path, str]
+    """The photographs that were not used, each with the reason."""
 
 
 def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
@@ -77,19 +69,17 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     ImageError
         Fewer than `MIN_PHOTOS` photographs can be used, or all show the board from one side.
     """
-    photos, skipped = _find_boards(paths, pattern)
-    photos, odd = _of_one_size(photos)
-    skipped += odd
-    _check_number(photos, skipped, pattern)
+    boards = {path: _find_board(path, pattern) for path in paths}
+    skipped = {path: board for path, board in boards.items() if isinstance(board, str)}
+    photos = [board for board in boards.values() if isinstance(board, BoardPhoto)]
+    skipped |= _of_other_sizes(photos)
+    photos = _without(skipped, photos, pattern)
     fit = _fit(photos, pattern)
     if outliers := _outliers(photos, fit.errors):
-        skipped += outliers
-        dropped = {outlier.path for outlier in outliers}
-        photos = [photo for photo in photos if photo.path not in dropped]
-        _check_number(photos, skipped, pattern)
+        skipped |= outliers
+        photos = _without(skipped, photos, pattern)
         fit = _fit(photos, pattern)
-    _check_fit(fit)
-    return Calibration(fit.camera, tuple(photos), fit.errors, tuple(skipped))
+    return Calibration(_camera_of(fit, _common_size(photos)), photos, skipped)
 
 
 def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
@@ -136,103 +126,97 @@ def _preview_of(path: Path, folder: Path) -> Path:
     return folder / f"{path.stem}.jpg"
 
 
-def _find_boards(
-    paths: Iterable[Path], pattern: Pattern
-) -> tuple[list[BoardPhoto], list[SkippedPhoto]]:
-    photos, skipped = [], []
-    for path in paths:
-        try:
-            image = read_image(path)
-        except ImageError as error:
-            skipped.append(SkippedPhoto(path, str(error).removeprefix(f"{path}: ")))
-            continue
-        corners = find_corners(image, pattern)
-        if corners is None:
-            reason = f"no board of {_text(pattern)} inner corners is seen"
-            skipped.append(SkippedPhoto(path, reason))
-        else:
-            photos.append(BoardPhoto(path, (image.shape[1], image.shape[0]), corners))
-    return photos, skipped
+def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
+    """Search the board in a photograph; return the reason if the photograph cannot be used."""
+    try:
+        image = read_image(path)
+    except ImageError as error:
+        return str(error).removeprefix(f"{path}: ")
+    corners = find_corners(image, pattern)
+    if corners is None:
+        return f"no board of {_text(pattern)} inner corners is seen"
+    return BoardPhoto(path, (image.shape[1], image.shape[0]), corners)
 
 
-def _of_one_size(photos: list[BoardPhoto]) -> tuple[list[BoardPhoto], list[SkippedPhoto]]:
-    if not photos:
-        return [], []
-    width, height = _common_size(photos)
-    same, odd = [], []
-    for photo in photos:
-        if max(abs(photo.size[0] - width), abs(photo.size[1] - height)) <= SIZE_TOLERANCE:
-            same.append(photo)
-        else:
-            reason = f"is {photo.size[0]}×{photo.size[1]}, the others are {width}×{height}"
-            odd.append(SkippedPhoto(photo.path, reason))
-    return same, odd
+def _of_other_sizes(photos: Sequence[BoardPhoto]) -> dict[Path, str]:
+    sizes = {photo.path: np.array(photo.size) for photo in photos}
+    common = _common_size(photos)
+    return {
+        path: f"is {_text(size)}, the others are {_text(common)}"
+        for path, size in sizes.items()
+        if np.abs(size - common).max() > SIZE_TOLERANCE
+    }
 
 
-def _common_size(photos: Iterable[BoardPhoto]) -> tuple[int, int]:
-    return Counter(photo.size for photo in photos).most_common(1)[0][0]
+def _common_size(photos: Sequence[BoardPhoto]) -> tuple[int, int]:
+    sizes = Counter(photo.size for photo in photos)
+    return max(sizes, key=sizes.__getitem__, default=(0, 0))
 
 
-def _check_number(photos: list[BoardPhoto], skipped: list[SkippedPhoto], pattern: Pattern) -> None:
-    if len(photos) < MIN_PHOTOS:
+def _without(
+    skipped: Mapping[Path, str], photos: Sequence[BoardPhoto], pattern: Pattern
+) -> list[BoardPhoto]:
+    """Return the photographs that are not skipped; refuse too few of them."""
+    kept = [photo for photo in photos if photo.path not in skipped]
+    if len(kept) < MIN_PHOTOS:
         raise ImageError(
-            f"only {len(photos)} of {len(photos) + len(skipped)} photographs can be used, at least "
+            f"only {len(kept)} of {len(kept) + len(skipped)} photographs can be used, at least "
             f"{MIN_PHOTOS} are needed; take more of the whole board from different sides, or "
             f"give another --pattern than {_text(pattern)}"
         )
+    return kept
 
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    camera: CalibratedCamera
-    errors: tuple[float, ...]
-    angle: float
-    """The largest angle between the boards of two photographs, degrees."""
+    """What OpenCV finds: the camera, and how each photograph shows the board."""
+
+    rms: float
+    matrix: Float64Array
+    distortion: Float64Array
+    rotations: Float64Array
+    """Rotation vectors of the boards, `(n, 3, 1)`."""
+    errors: Float64Array
+    """Root mean square distance of the corners to the model's, pixels, for each photograph."""
 
 
-def _check_fit(fit: _Fit) -> None:
-    """Refuse boards that are all seen from one side: these fit cameras of any focal length."""
-    if fit.angle < MIN_ANGLE or fit.camera.problem:
-        raise ImageError(
-            "the focal length cannot be found: all photographs show the board from much the same "
-            f"side (they differ by {fit.angle:.0f}°, {MIN_ANGLE:.0f}° are needed); take some with "
-            "the board slanted, to the left and to the right, up and down"
-        )
-
-
-def _fit(photos: list[BoardPhoto], pattern: Pattern) -> _Fit:
+def _fit(photos: Sequence[BoardPhoto], pattern: Pattern) -> _Fit:
     """Fit a camera to the corners of all photographs; a square of the board is 1 unit long."""
     board = np.zeros((pattern[0] * pattern[1], 3), np.float32)
     board[:, :2] = np.mgrid[: pattern[0], : pattern[1]].T.reshape(-1, 2)
-    size = _common_size(photos)
+    corners = [photo.corners for photo in photos]
     rms, matrix, distortion, rotations, *_, errors = cv2.calibrateCameraExtended(
-        [board] * len(photos), [photo.corners for photo in photos], size, np.eye(3), np.zeros(5)
+        [board] * len(photos), corners, _common_size(photos), np.eye(3), np.zeros(5)
     )
-    (fx, _, cx), (_, fy, cy), _ = np.asarray(matrix).tolist()
-    k1, k2, p1, p2, k3 = np.ravel(distortion).tolist()
-    camera = CalibratedCamera(*size, (fx, fy), (cx, cy), (k1, k2, p1, p2, k3), rms)
-    angle = _largest_angle(np.asarray(rotations, np.float64))
-    return _Fit(camera, tuple(np.ravel(errors).tolist()), angle)
+    return _Fit(rms, *(np.asarray(a, np.float64) for a in (matrix, distortion, rotations, errors)))
 
 
-def _largest_angle(rotations: Float64Array) -> float:
-    """Return the largest angle between two boards, degrees; rotation vectors `(n, 3, 1)`."""
-    normals = np.array([cv2.Rodrigues(rotation)[0][:, 2] for rotation in rotations])
-    return float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min())))
-
-
-def _outliers(photos: list[BoardPhoto], errors: Sequence[float]) -> list[SkippedPhoto]:
+def _outliers(photos: Sequence[BoardPhoto], errors: Float64Array) -> dict[Path, str]:
     median = float(np.median(errors))
-    return [
-        SkippedPhoto(
-            photo.path,
-            f"is an outlier: error {error:.2f} px, more than {OUTLIER_RATIO:g} times the median "
-            f"of {median:.2f} px",
-        )
-        for photo, error in zip(photos, errors, strict=True)
+    return {
+        photo.path: f"is an outlier: error {error:.2f} px, more than {OUTLIER_RATIO:g} times the "
+        f"median of {median:.2f} px"
+        for photo, error in zip(photos, errors.ravel().tolist(), strict=True)
         if error > OUTLIER_RATIO * median
-    ]
+    }
 
 
-def _text(pattern: Pattern) -> str:
-    return f"{pattern[0]}×{pattern[1]}"
+def _camera_of(fit: _Fit, size: tuple[int, int]) -> CalibratedCamera:
+    """Refuse boards that are all seen from one side: these fit cameras of any focal length."""
+    normals = np.array([cv2.Rodrigues(rotation)[0][:, 2] for rotation in fit.rotations])
+    angle = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min())))
+    try:
+        if angle >= MIN_ANGLE:
+            k1, k2, p1, p2, k3 = fit.distortion.ravel().tolist()
+            return CalibratedCamera(*size, fit.matrix.tolist(), (k1, k2, p1, p2, k3), fit.rms)
+    except ValidationError:  # no real camera has such values
+        pass
+    raise ImageError(
+        "the focal length cannot be found: all photographs show the board from much the same "
+        f"side (they differ by {angle:.0f}°, {MIN_ANGLE:.0f}° are needed); take some with "
+        "the board slanted, to the left and to the right, up and down"
+    )
+
+
+def _text(size: Iterable[int]) -> str:
+    return "×".join(map(str, size))

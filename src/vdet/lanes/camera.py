@@ -1,57 +1,70 @@
-"""A calibrated camera, and frames and boxes without its lens distortion."""
+"""A calibrated camera and its file, and frames and boxes without its lens distortion."""
 
-from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, field_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import ErrorDetails
+from pydantic_core.core_schema import ValidationInfo
 
 from vdet.boxes import Box, Float64Array
+from vdet.config.document import Document, config_error, format_key, read_document
 from vdet.errors import ConfigError
+from vdet.files import staged
 from vdet.media.images import Image
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 _OUTLINE_POINTS = 16  # on each side of a box
 
+_Side = Annotated[int, Field(ge=16, le=100_000)]
+_Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
+_Row = tuple[float, float, float]
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(frozen=True, slots=True, config=ConfigDict(extra="forbid", allow_inf_nan=False))
 class CalibratedCamera:
-    """A pinhole camera with lens distortion, for one frame size.
+    """A pinhole camera with lens distortion, for one frame size. Its fields are the file's keys.
 
     The distortion is Brown's model, as OpenCV implements it. All lengths are in pixels; x points
     right, y points down, and whole numbers are pixel centres.
     """
 
-    width: int
-    height: int
-    focal: tuple[float, float]
-    """Focal lengths along x and y."""
-    center: tuple[float, float]
-    """Principal point `(x, y)`."""
-    distortion: tuple[float, float, float, float, float]
+    width: _Side
+    height: _Side
+    matrix: tuple[_Row, _Row, _Row]
+    """Focal lengths and principal point: `((fx, 0, cx), (0, fy, cy), (0, 0, 1))`."""
+    distortion: tuple[_Coefficient, _Coefficient, _Coefficient, _Coefficient, _Coefficient]
     """k1, k2, p1, p2, k3."""
-    rms: float
+    rms: Annotated[float, Field(ge=0)]
     """Root mean square distance between the corners in the calibration photographs and the corners
     that the camera model predicts."""
 
-    @property
-    def matrix(self) -> Float64Array:
-        """The camera matrix, `(3, 3)`."""
-        (fx, fy), (cx, cy) = self.focal, self.center
-        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    @field_validator("matrix")
+    @classmethod
+    def _check_matrix(
+        cls, matrix: tuple[_Row, _Row, _Row], info: ValidationInfo
+    ) -> tuple[_Row, _Row, _Row]:
+        (fx, skew, x), (zero, fy, y), last = matrix
+        if (skew, zero, last) != (0, 0, (0, 0, 1)):
+            raise ValueError("should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
+        if {"width", "height"} <= info.data.keys():  # else they are wrong themselves
+            width, height = info.data["width"], info.data["height"]
+            shortest, longest = 0.1 * width, 100.0 * width
+            if not (shortest <= min(fx, fy) and max(fx, fy) <= longest):
+                raise ValueError(
+                    f"focal lengths should be {shortest:g} to {longest:g} px at this frame size"
+                )
+            if not (0 <= x < width and 0 <= y < height):
+                raise ValueError(
+                    f"the principal point should lie in the frame (is {x:.6g}, {y:.6g})"
+                )
+        return matrix
 
-    @property
-    def problem(self) -> str | None:
-        """Why no real camera has these values; None if one may have them."""
-        shortest, longest = 0.1 * self.width, 100.0 * self.width
-        if not all(shortest <= length <= longest for length in self.focal):
-            return f"focal lengths should be {shortest:g} to {longest:g} px at this frame size"
-        x, y = self.center
-        if not (0 <= x < self.width and 0 <= y < self.height):
-            return f"the principal point should lie in the frame (is {x:.6g}, {y:.6g})"
-        return None
-
-    def scaled_to(self, width: int, height: int) -> "CalibratedCamera":
-        """Return the same camera for frames of another size with the same aspect ratio.
+    def matrix_for(self, width: int, height: int) -> Float64Array:
+        """Return the camera matrix `(3, 3)` for frames of another size, but the same aspect ratio.
 
         Raises
         ------
@@ -65,21 +78,16 @@ class CalibratedCamera:
                 f"to {width}×{height}, another aspect ratio; calibrate with photographs of that "
                 "aspect ratio"
             )
-        (fx, fy), (cx, cy) = self.focal, self.center
-        return replace(
-            self,
-            width=width,
-            height=height,
-            focal=(fx * across, fy * down),
-            center=((cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5),
-            rms=self.rms * down,
-        )
+        (fx, _, cx), (_, fy, cy), last = self.matrix
+        x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
+        return np.array([(fx * across, 0, x), (0, fy * down, y), last])
 
 
 class Undistorter:
     """Removes the lens distortion of one camera from frames of one size.
 
-    Focal lengths, principal point and frame size stay the same. Threads may share an undistorter.
+    Focal lengths, principal point and frame size stay the same. Without a camera, nothing changes.
+    Threads may share an undistorter.
 
     Raises
     ------
@@ -87,20 +95,26 @@ class Undistorter:
         The aspect ratio of the frames is not the camera's.
     """
 
-    def __init__(self, camera: CalibratedCamera, width: int, height: int) -> None:
-        self._camera = camera.scaled_to(width, height)
-        self._matrix = self._camera.matrix
-        self._distortion = np.array(self._camera.distortion)
-        self._maps = cv2.initUndistortRectifyMap(
-            self._matrix, self._distortion, np.eye(3), self._matrix, (width, height), cv2.CV_16SC2
-        )
+    def __init__(self, camera: CalibratedCamera | None, width: int, height: int) -> None:
+        self._camera = camera
+        if camera:
+            self._size = width, height
+            self._matrix = camera.matrix_for(width, height)
+            self._distortion = np.array(camera.distortion)
+            self._maps = cv2.initUndistortRectifyMap(
+                self._matrix, self._distortion, np.eye(3), self._matrix, self._size, cv2.CV_16SC2
+            )
 
     def image(self, image: Image) -> Image:
         """Return the undistorted frame, BGR uint8 `(H, W, 3)`; black outside the camera's view."""
+        if not self._camera:
+            return image
         return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
 
     def points(self, points: Float64Array) -> Float64Array:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""
+        if not self._camera:
+            return points
         moved = cv2.undistortPoints(
             points.reshape(-1, 1, 2), self._matrix, self._distortion, P=self._matrix
         )
@@ -111,20 +125,66 @@ class Undistorter:
 
         It is clipped to the frame. Its area is 0 if it lies outside.
         """
+        if not self._camera:
+            return box
         outline = self.points(_outline(box))
         left, top = np.rint(outline.min(axis=0) + 0.5).astype(int).tolist()
         right, bottom = np.rint(outline.max(axis=0) + 0.5).astype(int).tolist()
-        return Box(left, top, right, bottom).clipped(self._camera.width, self._camera.height)
+        return Box(left, top, right, bottom).clipped(*self._size)
 
 
 def _outline(box: Box) -> Float64Array:
     """Return points on the outline of a box, half a pixel outside its outer pixel centres."""
     x = np.linspace(box.x1 - 0.5, box.x2 - 0.5, _OUTLINE_POINTS)
     y = np.linspace(box.y1 - 0.5, box.y2 - 0.5, _OUTLINE_POINTS)
-    sides = [
-        np.column_stack([x, np.full_like(x, y[0])]),
-        np.column_stack([x, np.full_like(x, y[-1])]),
-        np.column_stack([np.full_like(y, x[0]), y]),
-        np.column_stack([np.full_like(y, x[-1]), y]),
-    ]
-    return np.concatenate(sides)
+    grid = np.stack(np.meshgrid(x, y), axis=2)
+    return np.concatenate([grid[0], grid[-1], grid[:, 0], grid[:, -1]])
+
+
+def save_camera(camera: CalibratedCamera, path: Path, *, overwrite: bool = False) -> None:
+    """Write a camera as YAML. Raises `OutputError`."""
+    rows = "\n".join(f"  - {list(row)}" for row in camera.matrix)
+    text = f"""\
+# A camera, written by `vdet calibrate`.
+
+# frame size, pixels
+width: {camera.width}
+height: {camera.height}
+# focal lengths and principal point, pixels: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
+matrix:
+{rows}
+# lens distortion (OpenCV's model): [k1, k2, p1, p2, k3]
+distortion: {list(camera.distortion)}
+# root mean square error of the chessboard corners, pixels
+rms: {camera.rms!r}
+"""
+    with staged(path, overwrite=overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def load_camera(path: Path) -> CalibratedCamera:
+    """Read a camera file.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, is not YAML, or is not a camera file; one line for each mistake.
+    """
+    document = read_document(path)
+    try:
+        return TypeAdapter(CalibratedCamera).validate_python(document.values)
+    except ValidationError as error:
+        lines = (_describe(detail, document) for detail in error.errors())
+        raise config_error(lines, error.error_count()) from error
+
+
+def _describe(detail: ErrorDetails, document: Document) -> str:
+    match detail["type"]:
+        case "missing":
+            text = "is missing; `vdet calibrate` writes camera files"
+        case "unexpected_keyword_argument":
+            text = "is not a key of camera files"
+        case _:
+            text = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    key = tuple(detail["loc"])
+    return f"{document.place_of(key)}: {format_key(key)}: {text}"

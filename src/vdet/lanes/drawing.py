@@ -2,13 +2,11 @@
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from vdet.boxes import Float64Array
+from vdet.boxes import Float64Array, Int32Array
 from vdet.draw.boxes import draw_label, line_width
-from vdet.draw.paint import Color
-from vdet.lanes.lane import Lane
-from vdet.lanes.top_view import TopView
+from vdet.draw.paint import Color, draw_lines
+from vdet.lanes.road import Lane, Road
 from vdet.media.images import Image
 
 AREA: Color = (80, 200, 60)
@@ -37,33 +35,21 @@ def lane_text(lane: Lane) -> tuple[str, str]:
     )
 
 
-def stage_pictures(
-    image: Image, top: Image, mask: Image, lane: Lane | None, top_view: TopView
-) -> dict[str, Image]:
-    """Return pictures of the stages: `road`, `above`, `mask` and `fit`, BGR uint8.
+def stage_pictures(road: Road) -> dict[str, Image]:
+    """Return pictures of the stages, BGR uint8.
 
-    Parameters
-    ----------
-    image
-        The undistorted frame, BGR uint8 `(H, W, 3)`; `road` shows the outline of the top view
-        in it.
-    top
-        The top view of the frame, BGR uint8 `(rows, columns, 3)`; `above`, and `fit` with the lane.
-    mask
-        The paint in the top view, uint8 `(rows, columns)`; what vehicles hide is grey.
+    `road` is the undistorted frame with the outline of the top view, `above` the top view, `mask`
+    its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
-    road = image.copy()
-    outline = _fixed_point(top_view.outline)
-    cv2.polylines(road, [outline], True, LINE, line_width(image), cv2.LINE_AA, _SHIFT)
-    fit = _enlarge(top)
-    if lane:
-        _draw_area(fit, *(top_view.frame_to_top(line) * _SCALE for line in (lane.left, lane.right)))
-    return {
-        "road": road,
-        "above": _enlarge(top),
-        "mask": _enlarge(np.asarray(cv2.cvtColor(mask, cv2.COLOR_GRAY2BGR), np.uint8)),
-        "fit": fit,
-    }
+    frame = road.image.copy()
+    outline = _fixed_point(road.top_view.outline)
+    draw_lines(frame, outline, LINE, line_width(frame), closed=True, shift=_SHIFT)
+    above, fit = _enlarge(road.view.top), _enlarge(road.view.top)
+    if lane := road.lane:
+        lines = (road.top_view.frame_to_top(line) * _SCALE for line in (lane.left, lane.right))
+        _draw_area(fit, *lines)
+    mask = np.asarray(cv2.cvtColor(road.view.mask, cv2.COLOR_GRAY2BGR), np.uint8)
+    return {"road": frame, "above": above, "mask": _enlarge(mask), "fit": fit}
 
 
 def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
@@ -76,14 +62,13 @@ def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
     tinted = around.copy()
     cv2.fillPoly(tinted, [_fixed_point(area - (x0, y0))], AREA, cv2.LINE_8, _SHIFT)
     around[:] = cv2.addWeighted(tinted, _OPACITY, around, 1 - _OPACITY, 0)
-    lines = [_fixed_point(left), _fixed_point(right)]
-    cv2.polylines(image, lines, False, LINE, line_width(image), cv2.LINE_AA, _SHIFT)
+    for line in (left, right):
+        draw_lines(image, _fixed_point(line), LINE, line_width(image), shift=_SHIFT)
 
 
 def _enlarge(picture: Image) -> Image:
-    size = (picture.shape[1] * _SCALE, picture.shape[0] * _SCALE)
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_NEAREST), np.uint8)
+    return picture.repeat(_SCALE, axis=0).repeat(_SCALE, axis=1)
 
 
-def _fixed_point(points: Float64Array) -> npt.NDArray[np.int32]:
+def _fixed_point(points: Float64Array) -> Int32Array:
     return np.rint(points * (1 << _SHIFT)).astype(np.int32)

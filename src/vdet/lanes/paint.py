@@ -13,7 +13,6 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.lanes import LaneSettings
 from vdet.lanes.top_view import ACROSS, ALONG, TopView
 from vdet.media.images import Image
 
@@ -54,8 +53,6 @@ _BASE = 15.0
 _WINDOW = 3.0
 """Length of a sliding window, metres."""
 
-NO_PAINT = LinePaint(np.empty(0), np.empty(0))
-
 
 def paint_mask(top: Image) -> Image:
     """Return 255 for paint and 0 for the rest, uint8 `(rows, columns)`.
@@ -89,10 +86,10 @@ def hide(mask: Image, top_view: TopView, boxes: Iterable[Box]) -> Image:
     farthest = top_view.outline[:, 1].min()
     hidden = mask.copy()
     for box in boxes:
-        top, bottom = max(box.y1 - 0.5, farthest), box.y2 - 0.5
-        if top < bottom:
-            left, right = box.x1 - 0.5, box.x2 - 0.5
-            corners = np.array([[left, top], [right, top], [right, bottom], [left, bottom]])
+        x1, x2 = box.x1 - 0.5, box.x2 - 0.5
+        y1, y2 = max(box.y1 - 0.5, farthest), box.y2 - 0.5
+        if y1 < y2:
+            corners = np.array([[x1, y1], [x2, y1], [x2, y2], [x1, y2]])
             outline = np.rint(top_view.frame_to_top(corners)).astype(np.int32)
             cv2.fillConvexPoly(hidden, outline, (HIDDEN,))
     return hidden
@@ -109,8 +106,8 @@ def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) 
     padded = cv2.copyMakeBorder(mask, 0, 0, 2 * half + 1, 2 * half + 1, cv2.BORDER_CONSTANT)
     columns = (middles + 2 * half + 1)[:, None] + around
     near = np.take_along_axis(padded, columns, axis=1)
-    band = near == PAINT
     visible = (near != HIDDEN).all(axis=1)
+    band = near == PAINT
     counts = band.sum(axis=1) * visible
     rows = np.flatnonzero(counts)
     middle = middles[rows] + (band[rows] @ around) / counts[rows]
@@ -118,32 +115,26 @@ def paint_along(mask: Image, top_view: TopView, x: Float64Array, margin: float) 
     return LinePaint(top_view.distances[rows], x, float(visible.mean()))
 
 
-def find_base(mask: Image, top_view: TopView, settings: LaneSettings) -> tuple[float, float] | None:
+def find_base(mask: Image, top_view: TopView) -> tuple[float, float] | None:
     """Return x of both lines near the camera, metres: the best pair of peaks in the histogram.
 
     The pair has one line on each side of the camera, about a lane's width apart. None if there is
     no such pair.
     """
-    histogram = _histogram(mask, top_view)
-    expected, tolerance = settings.lane_width, WIDTH_TOLERANCE
-    least = max(1, round((expected - tolerance) * ACROSS))
-    most = round((expected + tolerance) * ACROSS)
+    near = top_view.distances < top_view.distances[-1] + _BASE
+    counts = np.count_nonzero(mask[near] == PAINT, axis=0).astype(np.float64)
+    spread = round(FINE_MARGIN * ACROSS) | 1
+    histogram = np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
+    expected = top_view.settings.lane_width
+    least, most = (round((expected + off) * ACROSS) for off in (-WIDTH_TOLERANCE, WIDTH_TOLERANCE))
     best, base = 0.0, None
-    for gap in range(least, most + 1):
+    for gap in range(max(1, least), most + 1):
         left, right = top_view.laterals[:-gap], top_view.laterals[gap:]
         score = histogram[:-gap] * histogram[gap:] * ((left < 0) & (right > 0))
         peak = int(score.argmax())
         if score[peak] > best:
             best, base = float(score[peak]), (float(left[peak]), float(right[peak]))
     return base
-
-
-def _histogram(mask: Image, top_view: TopView) -> Float64Array:
-    """Return how many of the nearest rows have paint in each column, smoothed, `(columns,)`."""
-    near = top_view.distances < top_view.distances[-1] + _BASE
-    counts = np.count_nonzero(mask[near] == PAINT, axis=0).astype(np.float64)
-    spread = round(FINE_MARGIN * ACROSS) | 1
-    return np.asarray(cv2.blur(counts[None], (spread, 1)), np.float64).ravel()
 
 
 def slide_windows(mask: Image, top_view: TopView, base: tuple[float, float]) -> LinePositions:
@@ -159,15 +150,10 @@ def slide_windows(mask: Image, top_view: TopView, base: tuple[float, float]) -> 
     for end in range(len(mask), 0, -rows):
         part = np.s_[max(0, end - rows) : end]
         middles += step
-        shift = _mean_offset(mask[part], top_view, middles, MARGIN)
+        offsets = top_view.laterals - middles[:, None]
+        counts = np.count_nonzero(mask[part] == PAINT, axis=0) * (np.abs(offsets) <= MARGIN)
+        shift = float((counts * offsets).sum() / max(1, counts.sum()))
         middles += shift
         step += shift / 2  # damped: part of the shift may be noise
         positions[:, part] = middles[:, None]
     return positions[0], positions[1]
-
-
-def _mean_offset(part: Image, top_view: TopView, middles: Float64Array, margin: float) -> float:
-    """Return the mean offset of the paint in both windows from their middles, metres."""
-    offsets = top_view.laterals - middles[:, None]
-    counts = np.count_nonzero(part == PAINT, axis=0) * (np.abs(offsets) <= margin)
-    return float((counts * offsets).sum() / max(1, counts.sum()))

@@ -1,23 +1,21 @@
-"""The road in the frames of a video: each frame undistorted, with its lane.
+"""The road in the frames of a video: each frame undistorted, its lane, and places on the road.
 
 `RoadFinder.observe` does what needs one frame alone. `RoadFinder.update` takes the frames in their
 order: it fits the lane near the last one, or finds a new one, and smooths it over time.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
-from vdet.lanes.curves import LaneCurves, NormalEquations, solve
-from vdet.lanes.drawing import stage_pictures
-from vdet.lanes.frame_fit import FrameFit, fit_near, fit_new
-from vdet.lanes.lane import Lane
+from vdet.lanes.curves import FrameFit, LaneCurves, NormalEquations, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask
-from vdet.lanes.position import RoadPosition, position_on_road
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
 
@@ -32,6 +30,12 @@ _STRAIGHT = 5000.0
 _EDGE = 0.005
 """A box that ends this near to the frame's edge is cut off: share of the width or height."""
 _LINE_POINTS = 24  # of each line of a `Lane`
+_REACH = 1.25
+"""Farthest reported vehicle, as a multiple of the distance up to which the lane is fitted."""
+_ROW = 0.1
+"""Largest relative error of a distance for an error of one row: more is near the horizon."""
+_LANES = 3
+"""Number of lanes to each side of the own one that are reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +43,82 @@ class LaneRequest:
     """Ask for lanes; `camera` took the frames, None if they are undistorted already."""
 
     camera: CalibratedCamera | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """The lane that the camera is in: its shape in metres, its two lines in pixels.
+
+    The lines are in the undistorted frame, `(n, 2)` as `x, y`, and begin at the nearest point.
+    """
+
+    curvature: float
+    """1/m, positive in a bend to the right; smoothed over more frames than the lines."""
+    radius: float | None
+    """Radius of the bend, metres; None if the road is straight (5000 m or more)."""
+    offset: float
+    """Distance of the camera from the middle of the lane, metres; positive: it is to the right."""
+    width: float
+    """Width of the lane, metres."""
+    left: Float64Array
+    right: Float64Array
+
+
+def lane_record(lane: Lane | None) -> dict[str, Any] | None:
+    """Return a lane as plain values for JSON; None if there is none.
+
+    `radius` (None on a straight road), `offset` and `width` are metres, rounded to millimetres.
+    `left` and `right` are `[[x, y], …]`, pixels, rounded to tenths. All mean the same as in `Lane`.
+    """
+    if lane is None:
+        return None
+    metres = {"radius": lane.radius, "offset": lane.offset, "width": lane.width}
+    lines = {"left": lane.left.tolist(), "right": lane.right.tolist()}
+    record: dict[str, Any] = {name: value and round(value, 3) for name, value in metres.items()}
+    return record | {
+        name: [[round(x, 1), round(y, 1)] for x, y in line] for name, line in lines.items()
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class RoadPosition:
+    """The place of a point on the road."""
+
+    distance: float
+    """Metres along the road from below the camera's lens."""
+    lateral: float
+    """Metres from the middle of the own lane, along the curve of the road; positive: right."""
+    lane: int | None
+    """0 for the own lane, 1 for the next one to the right, -1 to the left and so on; None for one
+    that is too far to the side."""
+
+
+def position_on_road(
+    foot: tuple[float, float], curves: LaneCurves, top_view: TopView
+) -> RoadPosition | None:
+    """Return where on the road a point is that a pixel of the undistorted frame shows.
+
+    `foot` is `(x, y)`; whole numbers are pixel centres. None if it is above or near the horizon, or
+    farther than the lane is known.
+
+    1 / z in the top view grows by the same amount with every row below the horizon. A camera that
+    pitches by a little moves all rows by the same amount, so the true distance Z is given by
+    1 / Z = 1 / z - pitch. The other lanes are taken to be as wide as the own one, and to follow the
+    same curve.
+    """
+    x, y = foot
+    slope, nearness = top_view.sight(foot)
+    _, below = top_view.sight((x, y + 1))
+    nearness, row = nearness - curves.pitch, below - nearness
+    farthest = _REACH * float(top_view.distances[0])
+    if not (nearness * farthest >= 1 and row <= _ROW * nearness):  # NaN too is not known
+        return None
+    distance = 1 / nearness
+    shift = curves.heading * distance + curves.bend * distance**2  # of all lines, at the distance
+    from_left = slope * distance - shift - curves.left
+    lane = math.floor(from_left / curves.width)
+    shown = lane if abs(lane) <= _LANES else None
+    return RoadPosition(distance, from_left - curves.width / 2, shown)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,20 +144,13 @@ class Road:
     curves: LaneCurves | None
     """The lines of `lane` on the ground; None if there is no lane."""
     top_view: TopView
-    undistorter: Undistorter | None
+    undistorter: Undistorter
+    """Moves boxes and points of the original frame to `image`."""
 
     @property
     def image(self) -> Image:
         """The undistorted frame, BGR uint8 `(H, W, 3)`; the frame itself if there is no camera."""
         return self.view.image
-
-    def place(self, box: Box) -> Box:
-        """Return the box in `image` for a box in the original frame; area 0 if it lies outside."""
-        return self.undistorter.box(box) if self.undistorter else box
-
-    def place_points(self, points: Float64Array) -> Float64Array:
-        """Return where points `(n, 2)` of the original frame, x and y, lie in `image`."""
-        return self.undistorter.points(points) if self.undistorter else points
 
     def cuts(self, box: Box) -> bool:
         """Tell whether the original frame's left, right or lower edge cuts a box in that frame."""
@@ -93,14 +166,8 @@ class Road:
         """
         if self.curves is None:
             return None
-        pixel = np.array([foot]) - 0.5
-        [[x, y]] = self.place_points(pixel)
+        [[x, y]] = self.undistorter.points(np.array([foot]) - 0.5)
         return position_on_road((x, y), self.curves, self.top_view)
-
-    def pictures(self) -> dict[str, Image]:
-        """Return a picture of every stage of finding the lane, as `stage_pictures` makes them."""
-        view = self.view
-        return stage_pictures(view.image, view.top, view.mask, self.lane, self.top_view)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,39 +197,34 @@ class RoadFinder:
     def __init__(
         self, request: LaneRequest, settings: LaneSettings, width: int, height: int
     ) -> None:
-        camera = request.camera
-        self._settings = settings
-        self._undistorter = Undistorter(camera, width, height) if camera else None
+        self._undistorter = Undistorter(request.camera, width, height)
         self._top_view = TopView(settings, width, height)
         self._state: _LaneState | None = None
 
     def observe(self, image: Image) -> FrameView:
         """Undistort a frame, BGR uint8 `(H, W, 3)`, and mark the paint in its top view."""
-        undistorted = self._undistorter.image(image) if self._undistorter else image
+        undistorted = self._undistorter.image(image)
         top = self._top_view.image(undistorted)
-        mask = paint_mask(top)
-        return FrameView(undistorted, top, mask)
+        return FrameView(undistorted, top, paint_mask(top))
 
     def update(self, view: FrameView, vehicles: Iterable[Box] = ()) -> Road:
         """Return the road in the next frame.
 
         `vehicles` are the boxes of those in it, in the original frame. They hide paint.
         """
-        placed = [self._undistorter.box(box) if self._undistorter else box for box in vehicles]
+        placed = [self._undistorter.box(box) for box in vehicles]
         view = replace(view, mask=hide(view.mask, self._top_view, placed))
-        self._state = self._next_state(view.mask)
-        lane, curves = (
-            (self._lane(self._state), self._state.curves) if self._state else (None, None)
-        )
+        self._state = state = self._next_state(view.mask)
+        lane, curves = (self._lane(state), state.curves) if state else (None, None)
         return Road(view, lane, curves, self._top_view, self._undistorter)
 
     def _next_state(self, mask: Image) -> _LaneState | None:
         """Fit near the last lane; else find a new one; else keep the last one for some frames."""
-        settings, state = self._settings, self._state
-        near = fit_near(mask, self._top_view, state.curves, settings) if state else None
+        state = self._state
+        near = fit_near(mask, self._top_view, state.curves) if state else None
         if state and near and (updated := _advance(state, near)):
             return updated
-        if new := fit_new(mask, self._top_view, settings):
+        if new := fit_new(mask, self._top_view):
             return _LaneState(new.curves, new.equations, (0, 0), 2 * new.curves.bend)
         return _advance(state, None) if state and not near else None
 
@@ -170,16 +232,10 @@ class RoadFinder:
         curves, curvature = state.curves, state.curvature
         far, near = self._top_view.distances[[0, -1]]
         z = np.geomspace(near, far, _LINE_POINTS)
-        left, right = curves.at(z)
-        straight = abs(curvature) * _STRAIGHT < 1
-        return Lane(
-            curvature=curvature,
-            radius=None if straight else 1 / abs(curvature),
-            offset=-(curves.left + curves.right) / 2,
-            width=curves.width,
-            left=self._top_view.ground_to_frame(left, z),
-            right=self._top_view.ground_to_frame(right, z),
-        )
+        left, right = (self._top_view.ground_to_frame(x, z) for x in curves.at(z))
+        radius = None if abs(curvature) * _STRAIGHT < 1 else 1 / abs(curvature)
+        offset = -(curves.left + curves.right) / 2
+        return Lane(curvature, radius, offset, curves.width, left, right)
 
 
 def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:

@@ -24,16 +24,33 @@ class TopView:
     """Converts between ground, undistorted frames of one size, and pictures from above."""
 
     def __init__(self, settings: LaneSettings, width: int, height: int) -> None:
-        self._to_frame = _ground_to_frame(settings, width, height)
+        self.settings = settings
+        near = settings.bottom_right - settings.bottom_left  # of the frame's width
+        far = settings.top_right - settings.top_left
+        start = settings.length * far / (near - far)  # widths in the frame are proportional to 1/z
+        end = start + settings.length
+        left = (settings.bottom_left - settings.top_left) / (near - far) * settings.lane_width
+        right = left + settings.lane_width
+        corners = [
+            (settings.bottom_left, settings.bottom),
+            (settings.bottom_right, settings.bottom),
+            (settings.top_right, settings.top),
+            (settings.top_left, settings.top),
+        ]
+        ground = np.array([(left, start), (right, start), (right, end), (left, end)], np.float32)
+        frame = (np.array(corners) * (width, height)).astype(np.float32)
+        self._to_frame = np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)
+        """From `(x, z, 1)`, metres, to pixels of the undistorted frame."""
         self._to_ground = np.linalg.inv(self._to_frame)
-        near = _nearest(settings)
         rows = round(settings.length * ALONG)
         columns = round((settings.lane_width + 2 * _MARGIN) * ACROSS)
-        self.distances = near + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / ALONG
+        self.distances = start + (rows - 0.5 - np.arange(rows, dtype=np.float64)) / ALONG
         """z of each row, metres; the first row is the farthest."""
         self.laterals = (np.arange(columns, dtype=np.float64) + 0.5 - columns / 2) / ACROSS
         """x of each column, metres."""
-        self._warp = self._to_frame @ self._to_ground_matrix()
+        x, z = self.laterals[0], self.distances[0]
+        self._warp = self._to_frame @ [[1 / ACROSS, 0, x], [0, -1 / ALONG, z], [0, 0, 1]]
+        """From `(column, row, 1)` of the top view to pixels of the undistorted frame."""
 
     def image(self, frame: Image) -> Image:
         """Warp an undistorted frame, uint8 `(H, W, 3)`, to the top view, `(rows, columns, 3)`."""
@@ -69,52 +86,8 @@ class TopView:
         corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]]
         return _transform(self._warp, np.array(corners))
 
-    def _to_ground_matrix(self) -> Float64Array:
-        """Return the matrix `(3, 3)` from `(column, row, 1)` of the top view to `(x, z, 1)`."""
-        return np.array(
-            [
-                [1 / ACROSS, 0, self.laterals[0]],
-                [0, -1 / ALONG, self.distances[0]],
-                [0, 0, 1],
-            ]
-        )
-
 
 def _transform(matrix: Float64Array, points: Float64Array) -> Float64Array:
     """Apply a homography to points `(n, 2)`."""
     moved = points @ matrix[:, :2].T + matrix[:, 2]
     return np.asarray(moved[:, :2] / moved[:, 2:])
-
-
-def _nearest(settings: LaneSettings) -> float:
-    """Return z of the nearer row of the trapezoid: widths in the frame are proportional to 1/z."""
-    far, near = _widths(settings)
-    return settings.length * far / (near - far)
-
-
-def _widths(settings: LaneSettings) -> tuple[float, float]:
-    """Return the width of the lane at the farther and the nearer row, share of the frame's."""
-    far = settings.top_right - settings.top_left
-    return far, settings.bottom_right - settings.bottom_left
-
-
-def _ground_to_frame(settings: LaneSettings, width: int, height: int) -> Float64Array:
-    """Return the homography `(3, 3)` from `(x, z, 1)`, metres, to undistorted pixels."""
-    far, near = _widths(settings)
-    slope = (settings.top_left - settings.bottom_left) / (near - far)
-    vanishing = settings.bottom_left + slope * near  # column at which the lines meet
-    left = (settings.bottom_left - vanishing) / near * settings.lane_width
-    right = left + settings.lane_width
-    start = _nearest(settings)
-    end = start + settings.length
-    ground = np.array([[left, start], [right, start], [right, end], [left, end]], np.float32)
-    frame = np.array(
-        [
-            [settings.bottom_left * width, settings.bottom * height],
-            [settings.bottom_right * width, settings.bottom * height],
-            [settings.top_right * width, settings.top * height],
-            [settings.top_left * width, settings.top * height],
-        ],
-        np.float32,
-    )
-    return np.asarray(cv2.getPerspectiveTransform(ground, frame), np.float64)

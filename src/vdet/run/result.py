@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.boxes import Boxes
-from vdet.lanes.lane import lane_record
-from vdet.lanes.road import Road
+from vdet.lanes.road import Road, lane_record
 from vdet.media import Frame
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counter import VehicleCounter

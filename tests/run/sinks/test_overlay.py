@@ -18,8 +18,7 @@ from vdet.config.schema import Settings
 from vdet.config.video import DrawSettings
 from vdet.draw.boxes import BLACK, WHITE, color_of, draw_box, draw_label
 from vdet.lanes.camera import CalibratedCamera
-from vdet.lanes.lane import Lane
-from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.coding import Coding
 from vdet.media.images import Image
@@ -28,7 +27,9 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.overlay import Overlay, time_text
 from vdet.track.track import Track
 
-LENS = CalibratedCamera(WIDTH, HEIGHT, (240, 240), (160, 120), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4)
+LENS = CalibratedCamera(
+    WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
+)
 CORNER = Box.sized(0, 0, 12, 12)
 LANE = Lane(
     curvature=0.0,
@@ -88,16 +89,16 @@ def test_predicted_vehicles_are_drawn_dashed() -> None:
 
 def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     undistorted = road_seen(LENS)
-    assert undistorted.place(CAR) != CAR
+    assert undistorted.undistorter.box(CAR) != CAR
     expected = undistorted.image.copy()
-    draw_box(expected, undistorted.place(CAR), color_of(1), "#1")
+    draw_box(expected, undistorted.undistorter.box(CAR), color_of(1), "#1")
     drawn = drawn_on(result_of(CAR, found=undistorted))
     np.testing.assert_array_equal(drawn, expected)
 
 
 def test_a_vehicle_that_undistortion_moves_out_of_the_picture_is_not_drawn() -> None:
     undistorted = road_seen(LENS)
-    assert undistorted.place(CORNER).area == 0
+    assert undistorted.undistorter.box(CORNER).area == 0
     drawn = drawn_on(result_of(CORNER, found=undistorted))
     np.testing.assert_array_equal(drawn, undistorted.image)
 
@@ -307,7 +308,7 @@ def test_a_trail_is_the_path_of_the_feet_in_the_last_seconds() -> None:
 def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
     seen = road_seen(LENS)
     foot = np.array([[CAR.x1 + CAR.width / 2, float(CAR.y2)]])
-    ((x, y),) = seen.place_points(foot).tolist()
+    ((x, y),) = seen.undistorter.points(foot).tolist()
     assert abs(y - CAR.y2) > 1, "the lens moves the foot"
     overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=None)
     for number in range(10):

@@ -13,8 +13,7 @@ from run.red_runs import model_for, result_of, video_info, write
 from run.sinks.test_overlay import LANE, LENS, road_seen
 from vdet.boxes import Box, Boxes
 from vdet.draw.boxes import color_of
-from vdet.lanes.lane import Lane
-from vdet.lanes.road import Road
+from vdet.lanes.road import Lane, Road
 from vdet.media.images import Image, read_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output

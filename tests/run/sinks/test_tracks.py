@@ -15,8 +15,7 @@ from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
 from vdet.labels.formats import track_suffixes
 from vdet.labels.reading import read_predictions
-from vdet.lanes.lane import Lane, lane_record
-from vdet.lanes.road import LaneRequest, Road, RoadFinder
+from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder, lane_record
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track

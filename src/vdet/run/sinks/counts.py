@@ -66,4 +66,4 @@ def _placed(points: Sequence[Point], road: Road | None) -> list[Point]:
     """Return where points of the frame lie in the picture that is drawn into."""
     if road is None:
         return list(points)
-    return [(x, y) for x, y in road.place_points(np.array(points, np.float64)).tolist()]
+    return [(x, y) for x, y in road.undistorter.points(np.array(points, np.float64)).tolist()]

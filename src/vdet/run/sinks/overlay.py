@@ -181,8 +181,8 @@ def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> lis
         box = track.box.clipped(width, height)
         foot = track.foot
         if road:
-            x, y = road.place_points(np.array([foot]))[0].tolist()
-            box, foot = road.place(box), (x, y)
+            x, y = road.undistorter.points(np.array([foot]))[0].tolist()
+            box, foot = road.undistorter.box(box), (x, y)
         if box.area:
             placed.append(replace(track, box=box, whole_foot=foot))
     return placed

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.files import make_folder
+from vdet.lanes.drawing import stage_pictures
 from vdet.media.images import Image, encode_image
 from vdet.regions import Regions
 from vdet.run.result import FrameResult
@@ -35,7 +36,7 @@ class StagesSink(BaseSink):
             pictures["regions"] = draw_regions(result.frame.image, regions)
         pictures[_BOXES] = _with_boxes(result)
         if result.road:
-            pictures |= result.road.pictures()
+            pictures |= stage_pictures(result.road)
         for number, (name, picture) in enumerate(pictures.items(), start=1):
             path = self.path / f"{number}-{name}.png"
             self.context.files.stage(path).write_bytes(encode_image(picture, path))

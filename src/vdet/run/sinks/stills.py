@@ -6,7 +6,7 @@ from typing import Any
 
 from vdet.errors import OutputError
 from vdet.files import print_now
-from vdet.lanes.lane import lane_record
+from vdet.lanes.road import lane_record
 from vdet.media import Picture
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.run.result import FrameResult
