@@ -4,7 +4,6 @@ import pytest
 from hypothesis import strategies as st
 
 from vdet.polygons import (
-    Outline,
     Point,
     crosses_itself,
     meeting,
@@ -41,6 +40,7 @@ class TestPolygons:
             [(0, 0), (4, 0), (0, 0), (0, 4)],  # a corner twice
             [(0, 0), (4, 0), (2, 0), (2, 4)],  # a side back along itself
             [(0, 0), (6, 0), (6, 4), (3, -1), (0, 4)],
+            [(0, 0), (2, 0), (4, 0)],  # no area
         ],
     )
     def test_those_that_cross_or_touch_themselves_are_known(self, corners: list[Point]) -> None:
@@ -55,16 +55,3 @@ class TestPolygons:
     def test_a_last_corner_that_repeats_the_first_is_dropped(self) -> None:
         assert unclosed([*SQUARE, SQUARE[0]]) == SQUARE
         assert unclosed(SQUARE) == SQUARE
-
-
-class TestOutlines:
-    def test_sides_along_the_edge_are_no_borders(self) -> None:
-        outline = Outline.laid([(0, 300), (1279.4, 300), (1280, 719), (1, 720)], (1280, 720))
-        assert outline.borders == (((0, 300), (1280, 300)),)
-        assert outline.distance((600, 900)) == pytest.approx(420, abs=0.1)
-        assert outline.contains((-50, 800))
-
-    def test_the_distance_is_negative_outside(self) -> None:
-        outline = Outline.laid([(100, 100), (200, 100), (200, 200), (100, 200)], (1280, 720))
-        assert outline.distance((150, 110)) == pytest.approx(10)
-        assert outline.distance((150, 80)) == pytest.approx(-20)

@@ -44,8 +44,8 @@ from vdet.run.video import RunTotals, VideoJob, check_job, open_video, run_video
 from vdet.track.factory import TrackerKind, make_tracker
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.count_files import count_file, count_frames
-from vdet.traffic.totals import Counts, Event
+from vdet.traffic.counter import count_file, count_frames
+from vdet.traffic.counts import Counts, Event
 
 __all__ = (
     "Box", "Boxes", "Counts", "Detector", "DetectorKind", "DetectorModel", "DetectorSettings",

@@ -13,7 +13,7 @@ from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
 from vdet.evaluate.scores import Scores, score
 from vdet.files import any_file, check_output, make_folder, staged
-from vdet.labels.reading import read_predictions, read_tracks, read_truth
+from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.dataset import find_boxed, find_patches
 from vdet.learn.svm.mining import MiningJob, VideoSource, mine
 from vdet.learn.svm.training import train
@@ -22,8 +22,7 @@ from vdet.progress import Steps, no_steps
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, check_job, run_video
 from vdet.synthetic import busy_road, demo_scene, write_clip, write_truth
-from vdet.traffic.counter import count_events
-from vdet.traffic.layout import lay_out
+from vdet.traffic.counter import count_file
 
 ROADS = 6
 """Drawn roads that the linear model learns from."""
@@ -126,11 +125,11 @@ def run_demo(
     with staged(folder / LINE, overwrite=overwrite) as temporary:
         temporary.write_text(_LINE, encoding="utf-8")
     settings = load_settings(places={"counts": folder / LINE})
-    layout = lay_out(settings.counts, scene.camera.width, scene.camera.height)
+    size = scene.camera.width, scene.camera.height
     truth, rate = read_truth(folder / TRUTH), float(scene.rate)
 
     def count(tracks: Path) -> int:
-        return len([*count_events(read_tracks(tracks, rate).frames, layout)])
+        return len(count_file(tracks, settings.counts, size, rate).events)
 
     def find(name: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> DemoRow:
         job = _job(folder, outputs, overwrite=overwrite)

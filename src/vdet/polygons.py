@@ -2,16 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 Point = tuple[float, float]
 Segment = tuple[Point, Point]
-
-_AT_EDGE = 0.002
-"""A corner within this share of the frame's side (or one pixel) of the frame's edge lies on it."""
-_INSIDE = 0.01
-"""Pixels from the edge of the frame to which points outside are moved."""
 
 
 def side_of(start: Point, end: Point, point: Point) -> float:
@@ -61,22 +55,22 @@ def unclosed(corners: Sequence[Point]) -> tuple[Point, ...]:
 
 
 def crosses_itself(corners: Sequence[Point]) -> bool:
-    """Tell whether two sides of a polygon have more in common than a corner between neighbours."""
+    """Tell whether two sides of a polygon have more in common than a corner between neighbours.
+
+    A polygon without an area does.
+    """
     if len(set(corners)) < len(corners):
         return True
-    count, all_sides = len(corners), sides(corners)
-    for (i, first), (j, second) in combinations(enumerate(all_sides), 2):
-        if j - i == 1 or (i == 0 and j == count - 1):
-            if _turns_back(first, second):
-                return True
-        elif _touch(first, second):
-            return True
-    return False
+    return any(_touch(first, second) for first, second in combinations(sides(corners), 2))
 
 
-def area_of(corners: Sequence[Point]) -> float:
-    """Return the area of a polygon that does not cross itself."""
-    return abs(sum(ax * by - bx * ay for (ax, ay), (bx, by) in sides(corners))) / 2
+def _touch(first: Segment, second: Segment) -> bool:
+    """Tell whether two sides have more in common than a corner."""
+    common = set(first) & set(second)
+    ends = [(first, point) for point in second] + [(second, point) for point in first]
+    if any(point not in common and distance_to(side, point) == 0 for side, point in ends):
+        return True
+    return not common and meeting(first, second) is not None
 
 
 def contains(corners: Sequence[Point], point: Point) -> bool:
@@ -90,100 +84,3 @@ def contains(corners: Sequence[Point], point: Point) -> bool:
         if (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax):
             inside = not inside
     return inside
-
-
-def _turn(a: Point, b: Point, c: Point) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _turns_back(first: Segment, second: Segment) -> bool:
-    """Tell whether two sides with a common end run along one another."""
-    (common,) = set(first) & set(second)
-    (a,), (b,) = set(first) - {common}, set(second) - {common}
-    ahead = (a[0] - common[0]) * (b[0] - common[0]) + (a[1] - common[1]) * (b[1] - common[1])
-    return _turn(common, a, b) == 0 and ahead > 0
-
-
-def _touch(first: Segment, second: Segment) -> bool:
-    if meeting(first, second) is not None:
-        return True
-    ends = [(first, point) for point in second] + [(second, point) for point in first]
-    return any(distance_to(segment, point) == 0 for segment, point in ends)
-
-
-@dataclass(frozen=True, slots=True)
-class Outline:
-    """A polygon laid over a frame; where it ends at the frame's edge, it goes on beyond.
-
-    Attributes
-    ----------
-    corners
-        Pixels of the frame.
-    borders
-        The sides that do not run along the frame's edge.
-    size
-        Width and height of the frame.
-    """
-
-    corners: tuple[Point, ...]
-    borders: tuple[Segment, ...]
-    size: tuple[float, float]
-
-    @staticmethod
-    def laid(corners: Sequence[Point], size: tuple[float, float]) -> "Outline":
-        """Lay a polygon over a frame; corners very near the frame's edge move onto it."""
-        snapped = tuple(snapped_to_edge(corner, size) for corner in corners)
-        borders = tuple(each for each in sides(snapped) if not _runs_along_edge(each, size))
-        return Outline(snapped, borders, size)
-
-    def contains(self, point: Point) -> bool:
-        """Tell whether a point lies in it; one outside the frame counts as at its edge."""
-        return contains(self.corners, self._in_frame(point))
-
-    def distance(self, point: Point) -> float:
-        """Return the distance of a point from the borders: positive inside, negative outside.
-
-        It is infinite where there is no border.
-        """
-        inside = self._in_frame(point)
-        distance = min((distance_to(each, inside) for each in self.borders), default=math.inf)
-        return distance if contains(self.corners, inside) else -distance
-
-    def meeting(self, path: Segment) -> float | None:
-        """Return the share of the way along `path` at which it last meets a border, if it does."""
-        start, end = path
-        inside = self._in_frame(start), self._in_frame(end)
-        shares = [share for each in self.borders if (share := meeting(inside, each)) is not None]
-        return max(shares, default=None)
-
-    def _in_frame(self, point: Point) -> Point:
-        width, height = self.size
-        return (
-            min(max(point[0], _INSIDE), width - _INSIDE),
-            min(max(point[1], _INSIDE), height - _INSIDE),
-        )
-
-
-def snapped_to_edge(point: Point, size: tuple[float, float]) -> Point:
-    """Return a point, moved onto the frame's edge where it is very near to it."""
-    x, y = (_snapped(value, length) for value, length in zip(point, size, strict=True))
-    return x, y
-
-
-def at_edge(point: Point, size: tuple[float, float]) -> bool:
-    """Tell whether a point lies on the frame's edge."""
-    return any(value in (0, length) for value, length in zip(point, size, strict=True))
-
-
-def _snapped(value: float, length: float) -> float:
-    near = max(1.0, _AT_EDGE * length)
-    if value <= near:
-        return 0.0
-    return float(length) if length - value <= near else value
-
-
-def _runs_along_edge(segment: Segment, size: tuple[float, float]) -> bool:
-    return any(
-        start == end and start in (0, length)
-        for start, end, length in zip(*segment, size, strict=True)
-    )

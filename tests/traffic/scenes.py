@@ -9,9 +9,8 @@ from vdet.boxes import Box
 from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.counter import count_events
-from vdet.traffic.layout import Layout, lay_out
-from vdet.traffic.totals import Event
+from vdet.traffic.counter import count_frames
+from vdet.traffic.counts import Counts, Event
 
 WIDTH, HEIGHT = 1280, 720
 CAR_HEIGHT = 60
@@ -92,24 +91,27 @@ LINE = LineSettings(name="line", start=(200, 400), end=(1000, 400), left="away",
 ZONE = ZoneSettings(name="zone", points=((400, 300), (800, 300), (800, 500), (400, 500)))
 
 
-def layout(
-    *shapes: LineSettings | ZoneSettings, width: int = WIDTH, height: int = HEIGHT, **rule: Any
-) -> Layout:
-    """Lay lines and zones, given in pixels of 1280×720, over a frame."""
+def counts(
+    video: Iterable[FrameTracks],
+    *shapes: LineSettings | ZoneSettings,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+    **rule: Any,
+) -> Counts:
+    """Count at lines and zones, given in pixels of 1280×720, in frames of this size."""
     settings = CountSettings(
         size=(WIDTH, HEIGHT),
         lines=tuple(each for each in shapes if isinstance(each, LineSettings)),
         zones=tuple(each for each in shapes if isinstance(each, ZoneSettings)),
         **rule,
     )
-    return lay_out(settings, width, height)
+    return count_frames(video, settings, size)
 
 
 def events(
-    video: Iterable[FrameTracks], *shapes: LineSettings | ZoneSettings, **rule: Any
+    video: Iterable[FrameTracks], *shapes: LineSettings | ZoneSettings, **options: Any
 ) -> tuple[Event, ...]:
-    """Count at these lines and zones."""
-    return count_events(video, layout(*(shapes or (LINE,)), **rule))
+    """Return the events at these lines and zones."""
+    return counts(video, *(shapes or (LINE,)), **options).events
 
 
 def ways(found: Iterable[Event]) -> list[str]:

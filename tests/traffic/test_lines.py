@@ -129,8 +129,7 @@ def test_rate_stride_and_scale_do_not_change_the_counts(
         through((2, 900, 380), (9, 900, 395)),
     ]
     video = list(frames(*paths, rate=rate, scale=scale))[::stride]
-    size = {"width": round(scale * WIDTH), "height": round(scale * HEIGHT)}
-    found = events(video, LINE, **size)
+    found = events(video, LINE, size=(round(scale * WIDTH), round(scale * HEIGHT)))
     assert sorted((event.id, event.direction) for event in found) == [
         (1, "here"), (2, "away"), (3, "away"), (3, "here"),
     ]  # fmt: skip

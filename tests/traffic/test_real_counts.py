@@ -12,8 +12,7 @@ from vdet.boxes import Box
 from vdet.config.loading import load_settings
 from vdet.labels.reading import read_truth
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.counter import count_events
-from vdet.traffic.layout import lay_out
+from vdet.traffic.counter import count_frames
 
 pytestmark = pytest.mark.realdata
 
@@ -53,10 +52,11 @@ def test_a_line_across_the_right_hand_lanes(
 ) -> None:
     lines = tmp_path / "lines.yaml"
     lines.write_text(LINES)
-    layout = lay_out(load_settings(None, (), {"counts": lines}).counts, 1280, 720)
-    expected = count_events(truth, layout)
+    settings = load_settings(None, (), {"counts": lines}).counts
+    expected = count_frames(truth, settings).events
     assert Counter(event.direction for event in expected) == {"ahead": 2}
-    later = count_events((frame for frame in truth if FIRST <= frame.time < END), layout)
+    shown = (frame for frame in truth if FIRST <= frame.time < END)
+    later = count_frames(shown, settings).events
     counts = tmp_path / "counts.csv"
     result = run(
         "detect-video", real_data / "project_video.mp4", "--no-video", "--lines", lines,

@@ -21,8 +21,8 @@ from vdet.synthetic import demo_scene, must_be_found, true_boxes
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.counter import count_events
-from vdet.traffic.layout import Layout, lay_out
+from vdet.traffic.counter import count_frames
+from vdet.traffic.counts import Event
 
 RATE, SECONDS = 25, 8
 SLIGHT = Noise(sides=0.02, missed=0.05, false=0.02, surest=0.3)
@@ -30,14 +30,14 @@ SEEDS = (2, 20, 23)
 """Of scenes in which tracking is exact."""
 
 
-def across(row: float, width: int, height: int) -> Layout:
-    """Lay a line over the whole width; vehicles that come nearer cross it to the right."""
+def across(frames: Sequence[FrameTracks], row: float, width: int, height: int) -> tuple[Event, ...]:
+    """Count at a line over the whole width; vehicles that come nearer cross it to the right."""
     line = LineSettings(name="row", start=(0, row), end=(1, row), left="away", right="nearer")
-    return lay_out(CountSettings(lines=(line,)), width, height)
+    return count_frames(frames, CountSettings(lines=(line,)), (width, height)).events
 
 
-def ways(frames: Sequence[FrameTracks], layout: Layout) -> list[str]:
-    return sorted(event.direction for event in count_events(frames, layout))
+def ways(frames: Sequence[FrameTracks], row: float) -> list[str]:
+    return sorted(event.direction for event in across(frames, row, 320, 180))
 
 
 def followed(
@@ -62,10 +62,9 @@ def test_random_traffic(seed: int) -> None:
     ]
     same, counted = _pairs(tracks, true), 0
     for row in (0.66, 0.7, 0.74, 0.78):
-        layout = across(row, WIDTH, HEIGHT)
         unclear = _unclear(true, row * HEIGHT)
-        found = {(same[e.id], e.direction) for e in count_events(tracks, layout)}
-        expected = {(e.id, e.direction) for e in count_events(true, layout)}
+        found = {(same[e.id], e.direction) for e in across(tracks, row, WIDTH, HEIGHT)}
+        expected = {(e.id, e.direction) for e in across(true, row, WIDTH, HEIGHT)}
         assert {e for e in found if e[0] not in unclear} == {
             e for e in expected if e[0] not in unclear
         }, row
@@ -111,20 +110,19 @@ def test_the_road_of_the_demo(seed: int) -> None:
     scene = demo_scene(seed, width=320, height=180)
     tracks = followed(lambda n: seen(scene, n), scene.frames, 320, 180)
     assert len({track.id for frame in tracks for track in frame.tracks}) == 4
-    layout = across(0.75, 320, 180)
-    assert ways(tracks, layout) == ["away", "nearer"]
+    assert ways(tracks, 0.75) == ["away", "nearer"]
     by_truth = [
         FrameTracks(
             n, n / RATE, tuple(Track(v.id, v.box, 1.0, False) for v in true_boxes(scene, n))
         )
         for n in range(scene.frames)
     ]
-    assert ways(by_truth, layout) == ["away", "nearer"]
+    assert ways(by_truth, 0.75) == ["away", "nearer"]
     times = [
-        [event.time for event in count_events(frames, layout)] for frames in (tracks, by_truth)
+        [event.time for event in across(frames, 0.75, 320, 180)] for frames in (tracks, by_truth)
     ]
     assert times[0] == pytest.approx(times[1], abs=0.2)
-    vehicle = {event.direction: event.id for event in count_events(by_truth, layout)}
+    vehicle = {event.direction: event.id for event in across(by_truth, 0.75, 320, 180)}
     assert vehicle == {"nearer": 3, "away": 4}
 
 
@@ -138,8 +136,8 @@ def test_a_vehicle_that_stops_and_reverses_on_the_line() -> None:
     tracks = followed(lambda n: seen(scene, n), scene.frames, 320, 180)
     feet = [frame.tracks[0].foot[1] for frame in tracks if frame.tracks]
     lowest = max(feet) / 180
-    assert ways(tracks, across(lowest - 0.08, 320, 180)) == ["away", "nearer"]
-    assert ways(tracks, across(lowest + 0.02, 320, 180)) == []
+    assert ways(tracks, lowest - 0.08) == ["away", "nearer"]
+    assert ways(tracks, lowest + 0.02) == []
 
 
 def seen(scene: Scene, index: int) -> Boxes:

@@ -2,9 +2,19 @@
 
 import pytest
 
-from traffic.scenes import HEIGHT, WIDTH, ZONE, events, frames, joined, numbered, through, ways
+from traffic.scenes import (
+    HEIGHT,
+    WIDTH,
+    ZONE,
+    counts,
+    events,
+    frames,
+    joined,
+    numbered,
+    through,
+    ways,
+)
 from vdet.config.places import ZoneSettings
-from vdet.traffic.totals import stays
 
 ACROSS = through((0, 200, 400), (8, 1000, 400))  # 100 pixels a second; in from 2 s to 6 s
 
@@ -70,8 +80,7 @@ def test_the_whole_frame_is_a_zone_without_a_border() -> None:
 def test_stays_follow_from_the_events() -> None:
     later = through((1, 200, 420), (9, 1000, 420))
     last = through((5.5, 900, 380), (9, 450, 380))
-    found = events(frames(ACROSS, later, last, seconds=9), ZONE)
-    (stay,) = stays(found, ["zone"])
+    (stay,) = counts(frames(ACROSS, later, last, seconds=9), ZONE).zones
     assert stay.most == 2
     assert stay.longest == pytest.approx(4, abs=0.01)
     assert stay.mean == pytest.approx((4 + 4 + 9 - (5.5 + 3.5 * 100 / 450)) / 3, abs=0.01)

@@ -13,7 +13,7 @@ from vdet.cli.options import option
 from vdet.files import check_output, printable, staged
 
 if TYPE_CHECKING:
-    from vdet.traffic.totals import Counts
+    from vdet.traffic.counts import Counts
 
 
 @command(
@@ -57,7 +57,8 @@ def count(
     settings = choice.read().counts
     if not settings:
         raise click.UsageError("there is nothing to count at; give --lines FILE")
-    from vdet.traffic.count_files import count_file, write_counts, write_counts_of_all
+    from vdet.traffic.counter import count_file
+    from vdet.traffic.counts import write_counts, write_counts_of_all
     from vdet.traffic.tables import SUFFIXES
 
     if target is not None:
@@ -81,7 +82,7 @@ def count(
 
 def _table(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of each file, and of all where there are several."""
-    from vdet.traffic.count_files import sum_totals
+    from vdet.traffic.counts import sum_totals
 
     totals = {name: counts.totals for name, counts in videos.items()}
     if len(videos) > 1:

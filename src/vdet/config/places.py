@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from vdet.config.section import Section
 from vdet.errors import ConfigError
-from vdet.polygons import Point, area_of, crosses_itself, unclosed
+from vdet.polygons import Point, crosses_itself, unclosed
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Place = tuple[Coordinate, Coordinate]
@@ -87,8 +87,6 @@ class PolygonSection(Section):
             raise ValueError(f"has {len(corners)} corners; give three or more")
         if crosses_itself(corners):
             raise ValueError("crosses or touches itself; give the corners in order around it")
-        if area_of(corners) == 0:
-            raise ValueError("has no area; give corners that do not lie on one line")
         return corners
 
 

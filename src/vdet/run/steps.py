@@ -17,8 +17,8 @@ from vdet.plugins import STEPS, built_in_names, load_plugin
 from vdet.regions import Regions, lay_regions
 from vdet.run.result import FrameResult
 from vdet.track.track import Track
+from vdet.traffic.borders import lay_out
 from vdet.traffic.counter import VehicleCounter
-from vdet.traffic.layout import lay_out
 
 
 class Step(Protocol):

@@ -21,6 +21,6 @@ The counts of a video follow from its tracks alone (`FrameTracks`), live or from
    successor.
 9. Events are what is stored. All totals follow from them.
 
-`layout` places lines and zones in a frame, `border` holds what a vehicle does at one of them,
-`counter` follows the vehicles, `events` and `totals` are the results, `files` writes them.
+`borders` places lines and zones in a frame and holds what a vehicle does at one of them, `counter`
+follows the vehicles, `counts` has the events, what follows from them, and their files.
 """

@@ -4,40 +4,37 @@ import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from vdet.boxes import Box
+from vdet.config.places import CountSettings
 from vdet.detect.classes import ClassScores
+from vdet.errors import ConfigError, TruthError
+from vdet.labels.reading import read_tracks
 from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
-from vdet.traffic.border import CLOCK, BorderState, Change, Sighting
-from vdet.traffic.layout import APPEAR, VANISH, Layout, Zone
-from vdet.traffic.totals import Counts, Event
+from vdet.traffic.borders import (
+    APPEAR,
+    CLOCK,
+    VANISH,
+    BorderState,
+    Change,
+    Layout,
+    Sighting,
+    Zone,
+    lay_out,
+)
+from vdet.traffic.counts import Counts, Event
 
 REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
 
 _GAP = 1.0
 """Most seconds from the end of a track to that of another one that goes on from it."""
-_SETTLED = 0.1
-"""Seconds after which a vehicle off a border's band has changed the side."""
 _LEAVES = 0.1
 """Heights of its box a second that a vehicle moves at least to leave the frame."""
 _MOST_GROWTH = 2.0
-"""A box is at most so many times as high as the one that it goes on from."""
-
-
-def count_events(frames: Iterable[FrameTracks], layout: Layout) -> tuple[Event, ...]:
-    """Return all events of a video, in the order of their times.
-
-    Parameters
-    ----------
-    frames
-        The tracks of each frame, in order; frames without tracks may be left out.
-    """
-    counter = VehicleCounter(layout)
-    for frame in frames:
-        counter.update(frame)
-    return counter.finish()
+"""Most times that a box is as high as the one that it goes on from."""
 
 
 @dataclass(slots=True)
@@ -47,10 +44,9 @@ class _Vehicle:
     id: int
     first: Sighting
     last: Sighting
-    outward: Point  # the sides of the frame that its last box touches: x and y, -1, 0 or 1
-    shown: float  # when it was last shown, also by prediction
     states: list[BorderState]
-    entered: dict[int, float] = field(default_factory=dict)  # by the number of the zone
+    shown: float = 0.0  # when it was last shown, also by prediction
+    outward: Point = (0.0, 0.0)  # sides of the frame that its last box touches: x, y, -1, 0 or 1
     velocity: Point = (0.0, 0.0)
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
@@ -75,8 +71,7 @@ class _Vehicle:
         if seconds > 0:
             (ax, ay), (bx, by) = self.last.point, sighting.point
             dx, dy = self.velocity
-            is_first = self.last is self.first
-            share = 1.0 if is_first else 0.5
+            share = 1.0 if self.last is self.first else 0.5
             self.velocity = (
                 dx + share * ((bx - ax) / seconds - dx),
                 dy + share * ((by - ay) / seconds - dy),
@@ -84,15 +79,10 @@ class _Vehicle:
         self.last = sighting
 
     def add(
-        self,
-        name: str,
-        direction: str,
-        at: Sighting | Change,
-        *,
-        stitched: bool = False,
-        seconds: float | None = None,
+        self, name: str, direction: str, at: Sighting | Change, seconds: float | None = None
     ) -> None:
         """Note an event."""
+        stitched = isinstance(at, Change) and at.stitched
         self.events.append(
             Event(at.time, at.frame, name, direction, self.id, None, at.score, stitched, seconds)
         )
@@ -109,7 +99,6 @@ class VehicleCounter:
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
-        self._borders = layout.borders
         self._vehicles: dict[int, _Vehicle] = {}
         self._events: list[Event] = []
         self._tally: Counter[tuple[str, str]] = Counter()
@@ -117,22 +106,17 @@ class VehicleCounter:
 
     def update(self, frame: FrameTracks) -> None:
         """Take in the tracks of the next frame."""
-        self._now = frame.time
-        for vehicle in self._forgotten(frame.time):
-            self._close(vehicle)
+        self._now = round(frame.time, 6)  # as files hold it
+        for vehicle in list(self._vehicles.values()):
+            if self._now - vehicle.shown > REMEMBERED:
+                self._close(vehicle)
         shown = {track.id for track in frame.tracks}
         for track in frame.tracks:
             known = self._vehicles.get(track.id)
-            if known is not None and known.is_taken_over:
-                known = None
-            if known is not None:
-                known.shown = frame.time
+            if known is not None and not known.is_taken_over:
+                known.shown = self._now
             if not track.predicted:
-                sighting = _sighting(track, frame)
-                vehicle = known or self._begin(track.id, sighting, shown)
-                vehicle.classes.add(track.class_name, track.score)
-                vehicle.outward = _touched_sides(track.box, self.layout.size)
-                self._see(vehicle, sighting)
+                self._see(track, self._sighting(track, frame.index), shown)
 
     def finish(self) -> tuple[Event, ...]:
         """Return all events; the video has ended."""
@@ -151,17 +135,37 @@ class VehicleCounter:
 
     def present(self, zone: Zone) -> int:
         """Return how many vehicles are in a zone now."""
-        number = self._borders.index(zone)
         return sum(
-            number in each.entered
+            state.border == zone and state.entered is not None
             for each in self._vehicles.values()
-            if not each.is_taken_over
-            and self._now - each.shown <= _GAP
-            and self._is_confirmed(each)
+            if not each.is_taken_over and self._now - each.shown <= _GAP
+            if self._is_confirmed(each)
+            for state in each.states
         )
 
-    def _forgotten(self, now: float) -> list[_Vehicle]:
-        return [each for each in self._vehicles.values() if now - each.shown > REMEMBERED]
+    def _sighting(self, track: Track, frame: int) -> Sighting:
+        """Return where a track is as exactly as files of tracks hold it, so both count alike."""
+        x, y = track.foot
+        point, height = (round(x, 2), round(y, 2)), float(track.box.xywh[3])
+        return Sighting(self._now, frame, point, height, round(track.score, 4))
+
+    def _see(self, track: Track, sighting: Sighting, shown: set[int]) -> None:
+        vehicle = self._vehicles.get(track.id)
+        if vehicle is None or vehicle.is_taken_over:
+            vehicle = self._begin(track.id, sighting, shown)
+        vehicle.classes.add(track.class_name, track.score)
+        vehicle.outward = _touched_sides(track.box, self.layout.size)
+        band = self.layout.band(sighting.height)
+        for state in vehicle.states:
+            before = state.side
+            change = state.see(sighting, vehicle.last, band)
+            if change is not None:
+                _note(vehicle, state, change)
+            elif before == 0 and state.side > 0 and isinstance(state.border, Zone):
+                state.entered = vehicle.first.time
+                vehicle.add(state.border.name, APPEAR, vehicle.first)
+        vehicle.move(sighting)
+        self._confirm(vehicle)
 
     def _begin(self, number: int, sighting: Sighting, shown: set[int]) -> _Vehicle:
         """Remember a new vehicle, which may go on from another that has ended."""
@@ -169,21 +173,19 @@ class VehicleCounter:
             self._close(self._vehicles[number])
         before = self._before(sighting, shown)
         if before is None:
-            states = [BorderState() for _ in self._borders]
-            vehicle = _Vehicle(number, sighting, sighting, (0, 0), sighting.time, states)
+            states = [BorderState(border) for border in self.layout.borders]
+            vehicle = _Vehicle(number, sighting, sighting, states, self._now)
         else:
-            before.is_taken_over = True
-            vehicle = _Vehicle(
-                number,
-                before.first,
-                before.last,
-                (0, 0),
-                sighting.time,
-                [state.taken_over() for state in before.states],
-                dict(before.entered),
-                before.velocity,
-                ClassScores(before.classes),
+            vehicle = replace(
+                before,
+                id=number,
+                states=[replace(state, stitched=True) for state in before.states],
+                shown=self._now,
+                classes=ClassScores(before.classes),
+                events=[],
+                tallied=0,
             )
+            before.is_taken_over = True
         self._vehicles[number] = vehicle
         return vehicle
 
@@ -202,31 +204,6 @@ class VehicleCounter:
                 near.append((distance, vehicle.id))
         return self._vehicles[min(near)[1]] if near else None
 
-    def _see(self, vehicle: _Vehicle, sighting: Sighting) -> None:
-        band = self.layout.band(sighting.height)
-        for number, (border, state) in enumerate(zip(self._borders, vehicle.states, strict=True)):
-            before = state.side
-            change = state.see(sighting, border, band, _SETTLED)
-            if change is not None:
-                self._note(vehicle, number, change)
-            elif before == 0 and state.side > 0 and isinstance(border, Zone):
-                vehicle.entered[number] = vehicle.first.time
-                vehicle.add(border.name, APPEAR, vehicle.first)
-        vehicle.move(sighting)
-        self._confirm(vehicle)
-
-    def _note(self, vehicle: _Vehicle, number: int, change: Change) -> None:
-        border, seconds = self._borders[number], None
-        if not change.meets:
-            return
-        if isinstance(border, Zone):
-            if change.side > 0:
-                vehicle.entered[number] = change.time
-            else:
-                seconds = change.time - vehicle.entered.pop(number, change.time)
-        direction = border.direction(change.side)
-        vehicle.add(border.name, direction, change, stitched=change.stitched, seconds=seconds)
-
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
         seen = vehicle.last.time - vehicle.first.time
         return seen >= self.layout.settings.confirmed - CLOCK
@@ -243,30 +220,32 @@ class VehicleCounter:
         """Keep the events of a vehicle that is not shown any more, and forget it."""
         del self._vehicles[vehicle.id]
         if not vehicle.is_taken_over:
-            self._end(vehicle)
+            _end(vehicle)
         self._confirm(vehicle)
         for event in vehicle.events[: vehicle.tallied]:
             self._events.append(_finished(event, vehicle.classes.best))
 
-    def _end(self, vehicle: _Vehicle) -> None:
-        for number, state in enumerate(vehicle.states):
-            if (change := state.end()) is not None:
-                self._note(vehicle, number, change)
-        for number, entered in vehicle.entered.items():
-            seconds = vehicle.last.time - entered
-            vehicle.add(self._borders[number].name, VANISH, vehicle.last, seconds=seconds)
+
+def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
+    """Note the event of a change, if the path meets the border."""
+    if not change.meets:
+        return
+    border, seconds = state.border, None
+    if isinstance(border, Zone):
+        entered, state.entered = state.entered, change.time if change.side > 0 else None
+        if change.side < 0:
+            seconds = 0.0 if entered is None else change.time - entered
+    vehicle.add(border.name, border.ways[change.side > 0], change, seconds)
 
 
-def _sighting(track: Track, frame: FrameTracks) -> Sighting:
-    """Return where a track is, as exactly as files of tracks hold it, so that both count alike."""
-    x, y = track.foot
-    return Sighting(
-        round(frame.time, 6),
-        frame.index,
-        (round(x, 2), round(y, 2)),
-        float(track.box.xywh[3]),
-        round(track.score, 4),
-    )
+def _end(vehicle: _Vehicle) -> None:
+    """Note the events of a vehicle that is not seen again."""
+    for state in vehicle.states:
+        if (change := state.end(vehicle.last)) is not None:
+            _note(vehicle, state, change)
+        if state.entered is not None:
+            stay = vehicle.last.time - state.entered
+            vehicle.add(state.border.name, VANISH, vehicle.last, stay)
 
 
 def _touched_sides(box: Box, size: tuple[int, int]) -> Point:
@@ -279,3 +258,46 @@ def _finished(event: Event, class_name: str | None) -> Event:
     seconds = None if event.seconds is None else round(event.seconds, 3)
     time, score = round(event.time, 3), round(event.score, 4)
     return replace(event, time=time, class_name=class_name, score=score, seconds=seconds)
+
+
+def count_file(
+    path: Path,
+    settings: CountSettings,
+    size: tuple[int, int] | None = None,
+    rate: float | None = None,
+) -> Counts:
+    """Count the vehicles of a file of tracks at the lines and in the zones of the settings.
+
+    Parameters
+    ----------
+    size
+        Width and height of the frames, pixels; None: as the file says, else as the lines say.
+    rate
+        Frames per second, for a file without times.
+
+    Raises
+    ------
+    TruthError
+        The file cannot be used, or has no times.
+    ConfigError
+        The lines do not fit the frames, or the size of the frames is not known.
+    """
+    saved = read_tracks(path, rate)
+    if not saved.has_times:
+        raise TruthError(f"{path}: has no times; give the frames per second, as in --rate 25")
+    return count_frames(saved.frames, settings, size or saved.size)
+
+
+def count_frames(
+    frames: Iterable[FrameTracks], settings: CountSettings, size: tuple[int, int] | None = None
+) -> Counts:
+    """Count the vehicles in the tracks of each frame; arguments and errors as of `count_file`."""
+    size = size or settings.size
+    if not settings:
+        raise ConfigError("there is nothing to count at; give lines or zones")
+    if size is None:
+        raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
+    counter = VehicleCounter(lay_out(settings, *size))
+    for frame in frames:
+        counter.update(frame)
+    return counter.counts()

@@ -19,7 +19,7 @@ from vdet.run.sinks.counts import COUNTS
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
 from vdet.testing import check_sink
-from vdet.traffic.count_files import join_counts
+from vdet.traffic.counts import join_counts
 
 COUNTS_AT = CountSettings(
     size=(320, 240),

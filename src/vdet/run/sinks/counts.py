@@ -17,8 +17,8 @@ from vdet.lanes.road import Road
 from vdet.polygons import Point
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.count_files import join_counts, write_counts
 from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.counts import join_counts, write_counts
 from vdet.traffic.tables import SUFFIXES
 
 
@@ -53,7 +53,7 @@ def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | 
     """
     for zone in counter.layout.zones:
         label = f"{zone.name}: {counter.present(zone)}"
-        draw_zone(surface, _placed(zone.outline.corners, road), label)
+        draw_zone(surface, _placed(zone.corners, road), label)
     for line in counter.layout.lines:
         left, right = (
             f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions

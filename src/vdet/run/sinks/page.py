@@ -13,11 +13,11 @@ from vdet.pages.video import Player, Thumbnail, VideoPage
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.counts import MinuteCount
 from vdet.traffic.crops import BestCrops, Crop
 from vdet.traffic.heat import HeatMap
 from vdet.traffic.levels import Levels
 from vdet.traffic.records import VehicleRecords
-from vdet.traffic.totals import Event, by_minute
 
 _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one that is faded in
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
@@ -79,7 +79,7 @@ class PageSink(BaseSink):
             still=None if self._still is None else self._heat.over(self._still),
             player=self._player(),
             settings=render(self.context.settings),
-            counts=_by_minute(self._counter.finish()) if self._counter else {},
+            counts=_by_minute(self._counter.counts().minutes) if self._counter else {},
         )
 
     def _player(self) -> Player | None:
@@ -94,10 +94,10 @@ class PageSink(BaseSink):
         return None
 
 
-def _by_minute(events: Sequence[Event]) -> dict[str, Counter[int]]:
+def _by_minute(counts: Sequence[MinuteCount]) -> dict[str, Counter[int]]:
     """Return the counts of each line or zone and direction by minute."""
     minutes: dict[str, Counter[int]] = {}
-    for each in by_minute(events):
+    for each in counts:
         name = f"{each.name}: {each.direction}"
         minutes.setdefault(name, Counter())[each.minute] = each.count
     return minutes

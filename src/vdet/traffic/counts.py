@@ -1,16 +1,26 @@
-"""Events, and what follows from them: totals, counts of each minute, and stays in zones."""
+"""Events and what follows from them: totals, counts of each minute, stays in zones; as files too.
+
+A `.csv` has the events, a `.json` the events and all totals. A file over several videos has the
+same columns with `video` before them, or the counts of each video and the sum of all totals.
+"""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, astuple, dataclass
 from itertools import accumulate
+from pathlib import Path
+from typing import Any
 
-from vdet.traffic.layout import APPEAR, ENTER
+from vdet.traffic.borders import APPEAR, ENTER
+from vdet.traffic.tables import VIDEO, is_json, join, write_json, write_table
 
 Key = tuple[str, str]
 """Name of a line or zone, and a direction."""
 
 _IN = (ENTER, APPEAR)
+_COLUMNS = ("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds")
+"""Of `.csv`: the fields of an event in their order."""
+_FORMS = {"time": ".3f", "score": ".4f", "stitched": "d", "seconds": ".3f"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +74,7 @@ class Total:
 
 @dataclass(frozen=True, slots=True)
 class MinuteCount:
-    """The same in one minute; minute 0 is the first of the video."""
+    """How many vehicles were counted in a direction in one minute, from 0 at time 0."""
 
     minute: int
     name: str
@@ -99,32 +109,36 @@ class Counts:
         events: Sequence[Event], keys: Iterable[Key] = (), zones: Iterable[str] = ()
     ) -> "Counts":
         """Sum up events; `keys` are counted also where nothing happened, `zones` are names."""
-        return Counts(tuple(events), totals(events, keys), by_minute(events), stays(events, zones))
+        classes = (() if event.class_name is None else (event.class_name,) for event in events)
+        ones = (
+            Total(event.name, event.direction, 1, Counter(names))
+            for event, names in zip(events, classes, strict=True)
+        )
+        totals = sum_totals([*(Total(*key, 0, {}) for key in keys), *ones])
+        return Counts(tuple(events), totals, _by_minute(events), stays(events, zones))
 
 
-def totals(events: Iterable[Event], keys: Iterable[Key] = ()) -> tuple[Total, ...]:
-    """Return the total of each name and direction: first `keys`, then others as they occur."""
-    classes: dict[Key, Counter[str]] = {key: Counter() for key in keys}
+def sum_totals(totals: Iterable[Total]) -> tuple[Total, ...]:
+    """Return the sum of the totals of each name and direction, in the order of their first."""
     counts: Counter[Key] = Counter()
-    for event in events:
-        key = event.name, event.direction
-        counts[key] += 1
-        of_key = classes.setdefault(key, Counter())
-        if event.class_name is not None:
-            of_key[event.class_name] += 1
+    classes: dict[Key, Counter[str]] = {}
+    for each in totals:
+        key = each.name, each.direction
+        counts[key] += each.count
+        classes[key] = classes.get(key, Counter()) + Counter(each.classes)
     return tuple(
         Total(*key, counts[key], dict(sorted(of_key.items()))) for key, of_key in classes.items()
     )
 
 
-def by_minute(events: Iterable[Event]) -> tuple[MinuteCount, ...]:
+def _by_minute(events: Iterable[Event]) -> tuple[MinuteCount, ...]:
     """Return the counts of each minute; minutes without an event are left out."""
     counts = Counter((int(e.time // 60), e.name, e.direction) for e in events)
     return tuple(MinuteCount(*key, count) for key, count in sorted(counts.items()))
 
 
 def stays(events: Iterable[Event], zones: Iterable[str]) -> tuple[Stay, ...]:
-    """Return what the events say of the vehicles in each of the zones of these names."""
+    """Return the stays in each of the zones of these names."""
     ordered = sorted(events, key=lambda event: (event.time, event.direction in _IN))
     return tuple(_stay(name, [event for event in ordered if event.name == name]) for name in zones)
 
@@ -136,3 +150,45 @@ def _stay(name: str, events: Sequence[Event]) -> Stay:
     if not seconds:
         return Stay(name, most, None, None)
     return Stay(name, most, round(sum(seconds) / len(seconds), 3), max(seconds))
+
+
+def write_counts(path: Path, counts: Counts) -> None:
+    """Write the counts of one video."""
+    if is_json(path):
+        write_json(path, _plain(counts))
+    else:
+        write_table(path, _COLUMNS, map(_cells, counts.events))
+
+
+def write_counts_of_all(path: Path, videos: Mapping[str, Counts]) -> None:
+    """Write the counts of several videos, by their names."""
+    if is_json(path):
+        write_json(path, _joined({name: _plain(counts) for name, counts in videos.items()}))
+    else:
+        rows = ((name, *_cells(event)) for name, each in videos.items() for event in each.events)
+        write_table(path, (VIDEO, *_COLUMNS), rows)
+
+
+def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
+    """Write the counts of several videos into one file, from the file of each of the same form.
+
+    Errors as of `join`.
+    """
+    join(outputs, path, _COLUMNS, _joined)
+
+
+def _joined(videos: Mapping[str, Any]) -> dict[str, Any]:
+    totals = sum_totals(Total(**total) for each in videos.values() for total in each["totals"])
+    return {"totals": [asdict(each) for each in totals], "videos": videos}
+
+
+def _plain(counts: Counts) -> dict[str, Any]:
+    events = (dict(zip(_COLUMNS, astuple(event), strict=True)) for event in counts.events)
+    return asdict(counts) | {"events": list(events)}
+
+
+def _cells(event: Event) -> list[str]:
+    return [
+        "" if value is None else format(value, _FORMS.get(column, ""))
+        for column, value in zip(_COLUMNS, astuple(event), strict=True)
+    ]

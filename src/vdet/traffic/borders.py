@@ -1,0 +1,283 @@
+"""Lines and zones in pixels of the frames of one video, and what one vehicle does at each."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from vdet.config.places import CountSettings
+from vdet.polygons import Point, Segment, contains, distance_to, meeting, side_of, sides
+
+ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
+"""Directions of a zone: over its border, or first and last seen inside."""
+
+CLOCK = 1e-4
+"""Seconds by which a duration may be too short: times are rounded."""
+
+_SETTLED = 0.1
+"""Seconds after which a vehicle off a border's band has changed the side."""
+_BAND = 0.05
+"""Distance from a border within which a vehicle is on neither side, in heights of its box."""
+_LEAST_BAND = 0.003
+"""Smallest such distance, as a share of the frame's height."""
+_AT_EDGE = 0.002
+"""A point within this share of the frame's side (or one pixel) of the frame's edge lies on it."""
+_INSIDE = 0.01
+"""Pixels from the edge of the frame to which points outside are moved."""
+
+_Size = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line; its positive side is the right of someone who looks from `start` to `end`.
+
+    `start` and `end` are those that are drawn; `reach` goes on where they lie at the frame's edge.
+    `ways` are the directions to the negative and to the positive side.
+    """
+
+    name: str
+    ways: tuple[str, str]
+    start: Point
+    end: Point
+    reach: Segment
+
+    @property
+    def directions(self) -> tuple[str, ...]:
+        """Left and right, by the names that the user gave."""
+        return self.ways
+
+    def distance(self, point: Point) -> float:
+        """Return the distance from the line, also from beyond its ends; positive on the right."""
+        return side_of(self.start, self.end, point)
+
+    def meeting(self, path: Segment) -> float | None:
+        """Return the share of the way along `path` at which it meets the line, if it does."""
+        return meeting(path, self.reach)
+
+
+@dataclass(frozen=True, slots=True)
+class Zone:
+    """A polygon, whose positive side is the inside; at the frame's edge it goes on beyond.
+
+    `sides` are those of its sides that do not run along the edge of the frame, `size` is the width
+    and height of the frame. All are in pixels.
+    """
+
+    name: str
+    corners: tuple[Point, ...]
+    sides: tuple[Segment, ...]
+    size: _Size
+
+    ways = EXIT, ENTER
+    directions = ENTER, EXIT, APPEAR, VANISH
+
+    def distance(self, point: Point) -> float:
+        """Return the distance from the sides, positive inside; infinite where there are none."""
+        point = self._in_frame(point)
+        distance = min((distance_to(side, point) for side in self.sides), default=math.inf)
+        return distance if contains(self.corners, point) else -distance
+
+    def meeting(self, path: Segment) -> float | None:
+        """Return the share of the way along `path` at which it last meets a side, if it does."""
+        inside = self._in_frame(path[0]), self._in_frame(path[1])
+        shares = (meeting(inside, side) for side in self.sides)
+        return max((share for share in shares if share is not None), default=None)
+
+    def _in_frame(self, point: Point) -> Point:
+        x, y = (
+            min(max(value, _INSIDE), length - _INSIDE)
+            for value, length in zip(point, self.size, strict=True)
+        )
+        return x, y
+
+
+Border = Line | Zone
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The lines and zones of a video with the rule that counts at them.
+
+    `size` is the width and height of the frames, pixels.
+    """
+
+    lines: tuple[Line, ...]
+    zones: tuple[Zone, ...]
+    size: tuple[int, int]
+    settings: CountSettings
+
+    @property
+    def borders(self) -> tuple[Border, ...]:
+        """All lines, then all zones."""
+        return (*self.lines, *self.zones)
+
+    @property
+    def keys(self) -> tuple[tuple[str, str], ...]:
+        """Every name with every direction that is counted there."""
+        return tuple((each.name, way) for each in self.borders for way in each.directions)
+
+    def band(self, height: float) -> float:
+        """Return the pixels from a border within which a box of this height is on neither side."""
+        return max(_BAND * height, _LEAST_BAND * self.size[1])
+
+
+def lay_out(settings: CountSettings, width: int, height: int) -> Layout:
+    """Place lines and zones in frames of `width` × `height` pixels.
+
+    Raises
+    ------
+    ConfigError
+        They are given for frames of another aspect ratio.
+    """
+    size = width, height
+    across, down = settings.scales(width, height)
+
+    def placed(point: Point) -> Point:
+        return _snapped(point[0] * across, width), _snapped(point[1] * down, height)
+
+    lines = tuple(
+        _line(each.name, (each.left, each.right), placed(each.start), placed(each.end), size)
+        for each in settings.lines
+    )
+    zones = tuple(_zone(each.name, [*map(placed, each.points)], size) for each in settings.zones)
+    return Layout(lines, zones, size, settings)
+
+
+def _line(name: str, ways: tuple[str, str], start: Point, end: Point, size: _Size) -> Line:
+    """Make a line; an end at the frame's edge goes on beyond it, where feet may be too."""
+    factor = sum(size) / math.dist(start, end)
+    dx, dy = factor * (end[0] - start[0]), factor * (end[1] - start[1])
+    first = (start[0] - dx, start[1] - dy) if _at_edge(start, size) else start
+    last = (end[0] + dx, end[1] + dy) if _at_edge(end, size) else end
+    return Line(name, ways, start, end, (first, last))
+
+
+def _zone(name: str, corners: Sequence[Point], size: _Size) -> Zone:
+    return Zone(
+        name,
+        tuple(corners),
+        tuple(side for side in sides(corners) if not _runs_along_edge(side, size)),
+        size,
+    )
+
+
+def _snapped(value: float, length: float) -> float:
+    """Return a coordinate, moved onto the frame's edge where it is very near to it."""
+    near = max(1.0, _AT_EDGE * length)
+    if value <= near:
+        return 0.0
+    return float(length) if length - value <= near else value
+
+
+def _at_edge(point: Point, size: _Size) -> bool:
+    return any(value in (0, length) for value, length in zip(point, size, strict=True))
+
+
+def _runs_along_edge(side: Segment, size: _Size) -> bool:
+    return any(
+        start == end and start in (0, length)
+        for start, end, length in zip(*side, size, strict=True)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """A vehicle as it is seen in a frame: where its foot is, and the height of its box, pixels."""
+
+    time: float
+    frame: int
+    point: Point
+    height: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change to the side of the sign `side`; `where` is the point at which the path crosses.
+
+    `meets` is False where the path passes beyond the ends of a line.
+    """
+
+    side: int
+    time: float
+    frame: int
+    where: Point
+    score: float
+    meets: bool
+    stitched: bool = False
+
+
+@dataclass(slots=True)
+class BorderState:
+    """What is remembered of a vehicle at a border.
+
+    Attributes
+    ----------
+    side
+        The settled side, 1 or -1; 0 before it is known.
+    stitched
+        Whether the vehicle was another track when its side was settled last.
+    entered
+        When it came into a zone in which it still is.
+    """
+
+    border: Border
+    side: int = 0
+    stitched: bool = False
+    entered: float | None = None
+    _sign: int = 0  # of the last place that was not exactly on the border
+    _beyond: int = 0  # the side on which it is beyond the band
+    _since: float = 0.0  # when it came there
+    _far: int = 0  # the side on which it was seen one height away last, until that is confirmed
+    _change: Change | None = None  # the last time at which it was over the border
+    _crossed: Point | None = None  # where it last crossed and was counted
+
+    def see(self, sighting: Sighting, before: Sighting, band: float) -> Change | None:
+        """Take in the next sighting; return the change of the settled side, if there is one.
+
+        `before` is the last sighting, or the same one at first. The first side that is settled is
+        no change.
+        """
+        distance = self.border.distance(sighting.point)
+        sign = (distance > 0) - (distance < 0)
+        if sign and self._sign == -sign:
+            self._change = _change(before, sighting, sign, self.border)
+        self._sign = sign or self._sign
+        is_far = abs(distance) >= sighting.height
+        was_far = self._far == sign
+        self._far = sign if is_far and abs(distance) > band else 0
+        if abs(distance) <= band:
+            self._beyond = 0
+            return self._settle(sign, sighting, is_far=True) if was_far and sign else None
+        if self._beyond != sign:
+            self._beyond, self._since = sign, sighting.time
+        if was_far or sighting.time - self._since >= _SETTLED - CLOCK:
+            return self._settle(sign, sighting, is_far=is_far or was_far)
+        return None
+
+    def end(self, last: Sighting) -> Change | None:
+        """Return the change that the last sighting shows, if the vehicle is not seen again."""
+        return self._settle(self._far, last, is_far=True) if self._far else None
+
+    def _settle(self, side: int, sighting: Sighting, *, is_far: bool) -> Change | None:
+        if self.side in (side, 0):
+            self.side, self.stitched = side, False
+            return None
+        change, crossed = self._change, self._crossed
+        if change is None or change.side != side:  # it was on the border when it was first seen
+            return None
+        if crossed and not is_far and math.dist(change.where, crossed) < sighting.height:
+            return None
+        self.side = side
+        self._crossed = change.where if change.meets else None
+        stitched, self.stitched = self.stitched, False
+        return replace(change, stitched=stitched)
+
+
+def _change(before: Sighting, after: Sighting, side: int, border: Border) -> Change:
+    share = border.meeting((before.point, after.point))
+    along = 1.0 if share is None else share
+    (ax, ay), (bx, by) = before.point, after.point
+    time = before.time + along * (after.time - before.time)
+    where = ax + along * (bx - ax), ay + along * (by - ay)
+    return Change(side, time, after.frame, where, after.score, meets=share is not None)
