@@ -19,7 +19,7 @@ from vdet.pages.index import write_index
 from vdet.pages.render import jpeg_uri
 from vdet.pages.video import Player, Thumbnail, VideoPage, read_facts
 from vdet.track.track import FrameTracks
-from vdet.traffic.levels import Levels
+from vdet.traffic.overview import Levels
 from vdet.traffic.records import VehicleRecord, summarize
 
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"

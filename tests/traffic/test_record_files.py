@@ -11,8 +11,7 @@ from traffic.passing import WIDTH, frame, passing, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
 from vdet.track.track import FrameTracks
-from vdet.traffic.record_files import join_records, write_records
-from vdet.traffic.records import summarize
+from vdet.traffic.records import join_records, summarize, write_records
 
 HEADING = (
     "id,class,first,last,seconds,seen,predicted,mean_score,best_score,"

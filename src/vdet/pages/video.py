@@ -19,7 +19,7 @@ from vdet.media.images import Image
 from vdet.pages import charts
 from vdet.pages.charts import Minutes, Plot, Span, Timeline, clock
 from vdet.pages.render import jpeg_uri, link_to, plural, render
-from vdet.traffic.levels import Levels
+from vdet.traffic.overview import Levels
 from vdet.traffic.records import VehicleRecord
 
 _MOST_VEHICLES = 300  # that are shown one by one

@@ -1,15 +1,16 @@
-"""A record of each vehicle, from the tracks of each frame."""
+"""A record of each vehicle, from the tracks of each frame; records as files, of many videos too."""
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from vdet.boxes import Box
 from vdet.detect.classes import ClassScores
+from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
-
-Point = tuple[float, float]
-"""x and y in pixels of the frame."""
+from vdet.traffic.tables import VIDEO, is_json, join, write_json, write_table
 
 PATH_STEP = 0.01
 """Distance after which a path gets its next point, as a share of the frame's width.
@@ -17,48 +18,94 @@ PATH_STEP = 0.01
 Shorter moves are jitter of the boxes.
 """
 
+_PLACE = ("x", "y", "width", "height")
+_COLUMNS = (
+    *("id", "class", "first", "last", "seconds", "seen", "predicted", "mean_score", "best_score"),
+    *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
+    *_PLACE,
+)
+"""Of `.csv`; x, y, width and height are those of the largest box."""
 
-@dataclass(frozen=True, slots=True)
+
+@dataclass(slots=True)
 class VehicleRecord:
     """A vehicle over a whole video.
 
     Attributes
     ----------
-    class_name
-        The class with the highest sum of scores over its frames; None where none is told.
+    frame_width
+        Width of the frames, pixels.
     first, last
         Times of the first and the last frame that show it, seconds.
+    largest
+        The box with the largest area, pixels.
     seconds
         How long it is shown. A frame is shown until the next one, the last frame as long as the one
         before it.
     seen, predicted
         Number of frames that show it where the detector saw it, and where it did not.
-    mean_score, best_score
-        Of these frames, 0 to 1.
+    best_score, sum_of_scores
+        Over these frames; a score is 0 to 1.
+    classes
+        Sums of scores over these frames, by class.
     path
         Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
         Only frames count in which it was seen, if there are any.
-    length
-        Of the path: pixels.
-    share
-        Length of the path as a share of the frame's width.
-    largest
-        The box with the largest area, pixels.
     """
 
     id: int
-    class_name: str | None
+    frame_width: int
     first: float
     last: float
-    seconds: float
-    seen: int
-    predicted: int
-    mean_score: float
-    best_score: float
-    path: tuple[Point, ...]
-    length: float
-    share: float
     largest: Box
+    seconds: float = 0.0
+    seen: int = 0
+    predicted: int = 0
+    best_score: float = 0.0
+    sum_of_scores: float = 0.0
+    classes: ClassScores = field(default_factory=ClassScores)
+    path: list[Point] = field(default_factory=list)
+
+    @property
+    def class_name(self) -> str | None:
+        """The class with the highest sum of scores; None where the detector tells no classes."""
+        return self.classes.best
+
+    @property
+    def mean_score(self) -> float:
+        """Mean of the scores of all its frames, 0 to 1."""
+        return self.sum_of_scores / (self.seen + self.predicted)
+
+    @property
+    def length(self) -> float:
+        """Length of the path, pixels."""
+        return sum(map(math.dist, self.path, self.path[1:]))
+
+    @property
+    def share(self) -> float:
+        """Length of the path as a share of the frame's width."""
+        return self.length / self.frame_width
+
+    def add(self, track: Track, time: float) -> None:
+        """Add the next frame that shows it."""
+        self.last = time
+        self.sum_of_scores += track.score
+        self.best_score = max(self.best_score, track.score)
+        self.classes.add(track.class_name, track.score)
+        self.largest = max(self.largest, track.box, key=lambda box: box.area)
+        if not (track.predicted or self.seen):
+            self.path.clear()
+        if not (track.predicted and self.seen):
+            self._go_to(track.foot)
+        self.predicted += track.predicted
+        self.seen += not track.predicted
+
+    def _go_to(self, point: Point) -> None:
+        """Continue the path; its last point stays only if it is a step away from the one before."""
+        is_near = (
+            math.dist(*self.path[-2:]) < PATH_STEP * self.frame_width if self.path[1:] else False
+        )
+        self.path[len(self.path) - is_near :] = [point]
 
 
 class VehicleRecords:
@@ -72,8 +119,7 @@ class VehicleRecords:
 
     def __init__(self, width: int) -> None:
         self._width = width
-        self._step = PATH_STEP * width
-        self._vehicles: dict[int, _Vehicle] = {}
+        self._vehicles: dict[int, VehicleRecord] = {}
         self._latest: FrameTracks | None = None
         self._period = 0.0
 
@@ -85,8 +131,9 @@ class VehicleRecords:
             self._show(self._latest)
         for track in frame.tracks:
             if track.id not in self._vehicles:
-                self._vehicles[track.id] = _Vehicle(track, frame.time)
-            self._vehicles[track.id].add(track, frame.time, self._step)
+                first = VehicleRecord(track.id, self._width, frame.time, frame.time, track.box)
+                self._vehicles[track.id] = first
+            self._vehicles[track.id].add(track, frame.time)
         self._latest = frame
 
     def _show(self, frame: FrameTracks) -> None:
@@ -97,7 +144,7 @@ class VehicleRecords:
         """Return the records by id; call it once, after the last frame."""
         if self._latest:
             self._show(self._latest)
-        return tuple(vehicle.record(self._width) for _, vehicle in sorted(self._vehicles.items()))
+        return tuple(record for _, record in sorted(self._vehicles.items()))
 
 
 def summarize(frames: Iterable[FrameTracks], width: int) -> tuple[VehicleRecord, ...]:
@@ -108,62 +155,53 @@ def summarize(frames: Iterable[FrameTracks], width: int) -> tuple[VehicleRecord,
     return records.end()
 
 
-class _Vehicle:
-    """A vehicle so far."""
+def write_records(records: Iterable[VehicleRecord], path: Path) -> None:
+    """Write the records; the suffix of `path` chooses the format."""
+    if is_json(path):
+        write_json(path, [_item(record) for record in records])
+    else:
+        write_table(path, _COLUMNS, (_cells(_item(record)) for record in records))
 
-    def __init__(self, track: Track, time: float) -> None:
-        self.seconds = 0.0
-        self._id = track.id
-        self._first = self._last = time
-        self._seen = self._predicted = 0
-        self._scores = 0.0
-        self._best = 0.0
-        self._classes = ClassScores()
-        self._largest = track.box
-        self._points: list[Point] = []
-        self._end: Point = track.foot
 
-    def add(self, track: Track, time: float, step: float) -> None:
-        self._last = time
-        self._scores += track.score
-        self._best = max(self._best, track.score)
-        self._classes.add(track.class_name, track.score)
-        if track.box.area > self._largest.area:
-            self._largest = track.box
-        self._go(track, step)
-        if track.predicted:
-            self._predicted += 1
-        else:
-            self._seen += 1
+def join_records(outputs: Mapping[str, Path], target: Path) -> None:
+    """Write one file over those of many videos, by their names; each record gets its video.
 
-    def _go(self, track: Track, step: float) -> None:
-        """Continue the path; what was seen first begins it anew, and then what was seen counts."""
-        if track.predicted and self._seen:
-            return
-        self._end = track.foot
-        if not (track.predicted or self._seen):
-            self._points = []
-        if not self._points or math.dist(self._points[-1], track.foot) >= max(step, 1e-9):
-            self._points.append(track.foot)
+    Errors as of `join`.
+    """
+    join(outputs, target, _COLUMNS, _with_videos)
 
-    def record(self, width: int) -> VehicleRecord:
-        path = tuple(self._points)
-        if self._end != path[-1]:
-            path = (*path, self._end)
-        length = sum(map(math.dist, path, path[1:]))
-        frames = self._seen + self._predicted
-        return VehicleRecord(
-            id=self._id,
-            class_name=self._classes.best,
-            first=self._first,
-            last=self._last,
-            seconds=self.seconds,
-            seen=self._seen,
-            predicted=self._predicted,
-            mean_score=self._scores / frames,
-            best_score=self._best,
-            path=path,
-            length=length,
-            share=length / width,
-            largest=self._largest,
-        )
+
+def _with_videos(videos: Mapping[str, Any]) -> list[dict[str, Any]]:
+    return [{VIDEO: name, **item} for name, items in videos.items() for item in items]
+
+
+def _item(record: VehicleRecord) -> dict[str, Any]:
+    return {
+        "id": record.id,
+        "class": record.class_name,
+        "first": round(record.first, 6),
+        "last": round(record.last, 6),
+        "seconds": round(record.seconds, 3),
+        "seen": record.seen,
+        "predicted": record.predicted,
+        "mean_score": round(record.mean_score, 4),
+        "best_score": round(record.best_score, 4),
+        "path": {
+            "start": [round(value, 1) for value in record.path[0]],
+            "end": [round(value, 1) for value in record.path[-1]],
+            "length": round(record.length, 1),
+            "length_share": round(record.share, 4),
+        },
+        "largest": dict(zip(_PLACE, record.largest.xywh, strict=True)),
+    }
+
+
+def _cells(value: Any) -> Iterator[Any]:
+    """Yield the values of an item, and those in its values, in the order of `_COLUMNS`."""
+    if isinstance(value, dict):
+        value = value.values()
+    elif not isinstance(value, list):
+        yield value
+        return
+    for each in value:
+        yield from _cells(each)

@@ -14,9 +14,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import MinuteCount
-from vdet.traffic.crops import BestCrops, Crop
-from vdet.traffic.heat import HeatMap
-from vdet.traffic.levels import Levels
+from vdet.traffic.overview import BestCrops, Crop, HeatMap, Levels
 from vdet.traffic.records import VehicleRecords
 
 _EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one that is faded in

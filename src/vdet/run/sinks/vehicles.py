@@ -9,9 +9,8 @@ from vdet.files import make_folder
 from vdet.media.images import encode_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
-from vdet.traffic.crops import BestCrops, Crop
-from vdet.traffic.record_files import join_records, write_records
-from vdet.traffic.records import VehicleRecords
+from vdet.traffic.overview import BestCrops, Crop
+from vdet.traffic.records import VehicleRecords, join_records, write_records
 from vdet.traffic.tables import SUFFIXES
 
 

@@ -1,0 +1,124 @@
+"""A video in pictures: the best one of each vehicle, where vehicles were, how many at once."""
+
+import numpy as np
+
+from traffic.passing import HEIGHT, WIDTH, frame, track
+from vdet.boxes import Box
+from vdet.media import Picture
+from vdet.media.images import Image
+from vdet.track.track import Track
+from vdet.traffic.overview import BestCrops, Crop, HeatMap, Levels
+
+ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
+PICTURE = Picture(ROAD)
+
+
+def crops(*shown: list[Track]) -> dict[int, Crop]:
+    """Return the picture of each vehicle that was given back last."""
+    best = BestCrops()
+    found = [crop for n, each in enumerate(shown) for crop in best.add(frame(n, *each), PICTURE)]
+    return {crop.id: crop for crop in (*found, *best.end())}
+
+
+def box(size: int, x: int = 50) -> Box:
+    return Box.sized(x, 60, size, size)
+
+
+def cut(place: Box) -> Image:
+    """Return a place with a tenth of its size around it."""
+    x, y = round(place.width / 10), round(place.height / 10)
+    return Box(place.x1 - x, place.y1 - y, place.x2 + x, place.y2 + y).cut(ROAD)
+
+
+def test_the_largest_is_taken_and_shows_the_box() -> None:
+    found = crops([track(1, box(40))], [track(1, box(50))], [track(1, box(45))])
+    np.testing.assert_array_equal(found[1].image, cut(box(50)))
+    assert found[1].time == 1 / 25
+
+
+def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
+    at_the_edge = Box.sized(WIDTH - 90, 60, 90, 90)
+    found = crops([track(1, box(40))], [track(1, at_the_edge)])
+    assert found[1].image.shape == (48, 48, 3)
+    alone = crops([track(1, at_the_edge)])
+    assert alone[1].image.shape == (108, 99, 3), "it is better than nothing"
+
+
+def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
+    assert crops([track(1, box(40), predicted=True)]) == {}
+
+
+def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:
+    best = BestCrops()
+    assert best.add(frame(0, track(1, box(40))), PICTURE) == []
+    assert [crop.id for crop in best.add(frame(1), PICTURE)] == [1]
+    assert best.add(frame(2), PICTURE) == []
+    assert best.add(frame(3, track(1, box(30))), PICTURE) == []
+    assert best.add(frame(4), PICTURE) == [], "the first one is better"
+    best.add(frame(5, track(1, box(60))), PICTURE)
+    assert [crop.image.shape[0] for crop in best.end()] == [72]
+
+
+def test_memory_holds_only_vehicles_that_are_shown() -> None:
+    best = BestCrops()
+    for number in range(1, 200):
+        best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), PICTURE)
+    assert len(best.end()) == 2
+
+
+STILL = np.full((HEIGHT, WIDTH, 3), (20, 90, 30), np.uint8)
+PLACE = Box.sized(200, 100, 60, 80)
+
+
+def heat(*boxes: Box, still: Image = STILL) -> Image:
+    made = HeatMap(WIDTH, HEIGHT)
+    for index, box in enumerate(boxes):
+        made.add(frame(index, track(1, box)))
+    return made.over(still)
+
+
+def color(picture: Image) -> Image:
+    """Return how much colour each pixel has."""
+    return np.asarray(np.ptp(picture, axis=2), np.uint8)
+
+
+def test_the_ground_under_a_vehicle_has_colour_and_nothing_else() -> None:
+    seen = color(heat(PLACE))
+    assert seen[PLACE.pixels[3] - 10, 230] > 60
+    assert seen[PLACE.pixels[1] + 20, 230] < 10, "the roof is not where it stands"
+    assert seen[:, :180].max() < 10
+
+
+def test_it_lies_at_the_same_place_over_a_still_of_any_size() -> None:
+    small = color(heat(PLACE, still=np.ascontiguousarray(STILL[::2, ::2])))
+    assert small.shape == (HEIGHT // 2, WIDTH // 2)
+    assert small[(PLACE.pixels[3] - 10) // 2, 115] > 60
+
+
+def test_boxes_that_reach_beyond_the_frame_count_as_far_as_it_goes() -> None:
+    heat(
+        Box.sized(-50, -40, 30, 20),
+        Box.sized(WIDTH - 5, HEIGHT - 5, 50, 50),
+        Box.sized(-10, 20, 9000, 9000),
+    )
+
+
+def levels(*counts: int, rate: float = 25) -> Levels:
+    made = Levels()
+    for index, count in enumerate(counts):
+        tracks = [track(number, Box.sized(9 * number, 5, 8, 8)) for number in range(1, count + 1)]
+        made.add(frame(index, *tracks, rate=rate))
+    return made
+
+
+def test_each_step_has_the_most_vehicles_that_are_shown_in_it() -> None:
+    made = levels(0, 0, 0, 0, 2, 2, 2, 2, 1, 3, 1, 1, 0)
+    assert made.most == 3
+    assert list(made.steps(3)) == [0, 2, 3]
+    assert list(made.steps(12)) == [0, 0, 0, 0, 2, 2, 2, 2, 1, 3, 1, 1]
+
+
+def test_of_one_frame_or_none_there_are_levels_too() -> None:
+    assert list(levels(2).steps(3)) == [2, 0, 0]
+    assert list(levels().steps(3)) == [0, 0, 0]
+    assert levels().most == 0
