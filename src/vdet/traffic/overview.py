@@ -1,4 +1,4 @@
-"""A whole video in pictures: the best one of each vehicle, where vehicles were, how many at once."""
+"""A whole video in pictures: the best of each vehicle, where vehicles were, how many at once."""
 
 import math
 from collections.abc import Sequence

@@ -102,10 +102,10 @@ class VehicleRecord:
 
     def _go_to(self, point: Point) -> None:
         """Continue the path; its last point stays only if it is a step away from the one before."""
-        is_near = (
-            math.dist(*self.path[-2:]) < PATH_STEP * self.frame_width if self.path[1:] else False
-        )
-        self.path[len(self.path) - is_near :] = [point]
+        step = PATH_STEP * self.frame_width
+        if len(self.path) > 1 and math.dist(self.path[-2], self.path[-1]) < step:
+            self.path.pop()
+        self.path.append(point)
 
 
 class VehicleRecords:
