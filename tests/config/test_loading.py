@@ -301,9 +301,10 @@ class TestFindConfig:
         assert find_config("my.yaml") == Path("my.yaml")
         assert find_config(str(tmp_path / "my.yaml")) == tmp_path / "my.yaml"
 
-    def test_a_file_of_the_name_goes_before_the_shipped_config(self, tmp_path: Path) -> None:
+    def test_a_file_of_the_name_does_not_replace_the_shipped_config(self, tmp_path: Path) -> None:
         (tmp_path / "seed").touch()
-        assert find_config("seed") == Path("seed")
+        assert find_config("seed").name == "seed.yaml"
+        assert find_config("./seed") == Path("seed")
 
     @pytest.mark.parametrize("name", ["no", "seed.yaml", "../configs/seed"])
     def test_an_unknown_name_names_the_shipped_configs(self, name: str) -> None:

@@ -2,25 +2,15 @@
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
-from typing import Literal
+from functools import partial
 
 from vdet.cli.command import command
 from vdet.cli.results import Results, facts_options
 from vdet.errors import in_one_line
 from vdet.version import __version__
 
-DECODERS = ("h264", "hevc", "av1", "vp9", "mpeg4", "mjpeg")
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that was looked at: "absent" where vdet works without it, "broken" where not."""
-
-    name: str
-    status: Literal["ok", "absent", "broken"]
-    text: str
+Finding = tuple[str, str, str]
+"""What was checked, "ok", "absent" (vdet works without it) or "broken", and what was found."""
 
 
 @command("vdet doctor", "vdet doctor --json -")
@@ -28,70 +18,56 @@ class Finding:
 def doctor(results: Results) -> int:
     """Check whether vdet works on this machine.
 
-    Packages, cores, codecs, extras and the shipped models are checked. The exit code is 1 where
-    something that vdet needs does not work.
+    Packages, codecs and the shipped models are checked. The exit code is 1 if something that vdet
+    needs does not work.
     """
     results.check()
-    findings = list(find_all())
-    works = all(finding.status != "broken" for finding in findings)
-    lines = [f"{each.status:6}  {each.name}: {each.text}" for each in findings]
+    from vdet.config.loading import shipped_configs
+    from vdet.workers import core_count
+
+    found = [("vdet", "ok", f"{__version__}, on {core_count()} cores"), *_packages()]
+    checks = {f"settings {name}": partial(_check_config, name) for name in shipped_configs()}
+    found += [_checked(*each) for each in ({"codec h264": _check_codec} | checks).items()]
+    works = all(status != "broken" for _, status, _ in found)
+    lines = [f"{status:6}  {name}: {text}" for name, status, text in found]
     lines.append("vdet works here" if works else "vdet does not work here: see what is broken")
-    results.print(lines, {"works": works, "findings": [asdict(finding) for finding in findings]})
+    findings = [{"name": name, "status": status, "text": text} for name, status, text in found]
+    results.print(lines, {"works": works, "findings": findings})
     return 0 if works else 1
 
 
-def find_all() -> Iterator[Finding]:
-    """Look at everything, one after the other."""
-    from vdet.workers import core_count
+def _packages() -> Iterator[Finding]:
+    """Check the packages that vdet needs, and those of each extra."""
+    from importlib.metadata import PackageNotFoundError, requires, version
 
-    yield Finding("vdet", "ok", f"{__version__}, on {core_count()} cores")
-    for extra, packages in required_packages().items():
-        missing = [package for package in packages if not installed_version(package)]
-        text = ", ".join(f"{package} {installed_version(package)}" for package in packages)
-        status: Literal["ok", "absent", "broken"] = "ok"
-        if missing:
-            status, text = "absent" if extra else "broken", f"pip install {' '.join(missing)}"
-        yield Finding(f"extra {extra}" if extra else "packages", status, text)
-    yield _find("codecs", _check_codecs)
-    for name in ("default", "svm", "seed"):
-        yield _find(f"settings {name}", lambda name=name: _load(name))  # type: ignore[misc]
-
-
-def required_packages() -> dict[str, list[str]]:
-    """Return the packages of each extra, and under "" those that vdet always needs."""
-    found: dict[str, list[str]] = {}
-    for text in requires("vdet") or ():
-        package, extra = re.split(r"[^\w.-]", text)[0], re.search(r"extra == .(\w+)", text)
-        found.setdefault(extra[1] if extra else "", []).append(package)
-    found.pop("dev", None)
-    return found
+    for requirement in requires("vdet") or ():
+        package = re.split(r"[^\w.-]", requirement)[0]
+        extra = re.search(r"extra == .(\w+)", requirement)
+        if extra and extra[1] == "dev":
+            continue
+        name = f"{package} (extra {extra[1]})" if extra else package
+        try:
+            yield name, "ok", version(package)
+        except PackageNotFoundError:
+            yield name, "absent" if extra else "broken", f"pip install {package}"
 
 
-def installed_version(package: str) -> str | None:
-    """Return the version of an installed package; None where there is none."""
+def _checked(name: str, check: Callable[[], str]) -> Finding:
     try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
-
-
-def _find(name: str, check: Callable[[], str]) -> Finding:
-    try:
-        return Finding(name, "ok", check())
+        return name, "ok", check()
     except Exception as error:  # whatever it is, it does not work
-        return Finding(name, "broken", f"{in_one_line(error)}; install vdet again")
+        return name, "broken", f"{in_one_line(error)}; install vdet again"
 
 
-def _check_codecs() -> str:
+def _check_codec() -> str:
     import av
 
     av.Codec("libx264", "w")
     av.Codec("h264", "r")
-    missing = sorted(set(DECODERS) - av.codecs_available)
-    return "encodes and decodes h264" + (f"; missing: {', '.join(missing)}" if missing else "")
+    return "can be written and read"
 
 
-def _load(name: str) -> str:
+def _check_config(name: str) -> str:
     from vdet.config.loading import find_config, load_settings
     from vdet.detect.factory import load_detector
 

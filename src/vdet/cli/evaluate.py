@@ -25,7 +25,7 @@ from vdet.version import __version__
     show_default="what vdet detect-image shows",
 )
 @option(
-    "--least-width options.SHARE",
+    "--least-width SHARE",
     "Ignore vehicles narrower than this share of the picture's width, 0 to 1.",
     options.SHARE,
     default=0.0,

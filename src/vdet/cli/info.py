@@ -15,19 +15,15 @@ Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
 
 
-@command(
-    "vdet info in.mp4",
-    "vdet info in.mp4 --json -",
-    "vdet info model.npz",
-)
+@command("vdet info in.mp4", "vdet info in.mp4 --json -", "vdet info model.npz")
 @click.argument("path", type=PATH, metavar="FILE")
 @facts_options
 def info(path: Path, results: Results) -> None:
     """Describe a video, a picture or a model file.
 
-    FILE is a video or numbered pictures (what it holds, what a written video keeps or loses of it,
-    where the horizon is), a picture, a linear model (.npz), or a network (.onnx) of vdet or of
-    another tool.
+    FILE is a video or numbered pictures (what it holds, what a written video loses of it, where
+    the horizon is), a picture, a linear model (.npz), or a network (.onnx) of vdet or of another
+    tool. With --json, a model's file also says how it was trained.
     """
     from vdet.media.images import is_picture_name
 
@@ -37,22 +33,25 @@ def info(path: Path, results: Results) -> None:
         describe = _picture if is_picture_name(path) and "%" not in path.name else _video
     facts = {"file": str(path)} | describe(path)
     results.print(
-        [f"{name.replace('_', ' ')}: {_text(value)}" for name, value in facts.items()], facts
+        [
+            f"{name.replace('_', ' ')}: {_text(facts[name])}"
+            for name in facts
+            if name != "provenance"
+        ],
+        facts,
     )
 
 
 def _text(value: Any) -> str:
     if isinstance(value, list):
-        return "; ".join(map(_text, value)) or "none"
-    if isinstance(value, dict):
-        simple = {key: each for key, each in value.items() if not isinstance(each, dict | list)}
-        return ", ".join(f"{key} {_text(each)}" for key, each in simple.items()) or "none"
+        return "; ".join(map(printable, value)) or "none"
     if isinstance(value, float):
         return f"{value:.6g}"
     return "unknown" if value is None else printable(str(value))
 
 
 def _linear_model(path: Path) -> Facts:
+    from vdet.detect.svm.kind import trained_on
     from vdet.detect.svm.model import load_model
 
     model = load_model(path)
@@ -61,36 +60,28 @@ def _linear_model(path: Path) -> Facts:
         "features": model.weights.shape[1],
         "patch": model.features.patch,
         "learnt_boxes": model.box_regression is not None,
-        "trained_on": _trained_on(path),
+        "trained_on": list(trained_on(path)),
         "provenance": model.provenance,
     }
 
 
 def _network(path: Path) -> Facts:
     from vdet.detect.classes import our_name
+    from vdet.detect.onnx.kind import trained_on
     from vdet.detect.onnx.recognition import recognize
     from vdet.detect.onnx.session import Session
 
     found = recognize(Session(path)).for_frames(1280, 720)
-    known = {name: our_name(name) for name in found.names}
     return {
         "kind": "network",
         "form": found.name,
         "reasons": list(found.reasons),
         "input_for_1280x720": f"{found.form.width}x{found.form.height}",
-        "vehicles": [name for name, ours in known.items() if ours is not None],
-        "other_classes": [name for name, ours in known.items() if ours is None],
-        "trained_on": _trained_on(path),
-        "provenance": found.header.provenance if found.header is not None else {},
+        "vehicles": [name for name in found.names if our_name(name)],
+        "other_classes": [name for name in found.names if not our_name(name)],
+        "trained_on": list(trained_on(path)),
+        "provenance": found.header.provenance if found.header else {},
     }
-
-
-def _trained_on(path: Path) -> list[str]:
-    from vdet.config.kinds import kind_of_model
-    from vdet.plugins import DETECTORS, load_plugin
-
-    kind = load_plugin(DETECTORS, str(kind_of_model(path)))
-    return list(kind.trained_on(path))
 
 
 def _picture(path: Path) -> Facts:
@@ -99,12 +90,7 @@ def _picture(path: Path) -> Facts:
 
     image = read_image(path)
     height, width = image.shape[:2]
-    return {
-        "kind": "picture",
-        "width": width,
-        "height": height,
-        "horizon": seen_horizon([image]),
-    }
+    return {"kind": "picture", "width": width, "height": height, "horizon": seen_horizon([image])}
 
 
 def _video(path: Path) -> Facts:
@@ -128,7 +114,7 @@ def _video(path: Path) -> Facts:
         "start": float(info.start),
         "seconds": None if info.duration is None else float(info.duration),
         "sounds": list(report.sounds),
-        "tags": {name: value for name, value in asdict(info.tags).items() if value},
+        **asdict(info.tags),
         "lost_in_mp4": list(report.lost),
         "horizon": seen_horizon(report.images),
     }

@@ -37,19 +37,18 @@ Chosen = Mapping[str, type[Section]]
 
 
 def find_config(name: str) -> Path:
-    """Return the config file at the path `name`, or else the shipped one of that name (`seed`).
+    """Return the shipped config of a name (`seed`), else the config file at that path (`./seed`).
 
     Raises
     ------
     ConfigError
         There is neither.
     """
-    path = Path(name)
-    if path.is_file():
-        return path
     shipped = shipped_configs()
     if (known := _ALIASES.get(name, name)) in shipped:
         return shipped[known]
+    if Path(name).is_file():
+        return Path(name)
     raise ConfigError(f"{name}: no such file; shipped configs are: {', '.join(shipped)}")
 
 
