@@ -9,7 +9,7 @@ from typing import ClassVar
 import pytest
 
 from running import write_drive
-from vdet.batch.manifest import Origin, Record, open_manifest
+from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import OutputSuffix, Plan, make_plan
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, ConfigError, OutputError
@@ -75,7 +75,7 @@ def note(source: str, *outputs: Output, work: str = DIGEST) -> None:
         sizes={path: size for path, (size, _) in states.items()},
         times={path: changed for path, (_, changed) in states.items()},
     )
-    with open_manifest(Path("out/manifest.jsonl"), Origin()) as add:
+    with open_manifest(Path("out/manifest.jsonl")) as add:
         add(made)
 
 

@@ -97,7 +97,7 @@ def test_with_vdet_debug_a_bug_shows_its_traceback(
     assert "Traceback" in capsys.readouterr().err
 
 
-def test_a_file_whose_process_was_killed_has_a_record(job: VideoJob) -> None:
-    record = record_of_killed(job)
+def test_a_file_whose_process_was_killed_has_a_record(job: VideoJob, work: Work) -> None:
+    record = record_of_killed(job, work)
     assert record.error is not None
     assert record.error.startswith(f"{job.source}: its process was killed")

@@ -21,18 +21,6 @@ _FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BI
 
 
 @dataclass(frozen=True, slots=True)
-class Origin:
-    """How the results were made: the program with its version, the model file and its SHA-256.
-
-    The last two are None for a detector without a model file.
-    """
-
-    program: str = f"vdet {__version__}"
-    model: str | None = None
-    model_sha256: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
 class Record:
     """The result of one file.
 
@@ -56,6 +44,10 @@ class Record:
     sizes, times
         Bytes of each output and the time of its last change (nanoseconds since 1970), by its path;
         of a folder the sum and the latest of the files in it.
+    program
+        The program with its version.
+    model, model_sha256
+        Name and SHA-256 of the model file; None for a detector without one.
     """
 
     input: str
@@ -71,6 +63,9 @@ class Record:
     digest: str | None = None
     sizes: Mapping[str, int] = field(default_factory=dict)
     times: Mapping[str, int] = field(default_factory=dict)
+    program: str = f"vdet {__version__}"
+    model: str | None = None
+    model_sha256: str | None = None
 
 
 Written = tuple[str, int, int]
@@ -120,7 +115,7 @@ def read_written(path: Path) -> dict[str, Written]:
 
 
 @contextmanager
-def open_manifest(path: Path, origin: Origin) -> Iterator[Callable[[Record], None]]:
+def open_manifest(path: Path) -> Iterator[Callable[[Record], None]]:
     """Give a function that adds a record to the manifest; it returns when the disk has it.
 
     The manifest is locked: no other batch can write into the folder until the block ends.
@@ -140,7 +135,7 @@ def open_manifest(path: Path, origin: Origin) -> Iterator[Callable[[Record], Non
             )
 
         def add(record: Record) -> None:
-            line = json.dumps(asdict(record) | asdict(origin), allow_nan=False) + "\n"
+            line = json.dumps(asdict(record), allow_nan=False) + "\n"
             with output_errors(path):
                 if file.write(line.encode()) != len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -93,9 +93,8 @@ def make_plan(
     ConfigError
         There is no sink of a name.
     """
-    _refuse_nested(clips, folder)
     sources = find_sources(clips)
-    _refuse_inside(sources, folder)
+    _refuse_nested(clips, sources, folder)
     jobs = [_job(source, folder, common, suffixes) for source in sources]
     totals = _totals(sources, folder, suffixes)
     _refuse_shared(jobs, totals, folder)
@@ -188,17 +187,14 @@ def _replacing_ours(job: VideoJob, written: Mapping[str, Written], manifest: Pat
     return replace(job, overwrite=any(os.path.lexists(output.path) for output in job.outputs))
 
 
-def _refuse_nested(clips: Iterable[Path], folder: Path) -> None:
+def _refuse_nested(clips: Iterable[Path], sources: Iterable[Source], folder: Path) -> None:
+    resolved = folder.resolve()
     for clip in clips:
-        if clip.is_dir() and folder.resolve().is_relative_to(clip.resolve()):
+        if clip.is_dir() and resolved.is_relative_to(clip.resolve()):
             raise BatchError(
                 f"{folder}: lies in the input folder {clip}, and its videos would be inputs of the "
                 "next run; give a folder outside"
             )
-
-
-def _refuse_inside(sources: Iterable[Source], folder: Path) -> None:
-    resolved = folder.resolve()
     for source in sources:
         if source.path.resolve().is_relative_to(resolved):
             raise BatchError(

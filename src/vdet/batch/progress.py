@@ -20,23 +20,6 @@ _ROW = np.dtype([("done", "i8"), ("expected", "i8"), ("ended", "?")])
 
 
 @dataclass(frozen=True, slots=True)
-class BatchState:
-    """How far a batch is.
-
-    Attributes
-    ----------
-    done, total
-        Frames done, and of all files. Of files that are not begun, they are guessed from the size.
-    ended
-        Number of files that have ended.
-    """
-
-    done: int
-    total: int
-    ended: int
-
-
-@dataclass(frozen=True, slots=True)
 class FrameCounts:
     """The counts of files in the file at `path`. It can be sent to worker processes.
 
@@ -76,17 +59,17 @@ class FrameCounts:
         done = rows["done"][number] if frames is None else frames
         rows[number] = (done, done, True)
 
-    def state(self) -> BatchState:
-        """Return how far the batch is."""
+    def state(self) -> tuple[int, int, int]:
+        """Return the frames done, the frames of all files, and how many files have ended.
+
+        The frames of files that are not begun are guessed from their sizes.
+        """
         rows, sizes = self._rows(), np.array(self.sizes)
         known = (rows["expected"] > 0) | rows["ended"]
         ratio = rows["expected"][known].sum() / max(sizes[known].sum(), 1e-9)
         expected = np.where(known, rows["expected"], sizes * ratio)
-        return BatchState(
-            done=int(rows["done"].sum()),
-            total=round(float(np.maximum(expected, rows["done"]).sum())),
-            ended=int(np.count_nonzero(rows["ended"])),
-        )
+        total = np.maximum(expected, rows["done"]).sum()
+        return int(rows["done"].sum()), round(float(total)), int(rows["ended"].sum())
 
 
 @contextmanager
@@ -103,7 +86,7 @@ def frame_counts(jobs: Sequence[VideoJob]) -> Iterator[FrameCounts | None]:
 
 
 def _size(job: VideoJob) -> float:
-    """Return the bytes of a video. Of each as much counts where only a part of it is read."""
+    """Return the bytes of a video; 1 if only a part of it is read."""
     try:
         return 1.0 if job.is_part else float(job.source.stat().st_size)
     except OSError:

@@ -1,7 +1,7 @@
 """Run a planned batch: process every file, and write its record when it has ended."""
 
 from collections.abc import Callable, Generator, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -43,13 +43,13 @@ def run_batch(
     function = partial(_process_numbered, work=work, counts=counts)
     try:
         with (
-            open_manifest(plan.manifest, work.origin) as add,
+            open_manifest(plan.manifest) as add,
             closing(
                 each_once(function, list(enumerate(plan.jobs)), workers, again=_replacing)
             ) as results,
         ):
             for (number, job), result in results:
-                record = result or record_of_killed(job)
+                record = result or record_of_killed(job, work)
                 add(record)
                 if counts:
                     counts.end(number, record.frames)
@@ -110,12 +110,7 @@ def each_once(
             ended |= error.lost
         left = [item for number, item in enumerate(left) if number not in ended]
     for item in suspects:
-        yield item, _result_alone(function, again(item), workers)
-
-
-def _result_alone(function: Callable[[T], R], item: T, workers: Workers) -> R | None:
-    try:
-        ((_, result),) = workers.map(function, [item])
-    except WorkerKilledError:
-        return None
-    return result
+        result: R | None = None
+        with suppress(WorkerKilledError):
+            ((_, result),) = workers.map(function, [again(item)])
+        yield item, result

@@ -7,18 +7,19 @@ import time
 import traceback
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
-from vdet.batch.manifest import Origin, Record
+from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector, model_file
 from vdet.errors import in_one_line
 from vdet.progress import Progress, no_progress
 from vdet.run.sinks.protocol import make_folders, output_state
 from vdet.run.video import VideoJob, run_video
+from vdet.version import __version__
 
 _SEARCH = {"input", "detector", "tracker", "regions"}
 """The sections of the settings that tracks depend on."""
@@ -37,16 +38,18 @@ class Work:
         A model file; None for the shipped one, or for a detector without one.
     threads
         Of the search, of the decoder and of the encoder of each video; None for one per core.
-    origin, digest
-        For the records. The digest is of program, model and settings, and of the part and lanes
-        that are wanted.
+    digest
+        SHA-256 of program, model and settings, and of the part and lanes that are wanted.
+    model_name, model_sha256
+        Of the model file in use; None for a detector without one.
     """
 
     settings: Settings
     model: Path | None = None
     threads: int | None = None
-    origin: Origin = field(default_factory=Origin)
     digest: str = ""
+    model_name: str | None = None
+    model_sha256: str | None = None
 
     @classmethod
     def of(
@@ -59,34 +62,26 @@ class Work:
     ) -> Self:
         """Return the work of jobs that differ from `job` in their input and outputs only.
 
+        Its paths are absolute: processes on other machines work in other folders.
+
         Raises
         ------
         ConfigError, ModelError
             The detector cannot be loaded.
         """
         load_detector(settings.detector, model)
-        file, origin = model_file(settings.detector, model), Origin()
-        if file is not None:
-            origin = replace(origin, model=file.name, model_sha256=_digest_of(file))
-        sections = _sections(sinks, with_lanes=job.lanes is not None)
+        file, mask = model_file(settings.detector, model), settings.regions.mask
+        sha256 = _digest_of(file) or None
         wanted = (
-            *(origin.program, origin.model_sha256, job.start, job.end, job.frames, job.lanes),
-            _digest_of(settings.regions.mask),
-            settings.model_dump_json(include=sections),
+            *(f"vdet {__version__}", sha256, job.start, job.end, job.frames, job.lanes),
+            _digest_of(mask),
+            settings.model_dump_json(include=_sections(sinks, with_lanes=job.lanes is not None)),
         )
-        return cls(settings, model, threads, origin, _digest(*map(repr, wanted)))
-
-    def with_absolute_paths(self) -> Self:
-        """Return the same for processes that were started in other folders."""
-        mask = self.settings.regions.mask
-        regions = self.settings.regions.model_copy(
-            update={"mask": str(Path(mask).absolute()) if mask else mask}
-        )
-        return replace(
-            self,
-            settings=self.settings.model_copy(update={"regions": regions}),
-            model=self.model.absolute() if self.model else None,
-        )
+        if mask:
+            regions = settings.regions.model_copy(update={"mask": str(Path(mask).absolute())})
+            settings = settings.model_copy(update={"regions": regions})
+        digest, name = _digest(*map(repr, wanted)), file.name if file else None
+        return cls(settings, model and model.absolute(), threads, digest, name, sha256)
 
 
 def _sections(sinks: Iterable[str], *, with_lanes: bool) -> set[str]:
@@ -135,7 +130,7 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
 
     Errors are recorded, and not raised. `progress` is as `run_video` takes it.
     """
-    began, record = time.perf_counter(), _record(job)
+    began, record = time.perf_counter(), _record(job, work)
     digest = result_digest(work.digest, job.source)
     with _collected_warnings(job) as warnings:
         try:
@@ -151,10 +146,10 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
     return replace(record, seconds=seconds, warnings=tuple(warnings))
 
 
-def record_of_killed(job: VideoJob) -> Record:
+def record_of_killed(job: VideoJob, work: Work) -> Record:
     """Return the record of a job whose process was killed each time."""
     error = f"{job.source}: its process was killed, or crashed; there may be too little memory"
-    return replace(_record(job), error=error)
+    return replace(_record(job, work), error=error)
 
 
 def _run(job: VideoJob, work: Work, progress: Progress) -> dict[str, Any]:
@@ -180,7 +175,7 @@ def _run(job: VideoJob, work: Work, progress: Progress) -> dict[str, Any]:
     }
 
 
-def _record(job: VideoJob) -> Record:
+def _record(job: VideoJob, work: Work) -> Record:
     """Return the record of a job that begins now."""
     paths: dict[str, tuple[str, ...]] = {}
     for output in job.outputs:
@@ -190,6 +185,8 @@ def _record(job: VideoJob) -> Record:
         outputs={sink: each[0] if len(each) == 1 else each for sink, each in paths.items()},
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         seconds=0.0,
+        model=work.model_name,
+        model_sha256=work.model_sha256,
     )
 
 

@@ -111,11 +111,13 @@ def process_batch(
     folder = options.folder or Path()
     if options.scheduler:  # the workers were started in other folders
         clips, folder = [clip.absolute() for clip in clips], folder.absolute()
-        work = work.with_absolute_paths()
     digest = work.digest if options.skip_existing else None
     plan = make_plan(clips, folder, common, suffixes, digest=digest)
     if options.dry_run:
-        print_lines(*_plan_lines(plan))
+        print_lines(
+            *(f"{job.source}: {_output_names(job)} there already" for job in plan.skipped),
+            *(f"{job.source} → {_output_names(job)}" for job in plan.jobs),
+        )
         return 0
     if not plan.jobs:
         write_totals(plan)  # a run that was interrupted may have left them out
@@ -124,14 +126,6 @@ def process_batch(
     workers, threads = _workers(options, len(plan.jobs))
     failed = _run(plan, replace(work, threads=work.threads or threads), workers)
     return failure_code(failed, len(plan.jobs) + len(plan.skipped))
-
-
-def _plan_lines(plan: "Plan") -> list[str]:
-    """Return a line for each file: what would be written."""
-    return [
-        *(f"{job.source}: {_output_names(job)} there already" for job in plan.skipped),
-        *(f"{job.source} → {_output_names(job)}" for job in plan.jobs),
-    ]
 
 
 def _output_names(job: "VideoJob") -> str:
@@ -191,10 +185,8 @@ def batch_bar(plan: "Plan") -> "Iterator[FrameCounts | None]":
     def show(bar: "tqdm[Any]") -> None:
         if counts is None:
             return
-        state = counts.state()
-        bar.n, bar.total = state.done, state.total
-        ended = f"{state.ended} of {counted(len(plan.jobs), 'file')}"
-        bar.set_postfix_str(ended, refresh=False)
+        bar.n, bar.total, ended = counts.state()
+        bar.set_postfix_str(f"{ended} of {counted(len(plan.jobs), 'file')}", refresh=False)
 
     with (
         frame_counts(plan.jobs) as made,
