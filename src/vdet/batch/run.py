@@ -110,7 +110,7 @@ def each_once(
             ended |= error.lost
         left = [item for number, item in enumerate(left) if number not in ended]
     for item in suspects:
-        result: R | None = None
+        repeated: R | None = None
         with suppress(WorkerKilledError):
-            ((_, result),) = workers.map(function, [again(item)])
-        yield item, result
+            ((_, repeated),) = workers.map(function, [again(item)])
+        yield item, repeated
