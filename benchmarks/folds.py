@@ -17,7 +17,7 @@ import joblib
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import NO_BOXES, Boxes
+from vdet.boxes import NO_BOXES, BoolArray, Boxes
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
@@ -28,9 +28,9 @@ from vdet.labels.label import Label
 from vdet.labels.reading import read_truth
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.augmentation import augment
-from vdet.learn.svm.box_regression import extract_box_patches, fit_boxes
-from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
-from vdet.learn.svm.extraction import extract
+from vdet.learn.svm.box_regression import extract_box_patches, fit_split_boxes
+from vdet.learn.svm.dataset import PatchFile, find_patches
+from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit
 from vdet.media import Frame, Picture, VideoReader
 from vdet.run.loop import follow, peek
@@ -135,7 +135,9 @@ def _frames_of(files: Sequence[PatchFile]) -> Numbers:
 
 
 def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[LinearModel]:
-    files, boxed = find_patches(sources), find_boxed(sources)
+    patches = find_patches(sources)
+    files = [file for file in patches if not file.is_boxed]
+    boxed = [file for file in patches if file.is_boxed]
     training = settings.train.svm
     workers = make_workers()
     data = extract(
@@ -147,17 +149,13 @@ def _models(sources: Sequence[Path], last: int, settings: Settings) -> list[Line
     )
     boxes = extract_box_patches(files, boxed, settings, workers=workers)
     assert boxes is not None
-    boxed_data = boxes.boxed
-    assert boxed_data is not None
-    assert boxes.assumed is not None
-    assumed = boxes.assumed.rows
-    blocks = _block_of(_frames_of(files), last), _block_of(_frames_of(boxed), last)
 
     def without(block: int) -> LinearModel:
-        kept, kept_boxed = (each != block for each in blocks)
-        model = fit(data.rows.of(kept), settings)
-        sets = [data.rows.of(kept), boxed_data.rows.of(kept_boxed)]
-        return replace(model, box_regression=fit_boxes(sets, assumed, settings))
+        def held_out(some: LabelledVectors) -> BoolArray:
+            return np.equal(_block_of(_frames_of(some.files), last), block)
+
+        model = fit(data.of(~held_out(data)), settings)
+        return replace(model, box_regression=fit_split_boxes(data, boxes, held_out, settings)[0])
 
     at_once = joblib.Parallel(n_jobs=2, prefer="threads", verbose=5)
     return list(at_once(joblib.delayed(without)(block) for block in range(BLOCKS)))

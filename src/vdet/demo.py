@@ -14,7 +14,7 @@ from vdet.detect.svm.model import save_model
 from vdet.evaluate.scores import Scores, score
 from vdet.files import any_file, check_output, make_folder, staged
 from vdet.labels.reading import read_predictions, read_truth
-from vdet.learn.svm.dataset import find_boxed, find_patches
+from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import MiningJob, VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.media.writer import may_replace_video
@@ -150,8 +150,7 @@ def run_demo(
         write_clip(source.path, busy, overwrite=overwrite)
         write_truth(source.truth, busy, overwrite=overwrite)
     mine(MiningJob(sources, folder / PATCHES, overwrite), linear, None, steps=steps)
-    patches = [folder / PATCHES]
-    model, metrics = train(find_patches(patches), linear, boxed=find_boxed(patches), steps=steps)
+    model, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
     save_model(model, folder / MODEL, overwrite=overwrite)
     metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")

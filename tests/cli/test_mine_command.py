@@ -19,7 +19,7 @@ from vdet.detect.svm.model import load_model
 from vdet.labels.coco import COCO
 from vdet.labels.mot import read_mot
 from vdet.labels.reading import read_truth
-from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
+from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.media import VideoReader
 from vdet.synthetic import write_truth
 from vdet.synthetic.scene import Scene
@@ -64,7 +64,7 @@ def test_mines_patches_that_train_learns_from(
     target, model_path = tmp_path / "mined.zip", tmp_path / "m.npz"
     result = run("mine", clip_path, "--truth", truth_path, "-o", target, *options)
     assert result.code == 0, result.err
-    files = [*find_patches([target]), *find_boxed([target])]
+    files = find_patches([target])
     counts = Counter(file.group for file in files)
     assert set(counts) == {
         "vehicles/mined_road",
@@ -126,7 +126,7 @@ def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
         frames = [frame.image for frame in reader]
     truth = read_truth(truth_path)
     seen = set()
-    for patch in read_patches([*find_patches([target]), *find_boxed([target])]):
+    for patch in read_patches(find_patches([target])):
         match = NAME.fullmatch(patch.file.name.rpartition("/")[2])
         assert match
         number, x, y, side = map(int, match.groups())

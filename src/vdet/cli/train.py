@@ -46,7 +46,7 @@ def train(
         check_output(path, overwrite=overwrite, inputs=data)
     from vdet.detect.svm.model import save_model
     from vdet.labels.reading import holds_labelled_pictures
-    from vdet.learn.svm.dataset import find_boxed, find_patches
+    from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.mining import MiningJob, PictureSource, mine
     from vdet.learn.svm.training import train as fit_model
 
@@ -63,10 +63,8 @@ def train(
             sources = tuple(PictureSource(path) for path in pictures)
             mine(MiningJob(sources, archive), settings, None, steps=steps)
             patches.append(archive)
-        files, boxed = find_patches(patches), find_boxed(patches)
-        model, metrics = fit_model(
-            files, settings, boxed=boxed, jobs=jobs, scheduler=scheduler, steps=steps
-        )
+        files = find_patches(patches)
+        model, metrics = fit_model(files, settings, jobs=jobs, scheduler=scheduler, steps=steps)
     save_model(model, output, overwrite=overwrite)
     metrics.write(metrics_path, overwrite=overwrite)
     print_lines(*metrics.lines(), "", f"{output}: the model; {metrics_path}: the metrics")

@@ -16,7 +16,6 @@ from vdet.errors import DataError
 from vdet.learn.svm.dataset import (
     MAX_PATCH_BYTES,
     PatchFile,
-    find_boxed,
     find_patches,
     read_patches,
 )
@@ -279,37 +278,35 @@ def with_table(tmp_path: Path, make: Maker, names: Iterable[str], *rows: str) ->
 @pytest.mark.parametrize("make", [make_folder, make_zip])
 def test_a_table_has_the_sides_of_the_vehicle_in_a_patch(tmp_path: Path, make: Maker) -> None:
     source = with_table(tmp_path, make, BOXED, *ROWS)
-    assert [(file.group, file.vehicle, file.sides) for file in find_patches([source])] == [
-        ("non-vehicles/road", False, None),
-        ("vehicles/far", True, (-0.5, -0.25, 0.5, 0.25)),
-    ]
-    assert [(file.name, file.group, file.vehicle, file.sides) for file in find_boxed([source])] == [
-        ("boxes/far/1.png", "boxes/far", True, (-0.75, -0.25, None, 0.5)),
-        ("boxes/far/2.png", "boxes/far", True, (None,) * 4),
+    files = find_patches([source])
+    assert [(file.name, file.vehicle, file.is_boxed, file.sides) for file in files] == [
+        ("boxes/far/1.png", True, True, (-0.75, -0.25, None, 0.5)),
+        ("boxes/far/2.png", True, True, (None,) * 4),
+        ("non-vehicles/road/1.png", False, False, None),
+        ("vehicles/far/1.png", True, False, (-0.5, -0.25, 0.5, 0.25)),
     ]
 
 
 def test_a_table_applies_to_its_own_source_alone(tmp_path: Path) -> None:
     mined = with_table(tmp_path, make_folder, BOXED, *ROWS)
     other = make_folder(tmp_path / "other", BOTH)
-    vehicles = [file for file in find_patches([mined, other]) if file.vehicle]
+    files = find_patches([mined, other])
+    vehicles = [file for file in files if file.vehicle and not file.is_boxed]
     assert [(file.source, file.sides is None) for file in vehicles] == [
         (mined, False),
         (other, True),
     ]
-    assert {file.source for file in find_boxed([other, mined])} == {mined}
+    assert {file.source for file in files if file.is_boxed} == {mined}
 
 
 def test_a_picture_in_boxes_that_is_not_in_the_table_is_skipped(tmp_path: Path) -> None:
     source = with_table(tmp_path, make_folder, BOXED, *ROWS[:3])
-    assert [file.name for file in find_boxed([source])] == ["boxes/far/1.png"]
-    assert len(find_patches([source])) == 2
+    assert [name for name, _ in listed(source)] == ["boxes/far/1.png", *BOTH[::-1]]
 
 
 def test_without_a_table_boxes_is_an_ordinary_folder(tmp_path: Path) -> None:
     make_folder(tmp_path, ["vehicles/boxes/1.png", "non-vehicles/1.png"])
     assert listed(tmp_path)[1] == ("vehicles/boxes/1.png", "vehicles/boxes")
-    assert find_boxed([tmp_path]) == []
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 import logging
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -24,7 +24,8 @@ from vdet.config.schema import (
 )
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.extraction import RowNumbers, Rows
+from vdet.learn.svm.dataset import PatchFile
+from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
 from vdet.learn.svm.fitting import LinearSvm
 from vdet.learn.svm.fitting import fit as fit_rows
 
@@ -41,6 +42,12 @@ def clouds(count: int = 300) -> tuple[Float32Array, npt.NDArray[np.bool_]]:
     return vectors.astype(np.float32), vehicle
 
 
+def labelled(vectors: Float32Array, vehicle: BoolArray, origins: RowNumbers) -> LabelledVectors:
+    files = [PatchFile(Path(), f"{row}.png", "some", True) for row in range(origins.max() + 1)]
+    sides = np.zeros((len(vectors), 4), np.float32)
+    return LabelledVectors(vectors, vehicle, sides, origins, files)
+
+
 def fit(
     vectors: Float32Array,
     vehicle: BoolArray,
@@ -51,9 +58,9 @@ def fit(
 ) -> LinearModel:
     """Fit to copies of vectors; without origins, all rows are patches."""
     training = SvmTrainingSettings(C=0.01, ensemble=ensemble).model_copy(update=changes)
-    rows = Rows.of_patches(vectors.copy(), vehicle)
-    if origins is not None:
-        rows = replace(rows, origins=origins)
+    if origins is None:
+        origins = np.arange(len(vectors))
+    rows = labelled(vectors.copy(), vehicle, origins)
     return fit_rows(
         rows, Settings(detector=SvmSettings(features=COLOUR), train=TrainSettings(svm=training))
     )
@@ -174,7 +181,7 @@ def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPa
     origins = np.concatenate([np.arange(3000), rng.integers(0, 3000, 4500)])
     vectors = rng.normal(size=(7500, 768)).astype(np.float32)
     vehicle = (vectors[:, 0] > 0)[origins]
-    rows = Rows(vectors, vehicle, np.zeros((7500, 4), np.float32), origins)
+    rows = labelled(vectors, vehicle, origins)
     features = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=256))
     training = SvmTrainingSettings()
     settings = Settings(detector=SvmSettings(features=features), train=TrainSettings(svm=training))

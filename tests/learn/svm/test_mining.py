@@ -14,7 +14,7 @@ from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import MiningSettings, OutputSettings, Settings, TrainSettings
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.choosing import MOST, Most
-from vdet.learn.svm.dataset import find_boxed, find_patches, read_patches
+from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.learn.svm.mining import MiningJob, MiningResult, PictureSource, VideoSource, mine
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image, write_image
@@ -124,7 +124,7 @@ def test_windows_on_a_wrong_detection_are_false_alarms_and_those_on_the_truth_ve
     for box in boxes_of(archive, "non-vehicles/mined_road"):
         assert box.iou(TREE) > 0.35
         assert box.intersection(CAR).area == 0
-    for patch in read_patches([*find_patches([archive]), *find_boxed([archive])]):
+    for patch in read_patches(find_patches([archive])):
         assert patch.image is not None
         _, green, red = patch.image[32, 32].tolist()
         if patch.file.name.startswith("non-vehicles"):

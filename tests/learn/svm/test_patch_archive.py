@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vdet.errors import OutputError
-from vdet.learn.svm.dataset import Sides, find_boxed, find_patches, patch_archive, read_patches
+from vdet.learn.svm.dataset import Sides, find_patches, patch_archive, read_patches
 from vdet.media.images import Image
 
 NAMES = ("vehicles/a/1.png", "boxes/a/2.png", "non-vehicles/a/3.png")
@@ -25,7 +25,7 @@ def write(path: Path) -> Path:
 
 def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     path = write(tmp_path / "a.zip")
-    files = [*find_patches([path]), *find_boxed([path])]
+    files = find_patches([path])
     assert {file.name: file.sides for file in files} == {
         NAMES[0]: (-0.5, -0.25, 0.5, 0.1234),
         NAMES[1]: BOXES[1],

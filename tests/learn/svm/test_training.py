@@ -29,15 +29,8 @@ from vdet.detect.svm.features import FeatureExtractor, Layout
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import Augmenter, augment
-from vdet.learn.svm.dataset import PatchFile, find_boxed, find_patches
-from vdet.learn.svm.extraction import (
-    MAX_NAMED,
-    TEST_SHARE,
-    LabelledVectors,
-    Rows,
-    extract,
-    hold_out,
-)
+from vdet.learn.svm.dataset import PatchFile, find_patches
+from vdet.learn.svm.extraction import MAX_NAMED, TEST_SHARE, LabelledVectors, extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.training import train
 from vdet.media.images import Image, read_image, write_image
@@ -149,7 +142,6 @@ def test_patches_are_described_in_order_with_their_class_and_group(files: list[P
     assert data.groups.tolist() == [file.group for file in files]
     assert data.vehicle.tolist() == [file.vehicle for file in files]
     assert data.vehicle.sum() == 32
-    assert data.broken == 0
     last = cv2.imread(str(files[-1].source / files[-1].name))
     assert last is not None
     extractor = FeatureExtractor(SETTINGS.svm.features)
@@ -173,7 +165,7 @@ def test_several_processes_give_the_same_as_one(
         for workers in (ThisProcess(), LocalProcesses(2))
     )
     for name in ("vectors", "vehicle", "sides", "origins"):
-        np.testing.assert_array_equal(getattr(one.rows, name), getattr(two.rows, name))
+        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     np.testing.assert_array_equal(one.groups, two.groups)
     assert one.digest == two.digest
 
@@ -183,8 +175,8 @@ def test_augmented_samples_follow_and_have_the_row_of_their_patch(
 ) -> None:
     monkeypatch.setattr("vdet.learn.svm.extraction.CHUNK", 10)
     mirror = partial(augment, settings=AugmentationSettings(mirror=True, cut=0, parts=0))
-    rows = describe(files, augmenter=mirror).rows
-    assert rows.patches == 57
+    rows = describe(files, augmenter=mirror)
+    assert len(rows.files) == 57
     assert rows.origins.tolist() == [*range(57), *range(57)]
     assert rows.vehicle.tolist() == [file.vehicle for file in files] * 2
     last = read_image(files[-1].source / files[-1].name)
@@ -193,8 +185,8 @@ def test_augmented_samples_follow_and_have_the_row_of_their_patch(
 
 
 def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile]) -> None:
-    whole = describe(files, augmenter=AUGMENTER, seed=7).rows
-    one = describe(files[40:41], augmenter=AUGMENTER, seed=7).rows
+    whole = describe(files, augmenter=AUGMENTER, seed=7)
+    one = describe(files[40:41], augmenter=AUGMENTER, seed=7)
     assert len(one.origins) > 1
     np.testing.assert_array_equal(whole.vectors[whole.origins == 40], one.vectors)
 
@@ -203,13 +195,15 @@ def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
     vectors = np.array([0, 10, 20, 30, 40, 1, 11, 12, 21, 41], np.float32)[:, np.newaxis]
     vehicle = np.array([True, False] * 5)
     sides = np.arange(40, dtype=np.float32).reshape(10, 4)
-    rows = Rows(vectors, vehicle, sides, np.array([0, 1, 2, 3, 4, 0, 1, 1, 2, 4]))
+    files = [PatchFile(Path(), f"{row}.png", "vehicles", True) for row in range(5)]
+    origins = np.array([0, 1, 2, 3, 4, 0, 1, 1, 2, 4])
+    rows = LabelledVectors(vectors, vehicle, sides, origins, files)
     kept = rows.of(np.array([False, True, True, False, True]))
     assert kept.vectors[:, 0].tolist() == [10, 20, 40, 11, 12, 21, 41]
     assert kept.sides[:, 0].tolist() == [4, 8, 16, 24, 28, 32, 36]
     assert kept.vehicle.tolist() == [False, True, True, True, False, True, False]
     assert kept.origins.tolist() == [0, 1, 2, 0, 0, 1, 2]
-    assert kept.patches == 3
+    assert list(kept.files) == [files[1], files[2], files[4]]
 
 
 def test_a_process_that_is_killed_is_an_error(
@@ -252,7 +246,6 @@ def test_broken_patches_are_skipped_and_counted_and_the_first_ones_named(
     mixed = with_broken(files, tmp_path, count)
     with caplog.at_level(logging.WARNING, "vdet"):
         data = describe(mixed, max_broken=0.5)
-    assert data.broken == count
     assert data.groups.tolist() == [file.group for file in files]
     np.testing.assert_array_equal(data.vectors, describe(files).vectors)
     assert [record.message for record in caplog.records] == [
@@ -329,7 +322,7 @@ def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_he
     model, report = train(files, settings, jobs=1)
     data = describe(files)
     held = hold_out(data.groups, name, TEST_SHARE, settings.train.svm.seed)
-    expected = fit(data.rows.of(~held), settings)
+    expected = fit(data.of(~held), settings)
     np.testing.assert_array_equal(model.weights, expected.weights)
     assert [split.train_augmented for split in report.splits] == [0, 0]
 
@@ -340,18 +333,18 @@ def test_neither_test_patches_nor_samples_made_of_them_are_learned_from(
 ) -> None:
     """Other pictures in place of the held-out ones give the same model."""
     settings = but(split=name)
-    lists = find_patches([mined]), find_boxed([mined])
+    files = find_patches([mined])
     spoilt = tmp_path / "spoilt"
     shutil.copytree(mined, spoilt)
-    for files in lists:
-        groups = np.array([file.group for file in files])
+    for is_boxed in (False, True):
+        some = [file for file in files if file.is_boxed is is_boxed]
+        groups = np.array([file.group for file in some])
         held = hold_out(groups, name, TEST_SHARE, settings.train.svm.seed)
         for row in np.flatnonzero(held):
             flat = np.full((SIZE, SIZE, 3), row, np.uint8)
-            write_image(spoilt / files[row].name, flat, overwrite=True)
-    one, _ = train(lists[0], settings, boxed=lists[1], jobs=1)
-    files, boxed = find_patches([spoilt]), find_boxed([spoilt])
-    other, report = train(files, settings, boxed=boxed, jobs=1)
+            write_image(spoilt / some[row].name, flat, overwrite=True)
+    one, _ = train(files, settings, jobs=1)
+    other, report = train(find_patches([spoilt]), settings, jobs=1)
     np.testing.assert_array_equal(one.weights, other.weights)
     np.testing.assert_array_equal(one.slopes, other.slopes)
     assert one.box_regression is not None
@@ -426,10 +419,10 @@ def test_with_boxes_a_model_finds_the_sides_of_vehicles(
 ) -> None:
     monkeypatch.setattr("vdet.learn.svm.box_regression.PENALTY", 1e-3)  # the patches are few
     settings = but(split="tail")
-    files, boxed = find_patches([mined]), find_boxed([mined])
-    model, report = train(files, settings, boxed=boxed, jobs=1)
+    files = find_patches([mined])
+    model, report = train(files, settings, jobs=1)
     assert model.box_regression is not None
-    last = boxed[-1]
+    last = [file for file in files if file.is_boxed][-1]
     assert last.sides is not None
     described = FeatureExtractor(SETTINGS.svm.features).describe(read_image(mined / last.name))
     hogs = described[: Layout.of(SETTINGS.svm.features).hog_length]
@@ -454,7 +447,7 @@ def test_vehicles_from_sets_without_boxes_are_assumed_to_fill_their_patch(
     shutil.copytree(mined, small)
     table = small / "boxes.csv"
     table.write_text(table.read_text().replace(",-0.5,,0.5,", ",-0.2,-0.1,0.2,0.1"))
-    files = find_patches([small, data])
+    files = [file for file in find_patches([small, data]) if not file.is_boxed]
     model, _ = train(files, SETTINGS, jobs=1)
     assert model.box_regression is not None
     vehicles = [file for file in files if file.vehicle]

@@ -12,7 +12,7 @@ from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
 from vdet.learn.svm.augmentation import Augmenter, augment, zoom_in
 from vdet.learn.svm.dataset import PatchFile, Sides
-from vdet.learn.svm.extraction import LabelledVectors, Rows, extract
+from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.progress import Steps, no_steps
 from vdet.workers import Workers
 
@@ -35,14 +35,14 @@ _BLOCK = 1024
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxPatches:
-    """Patches that only the regression uses; None if there are none.
+    """Patches that only the regression uses.
 
     `boxed` are patches of neither class, with known sides. `assumed` are the vehicles from sources
     without boxes, with `_ASSUMED_SIDES`.
     """
 
-    boxed: LabelledVectors | None
-    assumed: LabelledVectors | None
+    boxed: LabelledVectors
+    assumed: LabelledVectors
 
 
 def extract_box_patches(
@@ -70,27 +70,23 @@ def extract_box_patches(
         return None
     training = settings.train.svm
 
-    def describe(
-        some: Sequence[PatchFile], augmenter: Augmenter, step: str
-    ) -> LabelledVectors | None:
-        if not some:
-            return None
+    def describe(some: Sequence[PatchFile], augmenter: Augmenter, step: str) -> LabelledVectors:
         return extract(
             some,
             settings.svm.features,
             training,
             augmenter=augmenter,
             workers=workers,
-            progress=steps(step, len(some)),
+            progress=(steps if some else no_steps)(step, len(some)),
         )
 
     without_parts = training.augmentation.model_copy(update={"parts": 0.0})  # parts have no box
-    augmenter = partial(augment, settings=without_parts)
     assumed = [
         replace(file, sides=_ASSUMED_SIDES)
         for file in files
         if file.vehicle and file.source not in with_boxes
     ]
+    augmenter = partial(augment, settings=without_parts)
     return BoxPatches(
         describe(boxed, augmenter, "describing patches with boxes"),
         describe(assumed, zoom_in, "describing vehicles again"),
@@ -105,6 +101,8 @@ def fit_split_boxes(
 ) -> tuple[BoxRegression | None, float | None]:
     """Fit on the patches that are not held out and measure the error on the others.
 
+    Samples with assumed sides have less weight.
+
     Parameters
     ----------
     hold_out
@@ -115,50 +113,30 @@ def fit_split_boxes(
     The regression, and the mean absolute error on the known sides of patches that are held out, as
     a share of the patch's side. Either is None if it has no patches.
     """
-    sets = [data] if patches.boxed is None else [data, patches.boxed]
-    held = [hold_out(each) for each in sets]
-    assumed = None
-    if patches.assumed is not None:
-        assumed = patches.assumed.rows.of(~hold_out(patches.assumed))
-    learnt = [_with_sides(each, ~out) for each, out in zip(sets, held, strict=True)]
-    regression = fit_boxes(learnt, assumed, settings)
-    if regression is None:
-        return None, None
     length = Layout.of(settings.svm.features).hog_length
-    errors = []
-    for each, out in zip(sets, held, strict=True):
-        rows = _with_sides(each, out)
-        tested = slice(rows.patches)
-        found = regression.sides(rows.vectors[tested, :length])
-        errors.append(abs(found - rows.sides[tested]))
-    together = np.concatenate(errors)
-    if not len(together):
-        return regression, None
-    return regression, round(float(np.nanmean(together)), 4)
-
-
-def _with_sides(data: LabelledVectors, kept: BoolArray) -> Rows:
-    """Return the rows of the kept patches of which at least one side is known."""
-    known = np.isfinite(data.rows.sides[: len(data.groups)]).any(axis=1)
-    return data.rows.of(kept & known)
-
-
-def fit_boxes(
-    sets: Sequence[Rows], assumed: Rows | None, settings: Settings
-) -> BoxRegression | None:
-    """Fit on samples with known sides and, with less weight, on samples with assumed sides.
-
-    Returns None if no side is known.
-    """
-    length = Layout.of(settings.svm.features).hog_length
-    rows = [BoxRows(each.vectors[:, :length], each.sides) for each in sets]
-    count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in sets)
+    sets = data, patches.boxed
+    learnt = [_with_sides(each, ~hold_out(each)) for each in sets]
+    count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in learnt)
     if not count:
-        return None
-    if assumed is not None:
+        return None, None
+    rows = [BoxRows(each.vectors[:, :length], each.sides) for each in learnt]
+    if patches.assumed.files:
+        assumed = patches.assumed.of(~hold_out(patches.assumed))
         weight = ASSUMED * count / len(assumed.sides)
         rows.append(BoxRows(assumed.vectors[:, :length], assumed.sides, weight))
-    return fit_sides(rows, PENALTY)
+    regression = fit_sides(rows, PENALTY)
+    errors = []
+    for each in sets:
+        tested = _with_sides(each, hold_out(each))
+        hogs = tested.vectors[: len(tested.files), :length]
+        errors.append(abs(regression.sides(hogs) - tested.sides[: len(hogs)]))
+    together = np.concatenate(errors)
+    return regression, round(float(np.nanmean(together)), 4) if len(together) else None
+
+
+def _with_sides(data: LabelledVectors, kept: BoolArray) -> LabelledVectors:
+    """Return the kept patches of which at least one side is known."""
+    return data.of(kept & np.isfinite(data.sides[: len(kept)]).any(axis=1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,13 +157,6 @@ class BoxRows:
     hogs: Float32Array
     sides: Float32Array
     weight: float = 1.0
-
-    def blocks(self, columns: Sequence[int]) -> Iterator["BoxRows"]:
-        """Yield the rows in which a side is known, block by block, with these sides only."""
-        rows = np.flatnonzero(~np.isnan(self.sides[:, columns[0]]))
-        for start in range(0, len(rows), _BLOCK):
-            some = rows[start : start + _BLOCK]
-            yield BoxRows(self.hogs[some], self.sides[some][:, columns], self.weight)
 
 
 def fit_sides(parts: Sequence[BoxRows], penalty: float) -> BoxRegression:
@@ -254,4 +225,9 @@ def _fit_columns(
 
 
 def _blocks(parts: Sequence[BoxRows], columns: Sequence[int]) -> Iterator[BoxRows]:
-    return (block for part in parts for block in part.blocks(columns))
+    """Yield the rows in which these sides are known, block by block, with these sides only."""
+    for part in parts:
+        rows = np.flatnonzero(~np.isnan(part.sides[:, columns[0]]))
+        for start in range(0, len(rows), _BLOCK):
+            some = rows[start : start + _BLOCK]
+            yield BoxRows(part.hogs[some], part.sides[some][:, columns], part.weight)

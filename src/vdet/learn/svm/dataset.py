@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path, PurePosixPath
 
 import cv2
@@ -53,6 +54,11 @@ class PatchFile:
     sides: Sides | None = None
     """Sides of the vehicle in the patch, if known."""
 
+    @property
+    def is_boxed(self) -> bool:
+        """Whether it lies in `boxes/` and belongs to neither class; it has `sides`."""
+        return self.group.split("/")[0] == BOXED
+
     def __str__(self) -> str:
         return f"{self.source}: {printable(self.name)}"
 
@@ -67,7 +73,7 @@ class Patch:
 
 
 def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
-    """List the patches of both classes, group by group, in numeric order of file names.
+    """List the patches, group by group, in numeric order of file names.
 
     Raises
     ------
@@ -76,31 +82,13 @@ def find_patches(sources: Sequence[Path]) -> list[PatchFile]:
         boxes is damaged, or a zip file has a member whose name occurs twice or leads out of the
         archive, or which is a symbolic link.
     """
-    files = _find(sources, boxed=False)
-    for name, vehicle in CLASSES.items():
-        if not any(file.vehicle is vehicle for file in files):
-            where = ", ".join(map(str, sources))
-            raise DataError(
-                f"{where}: no patches of the class {name}; expected pictures in {name}/<group>/ "
-                "inside a folder or zip file"
-            )
-    return files
-
-
-def find_boxed(sources: Sequence[Path]) -> list[PatchFile]:
-    """List the patches of `boxes/`, in the same order; each has `sides`.
-
-    Raises
-    ------
-    DataError
-        As for `find_patches`, but a class may be without patches.
-    """
-    return _find(sources, boxed=True)
-
-
-def _find(sources: Sequence[Path], *, boxed: bool) -> list[PatchFile]:
     files = [file for source in dict.fromkeys(sources) for file in _find_in(source)]
-    files = [file for file in files if (file.group.split("/")[0] == BOXED) is boxed]
+    for name, vehicle in CLASSES.items():
+        if not any(file.vehicle is vehicle and not file.is_boxed for file in files):
+            raise DataError(
+                f"{', '.join(map(str, sources))}: no patches of the class {name}; expected "
+                f"pictures in {name}/<group>/ inside a folder or zip file"
+            )
     return sorted(files, key=lambda file: (file.group, _numeric(file.name), file.source))
 
 
@@ -148,31 +136,31 @@ def _numeric(name: str) -> list[tuple[int, str]]:
 
 def read_patches(files: Iterable[PatchFile]) -> Iterator[Patch]:
     """Yield patches in the order given; a broken one has no image. Each zip file is opened once."""
+    files = list(files)
+    contents = _contents((file.source, file.name) for file in files)
+    for file, data in zip(files, contents, strict=True):
+        yield Patch(file, decode_image(data), zlib.crc32(data))
+
+
+def _contents(places: Iterable[tuple[Path, str]]) -> Iterator[bytes]:
+    """Yield the content of files in folders or zip files; an empty one if it cannot be read."""
     with ExitStack() as stack:
-        archives: dict[Path, zipfile.ZipFile] = {}
-        for file in files:
-            data = _read_bytes(file.source, file.name, archives, stack)
-            yield Patch(file, decode_image(data), zlib.crc32(data))
-
-
-def _read_bytes(
-    source: Path, name: str, archives: dict[Path, zipfile.ZipFile], stack: ExitStack
-) -> bytes:
-    """Return the content of a file; an empty one if it cannot be read."""
-    try:
-        if source.is_dir():
-            return read_whole(source / name, most=MAX_PATCH_BYTES, what="patch", error=DataError)
-        if source not in archives:
-            archives[source] = stack.enter_context(open_archive(source))
-        return read_member(archives[source], name, most=MAX_PATCH_BYTES)
-    except (DataError, ArchiveError):
-        return b""
+        opened = cache(lambda source: stack.enter_context(open_archive(source)))
+        for source, name in places:
+            try:
+                if source.is_dir():
+                    path = source / name
+                    data = read_whole(path, most=MAX_PATCH_BYTES, what="patch", error=DataError)
+                else:
+                    data = read_member(opened(source), name, most=MAX_PATCH_BYTES)
+            except (DataError, ArchiveError):
+                data = b""
+            yield data
 
 
 def _read_table(source: Path) -> dict[str, Sides]:
     """Return the sides of each patch in the source's table."""
-    with ExitStack() as stack:
-        table = _read_bytes(source, TABLE, {}, stack)
+    [table] = _contents([(source, TABLE)])
     try:
         rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline="")))
         if not rows or tuple(rows[0]) != COLUMNS:

@@ -4,7 +4,7 @@ import hashlib
 import logging
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
@@ -31,7 +31,7 @@ SplitName = Literal["random", "tail"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class LabelledVectors:
     """Feature vectors of patches, followed by those of the samples made of these patches.
 
     Attributes
@@ -44,61 +44,40 @@ class Rows:
         float32 `(n, 4)`: left, top, right, bottom of each vehicle, NaN for unknown sides.
     origins
         intp `(n,)`: the row of the patch that a sample was made of; a patch has its own row.
+    files
+        The file of each patch.
+    digest
+        SHA-256 over the names, checksums and boxes of all patch files, also the broken ones.
     """
 
     vectors: Float32Array
     vehicle: BoolArray
     sides: Float32Array
     origins: RowNumbers
-
-    @classmethod
-    def of_patches(
-        cls, vectors: Float32Array, vehicle: BoolArray, sides: Float32Array | None = None
-    ) -> "Rows":
-        """Return rows without samples; without `sides`, no side is known."""
-        if sides is None:
-            sides = np.full((len(vehicle), 4), np.nan, np.float32)
-        return cls(vectors, vehicle, sides, np.arange(len(vehicle)))
+    files: Sequence[PatchFile]
+    digest: str = ""
 
     @property
-    def patches(self) -> int:
-        """The number of patches; their rows come first."""
-        return int(np.count_nonzero(self.origins == np.arange(len(self.origins))))
+    def groups(self) -> npt.NDArray[np.str_]:
+        """The group of each patch, str `(patches,)`."""
+        return np.array([file.group for file in self.files], str)
 
-    def of(self, kept: BoolArray) -> "Rows":
+    @property
+    def labels(self) -> BoolArray:
+        """The labels of the patches, bool `(patches,)`."""
+        return self.vehicle[: len(self.files)]
+
+    def of(self, kept: BoolArray) -> "LabelledVectors":
         """Return a copy of the kept patches, bool `(patches,)`, with the samples made of them."""
         used = np.flatnonzero(kept[self.origins])
         new_rows = np.cumsum(kept) - 1
-        return Rows(
+        return LabelledVectors(
             self.vectors[used],
             self.vehicle[used],
             self.sides[used],
             new_rows[self.origins[used]],
+            [self.files[row] for row in np.flatnonzero(kept).tolist()],
         )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LabelledVectors:
-    """The feature vectors of a set of patches.
-
-    `groups` is str `(patches,)`: the group of each patch. `digest` is the SHA-256 over the names,
-    checksums and boxes of all patch files, `broken` the number of files that could not be read.
-    """
-
-    rows: Rows
-    groups: npt.NDArray[np.str_]
-    digest: str = ""
-    broken: int = 0
-
-    @property
-    def vectors(self) -> Float32Array:
-        """The vectors of the patches, float32 `(patches, features)`."""
-        return self.rows.vectors[: len(self.groups)]
-
-    @property
-    def vehicle(self) -> BoolArray:
-        """The labels of the patches, bool `(patches,)`."""
-        return self.rows.vehicle[: len(self.groups)]
 
 
 def extract(
@@ -133,35 +112,8 @@ def extract(
         The cluster of `workers` cannot be used.
     """
     describe = partial(_describe, features=features, augmenter=augmenter, seed=training.seed)
-    chunks = _describe_all(describe, files, workers, progress)
-    good = [each for chunk in chunks for each in chunk.good]
-    _check_broken(files, good, training.max_broken)
-    checksums = [each for chunk in chunks for each in chunk.checksums]
-    return LabelledVectors(
-        _joined(chunks),
-        np.array([file.group for file, ok in zip(files, good, strict=True) if ok], str),
-        _digest(files, checksums),
-        good.count(False),
-    )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Chunk:
-    """The rows of some patch files; `good` and `checksums` are of all files, also broken ones."""
-
-    rows: Rows
-    good: list[bool]
-    checksums: list[int]
-
-
-def _describe_all(
-    describe: Callable[[Sequence[PatchFile]], _Chunk],
-    files: Sequence[PatchFile],
-    workers: Workers,
-    progress: Callable[[int], object],
-) -> list[_Chunk]:
-    parts = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)]
-    chunks: dict[int, _Chunk] = {}
+    parts = [files[i : i + CHUNK] for i in range(0, len(files), CHUNK)] or [[]]
+    chunks: dict[int, tuple[LabelledVectors, list[int]]] = {}
     try:
         with closing(workers.map(describe, parts)) as results:
             for number, chunk in results:
@@ -172,62 +124,67 @@ def _describe_all(
             "a process that described patches was killed; there may be too little memory: try "
             "fewer --jobs"
         ) from error
-    return [chunks[number] for number in range(len(parts))]
+    checksums = [each for number in range(len(parts)) for each in chunks[number][1]]
+    data = _joined([chunks.pop(number)[0] for number in range(len(parts))])
+    _check_broken(files, set(data.files), training.max_broken)
+    return replace(data, digest=_digest(files, checksums))
 
 
 def _describe(
     files: Sequence[PatchFile], features: FeatureSettings, augmenter: Augmenter | None, seed: int
-) -> _Chunk:
+) -> tuple[LabelledVectors, list[int]]:
+    """Return the vectors of the files that are not broken, and the checksums of all files."""
     patches = list(read_patches(files))
-    samples, seeds = [], []
+    samples, good = [], []
     for patch in patches:
         if patch.image is not None:
             sides = np.array(patch.file.sides or UNKNOWN_SIDES, np.float32)
             samples.append(Sample(patch.image, patch.file.vehicle, sides))
-            seeds.append((seed, patch.checksum))
-    origins = list(range(len(samples)))
+            good.append(patch)
+    origins = list(range(len(good)))
     if augmenter is not None:
-        for row in range(len(samples)):
-            made = list(augmenter(samples[row], seeds[row]))
+        for row, patch in enumerate(good):
+            made = list(augmenter(samples[row], (seed, patch.checksum)))
             samples += made
             origins += [row] * len(made)
-    rows = Rows(
+    data = LabelledVectors(
         FeatureExtractor(features).describe_all(
             to_patch(sample.image, features.patch) for sample in samples
         ),
         np.array([sample.vehicle for sample in samples], bool),
         np.array([sample.sides for sample in samples], np.float32).reshape(-1, 4),
         np.array(origins, np.intp),
+        [patch.file for patch in good],
     )
-    good = [patch.image is not None for patch in patches]
-    return _Chunk(rows, good, [patch.checksum for patch in patches])
+    return data, [patch.checksum for patch in patches]
 
 
-def _joined(chunks: list[_Chunk]) -> Rows:
+def _joined(chunks: list[LabelledVectors]) -> LabelledVectors:
     """Join all rows, patches first; empty `chunks` on the way: the vectors are in memory once."""
-    patches = [chunk.good.count(True) for chunk in chunks]
-    samples = [len(chunk.rows.origins) - n for chunk, n in zip(chunks, patches, strict=True)]
-    numbers = np.arange(sum(patches) + sum(samples))
-    parts = np.split(numbers, np.cumsum([*patches, *samples])[:-1])
-    halves = parts[: len(chunks)], parts[len(chunks) :]
-    places = [np.concatenate(pair) for pair in zip(*halves, strict=True)]
-    joined = Rows(
-        np.empty((len(numbers), chunks[0].rows.vectors.shape[1]), np.float32),
-        np.empty(len(numbers), bool),
-        np.empty((len(numbers), 4), np.float32),
-        numbers,
+    files = [file for chunk in chunks for file in chunk.files]
+    total, width = sum(len(chunk.origins) for chunk in chunks), chunks[0].vectors.shape[1]
+    joined = LabelledVectors(
+        np.empty((total, width), np.float32),
+        np.empty(total, bool),
+        np.empty((total, 4), np.float32),
+        np.arange(total),
+        files,
     )
+    patch, sample = len(files), total  # behind the last row of either kind
     while chunks:
-        rows, place = chunks.pop().rows, places.pop()
-        joined.vectors[place] = rows.vectors
-        joined.vehicle[place] = rows.vehicle
-        joined.sides[place] = rows.sides
-        joined.origins[place] = place[rows.origins]
+        chunk = chunks.pop()
+        patches, samples = len(chunk.files), len(chunk.origins) - len(chunk.files)
+        patch, sample = patch - patches, sample - samples
+        rows = np.r_[patch : patch + patches, sample : sample + samples]
+        joined.vectors[rows] = chunk.vectors
+        joined.vehicle[rows] = chunk.vehicle
+        joined.sides[rows] = chunk.sides
+        joined.origins[rows] = rows[chunk.origins]
     return joined
 
 
-def _check_broken(files: Sequence[PatchFile], good: Sequence[bool], max_broken: float) -> None:
-    broken = [file for file, ok in zip(files, good, strict=True) if not ok]
+def _check_broken(files: Sequence[PatchFile], good: set[PatchFile], max_broken: float) -> None:
+    broken = [file for file in files if file not in good]
     for file in broken[:MAX_NAMED]:
         log.warning("%s: is no readable picture; skipped", file)
     if len(broken) > MAX_NAMED:

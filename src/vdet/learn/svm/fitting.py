@@ -24,7 +24,7 @@ from vdet.boxes import BoolArray, Float32Array, Float64Array
 from vdet.config.schema import FeatureSettings, Settings, SvmTrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.extraction import RowNumbers, Rows
+from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
 
 log = logging.getLogger("vdet")
 
@@ -37,7 +37,7 @@ _CORRECTIONS = 20  # of L-BFGS
 _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 
 
-def fit(rows: Rows, settings: Settings) -> LinearModel:
+def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     """Fit StandardScaler → LinearSvm → CalibratedClassifierCV on raw feature vectors.
 
     The sigmoid is fitted on the patches alone, each scored by an SVM that was fitted without it and
@@ -54,8 +54,7 @@ def fit(rows: Rows, settings: Settings) -> LinearModel:
         A class has fewer patches than there are calibration folds.
     """
     training = settings.train.svm
-    labels = rows.vehicle[: rows.patches]
-    fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
+    fewest = min(np.count_nonzero(rows.labels), np.count_nonzero(~rows.labels))
     if fewest < FOLDS:
         raise DataError(
             f"a class has {fewest} training patches, calibration needs {FOLDS}; give more patches"
@@ -80,11 +79,12 @@ def fit(rows: Rows, settings: Settings) -> LinearModel:
     return _to_model(calibrated.calibrated_classifiers_, scaler, settings.svm.features)
 
 
-def _folds(rows: Rows, training: SvmTrainingSettings) -> Iterator[tuple[RowNumbers, RowNumbers]]:
+def _folds(
+    rows: LabelledVectors, training: SvmTrainingSettings
+) -> Iterator[tuple[RowNumbers, RowNumbers]]:
     """Yield the rows to fit on and those to calibrate on."""
     splitter = StratifiedKFold(FOLDS, shuffle=True, random_state=training.seed)
-    patches = np.arange(rows.patches)
-    for _, tested in splitter.split(patches, rows.vehicle[patches]):
+    for _, tested in splitter.split(rows.labels, rows.labels):
         inside = np.isin(rows.origins, tested)
         yield np.flatnonzero(~inside), np.flatnonzero(inside)
 

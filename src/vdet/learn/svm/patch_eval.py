@@ -5,7 +5,7 @@ a split that leaks nothing, because patches in a row are near-duplicates.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -19,18 +19,16 @@ from vdet.evaluate.output import RunName, run_lines, share, table
 from vdet.evaluate.tiles import Tile
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.learn.svm.extraction import TEST_SHARE, LabelledVectors, extract, hold_out
+from vdet.learn.svm.extraction import TEST_SHARE, extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.metrics import CONFUSION_HEADINGS, Classification, Rate
-from vdet.pages.charts import FILL, SOFT, Axis, Line, Plot, curve, number_axis
+from vdet.pages.charts import FILL, Axis, Plot, curve, number_axis
 from vdet.pages.render import render
 from vdet.progress import Steps, no_steps
 from vdet.workers import make_workers
 
 THRESHOLD = 0.5
 """A patch with at least this probability is classified as a vehicle."""
-BINS = 10
-"""Bins of the calibration, of equal width over the probabilities 0 to 1."""
 MOST_MISTAKES = 24
 """Most mistakes of either kind that are shown."""
 
@@ -60,10 +58,6 @@ class PatchScores:
         How the tested patches are related to those of the training.
     roc_auc, log_loss
         None if all tested patches are of one class.
-    calibration_error
-        Mean distance of probability and share of vehicles in a bin, weighted by patches.
-    calibration
-        Mean probability and share of vehicles of each bin that is not empty, float64 `(n,)` each.
     roc
         Shares of false alarms and of found vehicles at each threshold, float64 `(n,)` each.
     mistakes
@@ -79,8 +73,6 @@ class PatchScores:
     recall: Rate
     roc_auc: float | None
     log_loss: float | None
-    calibration_error: float
-    calibration: tuple[Float64Array, Float64Array]
     roc: tuple[Float64Array, Float64Array]
     mistakes: tuple[Mistake, ...]
 
@@ -108,6 +100,7 @@ def evaluate_patches(
         Too many patches are unreadable, or there are too few to train on.
     """
     training = settings.train.svm
+    files = [file for file in files if not file.is_boxed]
     data = extract(
         files,
         model.features if model else settings.svm.features,
@@ -117,68 +110,49 @@ def evaluate_patches(
         progress=steps("describing patches", len(files)),
     )
     if model:
-        tested = np.full(len(data.vehicle), True)
+        tested = np.full(len(data.files), True)
         meaning = _SAME if model.provenance.get("data_sha256") == data.digest else _OTHER
     else:
         steps("fitting the model", None)
         tested = hold_out(data.groups, "tail", TEST_SHARE, training.seed)
         if not tested.any():
             raise DataError("nothing can be held out; give more patches")
-        model, meaning = fit(data.rows.of(~tested), settings), _SPLIT
+        model, meaning = fit(data.of(~tested), settings), _SPLIT
     steps("computing scores", None)
-    kept = list(files)
-    if data.broken:
-        kept = [patch.file for patch in read_patches(files) if patch.image is not None]
-    probabilities = model.probabilities(data.vectors[tested]).astype(np.float64)
-    return score_patches(data, tested, probabilities, kept, meaning)
+    rows = np.flatnonzero(tested)
+    probabilities = model.probabilities(data.vectors[rows]).astype(np.float64)
+    scores = score_patches([data.files[row] for row in rows.tolist()], probabilities, meaning)
+    return replace(
+        scores,
+        vehicles=int(np.count_nonzero(data.labels)),
+        non_vehicles=int(np.count_nonzero(~data.labels)),
+        broken=len(files) - len(data.files),
+    )
 
 
 def score_patches(
-    data: LabelledVectors,
-    tested: BoolArray,
-    probabilities: Float64Array,
-    files: Sequence[PatchFile],
-    meaning: str,
+    files: Sequence[PatchFile], probabilities: Float64Array, meaning: str = ""
 ) -> PatchScores:
-    """Compute the metrics.
-
-    Parameters
-    ----------
-    tested
-        bool `(n,)`: the patches of `data` that were tested, at least one.
-    probabilities
-        float64 `(m,)`: the probability of each tested patch of being a vehicle.
-    files
-        The `n` patches of `data`, in its order.
-    meaning
-        How the tested patches are related to those of the training.
-    """
+    """Compute the metrics of patches, at least one, and their probabilities, float64 `(n,)`."""
     from sklearn import metrics
 
-    vehicle = data.vehicle[tested]
+    vehicle = np.array([file.vehicle for file in files])
     positive = probabilities >= THRESHOLD
-    bins = np.minimum((probabilities * BINS).astype(int), BINS - 1)  # the last one includes 1
-    _, places, counts = np.unique(bins, return_inverse=True, return_counts=True)
-    given, true = (np.bincount(places, each) for each in (probabilities, vehicle.astype(float)))
-    both = len(np.unique(vehicle)) == 2
+    both = 0 < np.count_nonzero(vehicle) < len(vehicle)
     roc = metrics.roc_curve(vehicle, probabilities)[:2] if both else (np.empty(0), np.empty(0))
-    rows = np.flatnonzero(tested)
     return PatchScores(
-        vehicles=int(np.count_nonzero(data.vehicle)),
-        non_vehicles=int(np.count_nonzero(~data.vehicle)),
-        broken=data.broken,
+        vehicles=int(np.count_nonzero(vehicle)),
+        non_vehicles=int(np.count_nonzero(~vehicle)),
+        broken=0,
         meaning=meaning,
-        test=Classification.of(vehicle, positive, data.groups[tested]),
+        test=Classification.of(vehicle, positive, np.array([file.group for file in files])),
         precision=Rate.of(vehicle[positive]),
         recall=Rate.of(positive[vehicle]),
         roc_auc=float(metrics.roc_auc_score(vehicle, probabilities)) if both else None,
         log_loss=float(metrics.log_loss(vehicle, probabilities)) if both else None,
-        calibration_error=float(np.abs(given - true).sum() / len(vehicle)),
-        calibration=(given / counts, true / counts),
         roc=roc,
         mistakes=tuple(
-            Mistake(files[rows[row]], float(probabilities[row]))
-            for row in _worst(vehicle, probabilities)
+            Mistake(files[row], float(probabilities[row])) for row in _worst(vehicle, probabilities)
         ),
     )
 
@@ -212,15 +186,14 @@ def metric_rows(scores: PatchScores) -> list[list[str]]:
         ["recall", str(scores.recall)],
         ["ROC AUC", share(scores.roc_auc, 4)],
         ["log loss", share(scores.log_loss, 4)],
-        ["calibration error", share(scores.calibration_error, 4)],
     ]
 
 
 def values(scores: PatchScores) -> dict[str, Any]:
-    """Return the scores as values for JSON, without the points of the curves."""
+    """Return the scores as values for JSON, without the points of the curve."""
     mistakes = [asdict(each) | {"file": str(each.file)} for each in scores.mistakes]
     found = asdict(scores) | {"mistakes": mistakes}
-    del found["roc"], found["calibration"]
+    del found["roc"]
     return found
 
 
@@ -239,7 +212,7 @@ def patch_page(scores: PatchScores, run: RunName) -> str:
         ],
         metrics=metric_rows(scores),
         confusion_headings=CONFUSION_HEADINGS,
-        plots=(_roc_plot(scores), _calibration_plot(scores)),
+        roc=_roc_plot(scores),
         missed=_tiles(scores, vehicle=True),
         alarms=_tiles(scores, vehicle=False),
     )
@@ -252,13 +225,6 @@ def _roc_plot(scores: PatchScores) -> Plot:
     roc = [curve(np.log10(np.maximum(alarms, _LEAST_RATE)), found, FILL)] if len(found) else []
     title = "ROC curve: found vehicles / vehicles"
     return Plot(title, x, number_axis(0, 1), lines=roc)
-
-
-def _calibration_plot(scores: PatchScores) -> Plot:
-    points = list(zip(*scores.calibration, strict=True))
-    lines = [Line([(0, 0), (1, 1)], SOFT, dashed=True), Line(points, FILL, dots=True)]
-    title = "Calibration: share of vehicles"
-    return Plot(title, number_axis(0, 1, "probability"), number_axis(0, 1), lines=lines)
 
 
 def _tiles(scores: PatchScores, *, vehicle: bool) -> list[Tile]:

@@ -26,7 +26,6 @@ def train(
     files: Sequence[PatchFile],
     settings: Settings,
     *,
-    boxed: Sequence[PatchFile] = (),
     jobs: int | None = None,
     scheduler: str | None = None,
     steps: Steps = no_steps,
@@ -35,9 +34,8 @@ def train(
 
     Parameters
     ----------
-    boxed
-        Patches of neither class with known box sides. If they or `files` have known sides, the
-        model learns to find the sides of vehicles.
+    files
+        If some have known sides, the model learns to find the sides of vehicles.
     jobs
         Processes, as joblib counts them: -1 for one per core.
     scheduler
@@ -59,25 +57,27 @@ def train(
     """
     training = settings.train.svm
     workers = make_workers(jobs, scheduler)
+    boxed = [file for file in files if file.is_boxed]
+    of_classes = [file for file in files if not file.is_boxed]
     data = extract(
-        files,
+        of_classes,
         settings.svm.features,
         training,
         workers=workers,
         augmenter=partial(augment, settings=training.augmentation),
-        progress=steps("describing patches", len(files)),
+        progress=steps("describing patches", len(of_classes)),
     )
-    boxes = extract_box_patches(files, boxed, settings, workers=workers, steps=steps)
+    boxes = extract_box_patches(of_classes, boxed, settings, workers=workers, steps=steps)
     names: list[SplitName] = ["random", "tail"]
     names.sort(key=lambda name: name != training.split)
     fitted = [_fit_split(data, boxes, settings, name, steps) for name in names]
     model = fitted[0][0]
     report = TrainingMetrics(
-        vehicles=int(np.count_nonzero(data.vehicle)),
-        non_vehicles=int(np.count_nonzero(~data.vehicle)),
-        boxed=sum(file.sides is not None for file in (*files, *boxed)),
-        broken=data.broken + (boxes.boxed.broken if boxes and boxes.boxed else 0),
-        groups=dict(Counter(file.group for file in (*files, *boxed))),
+        vehicles=int(np.count_nonzero(data.labels)),
+        non_vehicles=int(np.count_nonzero(~data.labels)),
+        boxed=sum(file.sides is not None for file in files),
+        broken=len(files) - len(data.files) - (len(boxes.boxed.files) if boxes else len(boxed)),
+        groups=dict(Counter(file.group for file in (*of_classes, *boxed))),
         features=data.vectors.shape[1],
         splits=tuple(split for _, split in fitted),
     )
@@ -87,7 +87,7 @@ def train(
         "training": training.model_dump(mode="json"),
         "report": asdict(report),
     }
-    if boxes and boxes.boxed:
+    if boxes and boxed:
         provenance["boxes_sha256"] = boxes.boxed.digest
     return replace(model, provenance=provenance), report
 
@@ -99,25 +99,26 @@ def _fit_split(
     name: SplitName,
     steps: Steps,
 ) -> tuple[LinearModel, SplitMetrics]:
+    training = settings.train.svm
+
     def held_of(some: LabelledVectors) -> BoolArray:
-        training = settings.train.svm
         return hold_out(some.groups, name, TEST_SHARE, training.seed)
 
     held = held_of(data)
     if not held.any():
         raise DataError("no folder has two patches, of which one could be held out; give more")
     steps(f"fitting the classifier, {name} split", None)
-    model = fit(data.rows.of(~held), settings)
+    model = fit(data.of(~held), settings)
     regression, error = None, None
     if boxes is not None:
         steps(f"fitting the sides of boxes, {name} split", None)
         regression, error = fit_split_boxes(data, boxes, held_of, settings)
-    predicted = model.probabilities(data.vectors) >= 0.5
+    predicted = model.probabilities(data.vectors[: len(held)]) >= 0.5
     return replace(model, box_regression=regression), SplitMetrics(
         split=name,
         train_patches=int(np.count_nonzero(~held)),
-        train_augmented=int(np.count_nonzero(~held[data.rows.origins[len(held) :]])),
-        train_accuracy=float((predicted == data.vehicle)[~held].mean()),
-        test=Classification.of(data.vehicle[held], predicted[held], data.groups[held]),
+        train_augmented=int(np.count_nonzero(~held[data.origins[len(held) :]])),
+        train_accuracy=float((predicted == data.labels)[~held].mean()),
+        test=Classification.of(data.labels[held], predicted[held], data.groups[held]),
         box_error=error,
     )
