@@ -32,7 +32,6 @@ from vdet.evaluate.images.evaluate import ImagesResult, evaluate_images
 from vdet.evaluate.images.scores import Counting, Source
 from vdet.labels.reading import read_labelled_pictures
 from vdet.learn.net.run import NetworkJob, train_to_file
-from vdet.learn.net.sources import LabelledClip
 from vdet.workers import core_count
 
 GROUPS = (
@@ -152,7 +151,7 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
     settings = load_settings(None, [f"train.net.steps={arguments.steps}", *_UNCALIBRATED])
-    clip = LabelledClip(arguments.video, arguments.truth)
+    clip = (arguments.video, arguments.truth)
     sets = split_sets(arguments.roads, arguments.work / "sets")
     results = []
     for group in GROUPS:
@@ -241,10 +240,10 @@ def summarize(results: Sequence[ImagesResult]) -> Summary:
     )
 
 
-def video_lines(clip: LabelledClip, network: Path, settings: Settings) -> list[str]:
+def video_lines(clip: tuple[Path, Path], network: Path, settings: Settings) -> list[str]:
     """Return how well a network finds and follows the vehicles of a video."""
     variant = Variant(settings, load_detector(settings.detector, network), ())
-    return list(result_lines(evaluate_clips([open_clip(clip.video, clip.truth)], [variant])))
+    return list(result_lines(evaluate_clips([open_clip(*clip)], [variant])))
 
 
 def _group_f1(result: ImagesResult, scores: Float64Array) -> Float64Array:

@@ -60,12 +60,10 @@ def train_net(
         raise DataError("torch or onnx is not installed; pip install torch onnx") from error
     from vdet.labels.roles import Roles
     from vdet.learn.net.run import NetworkJob, train_to_file
-    from vdet.learn.net.sources import LabelledClip
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
-    labelled = tuple(LabelledClip(video, truth) for video, truth in clips)
-    job = NetworkJob(data, labelled, output, base, overwrite, Roles.from_settings(base_settings))
+    job = NetworkJob(data, clips, output, base, overwrite, Roles.from_settings(base_settings))
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)

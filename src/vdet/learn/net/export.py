@@ -87,21 +87,33 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
     DataError
         The file is not a network of this form.
     """
-    try:
-        folded = _convolutions(path)
-        for (layer, norm), (weight, bias) in zip(_layers(network), folded, strict=True):
+    biases: list[Tensor] = []
+
+    def load(layer: nn.Module, inputs: tuple[Tensor]) -> None:
+        """Set a layer before it computes: a convolution, or the normalisation behind it."""
+        if isinstance(layer, nn.Conv2d):
+            weight, bias = next(folded)
             factor = 1 / 255 if layer is network.stem else 1.0
             layer.weight.copy_(weight.reshape(layer.weight.shape) / factor)
-            target = layer.bias if norm is None else norm.bias
-            assert target is not None
-            target.copy_(bias.reshape(target.shape))
+            biases.append(bias)
+            if layer.bias is not None:
+                layer.bias.copy_(bias.reshape(layer.bias.shape))
+        else:
+            _undo(layer, inputs[0], biases[-1])
+
+    kinds = nn.Conv2d | nn.BatchNorm2d
+    layers = [each for each in network.modules() if isinstance(each, kinds)]
+    hooks = [layer.register_forward_pre_hook(load) for layer in layers]
+    try:
+        folded = iter(_convolutions(path))
+        network(pictures)
+        if next(folded, None) is not None:
+            raise ValueError("more convolutions than the network has")
     except Exception as error:  # onnx and torch raise many kinds for a file of another form
         raise DataError(f"{path}: is not a network that vdet train-net has written") from error
-    norms = [norm for norm in network.modules() if isinstance(norm, nn.BatchNorm2d)]
-    hooks = [norm.register_forward_pre_hook(_undo) for norm in norms]
-    network(pictures)
-    for hook in hooks:
-        hook.remove()
+    finally:
+        for hook in hooks:
+            hook.remove()
 
 
 def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
@@ -118,35 +130,13 @@ def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     ]
 
 
-def _layers(network: Network) -> list[tuple[nn.Conv2d, nn.BatchNorm2d | None]]:
-    """Return the convolutions in the order of the graph, each with its normalisation."""
-    calls: list[nn.Module] = []
-
-    def note(layer: nn.Module, *_: object) -> None:
-        calls.append(layer)
-
-    kinds = nn.Conv2d | nn.BatchNorm2d
-    layers = [each for each in network.modules() if isinstance(each, kinds)]
-    hooks = [layer.register_forward_hook(note) for layer in layers]
-    network.eval()(torch.zeros(1, 3, 32, 32))
-    network.train()
-    for hook in hooks:
-        hook.remove()
-    pairs = zip(calls, [*calls[1:], None], strict=True)
-    return [
-        (layer, norm if isinstance(norm, nn.BatchNorm2d) else None)
-        for layer, norm in pairs
-        if isinstance(layer, nn.Conv2d)
-    ]
-
-
-def _undo(norm: nn.Module, inputs: tuple[Tensor]) -> None:
-    """Set a normalisation so that it changes nothing but adds its bias."""
+def _undo(norm: nn.Module, inputs: Tensor, bias: Tensor) -> None:
+    """Set a normalisation so that it changes nothing but adds a bias."""
     assert isinstance(norm, nn.BatchNorm2d)
     assert norm.running_mean is not None
     assert norm.running_var is not None
-    variance, mean = torch.var_mean(inputs[0], (0, 2, 3))
+    variance, mean = torch.var_mean(inputs, (0, 2, 3))
     norm.running_mean.copy_(mean)
     norm.running_var.copy_(variance)
     norm.weight.copy_(torch.sqrt(variance + norm.eps))
-    norm.bias.add_(mean)
+    norm.bias.copy_(bias + mean)

@@ -11,7 +11,7 @@ from vdet.detect.onnx.session import Session
 from vdet.files import write_json
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.learn.net.export import export_network
-from vdet.learn.net.sources import CLASSES, LabelledClip, SourceReport, clip_source, image_source
+from vdet.learn.net.sources import CLASSES, SourceReport, clip_source, image_source
 from vdet.learn.net.training import TrainingState, train_network
 from vdet.version import __version__
 
@@ -27,7 +27,7 @@ class NetworkJob:
     pictures
         Sets of labelled pictures.
     clips
-        Labelled videos.
+        Labelled videos, each with the file of its true boxes.
     output
         The file of the network; metrics and checkpoint, the training's state, lie beside it.
     base
@@ -39,7 +39,7 @@ class NetworkJob:
     """
 
     pictures: tuple[Path, ...]
-    clips: tuple[LabelledClip, ...]
+    clips: tuple[tuple[Path, Path], ...]
     output: Path
     base: Path | None = None
     overwrite: bool = False
@@ -106,7 +106,7 @@ def train_to_file(
         header = read_header(Session(job.base))
         base["base"] = header.provenance if header else {}
     sources = [image_source(path, job.roles) for path in job.pictures]
-    sources += [clip_source(clip, job.roles) for clip in job.clips]
+    sources += [clip_source(video, truth, job.roles) for video, truth in job.clips]
     recent: list[float] = []
 
     def note(state: TrainingState) -> None:

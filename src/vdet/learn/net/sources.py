@@ -89,14 +89,6 @@ class Source:
         return SourceReport(self.name, len(self.samples), vehicles, digest.hexdigest())
 
 
-@dataclass(frozen=True, slots=True)
-class LabelledClip:
-    """A video and the file with its true boxes; every `EVERY`-th frame is used."""
-
-    video: Path
-    truth: Path
-
-
 def image_source(path: Path, roles: Roles = DEFAULT_ROLES) -> Source:
     """Read a set of labelled pictures into memory.
 
@@ -114,8 +106,8 @@ def image_source(path: Path, roles: Roles = DEFAULT_ROLES) -> Source:
     return Source(Path(labelled.name).resolve().name, samples)
 
 
-def clip_source(clip: LabelledClip, roles: Roles = DEFAULT_ROLES) -> Source:
-    """Read frames of a labelled video into memory; all its vehicles are cars.
+def clip_source(video: Path, truth_file: Path, roles: Roles = DEFAULT_ROLES) -> Source:
+    """Read every `EVERY`-th frame of a labelled video into memory; all its vehicles are cars.
 
     Raises
     ------
@@ -124,14 +116,14 @@ def clip_source(clip: LabelledClip, roles: Roles = DEFAULT_ROLES) -> Source:
     VideoError
         The video cannot be read.
     """
-    truth = read_truth(clip.truth, roles)
+    truth = read_truth(truth_file, roles)
     samples = []
-    with VideoReader(clip.video, frames=truth.last_frame) as reader:
+    with VideoReader(video, frames=truth.last_frame) as reader:
         for number, frame in enumerate(reader, start=1):
             if number % EVERY == 0:
                 rows = truth.frame(number)
                 samples.append(_sample(frame.image, rows.boxes, ["car"] * len(rows), rows.ignored))
-    return Source(clip.video.name, samples)
+    return Source(video.name, samples)
 
 
 def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray) -> Sample:
