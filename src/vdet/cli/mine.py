@@ -53,10 +53,12 @@ def mine(
     options.check_suffix(output, ".zip", what="patches")
     settings = choice.read_for_whole_frames(detector="svm")
     from vdet.detect.factory import model_file
+    from vdet.detect.svm.kind import load_svm
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
+    from vdet.workers import limit_library_threads
 
-    file = model_file(settings.detector, choice.model_path)
+    file = model_file(settings.svm, choice.model_path)
     inputs = [*sources, *truths, *([file] if file else [])]
     check_output(output, overwrite=overwrite, inputs=inputs)
     videos = [path for path in sources if not holds_labelled_pictures(path)]
@@ -73,9 +75,10 @@ def mine(
         output,
         overwrite,
     )
-    detector = choice.load_detector(settings.detector)
+    limit_library_threads()
+    model = load_svm(settings.svm, choice.model_path)
     with progress_steps(" frames") as steps:
-        mined = mining.mine(job, settings, detector, steps=steps)
+        mined = mining.mine(job, settings, model, steps=steps)
     print_lines(
         f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "
         f"{mined.false_alarms} false alarms, {mined.parts} more on parts of vehicles; "

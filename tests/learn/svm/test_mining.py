@@ -1,27 +1,26 @@
-"""Patches from a labelled video, for a detector that is no linear model."""
+"""Patches from labelled videos and pictures, without a model."""
 
 import re
 import zipfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from vdet.boxes import NO_BOXES, Box, Boxes
-from vdet.config.schema import MiningSettings, OutputSettings, Settings, TrainSettings
+from vdet.boxes import Box
+from vdet.config.schema import OutputSettings, Settings
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.choosing import MOST, Most
 from vdet.learn.svm.dataset import find_patches, read_patches
-from vdet.learn.svm.mining import MiningJob, MiningResult, PictureSource, VideoSource, mine
+from vdet.learn.svm.mining import MiningJob, PictureSource, VideoSource, mine
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image, write_image
 
 WIDTH, HEIGHT, FRAMES = 640, 360, 5
 CAR = Box.sized(270, 190, 100, 70)
-TREE = Box.sized(60, 190, 96, 70)  # what the detector takes for a vehicle
+TREE = Box.sized(60, 190, 96, 70)
 RED, GREEN = (0, 0, 255), (0, 160, 0)
 NAME = re.compile(r"(?:frame|picture)(\d{6})_x(-?\d+)_y(\d+)_s(\d{4})\.png")
 
@@ -32,33 +31,6 @@ def draw() -> Image:
     for box, color in ((CAR, RED), (TREE, GREEN)):
         box.cut(image)[:] = color
     return image
-
-
-@dataclass
-class FixedBoxes:
-    """A detector that returns the same boxes for every picture, whatever it shows."""
-
-    detections: Boxes
-
-    def for_video(self, width: int, height: int, images: Sequence[Image]) -> "FixedBoxes":
-        assert all(image.shape == (height, width, 3) for image in images)
-        return self
-
-    def search(self, picture: Picture, index: int | None) -> Image:
-        assert index is None, "mined frames are searched as still pictures"
-        return picture.image
-
-    def detect(self, candidates: Image) -> Boxes:
-        assert candidates.dtype == np.uint8
-        return self.detections
-
-    def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:  # noqa: ARG002
-        return {}
-
-
-def found(*boxes: Box, score: float = 0.9) -> Boxes:
-    corners = [(box.x1, box.y1, box.x2, box.y2) for box in boxes]
-    return Boxes(corners, [score] * len(boxes)) if boxes else NO_BOXES
 
 
 @pytest.fixture(scope="module")
@@ -72,30 +44,13 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-Mine = Callable[..., MiningResult]
-
-
 @pytest.fixture
-def mined(clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Mine:
-    """Mine the clip, in which the truth has the car, with a detector that finds these boxes."""
+def video(clip: Path, tmp_path: Path) -> VideoSource:
+    """Return the clip with a truth that has the car."""
     truth = tmp_path / "gt.txt"
     box = f"{CAR.x1 + 1},{CAR.y1 + 1},{CAR.width},{CAR.height}"
     truth.write_text("".join(f"{number},1,{box},1,3,1\n" for number in range(1, FRAMES + 1)))
-
-    def run(
-        *boxes: Box,
-        score: float = 0.9,
-        detector: type[FixedBoxes] = FixedBoxes,
-        probability: float = 0.2,
-        **most: int,
-    ) -> MiningResult:
-        model = detector(found(*boxes, score=score))
-        job = MiningJob((VideoSource(clip, truth, every=2),), tmp_path / "mined.zip")
-        monkeypatch.setattr("vdet.learn.svm.mining.MOST", Most(**most))
-        settings = Settings(train=TrainSettings(mine=MiningSettings(probability=probability)))
-        return mine(job, settings, model)
-
-    return run
+    return VideoSource(clip, truth, every=2)
 
 
 def boxes_of(archive: Path, group: str) -> list[Box]:
@@ -109,63 +64,31 @@ def boxes_of(archive: Path, group: str) -> list[Box]:
     return boxes
 
 
-def test_windows_on_a_wrong_detection_are_false_alarms_and_those_on_the_truth_vehicles(
-    mined: Mine, tmp_path: Path
+def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
+    video: VideoSource, tmp_path: Path
 ) -> None:
-    result = mined(CAR, TREE)
-    assert result.frames == 3
-    assert result.vehicles > 0
-    assert result.false_alarms > 0
-    assert result.parts == 0
     archive = tmp_path / "mined.zip"
+    result = mine(MiningJob((video,), archive), Settings(), None)
+    assert result.frames == 3
     for box in boxes_of(archive, "vehicles/mined_road"):
         assert box.iou(CAR) > 0.35
-        assert box.intersection(TREE).area == 0
     for box in boxes_of(archive, "non-vehicles/mined_road"):
-        assert box.iou(TREE) > 0.35
-        assert box.intersection(CAR).area == 0
-    for patch in read_patches(find_patches([archive])):
+        assert box.iou(CAR) < 0.5
+    vehicles = [file for file in find_patches([archive]) if file.group == "vehicles/mined_road"]
+    assert len(vehicles) == result.vehicles > 0
+    for patch in read_patches(vehicles):
         assert patch.image is not None
         _, green, red = patch.image[32, 32].tolist()
-        if patch.file.name.startswith("non-vehicles"):
-            assert green > red + 40, "the middle of a false alarm shows the tree"
-        elif patch.file.name.startswith("vehicles"):
-            assert red > green + 100, "the middle of a vehicle shows the car"
+        assert red > green + 100, "the middle of a vehicle shows the car"
 
 
-def test_a_detection_below_the_least_probability_is_no_false_alarm(mined: Mine) -> None:
-    assert mined(TREE, score=0.3, probability=0.4).false_alarms == 0
-
-
-def test_a_detection_of_a_part_of_a_vehicle_gives_parts(mined: Mine, tmp_path: Path) -> None:
-    part = Box.sized(CAR.x1 + 34, CAR.y1 + 20, 32, 24)
-    result = mined(part)
-    assert result.parts > 0
-    assert result.false_alarms == 0
-    for box in boxes_of(tmp_path / "mined.zip", "non-vehicles/mined_road_parts"):
-        assert CAR.contains(box.center)
-        assert box.width < CAR.width / 2
-
-
-def test_nothing_found_and_nothing_wanted_is_an_error(mined: Mine, tmp_path: Path) -> None:
+def test_nothing_wanted_is_an_error(
+    video: VideoSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("vdet.learn.svm.mining.MOST", Most(0, 0, 0))
     with pytest.raises(DataError, match=r"road\.mp4: no window fits a vehicle or is a false alarm"):
-        mined(per_vehicle=0)
+        mine(MiningJob((video,), tmp_path / "mined.zip"), Settings(), None)
     assert not (tmp_path / "mined.zip").exists()
-
-
-class Remembers(FixedBoxes):
-    """A detector that finds nothing from its second picture on."""
-
-    def for_video(self, width: int, height: int, images: Sequence[Image]) -> "Remembers":  # noqa: ARG002
-        return Remembers(self.detections)
-
-    def detect(self, candidates: Image) -> Boxes:  # noqa: ARG002
-        detections, self.detections = self.detections, NO_BOXES
-        return detections
-
-
-def test_every_frame_is_searched_for_itself(mined: Mine) -> None:
-    assert mined(TREE, detector=Remembers, false_alarms=1).false_alarms == 3
 
 
 def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video(
@@ -178,7 +101,7 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
     job = MiningJob((VideoSource(source, truth),), tmp_path / "mined.zip")
     with pytest.raises(VideoError, match=r"tiny\.mp4: no window fits into a frame of 8×8 pixels"):
-        mine(job, Settings(), FixedBoxes(NO_BOXES))
+        mine(job, Settings(), None)
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -199,28 +122,15 @@ class TestPictures:
         return folder
 
     def test_they_are_mined_like_the_frames_of_a_video(
-        self, folder: Path, clip: Path, tmp_path: Path
+        self, folder: Path, video: VideoSource, tmp_path: Path
     ) -> None:
-        truth = tmp_path / "gt.txt"
-        box = f"{CAR.x1 + 1},{CAR.y1 + 1},{CAR.width},{CAR.height}"
-        truth.write_text(f"1,1,{box},1,3,1\n")
-        sources = (PictureSource(folder), VideoSource(clip, truth))
+        sources = (PictureSource(folder), replace(video, last=1))
         job = MiningJob(sources, tmp_path / "mined.zip")
-        result = mine(job, Settings(), FixedBoxes(found(TREE)))
-        assert result.frames == 2
-        for kind in ("vehicles", "non-vehicles"):
-            boxes = boxes_of(job.output, f"{kind}/mined_city")
-            assert boxes == boxes_of(job.output, f"{kind}/mined_road") != []
-
-    def test_without_a_detector_windows_without_a_vehicle_are_taken(
-        self, folder: Path, tmp_path: Path
-    ) -> None:
-        job = MiningJob((PictureSource(folder),), tmp_path / "mined.zip")
-        result = mine(job, Settings(), None)
-        assert result.vehicles > 0
-        assert result.false_alarms == MOST.false_alarms
-        for box in boxes_of(job.output, "non-vehicles/mined_city"):
-            assert box.iou(CAR) < 0.5
+        assert mine(job, Settings(), None).frames == 2
+        vehicles = boxes_of(job.output, "vehicles/mined_city")
+        assert vehicles == boxes_of(job.output, "vehicles/mined_road") != []
+        alarms = boxes_of(job.output, "non-vehicles/mined_city")
+        assert len(alarms) == MOST.false_alarms
 
     def test_two_sources_of_one_name_are_refused(self, folder: Path, tmp_path: Path) -> None:
         job = MiningJob((PictureSource(folder), PictureSource(folder)), tmp_path / "mined.zip")

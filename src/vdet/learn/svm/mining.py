@@ -15,10 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import Boxes, Float32Array, Float64Array, Int32Array, from_sizes
+from vdet.boxes import Float64Array
 from vdet.config.schema import Settings, SvmSettings
-from vdet.detect.protocol import DetectorModel
-from vdet.detect.svm.detector import SvmDetector, horizon_of
+from vdet.detect.svm.detector import SvmModel, horizon_of
 from vdet.detect.svm.features import cut_window, to_patch
 from vdet.detect.svm.search import lay_grids
 from vdet.detect.svm.windows import Windows
@@ -32,7 +31,6 @@ from vdet.learn.svm.choosing import (
     FrameLabels,
     PatchKind,
     choose_windows,
-    compare_windows,
     cut_sides,
 )
 from vdet.learn.svm.dataset import patch_archive
@@ -86,7 +84,7 @@ class VideoSource:
     last: int | None = None
 
     def frames(
-        self, model: DetectorModel | None, settings: Settings, progress: Progress
+        self, model: SvmModel | None, settings: Settings, progress: Progress
     ) -> Iterator[LabelledFrame]:
         """Yield the frames to use; `progress` gets the number of frames that are read.
 
@@ -127,7 +125,7 @@ class VideoSource:
         return last
 
     def _uses(self, number: int, vehicles: Float64Array, width: int) -> bool:
-        """Tell whether a frame is used. One that cuts a vehicle off is rare and hard to learn."""
+        """Return whether a frame is used. One that cuts a vehicle off is rare and hard to learn."""
         is_regular = (number - self.first) % self.every == 0
         cuts_off = any(cut_sides(box, width).any() for box in vehicles)
         return number >= self.first and (is_regular or cuts_off)
@@ -140,7 +138,7 @@ class PictureSource:
     path: Path
 
     def frames(
-        self, model: DetectorModel | None, settings: Settings, progress: Progress
+        self, model: SvmModel | None, settings: Settings, progress: Progress
     ) -> Iterator[LabelledFrame]:
         """Yield all pictures; `progress` gets their number.
 
@@ -191,7 +189,7 @@ class MiningResult:
 
 
 def mine(
-    job: MiningJob, settings: Settings, model: DetectorModel | None, *, steps: Steps = no_steps
+    job: MiningJob, settings: Settings, model: SvmModel | None, *, steps: Steps = no_steps
 ) -> MiningResult:
     """Search the labelled frames and write patches for the training.
 
@@ -202,7 +200,7 @@ def mine(
     Parameters
     ----------
     model
-        The detector whose false alarms are searched for; None: any window without a vehicle may be
+        The model whose false alarms are searched for; None: any window without a vehicle may be
         taken.
     steps
         Called for each source with its name and its number of frames.
@@ -251,21 +249,19 @@ def mine(
 
 
 def search_windows(
-    model: DetectorModel | None, width: int, height: int, images: Sequence[Image]
+    model: SvmModel | None, width: int, height: int, images: Sequence[Image]
 ) -> Callable[[Image], Windows]:
     """Return a search of frames of this size, `images` are the first few, for their windows.
 
-    The windows of the linear model are its own. For another detector they are laid as the default
-    settings of the linear model say, and a window has the score of the detection that it fits.
-    Without a detector all windows have probability 1.
+    Without a model, the windows are those of the default settings, all with probability 1.
 
     Raises
     ------
     ImageError
         Such frames cannot be searched.
     """
-    detector = model.for_video(width, height, images) if model else None
-    if isinstance(detector, SvmDetector):
+    if model:
+        detector = model.for_video(width, height, images)
         return lambda image: detector.search(Picture(image), None).windows
     svm = SvmSettings()
     grids = lay_grids(svm, svm.features, width, height, horizon=horizon_of(svm, images))
@@ -274,26 +270,6 @@ def search_windows(
             f"no window fits into a frame of {width}×{height} pixels; give a larger one"
         )
     boxes = np.concatenate([grid.boxes for grid in grids])
-
-    def search(image: Image) -> Windows:
-        if model is None:
-            return _scored(boxes, np.ones(len(boxes), np.float32))
-        still = model.for_video(width, height, [image])
-        found = still.detect(still.search(Picture(image), None))
-        return _scored(boxes, _scores(boxes, found, width))
-
-    return search
-
-
-def _scores(boxes: Int32Array, detections: Boxes, frame_width: int) -> Float32Array:
-    """Return the highest score of the detections that each window fits; 0 where none fits."""
-    scores = np.zeros(len(boxes), np.float32)
-    squares = from_sizes(boxes)
-    for box, score in zip(detections.sides, detections.scores.tolist(), strict=True):
-        fits = compare_windows(squares, box, frame_width).fits
-        scores[fits] = np.maximum(scores[fits], score)
-    return scores
-
-
-def _scored(boxes: Int32Array, scores: Float32Array) -> Windows:
-    return Windows(boxes, scores, np.ones_like(scores), boxes.astype(np.float32))
+    ones = np.ones(len(boxes), np.float32)
+    windows = Windows(boxes, ones, ones, boxes.astype(np.float32))
+    return lambda _: windows
