@@ -393,4 +393,4 @@ def _intersection(a: Float64Array, b: Float64Array) -> Float64Array:
 def _common(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the length, at least 0, that spans `(…, 2)` of near and far end share."""
     shared = np.minimum(a[..., 1], b[..., 1]) - np.maximum(a[..., 0], b[..., 0])
-    return np.asarray(np.maximum(shared, 0, out=shared))
+    return np.asarray(np.maximum(shared, 0))

@@ -54,7 +54,7 @@ def vehicle(
     confirmed: bool = True,
     unseen: float = 0,
 ) -> Vehicle:
-    made = Vehicle.new(Observation(box, score), 0.04, MotionTrackerSettings())
+    made = Vehicle(Observation(box, score), 0.04, MotionTrackerSettings())
     made.confirmed, made.id, made.unseen = confirmed, number, unseen
     return made
 

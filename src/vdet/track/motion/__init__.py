@@ -8,7 +8,7 @@ For each vehicle a Kalman filter (`state`) estimates where it is in the next fra
 2.  a detection that fits two vehicles together better than one of them is shared by both;
 3.  a box that is cut off by the frame's side is measured by its inner edge only (`state`);
 4.  a detection that belongs to no vehicle may be a new one, unless it is a part of one
-    (`overlapping`);
+    (`association`);
 5.  a new vehicle is shown when there is enough evidence for it (`vehicle`);
 6.  a vehicle without a detection is shown by prediction for a short time; not behind another one
     that covers most of it. It is remembered for longer, and keeps its id;

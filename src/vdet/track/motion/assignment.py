@@ -23,42 +23,29 @@ def assign(values: Float64Array) -> list[tuple[int, int]]:
     rows, columns = values.shape
     if rows > columns:
         return sorted((row, column) for column, row in assign(values.T))
-    solver = _Solver(values)
+    costs, row_of = -values, np.full(columns, _FREE)
+    of_rows, of_columns = np.zeros(rows), np.zeros(columns)  # the dual variables
     for row in range(rows):
-        solver.add(row)
-    pairs = ((int(row), column) for column, row in enumerate(solver.row_of) if row != _FREE)
-    return sorted((row, column) for row, column in pairs if values[row, column] > 0)
-
-
-class _Solver:
-    """The best pairs of the rows added so far, and their dual variables."""
-
-    def __init__(self, values: Float64Array) -> None:
-        rows, columns = values.shape
-        self._costs = -values
-        self._of_rows, self._of_columns = np.zeros(rows), np.zeros(columns)
-        self.row_of = np.full(columns, _FREE)
-
-    def add(self, row: int) -> None:
-        """Pair one more row; others change their columns along the cheapest path."""
-        columns = len(self.row_of)
+        # Search the cheapest path from this row to a free column.
         lengths, previous = np.full(columns, np.inf), np.full(columns, _FREE)
         is_open = np.ones(columns, np.bool_)
         current, column, shortest = row, _FREE, 0.0
         while current != _FREE:
-            reached = shortest + self._costs[current] - self._of_rows[current] - self._of_columns
+            reached = shortest + costs[current] - of_rows[current] - of_columns
             shorter = is_open & (reached < lengths)
             lengths[shorter], previous[shorter] = reached[shorter], column
             column = int(np.where(is_open, lengths, np.inf).argmin())
             shortest, is_open[column] = float(lengths[column]), False
-            current = int(self.row_of[column])
-        self._of_rows[row] += shortest
-        passed = ~is_open
-        passed[column] = False
+            current = int(row_of[column])
+        passed = np.flatnonzero(~is_open & (row_of != _FREE))
         change = shortest - lengths[passed]
-        self._of_rows[self.row_of[passed]] += change
-        self._of_columns[passed] -= change
+        of_rows[row] += shortest
+        of_rows[row_of[passed]] += change
+        of_columns[passed] -= change
+        # The rows along the path change their columns.
         while column != _FREE:
             before = int(previous[column])
-            self.row_of[column] = row if before == _FREE else self.row_of[before]
+            row_of[column] = row if before == _FREE else row_of[before]
             column = before
+    pairs = ((int(row), column) for column, row in enumerate(row_of) if row != _FREE)
+    return sorted((row, column) for row, column in pairs if values[row, column] > 0)

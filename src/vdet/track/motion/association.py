@@ -1,5 +1,9 @@
 """Which detection belongs to which vehicle, and which vehicles are the same one.
 
+On a flat road what is nearer stands lower in the picture. So of two vehicles that overlap the one
+with the lower bottom hides the other, and two boxes that overlap and stand level are of one
+vehicle: two would be in the same place.
+
 Source: the order of the rounds is the matching cascade of Wojke, Bewley and Paulus, "Simple Online
 and Realtime Tracking with a Deep Association Metric", 2017; the buffered intersection over union is
 that of Yang et al., "Hard to Track Objects with Irregular Motions and Similar Appearances? Make It
@@ -11,9 +15,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vdet.boxes import Float64Array, area, iou, visible
+from vdet.boxes import BoolArray, Float64Array, area, coverage, iou, visible
 from vdet.track.motion.assignment import assign
-from vdet.track.motion.overlapping import CLEAR, PART, is_part, is_same
 from vdet.track.motion.vehicle import Vehicle
 
 Pairs = dict[int, int]
@@ -26,6 +29,90 @@ _REACH = 1.5
 
 _GROWTH = 3.0
 """How much larger or smaller its box may be then, as an area."""
+
+
+PART = 0.6
+"""A detection with more than this share inside a shown vehicle is a part of it."""
+
+HIDDEN = 0.5
+"""A vehicle is hidden where a nearer one covers more than this share of it."""
+
+_LEVEL = 0.15
+"""Bottoms that differ by less than this share of the lesser height are level."""
+
+_LEVEL_OVERLAP = 0.3
+"""Share of the smaller of two level boxes that lies in the other, where they are one vehicle."""
+
+_ALIKE = 0.5
+"""Intersection over union from which on two boxes are of one vehicle, level or not."""
+
+CLEAR = 0.8
+"""A detection on a nearer vehicle that scores less than this share of its score is a part of it."""
+
+
+def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
+    """Tell of each box whether another one covers more than half of it and is not farther.
+
+    Parameters
+    ----------
+    boxes
+        Shape `(n, 4)`: x1, y1, x2, y2 in pixels, each with an area.
+    present
+        Shape `(n,)`: those that can hide others.
+    """
+    bottoms = boxes[:, 3]
+    farther = bottoms < (bottoms - _LEVEL * (bottoms - boxes[:, 1]))[:, np.newaxis]
+    hiding = (coverage(boxes, boxes) > HIDDEN) & present & ~farther
+    np.fill_diagonal(hiding, val=False)
+    return np.asarray(hiding.any(axis=1))
+
+
+def is_same(box: Float64Array, other: Float64Array) -> bool:
+    """Tell whether two boxes, `(4,)`, show the same vehicle."""
+    one, two = box[np.newaxis], other[np.newaxis]
+    height = min(box[3] - box[1], other[3] - other[1])
+    is_level = abs(other[3] - box[3]) < _LEVEL * height
+    overlap = max(coverage(one, two), coverage(two, one))
+    return bool(iou(box, other) > _ALIKE or (is_level and overlap > _LEVEL_OVERLAP))
+
+
+def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
+    """Tell of each box, `(n, 4)`, whether most of it lies in one that scores higher.
+
+    A vehicle that comes out from behind another one has nearly the same score, and is no part.
+
+    Returns
+    -------
+    bool `(n,)`.
+    """
+    weaker = scores[:, np.newaxis] < CLEAR * scores
+    return np.asarray(((coverage(boxes, boxes) > PART) & weaker).any(axis=1))
+
+
+def is_part(box: Float64Array, other: Float64Array) -> bool:
+    """Tell whether most of `box`, `(4,)`, lies in `other`."""
+    return bool(coverage(box[np.newaxis], other[np.newaxis]) > PART)
+
+
+def around(boxes: Float64Array) -> Float64Array:
+    """Return the smallest box, `(4,)`, that covers all of `boxes`, `(n, 4)`."""
+    return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
+
+
+def shows_both(found: Float64Array, expected: Float64Array) -> bool:
+    """Tell whether the region `found`, `(4,)`, shows both vehicles `expected`, `(2, 4)`, as one.
+
+    That is where most of the second lies in it and it fits the box around both better than the
+    first one alone.
+    """
+    alone, together = iou(found, expected[0]), iou(found, around(expected))
+    return is_part(expected[1], found) and bool(together > alone)
+
+
+def stretched(box: Float64Array, before: Float64Array, after: Float64Array) -> Float64Array:
+    """Return `box` moved and scaled as `before` was to become `after`; all of shape `(4,)`."""
+    scale = (after[2:] - after[:2]) / (before[2:] - before[:2])
+    return after[[0, 1, 0, 1]] + (box - before[[0, 1, 0, 1]]) * scale[[0, 1, 0, 1]]
 
 
 def buffered_iou(
@@ -101,8 +188,10 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
     """
     kept: list[Vehicle] = []
     hidden = [vehicle for vehicle in vehicles if vehicle.hidden]
-    for vehicle in sorted(vehicles, key=_rank):
-        same = _track_of_same(vehicle, kept, hidden, size)
+    # Confirmed ones come first, then those with higher scores; nearly equal ones keep their order.
+    for vehicle in sorted(vehicles, key=lambda v: (not v.confirmed, -round(v.scores.value, 2))):
+        shown = [each for each in kept if each.confirmed and not each.unseen and not vehicle.unseen]
+        same = next((each for each in shown if _are_same(vehicle, each, hidden, size)), None)
         if same is None:
             kept.append(vehicle)
         elif vehicle.id is not None:
@@ -110,38 +199,24 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
     return [vehicle for vehicle in vehicles if vehicle in kept]
 
 
-def _rank(vehicle: Vehicle) -> tuple[bool, float]:
-    """Sort confirmed vehicles first, then by score; nearly equal scores keep their order."""
-    return not vehicle.confirmed, -round(vehicle.score, 2)
-
-
-def _track_of_same(
-    vehicle: Vehicle,
-    others: Sequence[Vehicle],
-    hidden: Sequence[Vehicle],
-    size: tuple[int, int],
-) -> Vehicle | None:
-    """Return the track among `others`, higher in rank, that shows the same vehicle.
+def _are_same(
+    vehicle: Vehicle, other: Vehicle, hidden: Sequence[Vehicle], size: tuple[int, int]
+) -> bool:
+    """Tell whether a track shows the same vehicle as another one, higher in rank.
 
     One that may be a `hidden` vehicle that comes out is no part of the vehicle before it.
     """
-    if vehicle.unseen:
-        return None
-    for other in others:
-        if not other.confirmed or other.unseen:
-            continue
-        boxes = visible(np.stack([vehicle.state.box, other.state.box]), size)
-        weaker = vehicle.confirmed or vehicle.score <= other.score
-        inside = not vehicle.confirmed and is_part(boxes[0], boxes[1:], PART)
-        part = inside and not _comes_out(vehicle, other, hidden)
-        if part or (weaker and is_same(boxes[0], boxes[1:])):
-            return other
-    return None
+    one, two = visible(np.stack([vehicle.state.box, other.state.box]), size)
+    is_weaker = vehicle.confirmed or vehicle.scores.value <= other.scores.value
+    if is_weaker and is_same(one, two):
+        return True
+    may_be_part = not vehicle.confirmed and is_part(one, two)
+    return may_be_part and not _comes_out(vehicle, other, hidden)
 
 
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
     """Tell whether one of the `hidden` vehicles was near and this one is as clear as the nearer."""
-    is_clear = vehicle.detection_score > CLEAR * nearer.detection_score
+    is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
     return is_clear and any(_distance(each, vehicle) < _REACH for each in hidden)
 
 

@@ -41,7 +41,7 @@ class MotionState:
     def at_rest(cls, box: Float64Array, noise: float, velocity: float) -> Self:
         """Start at `box` with velocity 0; `noise` and `velocity` are their standard deviations."""
         mean = np.zeros((4, 2))
-        mean[:, 0] = measurement_of(box)
+        mean[:, 0] = _measurement(box)
         return cls(mean, np.tile(np.diag([noise**2, velocity**2]), (4, 1, 1)))
 
     @property
@@ -62,24 +62,25 @@ class MotionState:
         covariance = step @ self.covariance @ step.T + acceleration**2 * drift
         return MotionState(self.mean @ step.T, covariance)
 
-    def corrected(self, measured: Float64Array, noise: float, seen: Float64Array) -> "MotionState":
-        """Take in a measurement.
+    def corrected(self, box: Float64Array, noise: float, size: tuple[int, int]) -> "MotionState":
+        """Take in a detected box.
 
         Parameters
         ----------
-        measured
-            Shape `(4,)`, as `measurement_of` gives it.
+        box
+            x1, y1, x2, y2 in full-frame pixels, inside the frame, with an area.
         noise
             Its standard deviation, in shares of the vehicle's size.
-        seen
-            Shape `(4,)`, 1 where it was measured and 0 where it could not be.
+        size
+            Width and height of the frame, pixels.
         """
-        unit = self._unit()
-        error = (measured - self.mean[:, 0]) / unit
+        mean, measured, seen = _measured(self.mean, box, size)
+        unit = np.array([*np.exp(mean[2:, 0]), 1.0, 1.0])
+        error = (measured - mean[:, 0]) / unit
         gain = self.covariance[:, :, 0] / (self.covariance[:, 0, 0] + noise**2)[:, np.newaxis]
         gain *= seen[:, np.newaxis]
         return MotionState(
-            self.mean + gain * (error * unit)[:, np.newaxis],
+            mean + gain * (error * unit)[:, np.newaxis],
             self.covariance - gain[:, :, np.newaxis] * self.covariance[:, np.newaxis, 0],
         )
 
@@ -88,46 +89,23 @@ class MotionState:
         factors = np.array([[1, motion], [1, motion], [1, growth], [1, growth]])
         return replace(self, mean=self.mean * factors)
 
-    def _unit(self) -> Float64Array:
-        width, height = np.exp(self.mean[2:, 0])
-        return np.array([width, height, 1.0, 1.0])
 
-
-def measurement_of(box: Float64Array) -> Float64Array:
+def _measurement(box: Float64Array) -> Float64Array:
     """Return centre x and y and log width and height, `(4,)`, of a box of x1, y1, x2, y2."""
     return np.concatenate([(box[:2] + box[2:]) / 2, np.log(box[2:] - box[:2])])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class EdgeMeasurement:
-    """What a box tells of a vehicle that the frame's sides may cut off.
-
-    `state` is the state that it is to correct, `measured` and `seen` are as
-    `MotionState.corrected` takes them.
-    """
-
-    state: MotionState
-    measured: Float64Array
-    seen: Float64Array
-
-
-def measure(state: MotionState, box: Float64Array, size: tuple[int, int]) -> EdgeMeasurement:
-    """Compare the detected `box` with the predicted `state`.
+def _measured(
+    expected: Float64Array, box: Float64Array, size: tuple[int, int]
+) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return the mean to correct, the measurement, and for each of the four 1 if it was seen, or 0.
 
     The box of a vehicle that comes in at a side grows with every frame though the vehicle does
     not, and its centre moves at half the vehicle's speed. So only the inner edge of a cut-off box
     counts; the width is what it was, or the visible part if that is more, and does not change by
     itself. Above and below it is the same with the height.
-
-    Parameters
-    ----------
-    box
-        x1, y1, x2, y2 in full-frame pixels, inside the frame, with an area.
-    size
-        Width and height of the frame, pixels.
     """
-    mean, covariance = state.mean.copy(), state.covariance.copy()
-    measured, seen = measurement_of(box), np.ones(4)
+    mean, measured, seen = expected.copy(), _measurement(box), np.ones(4)
     for axis, span in enumerate(size):
         first, last = box[axis], box[axis + 2]
         cut_before, cut_behind = first <= BORDER * span, last >= span - BORDER * span
@@ -142,4 +120,4 @@ def measure(state: MotionState, box: Float64Array, size: tuple[int, int]) -> Edg
         mean[axis + 2, 1] = 0
         measured[axis] = (first if cut_behind else last) + outward * length / 2
         seen[axis + 2] = 0
-    return EdgeMeasurement(MotionState(mean, covariance), measured, seen)
+    return mean, measured, seen

@@ -1,22 +1,24 @@
 """The motion tracker: which vehicles there are, frame after frame."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import count, product
 
 import numpy as np
 
-from vdet.boxes import Box, Boxes, Float64Array, are_nested, visible
+from vdet.boxes import BoolArray, Box, Boxes, Float64Array, are_nested, visible
 from vdet.config.schema import MotionTrackerSettings
 from vdet.media import Picture
-from vdet.track.motion.association import buffered_iou, pair, take_over_ids, without_duplicates
-from vdet.track.motion.overlapping import (
-    HIDDEN,
-    PART,
+from vdet.track.motion.association import (
     are_hidden,
     are_parts,
     around,
+    buffered_iou,
+    pair,
     shows_both,
     stretched,
+    take_over_ids,
+    without_duplicates,
 )
 from vdet.track.motion.vehicle import Observation, Vehicle
 from vdet.track.track import Track
@@ -50,12 +52,7 @@ class MotionTracker:
         self._time: float | None = None
         self._unsearched = 0.0  # seconds since the latest frame that was searched
 
-    def update(
-        self,
-        detections: Boxes,
-        time: float,
-        picture: Picture | None = None,  # noqa: ARG002 - boxes are enough
-    ) -> list[Track]:
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
         """Follow the vehicles into the next frame; as `VideoTracker.update`.
 
         The part of a detection outside the frame does not count.
@@ -69,11 +66,11 @@ class MotionTracker:
         found |= self._seen_as_one(expected, hidden, found)
         for row, vehicle in enumerate(self._vehicles):
             if row in found:
-                vehicle.see(found[row], seconds, self._size, self._settings)
+                vehicle.see(found[row], seconds, self._size)
             else:
-                vehicle.miss(seconds, self._settings)
+                vehicle.miss(seconds)
         left = [o for number, o in enumerate(observations) if number not in pairs.values()]
-        new = [Vehicle.new(o, seconds, self._settings) for o in left if self._adds_evidence(o)]
+        new = [Vehicle(o, seconds, self._settings) for o in left if self._adds_evidence(o)]
         self._vehicles = take_over_ids(self._staying() + new)
         self._vehicles = without_duplicates(self._vehicles, self._size)
         return self._tracks(seconds)
@@ -85,19 +82,21 @@ class MotionTracker:
         and the next `update` counts the seconds since the one before.
         """
         self._unsearched += self._move_to(time)
-        return self._tracks(0.0, searched=False)
+        return [replace(track, predicted=True) for track in self._tracks(0.0)]
 
     def _move_to(self, time: float) -> float:
-        """Move all vehicles on to this time, and return the seconds since the frame before."""
-        seconds = self._step_to(time)
-        self._predict(seconds)
-        return seconds
+        """Move all vehicles on to this time, and return the seconds since the frame before.
 
-    def _step_to(self, time: float) -> float:
-        """Return the seconds since the frame before."""
-        step = FIRST_STEP if self._time is None else max(time - self._time, SHORTEST_STEP)
+        Vehicles that were not seen for too long and those out of the frame are forgotten.
+        """
+        seconds = FIRST_STEP if self._time is None else max(time - self._time, SHORTEST_STEP)
         self._time = time
-        return step
+        longest = self._settings.remembered + self._settings.remembered_hidden
+        self._vehicles = [v for v in self._vehicles if v.unseen + seconds <= longest]
+        for vehicle in self._vehicles:
+            vehicle.predict(seconds)
+        self._vehicles = self._staying()
+        return seconds
 
     def _observations(self, detections: Boxes) -> list[Observation]:
         boxes = visible(detections.sides, self._size)
@@ -107,14 +106,6 @@ class MotionTracker:
             if _least_side(box) >= 1
         ]
 
-    def _predict(self, seconds: float) -> None:
-        """Move all vehicles on; forget those not seen for too long, and those out of the frame."""
-        longest = self._settings.remembered + self._settings.remembered_hidden
-        self._vehicles = [v for v in self._vehicles if v.unseen + seconds <= longest]
-        for vehicle in self._vehicles:
-            vehicle.predict(seconds)
-        self._vehicles = self._staying()
-
     def _boxes(self) -> Float64Array:
         """Return the visible parts of all vehicles, `(n, 4)`."""
         boxes = [vehicle.state.box for vehicle in self._vehicles]
@@ -122,102 +113,86 @@ class MotionTracker:
 
     def _staying(self) -> list[Vehicle]:
         """Return the vehicles that are neither over nor out of the frame."""
-        return [
-            vehicle
-            for vehicle, box in zip(self._vehicles, self._boxes(), strict=True)
-            if _least_side(box) >= 1 and not vehicle.is_over(self._settings)
-        ]
+        each = zip(self._vehicles, self._boxes(), strict=True)
+        return [vehicle for vehicle, box in each if _least_side(box) >= 1 and not vehicle.is_over]
 
     def _pair(
-        self,
-        expected: Float64Array,
-        hidden: Sequence[bool],
-        observations: Sequence[Observation],
+        self, expected: Float64Array, hidden: BoolArray, observations: Sequence[Observation]
     ) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first."""
         present: list[int] = []
         lost: list[int] = []
         new: list[int] = []
         for row, vehicle in enumerate(self._vehicles):
-            if vehicle.is_present(self._settings):
-                present.append(row)
-            else:
-                (lost if vehicle.confirmed else new).append(row)
+            group = present if vehicle.is_present else lost if vehicle.confirmed else new
+            group.append(row)
         boxes = np.reshape([observation.box for observation in observations], (-1, 4))
         buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
         values = buffered_iou(expected, buffers, boxes)
         values[values < _OVERLAP] = 0
         weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
-        scores = np.array([observation.score for observation in observations])
-        parts = are_parts(boxes, scores, PART)
-        values[np.ix_(np.flatnonzero(hidden), parts)] = 0  # parts of the vehicle that hides it
+        parts = are_parts(boxes, np.array([observation.score for observation in observations]))
+        values[np.ix_(hidden, parts)] = 0  # parts of the vehicle that hides it
         return pair(values, [present, lost, new])
 
     def _adds_evidence(self, observation: Observation) -> bool:
         """Tell whether such a detection, repeated in each frame, would make a vehicle."""
         return observation.score > self._settings.leak
 
-    def _hidden(self, boxes: Float64Array) -> list[bool]:
-        present = [vehicle.is_present(self._settings) for vehicle in self._vehicles]
-        return are_hidden(boxes, np.array(present, bool), HIDDEN)
+    def _hidden(self, boxes: Float64Array) -> BoolArray:
+        return are_hidden(boxes, np.array([each.is_present for each in self._vehicles], bool))
 
     def _seen_as_one(
-        self, expected: Float64Array, hidden: Sequence[bool], found: dict[int, Observation]
+        self, expected: Float64Array, hidden: BoolArray, found: Mapping[int, Observation]
     ) -> dict[int, Observation]:
         """Share a detection among two vehicles that it shows as one."""
         shared: dict[int, Observation] = {}
-        missed = [row for row in range(len(expected)) if row not in found and not hidden[row]]
-        for row, other in product(self._confirmed(found), self._confirmed(missed)):
+        confirmed = [row for row, vehicle in enumerate(self._vehicles) if vehicle.confirmed]
+        seen = [row for row in found if row in confirmed]
+        missed = [row for row in confirmed if row not in found and not hidden[row]]
+        for row, other in product(seen, missed):
             observation, both = found[row], expected[[row, other]]
-            if other in shared or not shows_both(observation.box, both, PART):
-                continue
-            for each in (row, other):
-                box = stretched(expected[each], around(both), observation.box)
-                shared[each] = Observation(box, observation.score, observation.class_name)
+            if other not in shared and shows_both(observation.box, both):
+                for each in (row, other):
+                    box = stretched(expected[each], around(both), observation.box)
+                    shared[each] = replace(observation, box=box)
         return shared
 
-    def _confirmed(self, rows: Iterable[int]) -> list[int]:
-        return [row for row in rows if self._vehicles[row].confirmed]
-
-    def _tracks(self, seconds: float, *, searched: bool = True) -> list[Track]:
+    def _tracks(self, seconds: float) -> list[Track]:
+        """Return the vehicles that are shown, by id; `seconds` since the latest searched frame."""
         boxes = self._boxes()
-        shown: list[tuple[Vehicle, Float64Array]] = []
-        for vehicle, box, hidden in zip(self._vehicles, boxes, self._hidden(boxes), strict=True):
-            predicted = vehicle.unseen > 0
-            vehicle.hidden += seconds * (hidden and predicted)
-            if self._is_clear(vehicle, box) and not (hidden and predicted):
-                shown.append((vehicle, box))
-        tracks = []
-        for vehicle, box in self._without_nested(shown):
-            vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
-            tracks.append(
-                Track(
-                    vehicle.id,
-                    Box(*box.tolist()),
-                    vehicle.score,
-                    predicted=vehicle.unseen > 0 or not searched,
-                    class_name=vehicle.class_name,
-                    whole_foot=Box(*vehicle.state.box.tolist()).foot,
-                )
-            )
+        shown: list[int] = []
+        for row, hidden in enumerate(self._hidden(boxes)):
+            vehicle = self._vehicles[row]
+            is_gone = bool(hidden) and vehicle.unseen > 0
+            vehicle.hidden += seconds * is_gone
+            if self._is_clear(vehicle, boxes[row]) and not is_gone:
+                shown.append(row)
+        nested = are_nested(boxes[shown], [self._vehicles[row].scores.value for row in shown])
+        tracks = [
+            self._track(self._vehicles[row], boxes[row])
+            for row, is_nested in zip(shown, nested, strict=True)
+            if not is_nested
+        ]
         return sorted(tracks, key=lambda track: track.id)
 
     def _is_clear(self, vehicle: Vehicle, box: Float64Array) -> bool:
         """Tell whether it is present, wide enough and likely enough to be shown."""
-        return (
-            vehicle.is_present(self._settings)
-            and box[2] - box[0] >= self._settings.smallest * self._size[0]
-            and vehicle.detection_score >= self._settings.least_score
-        )
+        is_wide = bool(box[2] - box[0] >= self._settings.smallest * self._size[0])
+        is_likely = vehicle.detection_scores.value >= self._settings.least_score
+        return vehicle.is_present and is_wide and is_likely
 
-    def _without_nested(
-        self, shown: Sequence[tuple[Vehicle, Float64Array]]
-    ) -> list[tuple[Vehicle, Float64Array]]:
-        boxes = np.reshape([box for _, box in shown], (-1, 4))
-        scores = np.array([vehicle.score for vehicle, _ in shown])
-        dropped = are_nested(boxes, scores)
-        return [each for each, drop in zip(shown, dropped, strict=True) if not drop]
+    def _track(self, vehicle: Vehicle, box: Float64Array) -> Track:
+        vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
+        return Track(
+            vehicle.id,
+            Box(*box.tolist()),
+            vehicle.scores.value,
+            predicted=vehicle.unseen > 0,
+            class_name=vehicle.classes.best,
+            whole_foot=Box(*vehicle.state.box.tolist()).foot,
+        )
 
 
 def _least_side(box: Float64Array) -> float:

@@ -6,12 +6,12 @@ It is measured in seconds of detections with score 1, so that it does not depend
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.classes import ClassScores
-from vdet.track.motion.state import MotionState, measure
+from vdet.track.motion.state import MotionState
 
 LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
@@ -46,9 +46,14 @@ class Observation:
     score: float
     class_name: str | None = None
 
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the box: its variance grows as the score falls."""
+        return float(_NOISE / max(self.score, _LEAST_SCORE) ** 0.5)
+
 
 @dataclass(eq=False, slots=True)
-class _RecentMean:
+class RecentMean:
     """A mean of values over the latest `SCORE_TIME`; older ones count less and less."""
 
     _sum: float = 0.0
@@ -56,17 +61,25 @@ class _RecentMean:
 
     @property
     def value(self) -> float:
+        """The mean so far."""
         return self._sum / self._weight
 
     def add(self, value: float, seconds: float) -> None:
+        """Add the value of the latest `seconds`."""
         kept = math.exp(-seconds / SCORE_TIME)
         self._sum = kept * self._sum + (1 - kept) * value
         self._weight = kept * self._weight + (1 - kept)
 
 
-@dataclass(eq=False, slots=True)
 class Vehicle:
     """What is remembered of a vehicle.
+
+    Parameters
+    ----------
+    first
+        Its first detection.
+    seconds
+        Time since the frame before.
 
     Attributes
     ----------
@@ -81,95 +94,64 @@ class Vehicle:
     unseen
         Seconds without a detection, up to the latest frame.
     hidden
-        How many of them it was hidden by a nearer vehicle.
+        Seconds of these in which a nearer vehicle hid it.
+    scores
+        Mean score of the latest detections, 0 to 1; a frame without one counts as 0.
+    detection_scores
+        The same, without the frames that have no detection.
+    classes
+        What its detections were taken for.
     """
 
-    state: MotionState
-    evidence: float = 0.0
-    confirmed: bool = False
-    id: int | None = None
-    unseen: float = 0.0
-    hidden: float = 0.0
-    _scores: _RecentMean = field(default_factory=_RecentMean)
-    _detection_scores: _RecentMean = field(default_factory=_RecentMean)
-    _class_scores: ClassScores = field(default_factory=ClassScores)
-
-    @classmethod
-    def new(
-        cls, observation: Observation, seconds: float, settings: MotionTrackerSettings
-    ) -> "Vehicle":
-        """Make a vehicle of its first detection, `seconds` after the frame before."""
-        state = MotionState.at_rest(observation.box, _noise(observation), _VELOCITY)
-        vehicle = cls(state)
-        vehicle._add(observation, seconds, settings)
-        return vehicle
+    def __init__(self, first: Observation, seconds: float, settings: MotionTrackerSettings) -> None:
+        self._settings = settings
+        self.state = MotionState.at_rest(first.box, first.noise, _VELOCITY)
+        self.evidence = self.unseen = self.hidden = 0.0
+        self.confirmed = False
+        self.id: int | None = None
+        self.scores, self.detection_scores = RecentMean(), RecentMean()
+        self.classes = ClassScores()
+        self._add(first, seconds)
 
     @property
-    def score(self) -> float:
-        """Mean score of the latest detections, 0 to 1; a frame without one counts as 0."""
-        return self._scores.value
+    def is_present(self) -> bool:
+        """Whether it is known and was seen lately."""
+        return self.confirmed and self.evidence > 0 and self.unseen <= self._settings.carried
 
     @property
-    def detection_score(self) -> float:
-        """The same, without the frames that have no detection."""
-        return self._detection_scores.value
-
-    @property
-    def class_name(self) -> str | None:
-        """The class with the highest sum of scores."""
-        return self._class_scores.best
+    def is_over(self) -> bool:
+        """Whether to forget it."""
+        if not self.confirmed:
+            return self.evidence <= 0
+        in_the_open = self.unseen - self.hidden
+        longest = self._settings.remembered_hidden
+        return in_the_open > self._settings.remembered or self.hidden > longest
 
     def predict(self, seconds: float) -> None:
         """Move on to the next frame, `seconds` later."""
         self.state = self.state.predicted(seconds, _ACCELERATION)
 
-    def see(
-        self,
-        observation: Observation,
-        seconds: float,
-        size: tuple[int, int],
-        settings: MotionTrackerSettings,
-    ) -> None:
+    def see(self, observation: Observation, seconds: float, size: tuple[int, int]) -> None:
         """Take in its detection in this frame of `size`, width and height in pixels."""
-        edge = measure(self.state, observation.box, size)
-        noise = _noise(observation)
-        self.state = edge.state.corrected(edge.measured, noise, edge.seen)
+        self.state = self.state.corrected(observation.box, observation.noise, size)
         self.unseen = self.hidden = 0.0
-        self._add(observation, seconds, settings)
+        self._add(observation, seconds)
 
-    def miss(self, seconds: float, settings: MotionTrackerSettings) -> None:
+    def miss(self, seconds: float) -> None:
         """Note a frame without a detection of it."""
         self.unseen += seconds
-        lost = self.unseen > settings.carried
+        lost = self.unseen > self._settings.carried
         motion = math.exp(-seconds / _SLOWING_TIME) if lost else 1.0
         self.state = self.state.slowed(motion, math.exp(-seconds / _SETTLING_TIME))
-        self._weigh(0.0, seconds, settings)
+        self._weigh(0.0, seconds)
 
-    def is_present(self, settings: MotionTrackerSettings) -> bool:
-        """Tell whether it is known and was seen lately."""
-        return self.confirmed and self.evidence > 0 and self.unseen <= settings.carried
+    def _add(self, observation: Observation, seconds: float) -> None:
+        self._weigh(observation.score, seconds)
+        self.detection_scores.add(observation.score, seconds)
+        self.classes.add(observation.class_name, observation.score)
 
-    def is_over(self, settings: MotionTrackerSettings) -> bool:
-        """Tell whether to forget it."""
-        if not self.confirmed:
-            return self.evidence <= 0
-        in_the_open = self.unseen - self.hidden
-        return in_the_open > settings.remembered or self.hidden > settings.remembered_hidden
-
-    def _add(
-        self, observation: Observation, seconds: float, settings: MotionTrackerSettings
-    ) -> None:
-        self._weigh(observation.score, seconds, settings)
-        self._detection_scores.add(observation.score, seconds)
-        self._class_scores.add(observation.class_name, observation.score)
-
-    def _weigh(self, score: float, seconds: float, settings: MotionTrackerSettings) -> None:
-        gained = (score - settings.leak) * min(seconds, LONGEST_LOOK)
-        self.evidence = min(max(self.evidence + gained, 0.0), settings.needed)
-        self.confirmed |= self.evidence >= settings.needed
-        self._scores.add(score, seconds)
-
-
-def _noise(observation: Observation) -> float:
-    """Return the deviation of a detection's box: its variance grows as the score falls."""
-    return float(_NOISE / max(observation.score, _LEAST_SCORE) ** 0.5)
+    def _weigh(self, score: float, seconds: float) -> None:
+        gained = (score - self._settings.leak) * min(seconds, LONGEST_LOOK)
+        self.evidence = min(max(self.evidence + gained, 0.0), self._settings.needed)
+        self.confirmed |= self.evidence >= self._settings.needed
+        self.scores.add(score, seconds)
