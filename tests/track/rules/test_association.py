@@ -3,7 +3,7 @@
 import pytest
 
 from boxing import moved_to
-from seed import SEED_TRACKER, tracker_but
+from seed import SEED_TRACKER
 from textured_road import textured_road
 from vdet.boxes import Box
 from vdet.config.schema import RulesTrackerSettings
@@ -23,7 +23,7 @@ def road(*boxes: Box | None) -> Image:
 
 
 def a_car(box: Box, frame: Image, shown_as: int | None = None) -> Car:
-    car = Car(SETTINGS.detections_needed, SETTINGS.history, shown_as)
+    car = Car(SETTINGS, shown_as)
     car.see(region(box), frame)
     return car
 
@@ -58,12 +58,6 @@ def test_a_region_belongs_to_the_car_whose_centroid_it_contains() -> None:
     assert result.cars == cars
 
 
-def test_a_car_has_one_place_even_if_two_regions_contain_it() -> None:
-    car = a_car(LEFT, road())
-    result = associate([car], [Box.sized(80, 190, 110, 90), Box.sized(100, 180, 120, 90)])
-    assert result.places[car].box == Box.sized(80, 190, 110, 90)
-
-
 def test_a_region_that_contains_a_car_is_not_lost_to_a_neighbour() -> None:
     inside, beside = a_car(RIGHT, road()), a_car(LEFT, road())
     result = associate([beside, inside], [Box.sized(205, 200, 80, 80), RIGHT])
@@ -81,13 +75,6 @@ def two_cars(*shown_as: int | None) -> list[Car]:
     return [a_car(LEFT, frame, ids[0]), a_car(RIGHT, frame, ids[1])]
 
 
-def test_of_several_cars_in_a_region_those_that_are_still_there_are_confirmed() -> None:
-    cars = two_cars()
-    left, right = moved_to(LEFT, 120, 205), moved_to(RIGHT, 300, 195)
-    result = associate(cars, [AROUND_BOTH], road(left, right))
-    assert boxes_of(result) == {cars[0]: left, cars[1]: right}
-
-
 def test_a_region_of_several_cars_with_one_confirmed_is_that_cars() -> None:
     cars = two_cars()
     result = associate(cars, [AROUND_BOTH], road(None, RIGHT))
@@ -100,14 +87,6 @@ def test_a_region_of_several_cars_with_none_confirmed_is_the_nearest_ones() -> N
     nearer_to_right = Box.sized(140, 190, 340, 100)
     result = associate(cars, [nearer_to_right], road())
     assert boxes_of(result) == {cars[1]: nearer_to_right}
-
-
-@pytest.mark.parametrize(("distance", "confirmed"), [(50, True), (49, False)])
-def test_a_car_is_confirmed_within_the_match_distance(distance: int, confirmed: bool) -> None:
-    cars = two_cars()
-    settings = tracker_but(match_distance=distance)
-    result = associate(cars, [AROUND_BOTH], road(moved_to(LEFT, 150, 200), RIGHT), settings)
-    assert (cars[0] in result.places) is confirmed
 
 
 # Rules 4 and 5
@@ -231,28 +210,6 @@ def test_two_regions_by_a_car_that_make_up_its_size_are_added_as_one(parts: list
     assert result.cars == [car]
 
 
-def test_of_several_other_regions_the_nearest_to_the_car_is_combined() -> None:
-    car = a_car(LORRY, road())
-    further = Box.sized(330, 200, 60, 100)
-    result = associate([car], [ITS_FRONT, further, ITS_REAR])
-    assert sorted(boxes_of(result).values(), key=lambda box: box.x1) == [COMBINED, further]
-    assert result.places[car].box == COMBINED
-
-
-def test_a_region_that_is_not_near_the_car_is_not_combined() -> None:
-    car = a_car(LORRY, road())
-    too_narrow, too_far = Box.sized(305, 200, 60, 100), Box.sized(355, 200, 90, 100)
-    assert list(boxes_of(associate([car], [too_narrow, too_far])).values()) == [too_far]
-
-
-def test_a_region_inside_a_car_is_combined_with_one_beside_it() -> None:
-    car = a_car(LORRY, road())
-    too_narrow = Box.sized(90, 200, 120, 100)
-    result = associate([car], [too_narrow, ITS_REAR])
-    assert boxes_of(result) == {car: Box.sized(90, 200, 220, 100)}
-    assert result.cars == [car]
-
-
 def test_a_region_that_a_car_has_already_is_combined_with_one_beside_it() -> None:
     car = a_car(LORRY, road())
     its_own = Box.sized(90, 200, 150, 100)
@@ -288,15 +245,6 @@ def test_of_the_two_cars_the_nearer_one_keeps_the_id() -> None:
     car = a_car(HIDING, road(), shown_as=4)
     result = associate([car], [ONE, OTHER])
     assert {place.box: new.id for new, place in result.places.items()} == {OTHER: 4, ONE: None}
-
-
-def test_a_car_that_has_a_region_already_may_still_become_two() -> None:
-    car = a_car(HIDING, road(), shown_as=4)
-    its_own = Box.sized(60, 200, 205, 100)
-    beside = Box.sized(300, 200, 70, 100)
-    result = associate([car], [its_own, beside])
-    assert sorted(place.box.x1 for place in result.places.values()) == [60, 300]
-    assert car not in result.cars
 
 
 # Rule 11

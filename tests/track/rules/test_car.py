@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from boxing import moved_to
-from seed import SEED_TRACKER
+from seed import SEED_TRACKER, tracker_but
 from vdet.boxes import Box
 from vdet.media.images import Image
 from vdet.track.rules.car import Car, Region, find_template
@@ -11,8 +11,8 @@ BOX = Box.sized(100, 60, 80, 60)
 FRAME = np.random.default_rng(0).integers(0, 256, (240, 320, 3), dtype=np.uint8)
 
 
-def seen(times: int = 1, needed: int = 10) -> Car:
-    car = Car(needed=needed, history=10)
+def seen(times: int = 1) -> Car:
+    car = Car(SEED_TRACKER)
     for _ in range(times):
         car.see(Region(BOX, (140, 90), 2.0), FRAME)
     return car
@@ -30,23 +30,6 @@ def test_box_and_centroid_are_averages_over_the_last_ten_detections() -> None:
     assert car.centroid == (45.0, 5.0)
 
 
-def test_the_last_ten_images_are_kept_cut_from_their_frames() -> None:
-    car = Car(needed=10, history=10)
-    for x in range(12):
-        car.see(Region(Box.sized(x, 0, 50, 60), (x, 0), 2.0), FRAME)
-    assert len(car.detections) == 10
-    for x, detection in enumerate(car.detections, start=2):
-        np.testing.assert_array_equal(detection.image, FRAME[0:60, x : x + 50])
-
-
-def test_a_match_counts_as_a_detection_and_moves_the_centroid_with_the_box() -> None:
-    car = seen()
-    car.see_match(moved_to(BOX, 106, 52), FRAME)
-    assert car.detections[-1].box == Box.sized(106, 52, 80, 60)
-    assert car.detections[-1].centroid == (146, 82)
-    assert (car.detected, car.count, car.in_a_row, car.matches) == (True, 2, 2, 1)
-
-
 def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     car = seen()
     car.see_match(BOX, FRAME)
@@ -57,28 +40,11 @@ def test_matches_in_a_row_are_ended_by_a_region_and_not_by_a_miss() -> None:
     assert car.matches == 0
 
 
-def test_a_car_is_shown_when_detected_now_and_often_enough_in_a_row() -> None:
-    assert not seen(9).is_shown
-    car = seen(10)
-    assert car.is_shown
-    car.miss()
-    assert not car.is_shown
-    car.see(Region(BOX, (140, 90), 2.0), FRAME)
-    assert not car.is_shown
-
-
-def test_a_car_vouched_for_counts_as_detected_that_often() -> None:
-    car = seen()
-    car.count_at_least(10)
-    assert car.is_shown
-    assert (car.in_a_row, car.count) == (10, 10)
-
-
 def test_the_latest_image_is_searched_around_the_latest_box() -> None:
-    car = Car(needed=10, history=10)
+    car = Car(SEED_TRACKER)
     car.see(Region(Box.sized(0, 0, 60, 60), (30, 30), 2.0), FRAME)
     car.see(Region(BOX, (140, 90), 2.0), FRAME)
-    assert car.find_in(shifted(FRAME, 7, -4), SEED_TRACKER) == moved_to(BOX, 107, 56)
+    assert car.find_in(shifted(FRAME, 7, -4)) == moved_to(BOX, 107, 56)
 
 
 # The search for a template
@@ -105,7 +71,8 @@ def search(
     distance: int = 50,
     min_score: float = 0.5,
 ) -> Box | None:
-    return find_template(frame, template, near, distance=distance, min_score=min_score)
+    settings = tracker_but(match_distance=distance, match_score=min_score)
+    return find_template(frame, Region(near, near.center, 0, image=template), settings)
 
 
 def test_a_moved_template_is_found_to_the_pixel_with_a_perfect_score() -> None:

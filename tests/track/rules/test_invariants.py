@@ -68,14 +68,6 @@ def _detections(found: list[tuple[Box, float]]) -> Boxes:
 
 @settings(deadline=None)
 @given(clips)
-def test_ids_are_unique_and_ordered_in_a_frame(clip: Clip) -> None:
-    for tracks in run(clip, EAGER):
-        ids = [track.id for track in tracks]
-        assert ids == sorted(set(ids))
-
-
-@settings(deadline=None)
-@given(clips)
 def test_ids_are_given_without_gaps_from_1_on(clip: Clip) -> None:
     shown = [track.id for tracks in run(clip, EAGER) for track in tracks]
     assert list(dict.fromkeys(shown)) == list(range(1, len(set(shown)) + 1))
@@ -102,27 +94,3 @@ def test_boxes_lie_in_the_frame_and_are_not_too_small(clip: Clip) -> None:
             assert track.box.x2 <= WIDTH + 1  # place and size are rounded each for itself
             assert track.box.y2 <= HEIGHT + 1
             assert min(track.box.width, track.box.height) >= EAGER.min_region
-
-
-@settings(deadline=None)
-@given(clips)
-def test_the_same_clip_gives_the_same_tracks(clip: Clip) -> None:
-    assert run(clip, EAGER) == run(clip, EAGER)
-
-
-@settings(deadline=None)
-@given(st.lists(st.tuples(pictures, st.lists(regions(), max_size=1)), max_size=12))
-def test_without_merging_no_car_is_shown_before_it_was_detected_often_enough(clip: Clip) -> None:
-    tracker = EAGER.model_copy(update={"merge_overlap": 1000, "confident_peak": 100.0})
-    in_a_row, ids_so_far = 0, 0
-    for (_, found), tracks in zip(clip, run(clip, tracker), strict=True):
-        in_a_row = in_a_row + 1 if found else 0
-        if any(track.id > ids_so_far for track in tracks):
-            assert in_a_row >= tracker.detections_needed
-            ids_so_far += 1
-
-
-@settings(deadline=None)
-@given(clips)
-def test_a_frame_without_regions_and_without_texture_shows_nothing(clip: Clip) -> None:
-    assert run([*clip, (PICTURES[2], [])], EAGER)[-1] == []

@@ -57,11 +57,6 @@ def kept(*boxes: Box, **changes: object) -> list[Box]:
     return [r.box for r in large_enough(detections(boxes), 640, 360, tracker_but(**changes))]
 
 
-def test_what_lies_outside_the_frame_does_not_count() -> None:
-    regions = Box.sized(-20, 10, 90, 60), Box.sized(600, 10, 80, 60), Box.sized(900, 10, 80, 60)
-    assert kept(*regions) == [Box.sized(0, 10, 70, 60)]
-
-
 def test_a_region_outside_the_frame_is_ignored_whatever_the_setting() -> None:
     assert kept(Box.sized(700, 10, 60, 60), min_region=0) == []
 
@@ -97,33 +92,11 @@ def test_a_shown_car_left_inside_another_is_absorbed_which_is_shown_at_once() ->
     assert track.box == BOTH
 
 
-def test_the_absorbing_car_takes_over_the_id_if_it_was_never_shown() -> None:
-    cars = RulesTracker(ONE_PLACE)
-    show(cars, SEDAN)
-    see_side_by_side(cars, frames=2)
-    assert ids(hide_sedan_behind_bus(cars)) == [1]
-
-
 def test_the_absorbing_car_keeps_its_own_id_if_it_was_shown_and_the_other_ends() -> None:
     cars = RulesTracker(tracker_but(history=1, detections_needed=1))
     see_side_by_side(cars, frames=8)
     assert ids(hide_sedan_behind_bus(cars)) == [2]
     assert update(cars, road(SEDAN)) == []  # its image is not searched either
-
-
-def test_of_two_cars_around_a_lost_one_the_nearer_absorbs_it() -> None:
-    cars = RulesTracker(ONE_PLACE)
-    lost, left, right = (
-        moved_to(SEDAN, 250, 200),
-        Box.sized(100, 200, 120, 80),
-        Box.sized(400, 200, 120, 80),
-    )
-    show(cars, lost)
-    for _ in range(2):
-        update(cars, road(lost, left, right), lost, left, right)
-    around_left, around_right = Box.sized(60, 190, 300, 100), Box.sized(240, 190, 260, 100)
-    tracks = update(cars, road(None, left, right), around_left, around_right)
-    assert tracks == [Track(1, around_right, 1.0, predicted=False)]
 
 
 def test_a_car_beside_the_other_ones_rectangle_is_not_absorbed() -> None:
@@ -150,13 +123,6 @@ def test_a_car_that_was_never_shown_is_not_searched() -> None:
         update(cars, road(SEDAN), SEDAN)
     assert update(cars, road(SEDAN)) == []
     assert update(cars, road(SEDAN), SEDAN) == []
-
-
-def test_a_car_shown_before_is_still_searched_after_a_miss() -> None:
-    cars = RulesTracker(tracker_but(detections_needed=1, young=0))
-    show(cars, SEDAN, times=1)
-    assert see(cars) == [[]]
-    assert [track.predicted for track in update(cars, road(SEDAN))] == [True]
 
 
 # Rule 14
@@ -247,17 +213,6 @@ def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:
     see(cars, Box.sized(100, 200, 260, 100), frames=10)
     (tracks,) = see(cars, Box.sized(70, 200, 120, 100), Box.sized(250, 200, 110, 100))
     assert [(track.id, track.box.x1) for track in tracks] == [(1, 250), (2, 70)]
-
-
-def test_two_cars_that_meet_become_one_in_the_same_frame_under_the_older_id() -> None:
-    cars = RulesTracker(SEED_TRACKER)
-    behind = Box.sized(150, 200, 100, 80)
-    frame = road(SEDAN, behind)
-    for _ in range(10):
-        update(cars, frame, SEDAN, behind, VAN)
-    around = Box.sized(95, 195, 160, 90)
-    tracks = update(cars, frame, around, VAN)
-    assert [(track.id, track.box) for track in tracks] == [(1, around), (3, VAN)]
 
 
 # Scores, classes, and the frame

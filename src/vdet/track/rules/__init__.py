@@ -1,8 +1,8 @@
 """The tracker of the original system: regions of the heatmap become cars, by these rules.
 
-The code and the tests number the rules so; the constants are the original's (the settings have
-them all, under `tracker` with `kind: rules`). A region is a detection, its peak the detection's
-strength. Source: seed section 3, "Video pipeline".
+The code and the tests use these numbers. The constants are the original's; all of them are
+settings, under `tracker` with `kind: rules`. A region is a detection, and its peak is the
+strength of the detection.
 
 1.  Regions narrower or lower than 50 px are ignored.
 2.  A region's cars are those whose centroid it contains.

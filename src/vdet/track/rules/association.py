@@ -1,6 +1,6 @@
 """Which region of a frame belongs to which car, and which regions become cars (rules 2 to 11).
 
-Source: seed section 3, "Video pipeline". Where it can be read in two ways, this is the choice:
+Where the description of the original system can be read in two ways, this is the choice:
 
 * A car is in a region if its average centroid lies in the region's bounding box. A car has at most
   one place in a frame; regions are taken in the order given.
@@ -68,40 +68,30 @@ class Association:
         self._unused = list(regions)
         self._image = image
         self._settings = settings
-        self._run()
+        without_car = [region for region in regions if not self._place_inside(region)]
+        for region in without_car:
+            if region in self._unused:
+                self._place_near(region)
 
     @property
     def cars(self) -> list[Car]:
         """The cars after this frame: those known that live on, then those created."""
         return self._known + self._created
 
-    def _run(self) -> None:
-        without_car = []
-        for region in list(self._unused):
-            if inside := self._cars_in(region):
-                self._place_inside(region, inside)
-            else:
-                without_car.append(region)
-        for region in without_car:
-            if region in self._unused:
-                self._place_near(region)
-
-    def _cars_in(self, region: Region) -> list[Car]:
-        """Rule 2."""
+    def _place_inside(self, region: Region) -> bool:
+        """Rules 2 to 7; False where no car is inside the region."""
         free = [car for car in self._known if car not in self.places]
-        return [car for car in free if region.box.contains(car.centroid)]
-
-    def _place_inside(self, region: Region, inside: list[Car]) -> None:
-        matches = self._confirm(inside) if len(inside) > 1 else {}
+        inside = [car for car in free if region.box.contains(car.centroid)]
+        found = {car: car.find_in(self._image) for car in inside} if len(inside) > 1 else {}
+        matches = {car: box for car, box in found.items() if box is not None}
         if len(matches) > 1:
             self._merge_or_separate(region, matches)
-        else:
-            self._place_alone(region, _nearest(region, matches or inside))
-
-    def _confirm(self, cars: Iterable[Car]) -> dict[Car, Box]:
-        """Rule 3: the cars whose latest image is found, and where."""
-        found = {car: car.find_in(self._image, self._settings) for car in cars}
-        return {car: box for car, box in found.items() if box is not None}
+        elif inside:
+            car = min(matches or inside, key=lambda each: _distance(each, region))
+            car.trust(region.peak)
+            if car.is_filled_by(region.box):
+                self._place(car, region)
+        return bool(inside)
 
     def _merge_or_separate(self, region: Region, matches: dict[Car, Box]) -> None:
         """Rules 4 and 5."""
@@ -109,43 +99,28 @@ class Association:
             ids = [car.id for car in matches if car.id is not None]
             self._forget(matches)
             self._create_vouched(region, min(ids, default=None))
-        else:
-            for car, box in matches.items():
-                self.places[car] = replace(region, box=box, centroid=car.centroid_at(box))
-        self._use([region])
-
-    def _place_alone(self, region: Region, car: Car) -> None:
-        """Rules 6 and 7."""
-        if region.peak > self._settings.confident_peak:
-            car.need(self._settings.confident_detections_needed)
-        if is_good_size(region.box, car.box, self._settings):
-            self._place(car, region)
+            return
+        for car, box in matches.items():
+            self._place(car, replace(region, box=box, centroid=car.centroid_at(box)), region)
 
     def _place_near(self, region: Region) -> None:
+        """Rules 8 to 11."""
         car = self._near_car(region)
-        if car is None:
-            self._create(region)
-        elif not self._place_combined(region, car):
-            self._place_by_itself(region, car)
+        if car is not None and self._place_combined(region, car):
+            return
+        if car is None or car in self.places:
+            self._create(region).trust(region.peak)
+        elif car.is_filled_by(region.box):
+            self._place(car, region)
 
     def _near_car(self, region: Region) -> Car | None:
-        near = [c for c in self._known if c.box.gap(region.box) <= self._settings.near]
+        gaps = {car: car.box.gap(region.box) for car in self._known}
+        near = [car for car, gap in gaps.items() if gap <= self._settings.near]
         return min(
             near,
-            key=lambda car: (
-                car in self.places,
-                car.box.gap(region.box),
-                math.dist(car.centroid, region.centroid),
-            ),
+            key=lambda car: (car in self.places, gaps[car], _distance(car, region)),
             default=None,
         )
-
-    def _place_by_itself(self, region: Region, car: Car) -> None:
-        """Rule 8."""
-        if car in self.places:
-            self._create(region)
-        elif is_good_size(region.box, car.box, self._settings):
-            self._place(car, region)
 
     def _place_combined(self, region: Region, car: Car) -> bool:
         """Rules 9 and 10; False where no other region makes up the car together with this one."""
@@ -153,75 +128,50 @@ class Association:
         if other is None:
             return False
         combined = combine(region, other)
-        if not is_about_size(combined.box, car.box, self._settings):
+        if not car.is_as_wide_as(combined.box):
             return False
         if combined.box.width < self._settings.max_combined:
-            self._place(car, combined, made_of=(region, other))
-        else:
-            self._split(car, region, other)
+            self._place(car, combined, region, other)
+            return True
+        self._forget([car])
+        near, far = sorted((region, other), key=lambda each: _distance(car, each))
+        self._create_vouched(near, car.id)
+        self._create_vouched(far, None)
         return True
 
     def _other_region(self, region: Region, car: Car) -> Region | None:
         if car in self.places:
             return self.places[car]
-        others = [
+        near = [
             other
             for other in self._unused
             if other is not region and car.box.gap(other.box) <= self._settings.near
         ]
-        return min(others, key=lambda r: math.dist(r.centroid, car.centroid), default=None)
+        return min(near, key=lambda other: _distance(car, other), default=None)
 
-    def _split(self, car: Car, *regions: Region) -> None:
-        """Rule 10: each of the two regions becomes a car, both shown at once."""
-        self._forget([car])
-        near, far = sorted(regions, key=lambda r: math.dist(r.centroid, car.centroid))
-        self._create_vouched(near, car.id)
-        self._create_vouched(far, None)
-        self._use(regions)
-
-    def _create(self, region: Region) -> None:
-        """Rule 11."""
-        car = self._new_car(region)
-        if region.peak > self._settings.confident_peak:
-            car.need(self._settings.confident_detections_needed)
-        self._use([region])
-
-    def _create_vouched(self, region: Region, id_kept: int | None) -> None:
-        car = self._new_car(region)
-        car.id = id_kept
-        car.count_at_least(self._settings.detections_needed)
-
-    def _new_car(self, region: Region) -> Car:
-        car = Car(self._settings.detections_needed, self._settings.history)
+    def _create(self, region: Region, number: int | None = None) -> Car:
+        car = Car(self._settings, number)
         self._created.append(car)
-        self.places[car] = region
+        self._place(car, region)
         return car
+
+    def _create_vouched(self, region: Region, number: int | None) -> None:
+        self._create(region, number).vouch()
 
     def _forget(self, cars: Iterable[Car]) -> None:
         for car in cars:
             self._known.remove(car)
             self.places.pop(car, None)
 
-    def _place(self, car: Car, region: Region, made_of: Sequence[Region] = ()) -> None:
-        self.places[car] = region
-        self._use(made_of or [region])
-
-    def _use(self, regions: Iterable[Region]) -> None:
-        self._unused = [r for r in self._unused if all(r is not used for used in regions)]
-
-
-def _nearest(region: Region, cars: Iterable[Car]) -> Car:
-    return min(cars, key=lambda car: math.dist(car.centroid, region.centroid))
+    def _place(self, car: Car, place: Region, *used: Region) -> None:
+        """Give the car a place, made of the regions `used`; without them it is a region itself."""
+        self.places[car] = place
+        for region in used or [place]:
+            self._unused = [each for each in self._unused if each is not region]
 
 
-def is_good_size(region: Box, car: Box, settings: RulesTrackerSettings) -> bool:
-    """Tell whether a region is wide enough to be all of the car (rules 7 and 8)."""
-    return region.width > settings.wide or region.width > settings.good_fraction * car.width
-
-
-def is_about_size(combined: Box, car: Box, settings: RulesTrackerSettings) -> bool:
-    """Tell whether two regions, combined, are about as wide as the car (rules 9 and 10)."""
-    return abs(combined.width - car.width) <= settings.combined_tolerance * car.width
+def _distance(car: Car, region: Region) -> float:
+    return math.dist(car.centroid, region.centroid)
 
 
 def combine(first: Region, second: Region) -> Region:

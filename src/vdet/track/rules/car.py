@@ -1,10 +1,7 @@
-"""One car: where it was detected lately, and for how long.
-
-Source: seed section 3, "Define a Car class".
-"""
+"""One car of the original system: where it was detected lately, and for how long."""
 
 from collections import deque
-from dataclasses import InitVar, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from statistics import fmean, multimode
 
 import cv2
@@ -15,7 +12,6 @@ from vdet.config.schema import RulesTrackerSettings
 from vdet.media.images import Image
 
 Point = tuple[float, float]
-
 
 _NO_IMAGE: Image = np.empty((0, 0, 3), np.uint8)
 
@@ -36,7 +32,6 @@ class Region:
     image: Image = field(default_factory=lambda: _NO_IMAGE, compare=False)
 
 
-@dataclass(eq=False, slots=True)
 class Car:
     """What is remembered of a car.
 
@@ -46,16 +41,14 @@ class Car:
 
     Attributes
     ----------
-    needed
-        Detections in a row before the car is shown.
     id
         Given when the car is first shown; None before.
-    detected
-        Whether it was detected in the latest frame.
+    needed
+        Detections in a row before the car is shown.
     in_a_row
         Detections in a row up to the latest frame.
     count
-        Boxes so far.
+        Detections so far.
     matches
         How many of the latest detections, in a row, were template matches. Misses in between do
         not end the row, a region does.
@@ -65,18 +58,12 @@ class Car:
         The last `history` detections.
     """
 
-    needed: int
-    history: InitVar[int]
-    id: int | None = None
-    detected: bool = False
-    in_a_row: int = 0
-    count: int = 0
-    matches: int = 0
-    misses: int = 0
-    detections: deque[Region] = field(init=False)
-
-    def __post_init__(self, history: int) -> None:
-        self.detections = deque(maxlen=history)
+    def __init__(self, settings: RulesTrackerSettings, number: int | None = None) -> None:
+        self._settings = settings
+        self.id = number
+        self.needed = settings.detections_needed
+        self.in_a_row = self.count = self.matches = self.misses = 0
+        self.detections: deque[Region] = deque(maxlen=settings.history)
 
     @property
     def box(self) -> Box:
@@ -107,8 +94,25 @@ class Car:
 
     @property
     def is_shown(self) -> bool:
-        """Whether it is detected in the latest frame and for enough frames in a row (rule 14)."""
-        return self.detected and self.in_a_row >= self.needed
+        """Whether it was detected for enough frames in a row, up to the latest (rule 14)."""
+        return self.in_a_row >= self.needed
+
+    @property
+    def is_over(self) -> bool:
+        """Whether there is a reason to delete it (rules 15, 16 and 17)."""
+        is_young_and_missed = self.misses > 0 and self.count < self._settings.young
+        is_only_matched = self.matches >= self._settings.max_matches
+        return is_young_and_missed or is_only_matched or self.misses >= self._settings.max_misses
+
+    def is_filled_by(self, region: Box) -> bool:
+        """Tell whether a region is wide enough to be all of the car (rules 7 and 8)."""
+        least = min(self._settings.wide, self._settings.good_fraction * self.box.width)
+        return region.width > least
+
+    def is_as_wide_as(self, region: Box) -> bool:
+        """Tell whether two combined regions are about as wide as the car (rules 9 and 10)."""
+        width = self.box.width
+        return abs(region.width - width) <= self._settings.combined_tolerance * width
 
     def see(self, region: Region, image: Image) -> None:
         """Add a detection by a region of the frame `image`; the region lies in it."""
@@ -117,35 +121,27 @@ class Car:
 
     def see_match(self, box: Box, image: Image) -> None:
         """Add a detection by template match alone, in the frame `image`."""
-        last = self.detections[-1]
         self.matches += 1
-        self._add(Region(box, self.centroid_at(box), 0.0, last.score, last.class_name), image)
+        self._add(replace(self.detections[-1], box=box, centroid=self.centroid_at(box)), image)
 
     def miss(self) -> None:
         """Note a frame without a detection."""
-        self.detected = False
         self.in_a_row = 0
         self.misses += 1
 
-    def need(self, detections: int) -> None:
-        """Show the car after this number of detections in a row, if that is sooner."""
-        self.needed = min(self.needed, detections)
+    def trust(self, peak: float) -> None:
+        """Show the car sooner if the peak of its region is high (rules 6 and 11)."""
+        if peak > self._settings.confident_peak:
+            self.needed = min(self.needed, self._settings.confident_detections_needed)
 
-    def count_at_least(self, detections: int) -> None:
-        """Raise both counts of detections to this number where they are lower."""
-        self.in_a_row = max(self.in_a_row, detections)
-        self.count = max(self.count, detections)
+    def vouch(self) -> None:
+        """Let it count as detected often enough to be shown."""
+        self.in_a_row = max(self.in_a_row, self._settings.detections_needed)
+        self.count = max(self.count, self._settings.detections_needed)
 
-    def find_in(self, image: Image, settings: RulesTrackerSettings) -> Box | None:
+    def find_in(self, image: Image) -> Box | None:
         """Search the latest cut-out around the latest rectangle of the frame `image`."""
-        last = self.detections[-1]
-        return find_template(
-            image,
-            last.image,
-            last.box,
-            distance=settings.match_distance,
-            min_score=settings.match_score,
-        )
+        return find_template(image, self.detections[-1], self._settings)
 
     def centroid_at(self, box: Box) -> Point:
         """Return the latest centroid, moved as the latest rectangle moved to `box`."""
@@ -155,53 +151,42 @@ class Car:
 
     def _add(self, region: Region, image: Image) -> None:
         self.detections.append(replace(region, image=region.box.cut(image).copy()))
-        self.detected = True
         self.in_a_row += 1
         self.count += 1
         self.misses = 0
 
 
-def find_template(
-    image: Image,
-    template: Image,
-    near: Box,
-    *,
-    distance: int,
-    min_score: float,
-) -> Box | None:
-    """Return where `template` fits `image` best, if it fits well enough.
+def find_template(image: Image, template: Region, settings: RulesTrackerSettings) -> Box | None:
+    """Return where the image of a region fits `image` best, if it fits well enough.
 
     Parameters
     ----------
-    image, template
+    image
         BGR uint8 `(H, W, 3)`.
-    near
-        Where the template was in its own frame, full-frame pixels.
-    distance
-        How far its top left corner may have moved, pixels, in a straight line. Nothing outside
-        `near` grown by this distance is searched.
-    min_score
-        0 to 1; 1 is a perfect fit.
+    template
+        Its top left corner may have moved by `match_distance` pixels in a straight line. Nothing
+        outside its box, grown by this distance, is searched.
 
     Returns
     -------
-    The place, of the template's size and inside the image. None where nothing scores `min_score`,
-    where the template does not fit into the searched area, and for a template of one colour,
-    which fits anything flat.
+    The place, of the template's size and inside the image. None where nothing scores
+    `match_score`, where the template does not fit into the searched area, and for a template of
+    one colour, which fits anything flat.
     """
-    height, width = template.shape[:2]
+    distance, near = settings.match_distance, template.box
+    height, width = template.image.shape[:2]
     grown = Box.sized(
         near.x1 - distance, near.y1 - distance, width + 2 * distance, height + 2 * distance
     )
     area = grown.clipped(image.shape[1], image.shape[0])
-    if area.width < width or area.height < height or _is_flat(template):
+    if area.width < width or area.height < height or _is_flat(template.image):
         return None
-    searched = area.cut(image)
-    scores = np.asarray(cv2.matchTemplate(searched, template, cv2.TM_CCOEFF_NORMED), np.float32)
+    found = cv2.matchTemplate(area.cut(image), template.image, cv2.TM_CCOEFF_NORMED)
+    scores = np.asarray(found, np.float32)
     dy, dx = np.ogrid[: scores.shape[0], : scores.shape[1]]
     scores[np.hypot(area.x1 + dx - near.x1, area.y1 + dy - near.y1) > distance] = -1
     y, x = np.unravel_index(int(scores.argmax()), scores.shape)
-    if round(float(scores[y, x]), 4) < min_score:  # a perfect fit may score 0.9999998
+    if round(float(scores[y, x]), 4) < settings.match_score:  # a perfect fit may score 0.9999998
         return None
     return Box.sized(area.x1 + int(x), area.y1 + int(y), width, height)
 

@@ -1,6 +1,6 @@
 """The rules tracker: which cars there are, frame after frame.
 
-Source: seed section 3, "Video pipeline". Where it can be read in two ways, this is the choice
+Where the description of the original system can be read in two ways, this is the choice
 (`association` has those for the regions):
 
 * A car counts as shown before if it ever was, not only in the frame before.
@@ -47,18 +47,17 @@ class RulesTracker:
         """Follow the cars into the next frame as `VideoTracker.update`; `picture` is needed."""
         if picture is None:
             raise ValueError("the rules tracker needs the frame; give its image")
-        image = picture.image
         regions = large_enough(detections, picture.width, picture.height, self._settings)
-        association = Association(self._cars, regions, image, self._settings)
-        self._cars = association.cars
-        placed = association.places
+        association = Association(self._cars, regions, picture.image, self._settings)
+        self._cars, placed = association.cars, association.places
         for car, place in placed.items():
-            car.see(place, image)
+            car.see(place, picture.image)
         for car in [car for car in self._cars if car not in placed]:
             if not self._absorb(car, placed):
-                self._search(car, image)
-        self._cars = [car for car in self._cars if not self._is_over(car)]
-        return self._tracks()
+                self._search(car, picture.image)
+        self._cars = [car for car in self._cars if not car.is_over]
+        shown = [car for car in self._cars if car.is_shown]
+        return sorted((self._track(car) for car in shown), key=lambda track: track.id)
 
     def _absorb(self, car: Car, others: Iterable[Car]) -> bool:
         """Rule 12: a shown car gives way to the one that is now where it was."""
@@ -66,7 +65,7 @@ class RulesTracker:
         if car.id is None or not there:
             return False
         successor = min(there, key=lambda other: math.dist(other.centroid, car.centroid))
-        successor.count_at_least(self._settings.detections_needed)
+        successor.vouch()
         if successor.id is None:
             successor.id = car.id
         self._cars.remove(car)
@@ -74,27 +73,16 @@ class RulesTracker:
 
     def _search(self, car: Car, image: Image) -> None:
         """Rule 13: the image of a shown car is searched in the frame."""
-        box = None if car.id is None else car.find_in(image, self._settings)
+        box = None if car.id is None else car.find_in(image)
         if box is None:
             car.miss()
         else:
             car.see_match(box, image)
 
-    def _is_over(self, car: Car) -> bool:
-        """Rules 15, 16 and 17: the reasons to delete a car."""
-        young_and_missed = not car.detected and car.count < self._settings.young
-        only_matched = car.matches >= self._settings.max_matches
-        gone = car.misses >= self._settings.max_misses
-        return young_and_missed or only_matched or gone
-
-    def _tracks(self) -> list[Track]:
-        """Rule 14; a car gets its id when it is first shown."""
-        tracks = []
-        for car in self._cars:
-            if car.is_shown:
-                car.id = next(self._ids) if car.id is None else car.id
-                tracks.append(Track(car.id, car.box, car.score, car.matches > 0, car.class_name))
-        return sorted(tracks, key=lambda track: track.id)
+    def _track(self, car: Car) -> Track:
+        """Return what is shown of a car; it gets its id when it is first shown."""
+        car.id = next(self._ids) if car.id is None else car.id
+        return Track(car.id, car.box, car.score, car.matches > 0, car.class_name)
 
 
 def large_enough(
@@ -105,16 +93,10 @@ def large_enough(
     Rule 1. The part of a region outside the frame does not count.
     """
     least = max(1, settings.min_region)
-    centroids = detections.data.get("centroid", detections.centers).tolist()
+    boxes = [each.box.rounded.clipped(frame_width, frame_height) for each in detections]
+    centers = (detections.sides[:, :2] + detections.sides[:, 2:]) / 2
+    centroids = map(tuple, detections.data.get("centroid", centers).tolist())
     strengths = detections.data.get("strength", detections.scores).tolist()
-    regions = [
-        Region(
-            each.box.rounded.clipped(frame_width, frame_height),
-            (x, y),
-            strength,
-            each.score,
-            each.class_name,
-        )
-        for each, (x, y), strength in zip(detections, centroids, strengths, strict=True)
-    ]
+    scores, names = detections.scores.tolist(), detections.class_names
+    regions = map(Region, boxes, centroids, strengths, scores, names)
     return [r for r in regions if r.box.width >= least and r.box.height >= least]
