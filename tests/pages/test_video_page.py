@@ -15,9 +15,8 @@ from run.red_runs import video_info
 from traffic.passing import HEIGHT, WIDTH, frame, passing, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
-from vdet.pages.index import write_index
-from vdet.pages.render import jpeg_uri
-from vdet.pages.video import Player, Thumbnail, VideoPage, read_facts
+from vdet.pages.render import jpeg_uri, link_to
+from vdet.pages.video import Player, Thumbnail, VideoPage, read_facts, write_index
 from vdet.track.track import FrameTracks
 from vdet.traffic.overview import Levels
 from vdet.traffic.records import VehicleRecord, summarize
@@ -25,7 +24,7 @@ from vdet.traffic.records import VehicleRecord, summarize
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
 FOLDER = Path("found/a.page")
-VIDEO = Player.of(Path("found/a.mp4"), FOLDER, is_drawn=True, start=0.0)
+VIDEO = Player("a.mp4", "../a.mp4", is_drawn=True, start=0.0)
 TRUCK = replace(track(2, Box.sized(5, 5, 30.123456, 29.9)), class_name="truck")
 
 
@@ -58,7 +57,7 @@ def page(
 
 
 def player_of(name: str) -> Player:
-    return Player.of(Path("found") / name, FOLDER, is_drawn=True, start=0.0)
+    return Player(name, link_to(Path("found") / name, FOLDER), is_drawn=True, start=0.0)
 
 
 def seen(made: VideoPage) -> Elements:
@@ -93,7 +92,7 @@ class TestVideoPage:
         [
             (VIDEO, "a.mp4, with the vehicles drawn in."),
             (
-                Player.of(Path("clips/b.mp4"), FOLDER, is_drawn=False, start=0.0),
+                Player("b.mp4", "../b.mp4", is_drawn=False, start=0.0),
                 "b.mp4, the source: this run wrote no video",
             ),
             (None, "There is no video to show"),

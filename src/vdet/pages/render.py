@@ -55,19 +55,15 @@ def jpeg_uri(image: Image, most: int | None = None) -> str:
 
 
 def counted(count: int, noun: str) -> str:
-    """Return `1 car`, `6 cars`."""
-    return f"{count:,} {plural(noun) if count != 1 else noun}"
+    """Return `1 car`, `6 buses`."""
+    return f"{count:,} {named(count, noun)}"
 
 
-def plural(noun: str) -> str:
-    """Return `cars`, `buses`."""
-    return noun + ("es" if noun.endswith(("s", "x", "ch", "sh")) else "s")
+def named(count: int, noun: str) -> str:
+    """Return the noun for a number of things: `car`, `cars`, `buses`."""
+    return noun if count == 1 else noun + ("es" if noun.endswith("s") else "s")
 
 
 def link_to(path: Path, folder: Path) -> str:
-    """Return the address of a file for a page in `folder`: relative, or absolute if it must be."""
-    try:
-        relative = os.path.relpath(os.path.abspath(path), os.path.abspath(folder))  # noqa: PTH100
-    except ValueError:  # another drive of Windows
-        return path.absolute().as_uri()
-    return quote(os.fsencode(relative.replace(os.sep, "/")))
+    """Return the relative address of a file for a page in `folder`."""
+    return quote(os.fsencode(os.path.relpath(path, folder)))

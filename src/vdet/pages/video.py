@@ -1,4 +1,4 @@
-"""The page of a video: when vehicles were there, where, what they looked like."""
+"""The page of a video: when vehicles were there, where, what they looked like; and an index."""
 
 import math
 import platform
@@ -18,7 +18,7 @@ from vdet.media import VideoInfo
 from vdet.media.images import Image
 from vdet.pages import charts
 from vdet.pages.charts import Minutes, Plot, Span, Timeline, clock
-from vdet.pages.render import jpeg_uri, link_to, plural, render
+from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, named, render, write_page
 from vdet.traffic.overview import Levels
 from vdet.traffic.records import VehicleRecord
 
@@ -73,11 +73,6 @@ class Player:
     is_drawn: bool
     start: float
 
-    @staticmethod
-    def of(path: Path, folder: Path, *, is_drawn: bool, start: float) -> "Player":
-        """Return the player of a file for a page in `folder`."""
-        return Player(path.name, link_to(path, folder), is_drawn, start)
-
     def moment(self, time: float) -> str:
         """Return where the player stands at a time of the tracks, seconds."""
         return f"{max(0.0, time - self.start):.3f}"
@@ -115,17 +110,11 @@ class VideoPage:
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
-        packages = (
-            ("Python", platform.python_version()),
-            ("OpenCV", cv2.__version__),
-            ("NumPy", np.__version__),
-            ("PyAV", av.__version__),
+        versions = (
+            f"Python {platform.python_version()}, OpenCV {cv2.__version__}, "
+            f"NumPy {np.__version__}, PyAV {av.__version__}"
         )
-        facts = self._facts().model_dump(mode="json")
-        return render("video.html", page=self, facts=facts, packages=packages)
-
-    def _facts(self) -> Facts:
-        return Facts(
+        facts = Facts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=len(self.records),
@@ -133,6 +122,7 @@ class VideoPage:
             still=_NO_PICTURE if self.still is None else jpeg_uri(self.still, _SMALL),
             counts={name: minutes.total() for name, minutes in self.counts.items()},
         )
+        return render("video.html", page=self, facts=facts.model_dump(), versions=versions)
 
     @property
     def seconds(self) -> float:
@@ -146,8 +136,8 @@ class VideoPage:
         shown = sum(record.seconds for record in self.records) / max(1, count)
         classes = Counter(record.class_name for record in self.records if record.class_name)
         return [
-            ("vehicle" if count == 1 else "vehicles", str(count)),
-            *((plural(name) if n != 1 else name, str(n)) for name, n in classes.most_common(4)),
+            (named(count, "vehicle"), str(count)),
+            *((named(n, name), str(n)) for name, n in classes.most_common(4)),
             ("most at once", str(self.levels.most)),
             ("mean seconds shown", f"{shown:.1f}"),
             *((name, str(minutes.total())) for name, minutes in self.counts.items()),
@@ -204,3 +194,25 @@ def read_facts(page: Path) -> Facts:
     except (UnicodeDecodeError, ValidationError) as error:
         message = f"{page}: is no page of vdet on a video; remove it, and run again"
         raise OutputError(message) from error
+
+
+def write_index(outputs: Mapping[str, Path], target: Path) -> None:
+    """Write the page over many videos; `outputs` are the folders of their pages by their names.
+
+    A folder without a page is left out.
+
+    Raises
+    ------
+    OutputError
+        A page was not written by this program.
+    """
+    pages = {name: folder / PAGE_NAME for name, folder in outputs.items()}
+    videos = [
+        (name, link_to(page, target.parent), read_facts(page))
+        for name, page in pages.items()
+        if page.is_file()
+    ]
+    counts: Counter[str] = Counter()
+    for _, _, facts in videos:
+        counts.update(facts.counts)
+    write_page(render("index.html", videos=videos, counts=counts), target)

@@ -7,9 +7,8 @@ from pathlib import Path
 from vdet.config.rendering import render
 from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
-from vdet.pages.index import write_index
-from vdet.pages.render import PAGE_NAME, jpeg_uri, write_page
-from vdet.pages.video import Player, Thumbnail, VideoPage
+from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, write_page
+from vdet.pages.video import Player, Thumbnail, VideoPage, write_index
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
@@ -82,14 +81,12 @@ class PageSink(BaseSink):
 
     def _player(self) -> Player | None:
         """Return the video that this run writes; else the source, if it is a video file."""
-        for output in self.context.outputs:
-            if output.sink == "video":
-                return Player.of(output.path, self.path, is_drawn=True, start=self._start)
         source = self.video.path
-        if source.is_file() and not is_picture_name(source):
-            start = float(self.video.start)
-            return Player.of(source, self.path, is_drawn=False, start=start)
-        return None
+        drawn = [each.path for each in self.context.outputs if each.sink == "video"]
+        if not drawn and (not source.is_file() or is_picture_name(source)):
+            return None
+        path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))
+        return Player(path.name, link_to(path, self.path), bool(drawn), start)
 
 
 def _by_minute(counts: Sequence[MinuteCount]) -> dict[str, Counter[int]]:
