@@ -124,9 +124,8 @@ def text_color(background: Color) -> Color:
     """Return black or white: the one with the higher contrast ratio (WCAG 2.1) on a background."""
     shares = np.array(background) / 255
     linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
-    luminance = float(linear @ (0.0722, 0.7152, 0.2126))
-    on_black, on_white = (luminance + 0.05) / 0.05, 1.05 / (luminance + 0.05)
-    return BLACK if on_black > on_white else WHITE
+    luminance = float(linear @ (0.0722, 0.7152, 0.2126)) + 0.05
+    return BLACK if luminance**2 > 0.05 * 1.05 else WHITE
 
 
 def _sides(box: Box, width: int) -> Iterator[Box]:

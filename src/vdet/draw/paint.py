@@ -14,6 +14,7 @@ from vdet.boxes import Box, Float64Array, Int32Array
 from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes
+from vdet.polygons import Point
 
 Color = tuple[int, int, int]
 """Blue, green, red, 0 to 255."""
@@ -59,26 +60,16 @@ def draw_lines(
 
 
 def draw_arrow(
-    surface: Surface,
-    start: Sequence[float],
-    end: Sequence[float],
-    color: Color,
-    width: int,
-    *,
-    tip: float,
+    surface: Surface, start: Point, end: Point, color: Color, width: int, *, tip: float
 ) -> None:
     """Draw an arrow whose tip has the share `tip` of its length."""
-    first, last = np.asarray(start, np.float64), np.asarray(end, np.float64)
-    back = (first - last) * tip
-    turned = np.array([-back[1], back[0]])
-    wings = last + back + turned, last + back - turned
-    for line in ([first, last], [wings[0], last, wings[1]]):
-        draw_lines(surface, np.rint(line).astype(np.int32), color, width)
+    first, last = ((round(x), round(y)) for x, y in (start, end))
+    for layer, value, halved in _layers(surface, color):
+        thickness = max(1, round(width / 2**halved))
+        cv2.arrowedLine(layer, first, last, value, thickness, cv2.LINE_AA, halved, tip)
 
 
-def draw_trail(
-    surface: Surface, points: Sequence[tuple[float, float]], color: Color, width: int
-) -> None:
+def draw_trail(surface: Surface, points: Sequence[Point], color: Color, width: int) -> None:
     """Draw a smooth line along points, the oldest first; it ends at the newest.
 
     Parameters
@@ -149,11 +140,7 @@ def shade(surface: Surface, corners: Int32Array, color: Color, opacity: float) -
 
 
 def blend(
-    surface: Surface,
-    mask: Image,
-    corner: tuple[int, int],
-    color: Color,
-    opacity: float = 1.0,
+    surface: Surface, mask: Image, corner: tuple[int, int], color: Color, opacity: float = 1.0
 ) -> None:
     """Mix a colour into the pixels of a mask.
 

@@ -10,8 +10,8 @@ from vdet.polygons import Point, Segment, contains, distance_to, meeting, side_o
 ENTER, EXIT, APPEAR, VANISH = "enter", "exit", "appear", "vanish"
 """Directions of a zone: over its border, or first and last seen inside."""
 
-CLOCK = 1e-4
-"""Seconds by which a duration may be too short: times are rounded."""
+TIME_DIGITS = 4
+"""Decimals of a duration in seconds that are compared: times are rounded."""
 
 _SETTLED = 0.1
 """Seconds after which a vehicle off a border's band has changed the side."""
@@ -251,7 +251,7 @@ class BorderState:
             return self._settle(sign, sighting, is_far=True) if was_far and sign else None
         if self._beyond != sign:
             self._beyond, self._since = sign, sighting.time
-        if was_far or sighting.time - self._since >= _SETTLED - CLOCK:
+        if was_far or round(sighting.time - self._since, TIME_DIGITS) >= _SETTLED:
             return self._settle(sign, sighting, is_far=is_far or was_far)
         return None
 

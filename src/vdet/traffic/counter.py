@@ -15,7 +15,7 @@ from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.borders import (
     APPEAR,
-    CLOCK,
+    TIME_DIGITS,
     VANISH,
     BorderState,
     Change,
@@ -62,20 +62,17 @@ class _Vehicle:
     def expected(self, time: float) -> Point:
         """Return where it would be, had it gone on."""
         seconds = time - self.last.time
-        (x, y), (dx, dy) = self.last.point, self.velocity
-        return x + dx * seconds, y + dy * seconds
+        x, y = (a + v * seconds for a, v in zip(self.last.point, self.velocity, strict=True))
+        return x, y
 
     def move(self, sighting: Sighting) -> None:
         """Take in the place of the next sighting."""
         seconds = sighting.time - self.last.time
         if seconds > 0:
-            (ax, ay), (bx, by) = self.last.point, sighting.point
-            dx, dy = self.velocity
             share = 1.0 if self.last is self.first else 0.5
-            self.velocity = (
-                dx + share * ((bx - ax) / seconds - dx),
-                dy + share * ((by - ay) / seconds - dy),
-            )
+            ways = zip(self.velocity, self.last.point, sighting.point, strict=True)
+            x, y = (v + share * ((b - a) / seconds - v) for v, a, b in ways)
+            self.velocity = x, y
         self.last = sighting
 
     def add(
@@ -83,9 +80,10 @@ class _Vehicle:
     ) -> None:
         """Note an event."""
         stitched = isinstance(at, Change) and at.stitched
-        self.events.append(
-            Event(at.time, at.frame, name, direction, self.id, None, at.score, stitched, seconds)
-        )
+        time, score = round(at.time, 3), round(at.score, 4)
+        stay = None if seconds is None else round(seconds, 3)
+        event = Event(time, at.frame, name, direction, self.id, None, score, stitched, stay)
+        self.events.append(event)
 
 
 class VehicleCounter:
@@ -118,16 +116,12 @@ class VehicleCounter:
             if not track.predicted:
                 self._see(track, self._sighting(track, frame.index), shown)
 
-    def finish(self) -> tuple[Event, ...]:
-        """Return all events; the video has ended."""
-        for vehicle in list(self._vehicles.values()):
-            self._close(vehicle)
-        return tuple(sorted(self._events, key=lambda e: (e.time, e.frame, e.id, e.name)))
-
     def counts(self) -> Counts:
         """Return all results; the video has ended."""
-        zones = [zone.name for zone in self.layout.zones]
-        return Counts.of(self.finish(), self.layout.keys, zones)
+        for vehicle in list(self._vehicles.values()):
+            self._close(vehicle)
+        events = sorted(self._events, key=lambda e: (e.time, e.frame, e.id, e.name))
+        return Counts.of(events, self.layout.keys, [zone.name for zone in self.layout.zones])
 
     def count(self, name: str, direction: str) -> int:
         """Return how many vehicles have been counted so far in a direction of a line or zone."""
@@ -205,8 +199,8 @@ class VehicleCounter:
         return self._vehicles[min(near)[1]] if near else None
 
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
-        seen = vehicle.last.time - vehicle.first.time
-        return seen >= self.layout.settings.confirmed - CLOCK
+        seen = round(vehicle.last.time - vehicle.first.time, TIME_DIGITS)
+        return seen >= self.layout.settings.confirmed
 
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""
@@ -223,7 +217,7 @@ class VehicleCounter:
             _end(vehicle)
         self._confirm(vehicle)
         for event in vehicle.events[: vehicle.tallied]:
-            self._events.append(_finished(event, vehicle.classes.best))
+            self._events.append(replace(event, class_name=vehicle.classes.best))
 
 
 def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
@@ -252,12 +246,6 @@ def _touched_sides(box: Box, size: tuple[int, int]) -> Point:
     """Return at which sides of the frame a box is: -1 left or top, 1 right or bottom, 0 neither."""
     x1, y1, x2, y2 = box.pixels
     return (x2 >= size[0] - 1) - (x1 <= 1), (y2 >= size[1] - 1) - (y1 <= 1)
-
-
-def _finished(event: Event, class_name: str | None) -> Event:
-    seconds = None if event.seconds is None else round(event.seconds, 3)
-    time, score = round(event.time, 3), round(event.score, 4)
-    return replace(event, time=time, class_name=class_name, score=score, seconds=seconds)
 
 
 def count_file(

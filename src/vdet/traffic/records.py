@@ -1,7 +1,7 @@
 """A record of each vehicle, from the tracks of each frame; records as files, of many videos too."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -196,12 +196,8 @@ def _item(record: VehicleRecord) -> dict[str, Any]:
     }
 
 
-def _cells(value: Any) -> Iterator[Any]:
-    """Yield the values of an item, and those in its values, in the order of `_COLUMNS`."""
-    if isinstance(value, dict):
-        value = value.values()
-    elif not isinstance(value, list):
-        yield value
-        return
-    for each in value:
-        yield from _cells(each)
+def _cells(item: Mapping[str, Any]) -> list[Any]:
+    """Return the values of an item in the order of `_COLUMNS`."""
+    *values, path, largest = item.values()
+    (start, end, *lengths) = path.values()
+    return [*values, *start, *end, *lengths, *largest.values()]

@@ -3,6 +3,7 @@
 import csv
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -54,25 +55,26 @@ def join(
         return
     values: dict[str, Any] = {}
     for name, each in outputs.items():
-        try:
+        with _checked(each):
             values[name] = json.loads(each.read_text("utf-8"))
             joined({name: values[name]})
-        except (ValueError, TypeError, LookupError) as error:
-            raise _unusable(each) from error
     write_json(path, joined(values))
 
 
 def _rows(outputs: Mapping[str, Path], columns: tuple[str, ...]) -> Iterator[list[str]]:
     for name, path in outputs.items():
-        with path.open(encoding="utf-8", newline="") as file:
+        with _checked(path), path.open(encoding="utf-8", newline="") as file:
             rows = csv.reader(file, strict=True)
-            try:
-                if tuple(next(rows, ())) != columns:
-                    raise _unusable(path)
-                yield from ([name, *row] for row in rows)
-            except (ValueError, csv.Error) as error:
-                raise _unusable(path) from error
+            if tuple(next(rows, ())) != columns:
+                raise ValueError("other columns")
+            yield from ([name, *row] for row in rows)
 
 
-def _unusable(path: Path) -> OutputError:
-    return OutputError(f"{path}: has other content than expected; remove it, and run again")
+@contextmanager
+def _checked(path: Path) -> Iterator[None]:
+    """Turn what is raised for an unexpected content into an `OutputError`."""
+    try:
+        yield
+    except (ValueError, TypeError, LookupError, csv.Error) as error:
+        message = f"{path}: has other content than expected; remove it, and run again"
+        raise OutputError(message) from error
