@@ -13,7 +13,7 @@ from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import OutputSuffix, Plan, make_plan
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, ConfigError, OutputError
-from vdet.run.sinks import tracks
+from vdet.run.sinks import data
 from vdet.run.sinks.protocol import BatchTotal, Output, output_state
 from vdet.run.video import VideoJob
 
@@ -264,8 +264,8 @@ class TestTotals:
     @pytest.fixture(autouse=True)
     def all_tracks(self, monkeypatch: pytest.MonkeyPatch) -> None:
         total = BatchTotal("all", lambda _, target: target.touch())
-        kind = replace(tracks.TRACKS, total=total)
-        monkeypatch.setattr(tracks, "TRACKS", kind)
+        kind = replace(data.TRACKS, total=total)
+        monkeypatch.setattr(data, "TRACKS", kind)
 
     def test_it_is_made_from_the_outputs_of_all_videos_by_their_names(self) -> None:
         (total,) = plan_outputs("clips", suffixes={"tracks": ".cars.csv"}).totals
@@ -287,7 +287,7 @@ class TestTotals:
 
     def test_two_of_one_name_are_refused(self, monkeypatch: pytest.MonkeyPatch) -> None:
         total = BatchTotal("all", lambda _, target: target.touch(), suffix=".json")
-        monkeypatch.setattr(tracks, "TRACKS", replace(tracks.TRACKS, total=total))
+        monkeypatch.setattr(data, "TRACKS", replace(data.TRACKS, total=total))
         both = [OutputSuffix("tracks", ".csv"), OutputSuffix("tracks", ".txt")]
         with pytest.raises(BatchError, match=r"both would become out/all\.json"):
             make_plan([Path("clips")], Path("out"), COMMON, both)

@@ -15,8 +15,8 @@ from running import frames_of, names, write_drive
 from vdet.draw.boxes import color_of
 from vdet.media import VideoReader
 from vdet.media.images import read_image, write_image
-from vdet.run.sinks.tracks import TrackSink
-from vdet.run.sinks.video import VideoSink
+from vdet.run.sinks.data import TrackSink
+from vdet.run.sinks.drawn import VideoSink
 
 FRAMES = 15
 KNOWN = "known are video, tracks, stages, picture, json, vehicles, crops, page, counts"

@@ -15,7 +15,7 @@ from vdet.config.schema import Settings
 from vdet.errors import OutputError, VideoError
 from vdet.pages.render import PAGE_NAME
 from vdet.pages.video import read_facts
-from vdet.run.sinks.counts import COUNTS
+from vdet.run.sinks.data import COUNTS
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
 from vdet.testing import check_sink

@@ -24,7 +24,7 @@ from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes
 from vdet.run.result import FrameResult
-from vdet.run.sinks.overlay import Overlay, time_text
+from vdet.run.sinks.drawn import Overlay, time_text
 from vdet.track.track import Track
 
 LENS = CalibratedCamera(

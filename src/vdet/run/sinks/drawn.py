@@ -1,10 +1,12 @@
-"""What the section `draw` asks for, drawn into a copy of each frame."""
+"""The sinks `video` and `picture`: frames with what the section `draw` asks for drawn in."""
 
 import zlib
-from collections import deque
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 
@@ -17,24 +19,33 @@ from vdet.draw.boxes import (
     color_of,
     draw_box,
     draw_label,
+    draw_line,
+    draw_zone,
     line_width,
 )
 from vdet.draw.paint import Color, Surface, draw_trail
+from vdet.errors import OutputError
 from vdet.lanes.drawing import draw_lane
 from vdet.lanes.road import Road
-from vdet.media import Picture, VideoInfo
+from vdet.media import Frame, Picture, VideoInfo, VideoWriter
+from vdet.media.images import PICTURE_SUFFIXES, encode_image
+from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
+from vdet.polygons import Point
 from vdet.regions import Regions
 from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
+from vdet.run.threads import write_async
 from vdet.track.steady import SteadyBoxes
 from vdet.track.track import Track
+from vdet.traffic.counter import VehicleCounter
 
 VIDEO_LABEL = ("id",)
 PICTURE_LABEL = ("id", "score")
 _OTHER_CLASSES = 10
 """Colours for classes that are not among `OUR_NAMES`."""
 
-Points = deque[tuple[float, float, float]]
-"""Time in seconds, x and y in pixels."""
+FINISH_RATE = 5_000_000
+"""Bytes a second. At its end an .mp4 is written once more, with its index in front."""
 
 
 class Overlay:
@@ -48,7 +59,7 @@ class Overlay:
 
     def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
         self._settings = settings.draw
-        self._region_settings = settings.regions
+        self._all_settings = settings
         self._regions: Regions | None = None
         self._start = video.start if video else None
         automatic = VIDEO_LABEL if video else PICTURE_LABEL
@@ -56,7 +67,7 @@ class Overlay:
         self._steady = (
             SteadyBoxes(settings.draw.smoothing) if video and settings.draw.smoothing else None
         )
-        self._trails: dict[int, Points] = {}
+        self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
         self._missed: set[int] = set()
 
     def draw(self, result: FrameResult) -> Surface:
@@ -104,14 +115,15 @@ class Overlay:
         if self._start is None or not longest:
             return
         for track in shown:
-            self._trails.setdefault(track.id, deque()).append((now, *track.foot))
-        for points in self._trails.values():
-            while points and now - points[0][0] > longest:
-                points.popleft()
-        self._trails = {id_: points for id_, points in self._trails.items() if points}
+            self._trails.setdefault(track.id, []).append((now, track.foot))
+        for id_, points in list(self._trails.items()):
+            if kept := [point for point in points if now - point[0] <= longest]:
+                self._trails[id_] = kept
+            else:
+                del self._trails[id_]
         width = line_width(surface, self._settings.thickness)
         for track in shown:
-            path = [(x, y) for _, x, y in self._trails[track.id]]
+            path = [point for _, point in self._trails[track.id]]
             draw_trail(surface, path, colors[track.id], width)
 
     def _draw_vehicles(
@@ -141,7 +153,7 @@ class Overlay:
     def _region_color(self, track: Track, picture: Picture) -> Color:
         """Return the colour of the first polygon in which a vehicle stands; white in none."""
         if self._regions is None:
-            self._regions = Regions(self._region_settings, picture.width, picture.height)
+            self._regions = Regions(self._all_settings.regions, picture.width, picture.height)
         number = self._regions.number_at(track.foot)
         return color_of(number) if number else WHITE
 
@@ -186,3 +198,100 @@ def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> lis
         if box.area:
             placed.append(replace(track, box=box, whole_foot=foot))
     return placed
+
+
+def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | None) -> None:
+    """Draw the lines and zones, and what is counted so far.
+
+    In an undistorted picture they lie on the same places of the road.
+    """
+    for zone in counter.layout.zones:
+        label = f"{zone.name}: {counter.present(zone)}"
+        draw_zone(surface, _on_road(zone.corners, road), label)
+    for line in counter.layout.lines:
+        left, right = (
+            f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions
+        )
+        start, end = _on_road((line.start, line.end), road)
+        draw_line(surface, start, end, (left, right))
+
+
+def _on_road(points: Sequence[Point], road: Road | None) -> list[Point]:
+    """Return where points of the frame lie in the picture that is drawn into."""
+    if road is None:
+        return list(points)
+    return [(x, y) for x, y in road.undistorter.points(np.array(points, np.float64)).tolist()]
+
+
+class VideoSink:
+    """Draws into copies of the frames, and encodes them in a thread."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        assert context.video is not None  # `takes` says so
+        self._path = path
+        self._context = context
+        self._video = context.video
+        self._overlay = Overlay(context.settings, context.video)
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        context = self._context
+        writer = VideoWriter(
+            context.files.stage(self._path, may_replace_video),
+            self._video,
+            context.settings.output,
+            name=self._path,
+            whole_sound=not context.is_part,
+            threads=context.codec_threads,
+        )
+        timeout = context.timeout
+
+        def end_timeout() -> float | None:
+            return None if timeout is None else timeout + writer.size / FINISH_RATE
+
+        with ExitStack() as stack:
+            self._encode = stack.enter_context(
+                write_async(writer.write, within=writer, timeout=timeout, end_timeout=end_timeout)
+            )
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        with self._context.waits.on("encoding"):
+            self._stack.__exit__(*raised)
+
+    def write(self, result: FrameResult) -> None:
+        """Draw the shown vehicles, and give the frame to the encoder."""
+        surface = self._overlay.draw(result)
+        if result.counter and self._context.settings.counts.drawn:
+            draw_running_counts(surface, result.counter, result.road)
+        with self._context.waits.on("encoding"):
+            self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
+
+
+VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)
+
+
+class PictureSink(BaseSink):
+    """Writes one picture."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._overlay = Overlay(context.settings, None)
+        self._is_done = False
+
+    def write(self, result: FrameResult) -> None:
+        """Draw the vehicles, and write the picture.
+
+        Raises `OutputError` for a second picture.
+        """
+        if self._is_done:
+            raise OutputError(
+                f"{self.path}: takes one picture; for several give the name of a folder"
+            )
+        self._is_done = True
+        data = encode_image(Picture(self._overlay.draw(result)).image, self.path)
+        self.context.files.stage(self.path).write_bytes(data)
+
+
+PICTURE = SinkKind(PictureSink, sorted(PICTURE_SUFFIXES), "pictures", takes="pictures")

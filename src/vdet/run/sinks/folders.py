@@ -1,4 +1,4 @@
-"""The sink `stages`: a folder with a picture of every stage of one frame."""
+"""The sinks that fill a folder with pictures: `stages` of one frame, and `crops` of vehicles."""
 
 from pathlib import Path
 
@@ -8,10 +8,12 @@ from vdet.lanes.drawing import stage_pictures
 from vdet.media.images import Image, encode_image
 from vdet.regions import Regions
 from vdet.run.result import FrameResult
-from vdet.run.sinks.overlay import PICTURE_LABEL, label_text
+from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
+from vdet.traffic.overview import BestCrops, Crop
 
 _BOXES = "boxes"
+CROP_NAMES = "vehicle-*-at-*s.*"
 
 
 class StagesSink(BaseSink):
@@ -56,3 +58,34 @@ def _with_boxes(result: FrameResult) -> Image:
 
 
 STAGES = SinkKind(StagesSink, what="stages", marker=f"*-{_BOXES}.png", one_frame=True)
+
+
+class CropSink(BaseSink):
+    """Writes the picture of a vehicle when it is gone, again where a better one follows."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        make_folder(path)
+        self._folder = context.files.stage_folder(path, CROP_NAMES)
+        self._suffix = f".{context.settings.crops.format}"
+        self._best = BestCrops()
+        self._written: dict[int, Path] = {}
+
+    def finish(self) -> None:
+        """Write the pictures of the vehicles that are still shown."""
+        self._write_all(self._best.end())
+
+    def write(self, result: FrameResult) -> None:
+        """Look for better pictures in a frame."""
+        self._write_all(self._best.add(result.frame_tracks, result.frame.picture))
+
+    def _write_all(self, crops: list[Crop]) -> None:
+        for crop in crops:
+            if crop.id in self._written:
+                self._written[crop.id].unlink()
+            name = f"vehicle-{crop.id:04d}-at-{crop.time:.3f}s{self._suffix}"
+            self._written[crop.id] = path = self._folder / name
+            path.write_bytes(encode_image(crop.image, path))
+
+
+CROPS = SinkKind(CropSink, what="pictures of vehicles", marker=CROP_NAMES, takes="videos")

@@ -1,0 +1,186 @@
+"""The sinks that write data: `tracks`, `json`, `vehicles` and `counts`.
+
+Times are in seconds and those of the input. Pixels are those of the input frame, counted from 0,
+even where the frame is drawn undistorted, so boxes can be compared with labels of the input.
+"""
+
+import json
+import sys
+from pathlib import Path
+from typing import Any, BinaryIO, Self
+
+from vdet.errors import OutputError
+from vdet.files import print_now
+from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
+from vdet.labels.json_lines import JSON_LINES
+from vdet.lanes.road import lane_record
+from vdet.run.result import FrameResult
+from vdet.run.sinks.protocol import (
+    STANDARD_OUTPUT,
+    BaseSink,
+    BatchTotal,
+    SinkContext,
+    SinkKind,
+)
+from vdet.track.track import Track
+from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.counts import join_counts, write_counts
+from vdet.traffic.records import VehicleRecords, join_records, write_records
+from vdet.traffic.tables import SUFFIXES
+
+
+class TrackSink:
+    """Writes the shown tracks of each frame; the end of the name chooses the format.
+
+    The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
+    `.jsonl`, frame by frame. In `.jsonl` a frame has `lane` if the lane is looked for: null if none
+    is shown, else an object with `radius` (metres, null on a straight road), `offset` (of the
+    camera from the middle of the lane, metres, positive to the right), `width` (metres), `left` and
+    `right`: each line as `[[x, y], …]`, pixels of the undistorted frame, the nearest point first.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        self._path = path
+        self._context = context
+        self._file: BinaryIO | None = None
+        self._writer: TrackWriter
+
+    def __enter__(self) -> Self:
+        if self._path == STANDARD_OUTPUT:
+            self._writer = JSON_LINES.write(sys.stdout.buffer, None)
+            return self
+        form = format_for(self._path)
+        assert form is not None  # the suffixes of the kind say so
+        video = self._context.video
+        if form.needs_video and video is None:
+            raise OutputError(
+                f"{self._path}: {form.name} is for videos; give another format for pictures"
+            )
+        source = None
+        if video is not None:  # a whole video has the frames that are read
+            frames = video.frames if self._context.is_part else None
+            source = SourceVideo(video.path.name, video.width, video.height, frames)
+        self._file = self._context.files.stage(self._path).open("wb")
+        self._writer = form.write(self._file, source)
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if self._file is None:
+            sys.stdout.flush()
+            return
+        with self._file:
+            if kind is None:
+                self._writer.end()
+
+    def write(self, result: FrameResult) -> None:
+        """Add the tracks of a frame."""
+        self._writer.write(result.frame_tracks)
+
+
+TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True)
+
+
+class JsonSink(BaseSink):
+    """Collects an item per picture, and writes the list at the end, if there is an item.
+
+    Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
+    `height` (pixels of the input picture) and `score`. If lanes are searched for, it also has
+    `lane`, as in `.jsonl` tracks, and each box has `distance` (metres, two decimals) and `lane`, as
+    in `Track`, null where they are not known.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._items: list[dict[str, Any]] = []
+
+    def finish(self) -> None:
+        """Write the list."""
+        if not self._items:
+            return
+        text = json.dumps(self._items, indent=2, allow_nan=False) + "\n"
+        if self.path == STANDARD_OUTPUT:
+            print_now(text)
+        else:
+            self.context.files.stage(self.path).write_text(text, encoding="utf-8")
+
+    def write(self, result: FrameResult) -> None:
+        """Add the item of a picture."""
+        item: dict[str, Any] = {
+            "image": str(result.source),
+            "width": result.frame.picture.width,
+            "height": result.frame.picture.height,
+            "boxes": [_box(track, on_road=result.road is not None) for track in result.tracks],
+        }
+        if result.road:
+            item["lane"] = lane_record(result.road.lane)
+        self._items.append(item)
+
+
+def _box(track: Track, *, on_road: bool) -> dict[str, Any]:
+    """Return the values of a vehicle; with `on_road` also its place on the road."""
+    values: dict[str, Any] = {
+        **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
+        "score": round(track.score, 4),
+    }
+    if on_road:
+        metres = track.distance
+        values["distance"] = None if metres is None else round(metres, 2)
+        values["lane"] = track.lane
+    return values
+
+
+JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")
+
+
+class VehicleSink(BaseSink):
+    """Keeps a record of each vehicle, and writes all at the end, as `.csv` or `.json`."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._records = VehicleRecords(self.video.width)
+
+    def finish(self) -> None:
+        """Write the records."""
+        write_records(self._records.end(), self.context.files.stage(self.path))
+
+    def write(self, result: FrameResult) -> None:
+        """Add a frame."""
+        self._records.add(result.frame_tracks)
+
+
+VEHICLES = SinkKind(
+    VehicleSink,
+    SUFFIXES,
+    "records of vehicles",
+    takes="videos",
+    total=BatchTotal("all", join_records),
+)
+
+
+class CountsSink(BaseSink):
+    """Writes which vehicles cross lines, and enter, leave and stay in zones.
+
+    `.csv` has a line for each event: `time`, `frame`, `name`, `direction`, `id`, `class`, `score`,
+    `stitched`, `seconds` (see `Event`). `.json` has the events, and the totals, the counts by
+    minute and the stays in zones that follow from them.
+    """
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._counter: VehicleCounter | None = None
+        if not context.settings.counts:
+            raise OutputError(f"{path}: there is nothing to count at; give lines or zones")
+
+    def finish(self) -> None:
+        """Write the counts."""
+        if self._counter:
+            write_counts(self.context.files.stage(self.path), self._counter.counts())
+
+    def write(self, result: FrameResult) -> None:
+        """Keep the counter: at the end it has the counts of all frames."""
+        self._counter = result.counter
+
+
+COUNTS = SinkKind(
+    CountsSink, SUFFIXES, "counts", takes="videos", total=BatchTotal("all", join_counts)
+)
