@@ -33,7 +33,7 @@ from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit
 from vdet.media import Frame, Picture, VideoReader
-from vdet.run.loop import follow, peek
+from vdet.run.loop import Pipeline, peek
 from vdet.track.factory import make_tracker
 from vdet.workers import limit_library_threads, make_workers
 
@@ -178,7 +178,7 @@ def _search(
         )
         stride = settings.detector.stride_at(info.rate)
         tracker = make_tracker(settings, info.width, info.height)
-        count = sum(1 for _ in follow(frames, searching, tracker, stride=stride))
+        count = sum(1 for _ in Pipeline(searching, tracker, stride=stride).follow(frames))
     return SearchedVideo(info.width, info.height, info.rate, count, stride, searching.windows)
 
 
@@ -222,7 +222,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
             frame=result.frame.index + 1,
             id=track.id,
         )
-        for result in follow(frames, found, tracker, stride=searched.stride)
+        for result in Pipeline(found, tracker, stride=searched.stride).follow(frames)
         for track in result.tracks
     ]
     rate = float(searched.rate)

@@ -194,15 +194,9 @@ def follow(
         The video cannot be read or searched.
     """
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
-    job = VideoJob(
-        Path(source),
-        start=_exact(start),
-        end=_exact(end),
-        frames=frames,
-        lanes=_lanes(lanes, camera),
-    )
-    opened = open_video(job, loaded, settings, tracker=tracker, steps=steps, threads=threads)
-    with opened as video:
+    part = _exact(start), _exact(end), frames
+    job = VideoJob(Path(source), (), *part, lanes=_lanes(lanes, camera), threads=threads)
+    with open_video(job, loaded, settings, tracker=tracker, steps=steps) as video:
         yield from video.results
 
 
@@ -252,26 +246,13 @@ def detect_video(
     The others are those of `follow`, and the errors those of the command `vdet detect-video`.
     """
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
-    job = VideoJob(
-        Path(source),
-        _outputs({"video": video, "tracks": tracks, **(outputs or {})}),
-        _exact(start),
-        _exact(end),
-        frames,
-        Fraction(str(at)),
-        _lanes(lanes, camera),
-        overwrite,
-    )
+    wanted = _outputs({"video": video, "tracks": tracks, **(outputs or {})})
+    part = _exact(start), _exact(end), frames, Fraction(str(at))
+    request = _lanes(lanes, camera)
+    job = VideoJob(Path(source), wanted, *part, request, overwrite=overwrite, threads=threads)
     check_job(job)
-    return run_video(
-        job,
-        loaded,
-        settings,
-        tracker=tracker,
-        steps=steps,
-        threads=threads,
-        progress=reporting(progress) if progress else no_progress,
-    )
+    reported = reporting(progress) if progress else no_progress
+    return run_video(job, loaded, settings, tracker=tracker, steps=steps, progress=reported)
 
 
 def detect_image(

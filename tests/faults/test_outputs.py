@@ -98,9 +98,9 @@ def test_a_writer_that_hangs_at_its_end_is_given_up(
 
     monkeypatch.setattr(VideoWriter, "__exit__", hang)
     (tmp_path / "out").mkdir()
-    few = replace(job, frames=3)
+    few = replace(job, frames=3, timeout=1)
     with pytest.raises(VideoError, match="nothing could be read or written for 1 s"):
-        run_video(few, red_model(), SETTINGS, timeout=1)
+        run_video(few, red_model(), SETTINGS)
     assert names(tmp_path / "out") == []
     released.set()
     until(lambda: not any(thread.name.startswith("vdet-") for thread in threading.enumerate()))

@@ -186,8 +186,7 @@ class TestPixels:
     ) -> None:
         """With the settings that ship, each value of each frame is the same."""
         settings = written_with(OutputSettings(), boxes=False, label=())
-        job = VideoJob(filmed, outputs(video=tmp_path / "out.mp4"))
-        run_red(job, settings, codec_threads=1)
+        run_red(VideoJob(filmed, outputs(video=tmp_path / "out.mp4"), codec_threads=1), settings)
         plain = transcoded(filmed, tmp_path / "plain.mp4", OutputSettings())
         pairs = zip(planes_of(tmp_path / "out.mp4"), planes_of(plain), strict=True)
         for ours, theirs in pairs:

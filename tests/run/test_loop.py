@@ -5,6 +5,7 @@ import json
 import threading
 import weakref
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count, islice
 from pathlib import Path
@@ -162,7 +163,7 @@ class TestMemory:
                 held.append(frames_alive() - others)
 
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv")
-        run_red(VideoJob(red_clip, wanted), threads=2, progress=lambda _: advance)
+        run_red(VideoJob(red_clip, wanted, threads=2), progress=lambda _: advance)
         assert held
         assert 0 < max(held) <= QUEUED
 
@@ -181,7 +182,7 @@ class TestRun:
         monkeypatch.setattr("vdet.run.loop.map_ordered", note)
         job = VideoJob(write_drive(tmp_path / "a.mp4", 2))
         run_video(job, red_model(), SETTINGS)
-        run_video(job, red_model(), SETTINGS, threads=2)
+        run_video(replace(job, threads=2), red_model(), SETTINGS)
         assert pools == [3, 2]
 
     def test_the_totals_count_frames_and_vehicles(self, red_clip: Path, tmp_path: Path) -> None:

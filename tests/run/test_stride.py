@@ -12,8 +12,7 @@ from red_cars import HEIGHT, PERSPECTIVE, SETTINGS, WIDTH, drive
 from run.red_runs import COUNT, follow, outputs, run_red, write
 from vdet.config.schema import MotionTrackerSettings, Settings, SvmSettings
 from vdet.media import Picture
-from vdet.run.loop import NullDetector
-from vdet.run.loop import follow as follow_all
+from vdet.run.loop import NullDetector, Pipeline
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob
@@ -59,7 +58,7 @@ def test_the_detector_gets_the_number_of_each_frame_that_it_searches() -> None:
             searched.append(index)
 
     tracker = make_tracker(SETTINGS, WIDTH, HEIGHT)
-    list(follow_all(list(drive(20))[7:], Noting(), tracker, stride=4))
+    list(Pipeline(Noting(), tracker, stride=4).follow(list(drive(20))[7:]))
     assert searched == [7, 11, 15, 19]
 
 

@@ -329,7 +329,7 @@ class TestWriteAsync:
             time.sleep(0.2)
             passed.append(item)
 
-        with write_async(take, timeout=0.1, depth=9, end_timeout=lambda: SOON) as put:
+        with write_async(take, timeout=0.1, depth=9, extra=lambda: SOON) as put:
             for item in range(5):
                 put(item)
         assert passed == list(range(5))

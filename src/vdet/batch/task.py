@@ -156,14 +156,9 @@ def _run(job: VideoJob, work: Work, progress: Progress) -> dict[str, Any]:
     """Run a job, and return what its record says about the result."""
     for output in job.outputs:
         make_folders(output)
-    totals = run_video(
-        job,
-        load_detector(work.settings.detector, work.model),
-        work.settings,
-        threads=work.threads,
-        codec_threads=work.threads,
-        progress=progress,
-    )
+    job = replace(job, threads=work.threads, codec_threads=work.threads)
+    model = load_detector(work.settings.detector, work.model)
+    totals = run_video(job, model, work.settings, progress=progress)
     states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in job.outputs}
     return {
         "width": totals.width,

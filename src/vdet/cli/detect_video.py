@@ -131,8 +131,8 @@ def detect_video(
     check_mask(settings.regions)
     job = VideoJob(source, (), start, end, frames, at or Fraction(0), request, overwrite)
     if batch.folder is None:
-        job = replace(job, outputs=options.as_outputs(wanted))
-        _process_one(job, settings, choice, threads)
+        job = replace(job, outputs=options.as_outputs(wanted), threads=threads)
+        _process_one(job, settings, choice)
         return 0
     suffixes = read_suffixes(wanted, no_video=no_video)
     sinks = {each.sink for each in suffixes}
@@ -183,7 +183,6 @@ def _process_one(
     job: "VideoJob",
     settings: "Settings",
     choice: options.SettingsChoice,
-    threads: int | None,
 ) -> None:
     from vdet.run.video import check_job, run_video
 
@@ -191,7 +190,7 @@ def _process_one(
     check_job(job)
     with progress_steps(" frames") as steps:
         steps("opening", None)
-        totals = run_video(job, model, settings, threads=threads, progress=partial(steps, ""))
+        totals = run_video(job, model, settings, progress=partial(steps, ""))
     if not is_quiet():
         rate = totals.frames / totals.seconds
         found = f"{counted(totals.frames, 'frame')}, {counted(totals.tracks, 'track')}"

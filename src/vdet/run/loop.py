@@ -1,15 +1,16 @@
 """The loop: frames → detector → tracker → steps → results."""
 
 import itertools
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, limited
+from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
@@ -19,74 +20,32 @@ from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import Waits, map_ordered
 from vdet.track.factory import carrying, make_tracker
 from vdet.track.protocol import VideoTracker
+from vdet.track.track import Track
 
 FIRST_FRAMES = 5
 """Number of frames that `DetectorModel.for_video` gets."""
 
 
-def follow(
-    frames: Iterable[Frame],
-    detector: VideoDetector,
-    tracker: VideoTracker,
-    steps: Sequence[Step] = (),
-    *,
-    source: Path = Path(),
-    stride: int = 1,
-    threads: int = 1,
-    waits: Waits | None = None,
-) -> Generator[FrameResult]:
-    """Find and follow the vehicles through the frames of a video.
+@dataclass(frozen=True, slots=True)
+class Pipeline:
+    """What the frames of one video go through, or what one still picture goes through.
 
-    Parameters
+    Attributes
     ----------
     steps
         Each gets every result, in the order of the frames.
-    source
-        The video, for the results.
     stride
         Every `stride`-th frame is searched, beginning with the first. In the others the tracker
         carries the vehicles on.
-    threads
-        Number of frames that are searched at once. The results do not depend on it.
-    waits
-        Counts how long the search is waited for.
+    is_still
+        Whether the only frame is a still picture.
     """
-    tracker = carrying(tracker)
-    prepared = [step for step in steps if isinstance(step, ParallelStep)]
-
-    def search(numbered: tuple[int, Frame]) -> tuple[bool, Any]:
-        position, frame = numbered
-        for step in prepared:
-            step.prepare(frame)
-        if position % stride:
-            return False, None
-        return True, detector.search(frame.picture, frame.index)
-
-    waiting = partial((waits or Waits()).on, "searching")
-    ahead = threads * stride  # so that each thread has a frame to search
-    with map_ordered(search, enumerate(frames), threads, ahead=ahead, waiting=waiting) as results:
-        for (_, frame), (searched, candidates) in results:
-            time, picture = float(frame.time), frame.picture
-            if searched:
-                detections = detector.detect(candidates)
-                tracks = tracker.update(detections, time, picture)
-            else:
-                detections = NO_BOXES
-                tracks = tracker.carry(time, picture)
-            result = FrameResult(source, frame, detections, tuple(tracks), searched=searched)
-            for step in steps:
-                result = step.apply(result)
-            yield result
-
-
-@dataclass(frozen=True, slots=True)
-class Pipeline:
-    """What the frames of one video go through; `follow` explains it."""
 
     detector: VideoDetector
     tracker: VideoTracker
     steps: Sequence[Step] = ()
     stride: int = 1
+    is_still: bool = False
 
     def follow(
         self,
@@ -96,37 +55,65 @@ class Pipeline:
         threads: int = 1,
         waits: Waits | None = None,
     ) -> Generator[FrameResult]:
-        """Find and follow the vehicles, as the function `follow`."""
-        return follow(
-            frames,
-            self.detector,
-            self.tracker,
-            self.steps,
-            source=source,
-            stride=self.stride,
-            threads=threads,
-            waits=waits,
-        )
+        """Find and follow the vehicles.
+
+        Parameters
+        ----------
+        source
+            The video, for the results.
+        threads
+            Number of frames that are searched at once. The results do not depend on it.
+        waits
+            Counts how long the loop waits for the search.
+        """
+        tracker, detector = carrying(self.tracker), self.detector
+        prepared = [step for step in self.steps if isinstance(step, ParallelStep)]
+
+        def search(numbered: tuple[int, Frame]) -> tuple[bool, Any]:
+            position, frame = numbered
+            for step in prepared:
+                step.prepare(frame)
+            if position % self.stride:
+                return False, None
+            return True, detector.search(frame.picture, None if self.is_still else frame.index)
+
+        ahead = threads * self.stride  # so that each thread has a frame to search
+        with map_ordered(search, enumerate(frames), threads, ahead=ahead, waits=waits) as results:
+            for (_, frame), (searched, candidates) in results:
+                time, picture = float(frame.time), frame.picture
+                if searched:
+                    detections = detector.detect(candidates)
+                    tracks = tracker.update(detections, time, picture)
+                else:
+                    detections = NO_BOXES
+                    tracks = tracker.carry(time, picture)
+                result = FrameResult(source, frame, detections, tuple(tracks), searched=searched)
+                for step in self.steps:
+                    result = step.apply(result)
+                yield result
 
 
 def build(
     model: DetectorModel,
     settings: Settings,
-    video: VideoInfo,
+    video: VideoInfo | None,
     images: Sequence[Image],
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
     lanes: LaneRequest | None = None,
 ) -> Pipeline:
-    """Build what the frames of a video go through.
+    """Build what the frames of a video go through, or one still picture.
 
     Parameters
     ----------
+    video
+        None for a still picture.
     images
-        The first frames, from `peek`.
+        The first frames, from `peek`; the still picture alone.
     tracker
-        A tracker for this video; None for that of the settings.
+        A tracker for this video; None for that of the settings. In a still picture each detection
+        becomes a track, with ids from 1.
     steps
         Steps in addition to those of the settings.
     lanes
@@ -139,14 +126,14 @@ def build(
     ConfigError, ImageError
         The regions, the lines or the camera do not fit the frames.
     """
-    size = video.width, video.height
-    regions = lay_regions(settings.regions, *size)
-    return Pipeline(
-        limited(model.for_video(*size, images), regions),
-        tracker or make_tracker(settings, *size),
-        make_steps(StepContext(settings, *size, video, lanes), steps),
-        settings.detector.stride_at(video.rate),
-    )
+    height, width = (video.height, video.width) if video else images[0].shape[:2]
+    regions = lay_regions(settings.regions, width, height)
+    detector = limited(model.for_video(width, height, images), regions)
+    made = make_steps(StepContext(settings, width, height, video, lanes), steps)
+    if video is None:
+        return Pipeline(detector, StillTracker(), made, is_still=True)
+    stride = settings.detector.stride_at(video.rate)
+    return Pipeline(detector, tracker or make_tracker(settings, width, height), made, stride)
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
@@ -155,6 +142,26 @@ def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
     first = list(itertools.islice(rest, FIRST_FRAMES))
     # A list iterator lets go of its list at the end; the list itself would stay for the whole run.
     return [frame.image for frame in first], itertools.chain(iter(first), rest)
+
+
+@contextmanager
+def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
+    """Put the name of the video or picture before what is wrong with it."""
+    try:
+        yield
+    except (ConfigError, ImageError) as error:
+        raise kind(f"{source}: {error}") from error
+
+
+class StillTracker:
+    """Makes a track of each detection of a still picture."""
+
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
+        """Return a track for each detection, with ids from 1."""
+        return [
+            Track(number, each.box, each.score, predicted=False, class_name=each.class_name)
+            for number, each in enumerate(detections, start=1)
+        ]
 
 
 class NullDetector:

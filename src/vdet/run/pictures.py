@@ -1,30 +1,24 @@
 """Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
-import contextlib
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 from vdet.boxes import Boxes
-from vdet.config.places import RegionsSettings
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, VideoDetector, limited, stage_pictures_of
-from vdet.errors import ConfigError, ImageError, OutputError
+from vdet.detect.protocol import DetectorModel, stage_pictures_of
+from vdet.errors import ImageError, OutputError
 from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
 from vdet.progress import Progress, no_progress
-from vdet.regions import Regions, lay_regions
+from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
-from vdet.run.steps import ParallelStep, StepContext, make_steps
-from vdet.track.track import Track
-
-_WHOLE_FRAME = RegionsSettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,71 +166,25 @@ def detect_picture(
     settings: Settings,
     lanes: LaneRequest | None = None,
 ) -> FrameResult:
-    """Search a picture, BGR uint8 `(H, W, 3)`; `source` is its name in messages.
+    """Search a picture, BGR uint8 `(H, W, 3)`; threads may call this at once.
 
-    Each detection becomes a track, with ids from 1.
+    Each detection becomes a track, with ids from 1. `source` is the name of the picture in
+    messages.
 
     Raises
     ------
     ImageError
         The picture cannot be searched.
     """
-    frame = Frame(0, Fraction(0), Picture(image))
-    detections = search_picture(source, image, model, settings.regions)
-    result = FrameResult(source, frame, detections, _tracks(detections))
-    with _named(source):
-        height, width = image.shape[:2]
-        for step in make_steps(StepContext(settings, width, height, lanes=lanes)):
-            if isinstance(step, ParallelStep):
-                step.prepare(frame)
-            result = step.apply(result)
+    with named_errors(source, ImageError):
+        pipeline = build(model, settings, None, [image], lanes=lanes)
+        (result,) = pipeline.follow([Frame(0, Fraction(0), Picture(image))], source)
     return result
-
-
-def search_picture(
-    source: Path, image: Image, model: DetectorModel, regions: RegionsSettings = _WHOLE_FRAME
-) -> Boxes:
-    """Return what a picture shows; threads may call this at once.
-
-    With `regions`, only vehicles that stand in them are found.
-
-    Arguments and errors as in `detect_picture`.
-    """
-    with _named(source):
-        detector, laid = _start(image, model, regions)
-        detections = detector.detect(detector.search(Picture(image), None))
-    if laid is None:
-        return detections
-    return detections[[n for n, each in enumerate(detections) if laid.contains(each.box.foot)]]
-
-
-def _start(
-    image: Image, model: DetectorModel, regions: RegionsSettings
-) -> tuple[VideoDetector, Regions | None]:
-    height, width = image.shape[:2]
-    laid = lay_regions(regions, width, height)
-    return limited(model.for_video(width, height, [image]), laid), laid
 
 
 def _context(files: OutputFiles, model: DetectorModel, settings: Settings) -> SinkContext:
     def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
-        detector, _ = _start(image, model, settings.regions)
+        detector = build(model, settings, None, [image]).detector
         return stage_pictures_of(detector)(image, detections)
 
     return SinkContext(files, settings, stage_pictures=stage_pictures)
-
-
-@contextlib.contextmanager
-def _named(source: Path) -> Iterator[None]:
-    """Put the name of the picture before what is wrong with it."""
-    try:
-        yield
-    except (ConfigError, ImageError) as error:
-        raise ImageError(f"{source}: {error}") from error
-
-
-def _tracks(detections: Boxes) -> tuple[Track, ...]:
-    return tuple(
-        Track(number, each.box, each.score, predicted=False, class_name=each.class_name)
-        for number, each in enumerate(detections, start=1)
-    )

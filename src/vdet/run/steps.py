@@ -122,15 +122,17 @@ def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Tr
 
 
 class RegionStep:
-    """Leaves out the vehicles that stand outside the regions."""
+    """Leaves out what stands outside the regions."""
 
     def __init__(self, regions: Regions) -> None:
         self._regions = regions
 
     def apply(self, result: FrameResult) -> FrameResult:
-        """Keep the vehicles whose foot is in the regions."""
-        inside = (track for track in result.tracks if self._regions.contains(track.foot))
-        return replace(result, tracks=tuple(inside))
+        """Keep the detections and the vehicles whose foot is in the regions."""
+        contains, found = self._regions.contains, result.detections
+        detections = found[[n for n, each in enumerate(found) if contains(each.box.foot)]]
+        tracks = tuple(track for track in result.tracks if contains(track.foot))
+        return replace(result, detections=detections, tracks=tracks)
 
 
 class CountStep:

@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from operator import itemgetter
 from typing import Generic, Literal, TypeVar, get_args
 
@@ -50,7 +50,7 @@ class _Channel(Generic[T]):
         """Wait for room; return False if the queue is closed."""
         waited = 0.0
         while not self._closed.is_set():
-            with contextlib.suppress(queue.Full):
+            with suppress(queue.Full):
                 self._queue.put(item, timeout=POLL_INTERVAL)
                 return True
             waited += POLL_INTERVAL
@@ -122,15 +122,14 @@ def write_async(
     *,
     within: AbstractContextManager[object] | None = None,
     timeout: float | None = None,
-    end_timeout: Callable[[], float | None] | None = None,
+    extra: Callable[[], float] = lambda: 0.0,
 ) -> Iterator[Callable[[T], None]]:
     """Give a function that passes items to `take` in a thread; at most `depth` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
     one. An error in the thread is raised by the next call, or when the block ends. A call raises
     `StalledError` if there is no room within `timeout` seconds. So does the end of the block if the
-    last items, or leaving `within`, get no further within the seconds that `end_timeout` then
-    returns; without it, within `timeout`.
+    last items, or leaving `within`, get no further within `timeout` and the `extra` seconds.
     """
     channel: _Channel[T] = _Channel(depth)
     failures: list[BaseException] = []
@@ -153,9 +152,9 @@ def write_async(
     try:
         yield put
         channel.put(_End(), timeout)
-        _join(thread, channel, end_timeout() if end_timeout else timeout)
+        _join(thread, channel, None if timeout is None else timeout + extra())
     except BaseException:
-        with contextlib.suppress(StalledError):
+        with suppress(StalledError):
             channel.put(_End(_ClosedError()), JOIN_TIMEOUT)
         thread.join(JOIN_TIMEOUT)
         channel.close()
@@ -185,29 +184,29 @@ def map_ordered(
     threads: int,
     *,
     ahead: int | None = None,
-    waiting: Callable[[], AbstractContextManager[object]] = nullcontext,
+    waits: "Waits | None" = None,
 ) -> Iterator[Iterator[tuple[T, R]]]:
     """Pair items with the results of `function`, computed in parallel, in their order.
 
     At most `ahead` items are taken before the result of the first is waited for, or as many as
-    there are threads. It is waited for within a context manager that `waiting` returns.
+    there are threads. `waits` counts how long results are waited for.
     """
+    running: deque[tuple[T, Future[R]]] = deque()
 
-    def result(future: Future[R]) -> R:
-        with waiting():
-            return future.result()
+    def first() -> tuple[T, R]:
+        item, future = running.popleft()
+        with waits.on("searching") if waits else nullcontext():
+            return item, future.result()
 
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
         def pairs() -> Iterator[tuple[T, R]]:
-            running: deque[tuple[T, Future[R]]] = deque()
             for item in items:
                 running.append((item, pool.submit(function, item)))
                 if len(running) > (ahead or threads):
-                    first, future = running.popleft()
-                    yield first, result(future)
-            for first, future in running:
-                yield first, result(future)
+                    yield first()
+            while running:
+                yield first()
 
         try:
             yield pairs()

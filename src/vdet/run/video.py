@@ -6,16 +6,17 @@ from collections.abc import Generator, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
-from vdet.errors import ConfigError, FrameSizeError, ImageError, VideoError
+from vdet.errors import FrameSizeError, VideoError
 from vdet.files import OutputFiles
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, VideoReader
 from vdet.progress import Progress, no_progress
-from vdet.run.loop import NullDetector, Pipeline, build, peek
+from vdet.run.loop import NullDetector, Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sink, sink_kind
 from vdet.run.steps import Step
@@ -48,6 +49,14 @@ class VideoJob:
         If it is given, the lane is found too, and everything is drawn on undistorted frames.
     overwrite
         Outputs that are there already are replaced.
+    threads
+        Number of threads that search; None for one per core.
+    codec_threads
+        Number of threads of the decoder, and of the encoder; None for one per core.
+    timeout
+        Seconds in which the next frame must be read or written; after that the job fails, so that
+        a disk or a network that hangs does not stop a batch. The duration of the part before
+        `start` is added to it.
     """
 
     source: Path
@@ -58,6 +67,9 @@ class VideoJob:
     at: Fraction = Fraction(0)
     lanes: LaneRequest | None = None
     overwrite: bool = False
+    threads: int | None = None
+    codec_threads: int | None = None
+    timeout: float = IO_TIMEOUT
 
     @property
     def is_part(self) -> bool:
@@ -118,9 +130,6 @@ def open_video(
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
-    threads: int | None = None,
-    codec_threads: int | None = None,
-    timeout: float = IO_TIMEOUT,
     waits: Waits | None = None,
 ) -> Iterator[OpenVideo]:
     """Open a video, and follow the vehicles through it; parameters and errors as in `run_video`.
@@ -128,7 +137,7 @@ def open_video(
     Reading and searching run in threads.
     """
     waits = waits or Waits()
-    timeout += float(job.start or 0)
+    timeout = job.timeout + float(job.start or 0)
 
     def open_reader() -> VideoReader:
         return VideoReader(
@@ -136,26 +145,26 @@ def open_video(
             start=job.start,
             end=job.end,
             frames=job.frames,
-            threads=codec_threads or core_count(),
+            threads=job.codec_threads or core_count(),
             settings=settings.input,
         )
 
     with ExitStack() as stack:
-        stack.enter_context(_named_errors(job.source, timeout))
+        stack.enter_context(named_errors(job.source, VideoError))
+        stack.enter_context(_no_stall(job.source, timeout))
         with waits.on("reading"):
             reader = run_in_thread(open_reader, timeout=timeout)
         read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
         _check_times(job, reader.length)
         images, frames = peek(waits.for_each("reading", read))
+        make = partial(build, settings=settings, video=reader.info, images=images, lanes=job.lanes)
         try:
-            pipeline = build(
-                model, settings, reader.info, images, tracker=tracker, steps=steps, lanes=job.lanes
-            )
+            pipeline = make(model, tracker=tracker, steps=steps)
         except FrameSizeError as error:
             log.warning("%s: gets no boxes: %s", job.source, error)
-            pipeline = build(NullDetector(), settings, reader.info, images, lanes=job.lanes)
-        del images  # else they stay in memory for the whole run
-        threads = threads or core_count()
+            pipeline = make(NullDetector())
+        del make, images  # else they stay in memory for the whole run
+        threads = job.threads or core_count()
         results = pipeline.follow(frames, job.source, threads=threads, waits=waits)
         yield OpenVideo(reader, pipeline, stack.enter_context(closing(results)))
 
@@ -167,9 +176,6 @@ def run_video(
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
-    threads: int | None = None,
-    codec_threads: int | None = None,
-    timeout: float = IO_TIMEOUT,
     progress: Progress = no_progress,
 ) -> RunTotals:
     """Run a job. Its outputs appear under their names together, at the end of the run.
@@ -180,14 +186,6 @@ def run_video(
     ----------
     tracker, steps
         As `vdet.run.loop.build` takes them.
-    threads
-        Number of threads that search; None for one per core.
-    codec_threads
-        Number of threads of the decoder, and of the encoder; None for one per core.
-    timeout
-        Seconds in which the next frame must be read or written; after that the job fails, so that
-        a disk or a network that hangs does not stop a batch. The duration of the part before
-        `job.start` is added to it.
     progress
         Called once with the expected number of frames (None: unknown). What it returns is called
         with the number of frames done since the last call.
@@ -211,17 +209,7 @@ def run_video(
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles(overwrite=job.overwrite))
         video = stack.enter_context(
-            open_video(
-                job,
-                model,
-                settings,
-                tracker=tracker,
-                steps=steps,
-                threads=threads,
-                codec_threads=codec_threads,
-                timeout=timeout,
-                waits=waits,
-            )
+            open_video(job, model, settings, tracker=tracker, steps=steps, waits=waits)
         )
         reader, info = video.reader, video.reader.info
         context = SinkContext(
@@ -230,8 +218,8 @@ def run_video(
             info,
             is_part=job.is_part,
             at=job.at,
-            codec_threads=codec_threads or core_count(),
-            timeout=timeout,
+            codec_threads=job.codec_threads or core_count(),
+            timeout=job.timeout,
             outputs=job.outputs,
             stage_pictures=stage_pictures_of(video.pipeline.detector),
             waits=waits,
@@ -257,25 +245,22 @@ def _check_times(job: VideoJob, length: Fraction | None) -> None:
     """Refuse times that lie beyond the end, where the file declares its length."""
     latest = max(job.start or Fraction(0), job.at if job.shows_at else Fraction(0))
     if length is not None and latest >= length:
-        raise VideoError(f"{job.source}: {_seconds(latest)} is beyond its end{_at_end(length)}")
+        raise VideoError(f"{job.source}: {float(latest):.2f} s is beyond its end{_at_end(length)}")
 
 
 def _check_seen(job: VideoJob, last: Fraction | None, length: Fraction | None) -> None:
     """Refuse times at which there was no frame; `last` is the time of the last frame read."""
     if last is None:
-        raise VideoError(f"{job.source}: no frame lies in the times given{_at_end(length)}")
-    if job.shows_at and last < job.at:
-        raise VideoError(
-            f"{job.source}: no frame is read at {_seconds(job.at)} or later{_at_end(length)}"
-        )
+        missing = "lies in the times given"
+    elif job.shows_at and last < job.at:
+        missing = f"is read at {float(job.at):.2f} s or later"
+    else:
+        return
+    raise VideoError(f"{job.source}: no frame {missing}{_at_end(length)}")
 
 
 def _at_end(length: Fraction | None) -> str:
-    return "; check them" if length is None else f"; it ends at {_seconds(length)}"
-
-
-def _seconds(time: Fraction) -> str:
-    return f"{float(time):.2f} s"
+    return "; check them" if length is None else f"; it ends at {float(length):.2f} s"
 
 
 def _frames(reader: VideoReader) -> Generator[Frame]:
@@ -285,8 +270,7 @@ def _frames(reader: VideoReader) -> Generator[Frame]:
 
 
 @contextmanager
-def _named_errors(source: Path, timeout: float) -> Iterator[None]:
-    """Put the name of the video before what is wrong with it."""
+def _no_stall(source: Path, timeout: float) -> Iterator[None]:
     try:
         yield
     except StalledError as error:
@@ -294,5 +278,3 @@ def _named_errors(source: Path, timeout: float) -> Iterator[None]:
             f"{source}: nothing could be read or written for {timeout:g} s; check the disk or "
             "the network"
         ) from error
-    except (ConfigError, ImageError) as error:
-        raise VideoError(f"{source}: {error}") from error

@@ -73,7 +73,7 @@ def test_every_sink_gets_each_result_once_and_in_order(
         *outputs(video=tmp_path / "a.mp4", tracks=tmp_path / "a.csv"),
         Output("last", tmp_path / "last"),
     )
-    run_red(VideoJob(red_clip, wanted), threads=3)
+    run_red(VideoJob(red_clip, wanted, threads=3))
     for sink in (first, last):
         assert [result.frame.index for result in sink.results] == list(range(COUNT))
         assert (sink.entered, sink.left) == (1, [None])

@@ -15,7 +15,7 @@ from typing import Any
 
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
-from vdet.errors import ConfigError, ImageError, VideoError
+from vdet.errors import VideoError
 from vdet.files import OutputFiles
 from vdet.labels.label import Label
 from vdet.labels.reading import read_truth
@@ -24,7 +24,7 @@ from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.progress import Progress
-from vdet.run.loop import Pipeline, build, peek
+from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
 from vdet.track.track import Track
@@ -117,7 +117,7 @@ def find_tracks(
         )
         images, read = peek(reader)
         advance = progress(reader.expected)
-        try:
+        with named_errors(clip.video, VideoError):
             pipelines = build_variants(variants, reader.info, images)
             del images  # else they stay in memory for the whole run
             context = SinkContext(
@@ -134,8 +134,6 @@ def find_tracks(
                     row += [_label(result.frame.index + 1, track) for track in result.tracks]
                 frames = results[0].frame.index + 1
                 advance(1)
-        except (ConfigError, ImageError) as error:
-            raise VideoError(f"{clip.video}: {error}") from error
         if clip.until is not None and frames < clip.until:
             read_truth(
                 clip.truth_path, clip.roles, frame_count=frames

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.evaluate.images.scores import (
     Counting,
@@ -14,7 +15,7 @@ from vdet.evaluate.images.scores import (
 )
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.progress import Progress, no_progress
-from vdet.run.pictures import search_picture
+from vdet.run.pictures import detect_picture
 from vdet.run.threads import map_ordered
 
 
@@ -81,10 +82,11 @@ def measure(
     ImageError
         A picture cannot be read or searched; the message names it.
     """
+    settings = Settings()  # the whole picture, and no step
 
     def search(labelled: LabelledPicture) -> MeasuredImage:
         image = labelled.read()
-        found = search_picture(labelled.path, image, model)
+        found = detect_picture(labelled.path, image, model, settings).detections
         return MeasuredImage.of(labelled, image.shape[1], found, counting)
 
     measured = []

@@ -244,15 +244,14 @@ class VideoSink:
             whole_sound=not context.is_part,
             threads=context.codec_threads,
         )
-        timeout = context.timeout
-
-        def end_timeout() -> float | None:
-            return None if timeout is None else timeout + writer.size / FINISH_RATE
-
         with ExitStack() as stack:
-            self._encode = stack.enter_context(
-                write_async(writer.write, within=writer, timeout=timeout, end_timeout=end_timeout)
+            encoding = write_async(
+                writer.write,
+                within=writer,
+                timeout=context.timeout,
+                extra=lambda: writer.size / FINISH_RATE,
             )
+            self._encode = stack.enter_context(encoding)
             self._stack = stack.pop_all()
         return self
 
