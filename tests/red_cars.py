@@ -3,12 +3,13 @@
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from boxing import moved_to
 from vdet.batch.task import Work
-from vdet.boxes import Box
+from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import (
     FeatureSettings,
     HeatSettings,
@@ -123,3 +124,16 @@ def drive(count: int) -> Iterator[Frame]:
     """Give frames of a car that drives from left to right, 25 a second."""
     for index in range(count):
         yield Frame(index, Fraction(index, 25), Picture(road(car_at(index))))
+
+
+class NullDetector:
+    """A detector that finds nothing, in videos of any size."""
+
+    def for_video(self, *_: object) -> Self:
+        return self
+
+    def search(self, picture: Picture, index: int | None) -> None:
+        """Do nothing."""
+
+    def detect(self, candidates: None) -> Boxes:  # noqa: ARG002
+        return NO_BOXES

@@ -1,13 +1,11 @@
 """The loop: what is found in a video, what is kept, and what is left when something breaks."""
 
 import gc
-import json
 import threading
-import weakref
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from itertools import count, islice
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,7 @@ import numpy as np
 import pytest
 
 from conftest import Run
-from quick import QUICK, QUICK_OPTIONS
+from quick import QUICK_OPTIONS
 from red_cars import (
     HEIGHT,
     PERSPECTIVE,
@@ -31,22 +29,17 @@ from run.red_runs import (
     COUNT,
     follow,
     outputs,
-    read,
     run_red,
 )
 from running import write_drive
-from vdet.config.loading import load_settings
-from vdet.config.schema import DrawSettings, OutputSettings, Settings
-from vdet.detect.factory import load_detector
+from vdet.config.schema import Settings
 from vdet.errors import OutputError, VdetError, VideoError
 from vdet.media import Frame, VideoWriter
 from vdet.media.images import Image, read_image
 from vdet.media.planes import Planes
-from vdet.run.loop import FIRST_FRAMES, peek
+from vdet.run.loop import FIRST_FRAMES
 from vdet.run.threads import map_ordered
 from vdet.run.video import VideoJob, run_video
-from vdet.synthetic import frames, true_boxes
-from vdet.synthetic.scene import Scene
 from vdet.track.rules.tracker import RulesTracker
 
 QUEUED = 24
@@ -54,20 +47,6 @@ QUEUED = 24
 
 
 class TestFollowFrames:
-    def test_finds_the_vehicle_of_a_drawn_scene(self, scene: Scene, model_path: Path) -> None:
-        settings = load_settings(None, QUICK)
-        model = load_detector(settings.detector, model_path)
-        drawn = islice(frames(scene), 16)
-        results = list(follow(drawn, settings, width=320, height=180, model=model))
-        assert [result.frame.index for result in results] == list(range(16))
-        nearest = 3  # its number in the scene
-        overlaps = []
-        for result in results[8:]:
-            (box,) = (v.box for v in true_boxes(scene, result.frame.index) if v.id == nearest)
-            overlaps.append(max((track.box.iou(box) for track in result.tracks), default=0))
-        assert min(overlaps) > 0.3
-        assert np.mean(overlaps) > 0.5
-
     @pytest.mark.parametrize(
         ("settings", "least"), [(SETTINGS, 0.3), (PERSPECTIVE, 0.5)], ids=["original", "default"]
     )
@@ -132,24 +111,8 @@ class TestFirstFrames:
         assert [result.frame.index for result in results] == list(range(frames))
         assert [len(images) for images in asked] == [frames]
 
-    def test_no_more_frames_are_read_than_the_detector_needs(self) -> None:
-        source = drive(12)
-        images, same = peek(source)
-        assert len(images) == FIRST_FRAMES
-        assert next(source).index == FIRST_FRAMES
-        assert [frame.index for frame in same] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
-
 
 class TestMemory:
-    def test_the_first_frames_are_let_go_when_they_have_been_taken(self) -> None:
-        images, rest = peek(drive(COUNT))
-        first = weakref.ref(images[0])
-        del images
-        assert first() is not None
-        for _ in islice(rest, FIRST_FRAMES + 1):
-            pass
-        assert first() is None
-
     def test_a_whole_run_holds_few_frames_at_a_time(self, red_clip: Path, tmp_path: Path) -> None:
         def frames_alive() -> int:
             return sum(isinstance(item, Frame) for item in gc.get_objects())
@@ -216,25 +179,6 @@ class TestRun:
         one, other = (read_image(tmp_path / name / "3-hits.png") for name in ("alone", "whole"))
         np.testing.assert_array_equal(one, other)
 
-    def test_boxes_are_drawn_where_the_tracks_say(self, red_clip: Path, tmp_path: Path) -> None:
-        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        exact = {"output": OutputSettings(crf=1), "draw": DrawSettings(smoothing=None)}
-        run_red(VideoJob(red_clip, wanted, frames=20), SETTINGS.model_copy(update=exact))
-        records = [json.loads(line) for line in (tmp_path / "out.jsonl").read_text().splitlines()]
-        before, after = read(red_clip)[:20], read(tmp_path / "out.mp4")
-        for old, new, record in zip(before, after, records, strict=True):
-            change = np.abs(new.image.astype(int) - old.image).max(axis=2) > 20
-            if not record["tracks"]:
-                assert not change.any()
-                continue
-            (box,) = record["tracks"]
-            right, bottom = box["x"] + box["width"], box["y"] + box["height"]
-            assert change[bottom - 1, box["x"] : right].mean() > 0.9
-            assert change[box["y"] : bottom, right - 1].mean() > 0.9
-            assert not change[bottom + 3 :].any()
-            assert not change[:, right + 3 :].any()
-        assert records[-1]["tracks"]
-
 
 def _breaking(method: Callable[..., object], error: BaseException) -> Callable[..., object]:
     """Return a method that works ten times and then breaks."""
@@ -267,13 +211,6 @@ class TestBreakage:
 
         return breaks
 
-    def test_the_tracker_breaks(
-        self, job: VideoJob, breaks: Callable[[BaseException], None]
-    ) -> None:
-        breaks(RuntimeError("broken"))
-        with pytest.raises(RuntimeError, match="broken"):
-            run_red(job)
-
     @pytest.mark.parametrize("error", [OutputError("disk full"), OSError(28, "disk full")])
     def test_the_writer_breaks(
         self, job: VideoJob, monkeypatch: pytest.MonkeyPatch, error: OSError
@@ -287,13 +224,6 @@ class TestBreakage:
         monkeypatch.setattr("vdet.media.reader.Planes", _breaking(Planes, error))
         with pytest.raises(VdetError, match="its pixels"):
             run_red(job)
-
-    def test_the_progress_is_interrupted(self, job: VideoJob) -> None:
-        def interrupt(_: int) -> None:
-            raise KeyboardInterrupt
-
-        with pytest.raises(KeyboardInterrupt):
-            run_red(job, progress=lambda _: interrupt)
 
     def test_the_command_is_interrupted(
         self,

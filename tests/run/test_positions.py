@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from red_cars import NullDetector
 from run.red_runs import follow
 from vdet.boxes import Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
 from vdet.media import Frame, Picture
-from vdet.run.loop import NullDetector
 from vdet.run.pictures import detect_picture
 from vdet.run.result import FrameResult
 from vdet.run.steps import with_positions
@@ -102,15 +102,6 @@ def road() -> Road:
 
 def track_at(box: Box) -> Track:
     return Track(1, box, 0.9, predicted=False)
-
-
-def test_the_foot_of_the_whole_vehicle_counts(road: Road) -> None:
-    box = Box.sized(300, 200, 60, 50)
-    [plain] = with_positions([track_at(box)], road, 0)
-    [lower] = with_positions([replace(track_at(box), whole_foot=(330.0, 270.0))], road, 0)
-    assert plain.distance is not None
-    assert lower.distance is not None
-    assert lower.distance < plain.distance
 
 
 def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road) -> None:

@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from itertools import chain, islice
+from itertools import islice
 
 import pytest
 
@@ -14,7 +14,6 @@ from vdet.run.threads import (
     StalledError,
     map_ordered,
     prefetch,
-    run_in_thread,
     write_async,
 )
 
@@ -65,13 +64,6 @@ def threads_of_vdet() -> list[str]:
     return [thread.name for thread in threading.enumerate() if "vdet-" in thread.name]
 
 
-def stays(count: Callable[[], int], expected: int) -> bool:
-    """Wait until a count has the expected value; then return whether it still has it later."""
-    until(lambda: count() >= expected)
-    time.sleep(0.05)
-    return count() == expected
-
-
 def failing(error: BaseException, after: int) -> Iterator[int]:
     yield from range(after)
     raise error
@@ -109,14 +101,6 @@ class TestPrefetch:
         with prefetch(range(50), depth) as items:
             assert list(items) == list(range(50))
 
-    @pytest.mark.parametrize("depth", [1, 3])
-    def test_depth_items_wait_and_one_more_is_held(self, depth: int) -> None:
-        made: list[int] = []
-        with prefetch(recording(range(50), made), depth) as items:
-            for taken in range(4):
-                assert stays(lambda: len(made), taken + depth + 1)
-                next(items)
-
     @Errors
     def test_an_error_of_the_source_comes_after_what_it_gave(
         self, kind: type[BaseException]
@@ -127,15 +111,6 @@ class TestPrefetch:
             read.extend(items)
         assert caught.value is error
         assert read == list(range(7))
-
-    @Errors
-    def test_an_error_of_the_reader_ends_the_source(self, kind: type[BaseException]) -> None:
-        error = kind("reader")
-        made: list[int] = []
-        with pytest.raises(kind) as caught, prefetch(recording(range(10**9), made), 2) as items:
-            fail(error, after=next(items))
-        assert caught.value is error
-        assert len(made) <= 1 + 2 + 1
 
     @pytest.mark.parametrize("take", [1, 3])
     def test_a_generator_is_closed_by_the_thread_that_ran_it(self, take: int) -> None:
@@ -181,21 +156,6 @@ class TestPrefetch:
             next(setting(asked, given))
 
 
-class TestRunInThread:
-    def test_gives_what_the_call_gives(self) -> None:
-        assert run_in_thread(lambda: threading.current_thread().name) == "vdet-prefetch"
-
-    def test_raises_what_the_call_raises(self) -> None:
-        error = ValueError("call")
-        with pytest.raises(ValueError, match="call") as caught:
-            run_in_thread(lambda: fail(error, after=1))
-        assert caught.value is error
-
-    def test_a_call_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
-        with pytest.raises(StalledError):
-            run_in_thread(hang.wait, timeout=0.1)
-
-
 class TestWriteAsync:
     @pytest.mark.parametrize("depth", [1, 4, 100])
     def test_passes_all_items_on_in_order(self, depth: int) -> None:
@@ -203,65 +163,6 @@ class TestWriteAsync:
         with write_async(taken.append, depth) as hand_over:
             hand_all(range(50), hand_over)
         assert taken == list(range(50))
-
-    def test_depth_items_wait_while_another_is_taken(self) -> None:
-        gate = threading.Event()
-        handed: list[int] = []
-
-        def give_all() -> None:
-            for item in range(10):
-                hand_over(item)
-                handed.append(item)
-
-        with write_async(lambda _: gate.wait(), depth=3) as hand_over:
-            giver = threading.Thread(target=give_all)
-            giver.start()
-            try:
-                assert stays(lambda: len(handed), 3 + 1)
-            finally:
-                gate.set()
-                giver.join()
-        assert len(handed) == 10
-
-    @Errors
-    def test_an_error_of_the_taker_is_raised_at_one_of_the_next_items(
-        self, kind: type[BaseException]
-    ) -> None:
-        error = kind("taker")
-        taken: list[int] = []
-
-        def take(item: int) -> None:
-            if item == 3:
-                raise error
-            taken.append(item)
-
-        with pytest.raises(kind) as caught, write_async(take, 2) as hand_over:
-            hand_all(range(10**9), hand_over)
-        assert caught.value is error
-        assert taken == [0, 1, 2]
-
-    def test_an_error_at_the_last_item_is_raised_when_the_block_ends(self) -> None:
-        error = ValueError("taker")
-
-        def take(_: int) -> None:
-            raise error
-
-        with pytest.raises(ValueError, match="taker") as caught, write_async(take) as hand_over:
-            hand_over(0)
-        assert caught.value is error
-
-    def test_the_thread_enters_and_leaves_the_context(self) -> None:
-        seen: list[object] = []
-
-        @contextmanager
-        def within() -> Iterator[None]:
-            seen.append(threading.current_thread().name)
-            yield
-            seen.append("left")
-
-        with write_async(seen.append, within=within()) as hand_over:
-            hand_over(1)
-        assert seen == ["vdet-write", 1, "left"]
 
     @Errors
     def test_an_error_of_the_giver_is_an_error_in_the_context_too(
@@ -334,31 +235,6 @@ class TestWriteAsync:
                 put(item)
         assert passed == list(range(5))
 
-    def test_a_taker_that_hangs_is_abandoned(self, hang: threading.Event) -> None:
-        left: list[str] = []
-        first_is_taken = threading.Event()
-
-        def take(_: int) -> None:
-            first_is_taken.set()
-            hang.wait()
-
-        @contextmanager
-        def within() -> Iterator[None]:
-            try:
-                yield
-            except BaseException as error:
-                left.append(type(error).__name__)
-                raise
-
-        with (
-            pytest.raises(StalledError),
-            write_async(take, 1, within=within(), timeout=0.2) as hand_over,
-        ):
-            hand_all(chain([0], after(first_is_taken, range(10))), hand_over)
-        assert left == [], "the context of a thread that hangs must not be left"
-        hang.set()
-        until(lambda: left == ["_ClosedError"])
-
 
 class TestMapOrdered:
     @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -380,40 +256,6 @@ class TestMapOrdered:
         with map_ordered(str, recording(range(50), taken), threads) as pairs:
             for received, _ in enumerate(pairs, start=1):
                 assert len(taken) - received <= threads
-
-    @Errors
-    @pytest.mark.parametrize("threads", [1, 3])
-    def test_an_error_of_the_function_is_raised_instead_of_its_pair(
-        self, kind: type[BaseException], threads: int
-    ) -> None:
-        error = kind("function")
-        received: list[int] = []
-
-        def fail_at_5(item: int) -> int:
-            if item == 5:
-                raise error
-            return item
-
-        with pytest.raises(kind) as caught, map_ordered(fail_at_5, range(50), threads) as pairs:
-            received.extend(item for item, _ in pairs)
-        assert caught.value is error
-        assert received == list(range(5))
-
-    @Errors
-    def test_after_an_error_of_the_reader_no_item_is_begun(self, kind: type[BaseException]) -> None:
-        error = kind("reader")
-        begun: list[int] = []
-
-        def begin(item: int) -> None:
-            begun.append(item)
-
-        with (
-            pytest.raises(kind) as caught,
-            map_ordered(begin, range(10**9), threads=2) as pairs,
-        ):
-            fail(error, after=next(pairs))
-        assert caught.value is error
-        assert len(begun) <= 3
 
 
 class TestAllTogether:

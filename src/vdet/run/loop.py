@@ -12,12 +12,12 @@ from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, limited
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.lanes.road import LaneRequest
-from vdet.media import Frame, Picture, VideoInfo
+from vdet.media import Frame, VideoInfo
 from vdet.media.images import Image
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
-from vdet.run.threads import Waits, map_ordered
+from vdet.run.threads import map_ordered
 from vdet.track.factory import carrying, make_tracker
 from vdet.track.protocol import VideoTracker
 from vdet.track.track import Track
@@ -53,7 +53,6 @@ class Pipeline:
         source: Path = Path(),
         *,
         threads: int = 1,
-        waits: Waits | None = None,
     ) -> Generator[FrameResult]:
         """Find and follow the vehicles.
 
@@ -63,8 +62,6 @@ class Pipeline:
             The video, for the results.
         threads
             Number of frames that are searched at once. The results do not depend on it.
-        waits
-            Counts how long the loop waits for the search.
         """
         tracker, detector = carrying(self.tracker), self.detector
         prepared = [step for step in self.steps if isinstance(step, ParallelStep)]
@@ -78,7 +75,7 @@ class Pipeline:
             return True, detector.search(frame.picture, None if self.is_still else frame.index)
 
         ahead = threads * self.stride  # so that each thread has a frame to search
-        with map_ordered(search, enumerate(frames), threads, ahead=ahead, waits=waits) as results:
+        with map_ordered(search, enumerate(frames), threads, ahead=ahead) as results:
             for (_, frame), (searched, candidates) in results:
                 time, picture = float(frame.time), frame.picture
                 if searched:
@@ -156,24 +153,9 @@ def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
 class StillTracker:
     """Makes a track of each detection of a still picture."""
 
-    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
+    def update(self, detections: Boxes, *_: object) -> list[Track]:
         """Return a track for each detection, with ids from 1."""
         return [
             Track(number, each.box, each.score, predicted=False, class_name=each.class_name)
             for number, each in enumerate(detections, start=1)
         ]
-
-
-class NullDetector:
-    """A detector that finds nothing, for frames that are too small to be searched."""
-
-    def for_video(self, *_: object) -> "NullDetector":
-        """Return the detector."""
-        return self
-
-    def search(self, picture: Picture, index: int | None) -> None:
-        """Do nothing."""
-
-    def detect(self, candidates: None) -> Boxes:  # noqa: ARG002
-        """Return no detections."""
-        return NO_BOXES

@@ -8,13 +8,11 @@ after `JOIN_TIMEOUT`, together with the files that only it has open.
 import contextlib
 import queue
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext, suppress
-from operator import itemgetter
-from typing import Generic, Literal, TypeVar, get_args
+from typing import Generic, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -184,19 +182,17 @@ def map_ordered(
     threads: int,
     *,
     ahead: int | None = None,
-    waits: "Waits | None" = None,
 ) -> Iterator[Iterator[tuple[T, R]]]:
     """Pair items with the results of `function`, computed in parallel, in their order.
 
     At most `ahead` items are taken before the result of the first is waited for, or as many as
-    there are threads. `waits` counts how long results are waited for.
+    there are threads.
     """
     running: deque[tuple[T, Future[R]]] = deque()
 
     def first() -> tuple[T, R]:
         item, future = running.popleft()
-        with waits.on("searching") if waits else nullcontext():
-            return item, future.result()
+        return item, future.result()
 
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
@@ -212,44 +208,3 @@ def map_ordered(
             yield pairs()
         finally:
             pool.shutdown(cancel_futures=True)
-
-
-Part = Literal["reading", "searching", "encoding"]
-"""What the threads of a run do; the loop itself tracks and draws."""
-
-
-class Waits:
-    """Seconds that the loop of a run has waited for each part."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[Part, float] = dict.fromkeys(get_args(Part), 0.0)
-
-    @contextlib.contextmanager
-    def on(self, part: Part) -> Iterator[None]:
-        """Count the time of a block as waiting."""
-        began = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] += time.perf_counter() - began
-
-    def for_each(self, part: Part, items: Iterable[T]) -> Iterator[T]:
-        """Yield the items; the time until each is there counts as waiting."""
-        rest, end = iter(items), object()
-        while True:
-            with self.on(part):
-                item = next(rest, end)
-            if item is end:
-                return
-            yield item  # type: ignore[misc]
-
-    def describe(self, total: float) -> str:
-        """Describe what took most of the `total` seconds of a run, and what took how long."""
-        own = max(0.0, total - sum(self.seconds.values()))
-        part, longest = max(self.seconds.items(), key=itemgetter(1))
-        limit = part if longest > own else "tracking and drawing"
-        waited = ", ".join(f"{seconds:.1f} s for {part}" for part, seconds in self.seconds.items())
-        return (
-            f"{limit} limited the run: in {total:.1f} s it waited {waited}; tracking and drawing "
-            f"took {own:.1f} s"
-        )

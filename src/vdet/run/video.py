@@ -9,18 +9,26 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
+from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
+from vdet.detect.factory import as_model
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError
 from vdet.files import OutputFiles
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, VideoReader
 from vdet.progress import Progress, no_progress
-from vdet.run.loop import NullDetector, Pipeline, build, named_errors, peek
+from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sink, sink_kind
+from vdet.run.sinks.protocol import (
+    Output,
+    SinkContext,
+    check_sinks,
+    open_sink,
+    sink_kind,
+)
 from vdet.run.steps import Step
-from vdet.run.threads import StalledError, Waits, prefetch, run_in_thread
+from vdet.run.threads import StalledError, prefetch, run_in_thread
 from vdet.track.protocol import VideoTracker
 from vdet.workers import core_count
 
@@ -130,13 +138,11 @@ def open_video(
     *,
     tracker: VideoTracker | None = None,
     steps: Sequence[Step] = (),
-    waits: Waits | None = None,
 ) -> Iterator[OpenVideo]:
     """Open a video, and follow the vehicles through it; parameters and errors as in `run_video`.
 
     Reading and searching run in threads.
     """
-    waits = waits or Waits()
     timeout = job.timeout + float(job.start or 0)
 
     def open_reader() -> VideoReader:
@@ -152,20 +158,19 @@ def open_video(
     with ExitStack() as stack:
         stack.enter_context(named_errors(job.source, VideoError))
         stack.enter_context(_no_stall(job.source, timeout))
-        with waits.on("reading"):
-            reader = run_in_thread(open_reader, timeout=timeout)
+        reader = run_in_thread(open_reader, timeout=timeout)
         read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
         _check_times(job, reader.length)
-        images, frames = peek(waits.for_each("reading", read))
+        images, frames = peek(read)
         make = partial(build, settings=settings, video=reader.info, images=images, lanes=job.lanes)
         try:
             pipeline = make(model, tracker=tracker, steps=steps)
         except FrameSizeError as error:
             log.warning("%s: gets no boxes: %s", job.source, error)
-            pipeline = make(NullDetector())
+            pipeline = make(as_model(lambda _: NO_BOXES))
         del make, images  # else they stay in memory for the whole run
         threads = job.threads or core_count()
-        results = pipeline.follow(frames, job.source, threads=threads, waits=waits)
+        results = pipeline.follow(frames, job.source, threads=threads)
         yield OpenVideo(reader, pipeline, stack.enter_context(closing(results)))
 
 
@@ -200,7 +205,7 @@ def run_video(
 
     No output is left after an error.
     """
-    began, waits = time.perf_counter(), Waits()
+    began, writing = time.perf_counter(), 0.0
     ids: set[int] = set()
     frames, last = 0, None
     only_at = job.needs_only_at
@@ -208,9 +213,7 @@ def run_video(
         job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
     with ExitStack() as stack:
         files = stack.enter_context(OutputFiles(overwrite=job.overwrite))
-        video = stack.enter_context(
-            open_video(job, model, settings, tracker=tracker, steps=steps, waits=waits)
-        )
+        video = stack.enter_context(open_video(job, model, settings, tracker=tracker, steps=steps))
         reader, info = video.reader, video.reader.info
         context = SinkContext(
             files,
@@ -222,13 +225,14 @@ def run_video(
             timeout=job.timeout,
             outputs=job.outputs,
             stage_pictures=stage_pictures_of(video.pipeline.detector),
-            waits=waits,
         )
         sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
         advance = progress(None if only_at else reader.expected)
         for result in video.results:
+            written = time.perf_counter()
             for sink in sinks:
                 sink.write(result)
+            writing += time.perf_counter() - written
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
@@ -237,7 +241,10 @@ def run_video(
                 break
         _check_seen(job, last, reader.length)
     seconds = time.perf_counter() - began
-    log.info("%s: %s", job.source, waits.describe(seconds))
+    log.info(
+        "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
+        *(job.source, seconds - writing, writing),
+    )
     return RunTotals(info.width, info.height, frames, len(ids), seconds)
 
 

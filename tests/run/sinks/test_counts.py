@@ -72,13 +72,6 @@ def test_a_run_counts_the_red_car(red_clip: Path, tmp_path: Path) -> None:
     assert whole["zones"][0]["most"] == 1
 
 
-def test_counting_does_not_change_the_tracks(red_clip: Path, tmp_path: Path) -> None:
-    run_red(VideoJob(red_clip, outputs(tracks=tmp_path / "a.csv")))
-    wanted = outputs(tracks=tmp_path / "b.csv", counts=tmp_path / "c.csv")
-    run_red(VideoJob(red_clip, wanted), with_counts())
-    assert (tmp_path / "a.csv").read_text() == (tmp_path / "b.csv").read_text()
-
-
 def test_running_counts_are_drawn_if_asked_for(red_clip: Path, tmp_path: Path) -> None:
     drawn = COUNTS_AT.model_copy(update={"drawn": True})
     for name, counts in (("plain.mp4", COUNTS_AT), ("drawn.mp4", drawn)):
@@ -122,15 +115,6 @@ def test_a_batch_has_a_file_over_all_videos(suffix: str, red_clip: Path, tmp_pat
         whole = json.loads(text)
         assert whole["videos"]["b"] == json.loads(paths["b"].read_text())
         assert whole["totals"][0] == {"name": "gate", "direction": "out", "count": 2, "classes": {}}
-
-
-@pytest.mark.parametrize("suffix", [".csv", ".json"])
-def test_a_name_of_a_video_that_is_no_text_is_escaped(
-    suffix: str, red_clip: Path, tmp_path: Path
-) -> None:
-    run_red(VideoJob(red_clip, outputs(counts=tmp_path / f"a{suffix}")), with_counts())
-    join_counts({"clip\udcff": tmp_path / f"a{suffix}"}, tmp_path / f"all{suffix}")
-    assert "\\udcff" in (tmp_path / f"all{suffix}").read_text(encoding="utf-8")
 
 
 def test_a_page_shows_the_counts(red_clip: Path, tmp_path: Path) -> None:

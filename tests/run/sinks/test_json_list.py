@@ -11,7 +11,6 @@ from red_cars import road
 from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.lanes import LaneSettings
-from vdet.errors import OutputError
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track
@@ -63,8 +62,3 @@ def test_with_lanes_boxes_have_their_distance_and_lane(tmp_path: Path) -> None:
 def test_a_dash_is_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     write(Output("json", Path("-")), RESULTS, video=None)
     assert read(capsys.readouterr().out) == list(ITEMS)
-
-
-def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match=r"boxes\.json: cannot be written"):
-        write(Output("json", tmp_path / "none" / "boxes.json"), RESULTS, video=None)

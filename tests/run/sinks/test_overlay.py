@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from boxing import moved_to
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box
@@ -30,7 +29,6 @@ from vdet.track.track import Track
 LENS = CalibratedCamera(
     WIDTH, HEIGHT, ((240, 0, 160), (0, 240, 120), (0, 0, 1)), (-0.35, 0.1, 0.0, 0.0, 0.0), 0.4
 )
-CORNER = Box.sized(0, 0, 12, 12)
 LANE = Lane(
     curvature=0.0,
     radius=None,
@@ -68,12 +66,6 @@ def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
     np.testing.assert_array_equal(drawn_on(result_of(CAR)), expected)
 
 
-def test_scores_stand_beside_the_ids_where_they_are_asked_for() -> None:
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "#1 0.90")
-    np.testing.assert_array_equal(drawn_on(result_of(CAR), label=("id", "score")), expected)
-
-
 def test_predicted_vehicles_are_drawn_dashed() -> None:
     seen, predicted = (Track(1, CAR, 0.9, predicted=flag) for flag in (False, True))
     expected = road(CAR)
@@ -94,13 +86,6 @@ def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     draw_box(expected, undistorted.undistorter.box(CAR), color_of(1), "#1")
     drawn = drawn_on(result_of(CAR, found=undistorted))
     np.testing.assert_array_equal(drawn, expected)
-
-
-def test_a_vehicle_that_undistortion_moves_out_of_the_picture_is_not_drawn() -> None:
-    undistorted = road_seen(LENS)
-    assert undistorted.undistorter.box(CORNER).area == 0
-    drawn = drawn_on(result_of(CORNER, found=undistorted))
-    np.testing.assert_array_equal(drawn, undistorted.image)
 
 
 def test_the_frames_of_the_result_are_not_drawn_on() -> None:
@@ -142,28 +127,6 @@ def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
 
 def white(width: int, height: int) -> Image:
     return np.full((height, width, 3), 255, np.uint8)
-
-
-def test_only_boxes_and_their_labels_are_drawn_on() -> None:
-    boxes = [Box.sized(200, 400, 120, 90), Box.sized(800, 420, 240, 150)]
-    image = drawn_on(result_of(*boxes, image=white(1280, 720)))
-    allowed = np.zeros(image.shape[:2], bool)
-    for box in boxes:
-        allowed[box.y1 - 32 : box.y2, box.x1 : box.x2] = True
-        allowed[box.y1 + 5 : box.y2 - 5, box.x1 + 5 : box.x2 - 5] = False
-    drawn = (image != 255).any(axis=2)
-    assert drawn.any()
-    assert not (drawn & ~allowed).any()
-
-
-def test_each_id_has_its_own_color() -> None:
-    result = result_of(
-        Box.sized(20, 100, 50, 50), Box.sized(200, 100, 50, 50), image=white(320, 240)
-    )
-    three, four = (replace(track, id=track.id + 2) for track in result.tracks)
-    image = drawn_on(replace(result, tracks=(three, four)))
-    assert tuple(image[149, 45]) == color_of(3)
-    assert tuple(image[149, 225]) == color_of(4)
 
 
 # Labels
@@ -231,20 +194,6 @@ def test_a_vehicle_is_not_missed_in_frames_that_are_not_searched(predicted: str)
         np.testing.assert_array_equal(shown(overlay, result), expected)
 
 
-def test_lines_can_be_thicker() -> None:
-    widths = []
-    for thickness in (1.0, 3.0):
-        image = drawn_on(result_of(CAR), thickness=thickness, label=())
-        column = (
-            Box(CAR.x1 + CAR.width // 2, CAR.y1, CAR.x1 + CAR.width // 2 + 1, CAR.y2).cut(image)[
-                :, 0
-            ]
-            == color_of(1)
-        ).all(axis=1)
-        widths.append(int(column[: CAR.height // 2].sum()))
-    assert widths[1] == 3 * widths[0]
-
-
 def test_colors_can_be_those_of_the_classes() -> None:
     boxes = [Box.sized(10 + 60 * n, 100, 50, 50) for n in range(5)]
     names = ["car", "car", "truck", "tram", None]
@@ -305,27 +254,6 @@ def test_a_trail_is_the_path_of_the_feet_in_the_last_seconds() -> None:
     assert abs(min(trail_columns(0.4)) - (end - 40)) <= 4
 
 
-def test_with_lanes_trails_lie_where_undistortion_puts_the_feet() -> None:
-    seen = road_seen(LENS)
-    foot = np.array([[CAR.x1 + CAR.width / 2, float(CAR.y2)]])
-    ((x, y),) = seen.undistorter.points(foot).tolist()
-    assert abs(y - CAR.y2) > 1, "the lens moves the foot"
-    overlay = overlay_with(trails=1.0, boxes=False, label=(), smoothing=None)
-    for number in range(10):
-        start = moved_to(CAR, CAR.x1 - 4 * (9 - number), CAR.y1)
-        drawn = shown(overlay, result_of(start, found=seen, time=Fraction(number, 25)))
-    rows, columns = np.nonzero((drawn != seen.image).any(axis=2))
-    assert abs(columns.max() - x) <= 2
-    assert abs(rows[columns == columns.max()].mean() - y) <= 2
-
-
-def test_trails_of_vehicles_that_are_gone_are_forgotten() -> None:
-    overlay = overlay_with(trails=1.0)
-    for result in passing(50):
-        overlay.draw(replace(result, tracks=(replace(SEEN, id=result.frame.index + 1),)))
-    assert len(overlay._trails) <= 26
-
-
 def test_a_still_picture_has_no_trail_and_no_time() -> None:
     plain = drawn_on(result_of(CAR), video=None)
     asked = drawn_on(result_of(CAR), video=None, trails=2.0, time=True)
@@ -367,10 +295,3 @@ def test_boxes_that_tremble_are_drawn_steadily() -> None:
         drawn = [np.nonzero((image != 255).any(axis=(0, 2)))[0].min() for image in images[20:]]
         lefts.append(np.ptp(drawn))
     assert lefts[1] < lefts[0] == 2
-
-
-def test_boxes_that_are_smoothed_stay_in_the_frame() -> None:
-    overlay = overlay_with()
-    for number in range(60):
-        box = Box.sized(max(0, 150 - 8 * number), 100, 60, 50)
-        overlay.draw(result_of(box, image=white(320, 240), time=Fraction(number, 25)))

@@ -81,24 +81,6 @@ def test_every_sink_gets_each_result_once_and_in_order(
     assert any(result.tracks for result in last.results)
 
 
-def test_no_sink_changes_the_image_that_the_others_get(
-    red_clip: Path, tmp_path: Path, collect: Callable[[str], Collects]
-) -> None:
-    before, after = collect("before"), collect("after")
-    (tmp_path / "stages").mkdir()
-    wanted = (
-        Output("before", tmp_path),
-        *outputs(video=tmp_path / "a.mp4", stages=tmp_path / "stages"),
-        Output("after", tmp_path),
-    )
-    run_red(VideoJob(red_clip, wanted, frames=20))
-    assert any(result.tracks for result in before.results), "nothing was drawn"
-    read_again = [frame.image for frame in read(red_clip)]
-    for index, result in enumerate(after.results):
-        for image in (before.images[index], after.images[index], read_again[index]):
-            np.testing.assert_array_equal(result.frame.image, image)
-
-
 @dataclass
 class Fragile:
     """A sink that writes a line a frame, and fails at a moment, once."""
@@ -178,18 +160,6 @@ class TestFailure:
         assert len(list((tmp_path / "stages").iterdir())) == 5
 
     @pytest.mark.parametrize("moment", ["middle", "end"])
-    def test_earlier_outputs_stay_as_they_were(
-        self, job: VideoJob, register: Register, tmp_path: Path, moment: str
-    ) -> None:
-        for name in ("fragile.txt", "out.mp4", "out.csv"):
-            (tmp_path / name).write_text("precious")
-        self.set_failure(register, moment, RuntimeError("broken"))
-        with pytest.raises(RuntimeError, match="broken"):
-            run_red(job)
-        for name in ("fragile.txt", "out.mp4", "out.csv"):
-            assert (tmp_path / name).read_text() == "precious"
-
-    @pytest.mark.parametrize("moment", ["middle", "end"])
     def test_an_error_of_the_disk_names_the_output_that_it_hit(
         self, job: VideoJob, register: Register, tmp_path: Path, moment: str
     ) -> None:
@@ -264,18 +234,6 @@ class TestCheck:
     ) -> None:
         with pytest.raises(OutputError, match=rf"{name}: {what} are written as \.\w+, "):
             check_sinks([Output(sink, tmp_path / name)], overwrite=False)
-
-    @pytest.mark.parametrize(("sink", "name"), [("video", "A.MP4"), ("tracks", "a.Csv")])
-    def test_the_case_of_a_suffix_does_not_matter(
-        self, tmp_path: Path, sink: str, name: str
-    ) -> None:
-        check_sinks([Output(sink, tmp_path / name)], overwrite=False)
-
-    def test_the_folder_of_an_output_is_made_where_the_output_is_a_folder(
-        self, tmp_path: Path
-    ) -> None:
-        check_sinks([Output("stages", tmp_path / "new" / "stages")], overwrite=False)
-        assert (tmp_path / "new" / "stages").is_dir()
 
     def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "3-boxes.png").touch()

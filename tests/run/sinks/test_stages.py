@@ -17,7 +17,6 @@ from vdet.lanes.road import Lane, Road
 from vdet.media.images import Image, read_image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
-from vdet.track.track import Track
 
 NAMES = ["1-patches.png", "2-windows.png", "3-hits.png", "4-heat.png", "5-boxes.png"]
 
@@ -55,30 +54,10 @@ def test_the_moment_counts_from_the_first_frame(tmp_path: Path) -> None:
     assert (Box(CAR.x1, CAR.y2 - 1, CAR.x2, CAR.y2).cut(picture)[0] == color_of(1)).all()
 
 
-def test_pictures_are_made_once(tmp_path: Path) -> None:
-    first, second = detected(time=Fraction(1)), detected(CAR, time=Fraction(2))
-    stages(tmp_path / "one", Fraction(0), first)
-    stages(tmp_path / "two", Fraction(0), first, second)
-    for name in NAMES:
-        one, two = (tmp_path / folder / name for folder in ("one", "two"))
-        assert one.read_bytes() == two.read_bytes()
-
-
-def test_a_moment_that_never_comes_gives_no_pictures(tmp_path: Path) -> None:
-    assert stages(tmp_path / "stages", Fraction(9), detected()) == []
-
-
 @pytest.mark.parametrize("lane", [None, LANE])
 def test_pictures_show_the_lane_where_it_is_looked_for(tmp_path: Path, lane: Lane | None) -> None:
     names = stages(tmp_path, Fraction(0), detected(found=replace(road_seen(LENS), lane=lane)))
     assert names == [*NAMES, "6-road.png", "7-above.png", "8-mask.png", "9-fit.png"]
-
-
-def test_pictures_of_an_earlier_run_are_replaced(tmp_path: Path) -> None:
-    stages(tmp_path, Fraction(0), detected(CAR))
-    before = (tmp_path / "5-boxes.png").read_bytes()
-    assert stages(tmp_path, Fraction(0), detected()) == NAMES
-    assert (tmp_path / "5-boxes.png").read_bytes() != before
 
 
 def test_a_detector_without_pictures_of_its_own_gets_that_of_the_boxes(tmp_path: Path) -> None:
@@ -108,10 +87,6 @@ class TestBoxes:
         np.testing.assert_array_equal(result.frame.image, before)
         return read_image(folder / name)
 
-    def test_where_nothing_is_found_the_frame_is_shown_as_it_is(self, tmp_path: Path) -> None:
-        picture = self.picture(tmp_path, result_of(image=road()))
-        np.testing.assert_array_equal(picture, road())
-
     def test_vehicles_are_drawn_with_their_ids_and_scores(self, tmp_path: Path) -> None:
         plain, boxed = (
             self.picture(tmp_path / name, result_of(*boxes, image=road()))
@@ -120,12 +95,6 @@ class TestBoxes:
         side = np.s_[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
         assert (boxed[side] != plain[side]).any(axis=1).all()
         assert (boxed[: CAR.y1] != plain[: CAR.y1]).any(), "the label stands above the box"
-
-    def test_predicted_vehicles_are_drawn_dashed(self, tmp_path: Path) -> None:
-        track = Track(1, CAR, 0.9, predicted=True)
-        picture = self.picture(tmp_path, result_of(track, image=road()))
-        side = (Box(CAR.x1, CAR.y2 - 1, CAR.x2, CAR.y2).cut(picture)[0] == color_of(1)).all(axis=1)
-        assert 0.2 < side.mean() < 0.8
 
     def test_detections_are_drawn_even_where_no_vehicle_is_shown(self, tmp_path: Path) -> None:
         result = detected()

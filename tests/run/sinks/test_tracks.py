@@ -1,7 +1,7 @@
 """Files of tracks in each format."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -13,8 +13,6 @@ from run.red_runs import result_of, write
 from vdet.boxes import Box
 from vdet.config.lanes import LaneSettings
 from vdet.errors import OutputError
-from vdet.labels.formats import track_suffixes
-from vdet.labels.reading import read_predictions
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder, lane_record
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
@@ -100,34 +98,6 @@ def test_json_lines_tell_the_lane_where_it_was_looked_for(tmp_path: Path) -> Non
         lanes.append(record.pop("lane"))
         assert record == json.loads(other)
     assert lanes == [lane_record(LANE), None, None]
-
-
-@pytest.mark.parametrize("suffix", [".txt", ".csv"])
-def test_other_formats_have_no_place_for_a_lane(tmp_path: Path, suffix: str) -> None:
-    assert written_with_lanes(tmp_path / f"a{suffix}") == written(tmp_path / f"b{suffix}")
-
-
-@pytest.mark.parametrize("suffix", track_suffixes())
-def test_an_error_leaves_no_half_written_tracks(tmp_path: Path, suffix: str) -> None:
-    def interrupted() -> Iterator[FrameResult]:
-        yield RESULTS[0]
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write(Output("tracks", tmp_path / f"tracks{suffix}"), interrupted())
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("suffix", [each for each in track_suffixes() if each != ".yolo.zip"])
-def test_written_tracks_are_read_back_by_the_evaluation(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / f"tracks{suffix}"
-    written(path)
-    video = read_predictions(path)
-    assert video.frames.tolist() == [5, 7, 7]
-    assert video.ids.tolist() == [1, 1, 2]
-    assert video.boxes.tolist() == [[10, 20, 40, 60], [11, 21, 42, 62], [0, -3, 5, 3]]
-    if suffix != ".xml":  # which has no scores
-        assert video.scores.tolist() == [0.9877, 0.5, 1]
 
 
 def test_formats_that_describe_the_video_are_not_for_pictures(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ from vdet.traffic.records import VehicleRecords, join_records, write_records
 from vdet.traffic.tables import SUFFIXES
 
 
-class TrackSink:
+class TrackSink(BaseSink):
     """Writes the shown tracks of each frame; the end of the name chooses the format.
 
     The formats are those of `vdet.labels.formats`. The path `-` stands for standard output, as
@@ -39,28 +39,25 @@ class TrackSink:
     `right`: each line as `[[x, y], …]`, pixels of the undistorted frame, the nearest point first.
     """
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        self._path = path
-        self._context = context
-        self._file: BinaryIO | None = None
-        self._writer: TrackWriter
+    _file: BinaryIO | None = None
+    _writer: TrackWriter
 
     def __enter__(self) -> Self:
-        if self._path == STANDARD_OUTPUT:
+        if self.path == STANDARD_OUTPUT:
             self._writer = JSON_LINES.write(sys.stdout.buffer, None)
             return self
-        form = format_for(self._path)
+        form = format_for(self.path)
         assert form is not None  # the suffixes of the kind say so
-        video = self._context.video
+        video = self.context.video
         if form.needs_video and video is None:
             raise OutputError(
-                f"{self._path}: {form.name} is for videos; give another format for pictures"
+                f"{self.path}: {form.name} is for videos; give another format for pictures"
             )
         source = None
         if video is not None:  # a whole video has the frames that are read
-            frames = video.frames if self._context.is_part else None
+            frames = video.frames if self.context.is_part else None
             source = SourceVideo(video.path.name, video.width, video.height, frames)
-        self._file = self._context.files.stage(self._path).open("wb")
+        self._file = self.context.files.stage(self.path).open("wb")
         self._writer = form.write(self._file, source)
         return self
 

@@ -2,7 +2,6 @@
 
 import zlib
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -58,8 +57,8 @@ class Overlay:
     """
 
     def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
-        self._settings = settings.draw
-        self._all_settings = settings
+        self._settings = settings
+        self._draws = settings.draw
         self._regions: Regions | None = None
         self._start = video.start if video else None
         automatic = VIDEO_LABEL if video else PICTURE_LABEL
@@ -83,9 +82,11 @@ class Overlay:
         shown = _placed(shown, result.road, surface)
         self._draw_trails(surface, shown, colors, float(result.frame.time))
         self._draw_vehicles(surface, shown, colors)
-        if self._settings.time and self._start is not None:
+        if self._draws.time and self._start is not None:
             time = time_text(result.frame.time - self._start)
             draw_label(surface, time, (0, surface.shape[0]), BLACK)
+        if result.counter and self._settings.counts.drawn:
+            draw_running_counts(surface, result.counter, result.road)
         return surface
 
     def _surface(self, result: FrameResult) -> Surface:
@@ -104,14 +105,14 @@ class Overlay:
         tracks = list(result.tracks)
         if self._steady:
             tracks = self._steady.update(tracks, float(result.frame.time))
-        if self._settings.predicted == "hidden":
+        if self._draws.predicted == "hidden":
             tracks = [track for track in tracks if track.id not in self._missed]
         return sorted(tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(
         self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color], now: float
     ) -> None:
-        longest = self._settings.trails
+        longest = self._draws.trails
         if self._start is None or not longest:
             return
         for track in shown:
@@ -121,7 +122,7 @@ class Overlay:
                 self._trails[id_] = kept
             else:
                 del self._trails[id_]
-        width = line_width(surface, self._settings.thickness)
+        width = line_width(surface, self._draws.thickness)
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
             draw_trail(surface, path, colors[track.id], width)
@@ -129,7 +130,7 @@ class Overlay:
     def _draw_vehicles(
         self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color]
     ) -> None:
-        settings = self._settings
+        settings = self._draws
         if settings.boxes:
             for track in shown:
                 dashed = settings.predicted == "dashed" and track.id in self._missed
@@ -140,22 +141,22 @@ class Overlay:
                 draw_label(surface, text, (track.box.x1, track.box.y1), colors[track.id])
 
     def _color(self, track: Track, picture: Picture) -> Color:
-        match self._settings.colors:
+        match self._draws.colors:
             case "id":
-                return color_of(track.id)
+                number: int | None = track.id
             case "class":
-                return _class_color(track.class_name)
+                number = _class_number(track.class_name)
             case "region":
-                return self._region_color(track, picture)
+                number = self._region_number(track, picture)
             case "one":
                 return GREEN
+        return WHITE if number is None else color_of(number)
 
-    def _region_color(self, track: Track, picture: Picture) -> Color:
-        """Return the colour of the first polygon in which a vehicle stands; white in none."""
+    def _region_number(self, track: Track, picture: Picture) -> int | None:
+        """Return the number of the first polygon in which a vehicle stands; None in none."""
         if self._regions is None:
-            self._regions = Regions(self._all_settings.regions, picture.width, picture.height)
-        number = self._regions.number_at(track.foot)
-        return color_of(number) if number else WHITE
+            self._regions = Regions(self._settings.regions, picture.width, picture.height)
+        return self._regions.number_at(track.foot) or None
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:
@@ -176,13 +177,12 @@ def time_text(time: Fraction) -> str:
     return f"{minutes // 60}:{minutes % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
 
 
-def _class_color(name: str | None) -> Color:
-    """Return the colour of a class; white where the detector does not tell it."""
+def _class_number(name: str | None) -> int | None:
     if name is None:
-        return WHITE
+        return None
     if name in OUR_NAMES:
-        return color_of(OUR_NAMES.index(name) + 1)
-    return color_of(len(OUR_NAMES) + 1 + zlib.crc32(name.encode()) % _OTHER_CLASSES)
+        return OUR_NAMES.index(name) + 1
+    return len(OUR_NAMES) + 1 + zlib.crc32(name.encode()) % _OTHER_CLASSES
 
 
 def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> list[Track]:
@@ -223,49 +223,36 @@ def _on_road(points: Sequence[Point], road: Road | None) -> list[Point]:
     return [(x, y) for x, y in road.undistorter.points(np.array(points, np.float64)).tolist()]
 
 
-class VideoSink:
+class VideoSink(BaseSink):
     """Draws into copies of the frames, and encodes them in a thread."""
 
-    def __init__(self, path: Path, context: SinkContext) -> None:
-        assert context.video is not None  # `takes` says so
-        self._path = path
-        self._context = context
-        self._video = context.video
-        self._overlay = Overlay(context.settings, context.video)
-        self._stack = ExitStack()
-
     def __enter__(self) -> Self:
-        context = self._context
+        context = self.context
+        self._overlay = Overlay(context.settings, self.video)
         writer = VideoWriter(
-            context.files.stage(self._path, may_replace_video),
-            self._video,
+            context.files.stage(self.path, may_replace_video),
+            self.video,
             context.settings.output,
-            name=self._path,
+            name=self.path,
             whole_sound=not context.is_part,
             threads=context.codec_threads,
         )
-        with ExitStack() as stack:
-            encoding = write_async(
-                writer.write,
-                within=writer,
-                timeout=context.timeout,
-                extra=lambda: writer.size / FINISH_RATE,
-            )
-            self._encode = stack.enter_context(encoding)
-            self._stack = stack.pop_all()
+        self._encoding = write_async(
+            writer.write,
+            within=writer,
+            timeout=context.timeout,
+            extra=lambda: writer.size / FINISH_RATE,
+        )
+        self._encode = self._encoding.__enter__()
         return self
 
     def __exit__(self, *raised: Any) -> None:
-        with self._context.waits.on("encoding"):
-            self._stack.__exit__(*raised)
+        self._encoding.__exit__(*raised)
 
     def write(self, result: FrameResult) -> None:
         """Draw the shown vehicles, and give the frame to the encoder."""
         surface = self._overlay.draw(result)
-        if result.counter and self._context.settings.counts.drawn:
-            draw_running_counts(surface, result.counter, result.road)
-        with self._context.waits.on("encoding"):
-            self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
+        self._encode(Frame(result.frame.index, result.frame.time, Picture(surface)))
 
 
 VIDEO = SinkKind(VideoSink, VIDEO_SUFFIXES, "videos", takes="videos", may_replace=may_replace_video)

@@ -1,10 +1,10 @@
 """The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
 from vdet.config.schema import Settings
@@ -21,28 +21,17 @@ from vdet.files import (
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
-from vdet.run.threads import Waits
 
 STANDARD_OUTPUT = Path("-")
 
 
-class Sink(Protocol):
+class Sink(AbstractContextManager["Sink"], Protocol):
     """Takes the results of a run, frame by frame; a context manager.
 
     It writes into files that it gets from `SinkContext.files`. They appear under their names when
     the whole run ends without an error, and not at all otherwise. When the `with` block of the sink
     ends without an error, its files must be complete.
     """
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-        /,
-    ) -> None: ...
 
     def write(self, result: FrameResult) -> None:
         """Take the next result. It must not change the frame's image."""
@@ -79,8 +68,6 @@ class SinkContext:
     stage_pictures
         Returns a picture of each stage of the detection by its name, in order. It takes the image
         of a frame and its detections.
-    waits
-        Counts how long the run waits for an encoder.
     """
 
     files: OutputFiles
@@ -92,7 +79,6 @@ class SinkContext:
     timeout: float | None = None
     outputs: tuple[Output, ...] = ()
     stage_pictures: StagePictures = lambda *_: {}
-    waits: Waits = field(default_factory=Waits)
 
 
 class BaseSink:
