@@ -185,7 +185,6 @@ class TestRegions:
     @pytest.mark.parametrize(
         "command",
         [
-            ("eval", "video", "red.mp4", "--truth", "gt.txt"),
             ("eval", "images", "pictures"),
             ("mine", "red.mp4", "--truth", "gt.txt", "-o", "mined.zip"),
         ],

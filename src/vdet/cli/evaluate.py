@@ -177,23 +177,26 @@ def tracks(
     multiple=True,
 )
 @options.sink_option
-@options.settings_options("tracker.needed=0.3", options.model_option)
+@options.lane_options
+@options.settings_options("tracker.needed=0.3", options.regions_option, options.model_option)
 @results_options
 def video(
     videos: tuple[Path, ...],
     truths: tuple[Path, ...],
     until: int | None,
     sweeps: tuple[str, ...],
+    lanes: options.LaneChoice,
     choice: options.SettingsChoice,
     results: Results,
 ) -> None:
     """Measure detection and tracking in labelled video.
 
-    Vehicles are found and followed in each video IN, and compared with its truth.
+    Vehicles are found and followed in each video IN, and compared with its truth. With --regions,
+    vehicles outside the regions do not count.
     """
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
-    base = choice.read_for_whole_frames()
+    base = choice.read()
     from vdet.detect.factory import model_file
     from vdet.evaluate.clips.clip import Variant, open_clip
     from vdet.evaluate.clips.evaluate import evaluate_clips
@@ -202,15 +205,18 @@ def video(
     from vdet.evaluate.clips.text import plain, result_lines
     from vdet.evaluate.output import run_lines, run_name
     from vdet.labels.roles import Roles
+    from vdet.regions import check_mask
     from vdet.run.sinks.protocol import check_sinks
 
+    check_mask(base.regions)
+    request = lanes.read()
     swept = grid(with_values_in_force(sweeps, base))
     outputs = options.as_outputs(options.wanted_outputs())
     if outputs and (len(swept) > 1 or len(videos) > 1):
         raise click.UsageError("--sink is for one video under one setting; leave out the others")
     variants = []
     for extra in swept:
-        settings = choice.read_for_whole_frames(*extra)
+        settings = choice.read(*extra)
         model = choice.load_detector(settings.detector)
         variants.append(Variant(settings, model, extra))
     detectors = [variant.settings.detector for variant in variants]
@@ -222,7 +228,12 @@ def video(
     clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
     with progress_steps(" frames") as steps:
         runs = evaluate_clips(
-            clips, variants, partial(steps, ""), outputs=outputs, overwrite=results.overwrite
+            clips,
+            variants,
+            partial(steps, ""),
+            outputs=outputs,
+            lanes=request,
+            overwrite=results.overwrite,
         )
     name = run_name(detectors[0], choice.model_path, choice.config_name, choice.assignments)
     results.print(

@@ -140,9 +140,22 @@ def test_only_the_frames_that_the_truth_covers_are_read(
 ) -> None:
     steps: list[int] = []
     clip = open_clip(clip_path, truth_path)
-    (found,) = find_tracks(clip, [variant()], lambda _: steps.append)
+    ((found, _),) = find_tracks(clip, [variant()], lambda _: steps.append)
     assert found.frame_count == len(steps) == FRAMES
     assert found.rate == 25
+
+
+def test_vehicles_outside_the_regions_do_not_count(
+    clip_path: Path, truth_path: Path, variant: OfModel
+) -> None:
+    clip = open_clip(clip_path, truth_path)
+    middle = 220  # of 320 pixels; two of the three vehicles are to the left of it
+    left = "{name: left, points: [[0, 0], [0.6875, 0], [0.6875, 1], [0, 1]]}"
+    ((found, truth),) = find_tracks(clip, [variant(f"regions.polygons=[{left}]")], no_progress)
+    assert (found.boxes[:, [0, 2]].mean(axis=1) <= middle).all()
+    outside = truth.boxes[:, [0, 2]].mean(axis=1) > middle
+    assert 0 < outside.sum() < len(truth)
+    np.testing.assert_array_equal(truth.ignored, outside | clip.truth.ignored)
 
 
 def test_truth_beyond_the_video_is_refused_with_its_line(
@@ -183,7 +196,7 @@ def test_outputs_get_the_results_under_the_first_of_the_settings(
 ) -> None:
     tracks = tmp_path / "found.csv"
     variants = [variant(), variant("detector.heat.threshold=5000")]
-    first, second = find_tracks(
+    (first, _), (second, _) = find_tracks(
         open_clip(clip_path, truth_path),
         variants,
         no_progress,

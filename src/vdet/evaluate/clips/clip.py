@@ -13,6 +13,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from vdet.boxes import Box
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, VideoDetector, stage_pictures_of
 from vdet.errors import VideoError
@@ -21,9 +24,11 @@ from vdet.labels.label import Label
 from vdet.labels.reading import read_truth
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.labels.video import LabelledVideo
+from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.media.images import Image
 from vdet.progress import Progress
+from vdet.regions import Regions, lay_regions
 from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
@@ -85,9 +90,13 @@ def find_tracks(
     progress: Progress,
     outputs: Sequence[Output] = (),
     *,
+    lanes: LaneRequest | None = None,
     overwrite: bool = False,
-) -> list[LabelledVideo]:
+) -> list[tuple[LabelledVideo, LabelledVideo]]:
     """Find and follow the vehicles of a clip under each of the settings, in one pass.
+
+    Returns the tracks and the truth for each of them. Vehicles of the truth that stand outside the
+    regions are ignored.
 
     Parameters
     ----------
@@ -96,6 +105,8 @@ def find_tracks(
         the number of frames done since the last call.
     outputs
         Outputs that get the results under the first of the settings.
+    lanes
+        If it is given, the lane is found too, for the outputs.
     overwrite
         Replace outputs that are there.
 
@@ -118,7 +129,7 @@ def find_tracks(
         images, read = peek(reader)
         advance = progress(reader.expected)
         with named_errors(clip.video, VideoError):
-            pipelines = build_variants(variants, reader.info, images)
+            pipelines = build_variants(variants, reader.info, images, lanes)
             del images  # else they stay in memory for the whole run
             context = SinkContext(
                 files,
@@ -138,12 +149,29 @@ def find_tracks(
             read_truth(
                 clip.truth_path, clip.roles, frame_count=frames
             )  # raises an error with the line
-        rate = float(reader.info.rate)
-    return [LabelledVideo.of(each, frame_count=frames, rate=rate) for each in rows]
+        info, truth = reader.info, clip.truth.until(frames)
+    return [
+        (
+            LabelledVideo.of(each, frame_count=frames, rate=float(info.rate)),
+            _in_regions(truth, lay_regions(variant.settings.regions, info.width, info.height)),
+        )
+        for each, variant in zip(rows, variants, strict=True)
+    ]
+
+
+def _in_regions(truth: LabelledVideo, regions: Regions | None) -> LabelledVideo:
+    """Return the truth of a video, in which vehicles outside the regions are ignored."""
+    if regions is None:
+        return truth
+    outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
+    return replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
 
 
 def build_variants(
-    variants: Sequence[Variant], video: VideoInfo, images: Sequence[Image]
+    variants: Sequence[Variant],
+    video: VideoInfo,
+    images: Sequence[Image],
+    lanes: LaneRequest | None = None,
 ) -> list[Pipeline]:
     """Build what the frames go through under each of the settings; `images` are from `peek`.
 
@@ -152,7 +180,7 @@ def build_variants(
     searches: dict[Hashable, SharedSearch] = {}
     pipelines = []
     for each in variants:
-        own = build(each.model, each.settings, video, images)
+        own = build(each.model, each.settings, video, images, lanes=lanes)
         key = each.settings.detector.search_key, own.stride, each.settings.regions
         search = searches.setdefault(key, SharedSearch(own.detector))
         pipelines.append(replace(own, detector=SharingDetector(search, own.detector)))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from vdet.evaluate.clips.clip import Clip, Variant, find_tracks
@@ -13,6 +14,7 @@ from vdet.evaluate.timelines import Timeline, timelines
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.labels.video import LabelledVideo
+from vdet.lanes.road import LaneRequest
 from vdet.progress import Progress, no_progress
 from vdet.run.sinks.protocol import Output
 
@@ -53,6 +55,7 @@ def evaluate_clips(
     progress: Progress = no_progress,
     *,
     outputs: Sequence[Output] = (),
+    lanes: LaneRequest | None = None,
     overwrite: bool = False,
 ) -> list[RunResult]:
     """Find the vehicles in every clip, in one pass for all settings, and score each.
@@ -63,6 +66,8 @@ def evaluate_clips(
         As `find_tracks` takes it, called for each clip.
     outputs
         Outputs that get the results; only with one clip and one variant.
+    lanes
+        If it is given, the lane is found too, for the outputs.
     overwrite
         Replace outputs that are there.
 
@@ -71,11 +76,15 @@ def evaluate_clips(
     VideoError, TruthError, OutputError
         As `find_tracks`.
     """
-    found = [find_tracks(clip, variants, progress, outputs, overwrite=overwrite) for clip in clips]
+    find = partial(
+        find_tracks, variants=variants, progress=progress, lanes=lanes, overwrite=overwrite
+    )
+    found = [find(clip, outputs=outputs) for clip in clips]
     results = []
     for number, variant in enumerate(variants):
         of_clips = [
-            _score_clip(clip, each[number]) for clip, each in zip(clips, found, strict=True)
+            score_video(str(clip.video), *each[number], video=clip.video)
+            for clip, each in zip(clips, found, strict=True)
         ]
         results.append(RunResult(variant.assignments, tuple(of_clips), total(of_clips)))
     return results
@@ -101,11 +110,6 @@ def score_video(
         tuple(timelines(comparison, matched)),
         max(prediction.last_frame, truth.last_frame),
     )
-
-
-def _score_clip(clip: Clip, found: LabelledVideo) -> ClipResult:
-    truth = clip.truth.until(found.last_frame)
-    return score_video(str(clip.video), found, truth, video=clip.video)
 
 
 def score_files(
