@@ -3,7 +3,6 @@
 import weakref
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 from red_cars import HEIGHT, WIDTH, drive
@@ -24,13 +23,6 @@ def test_vehicles_are_searched_in_the_original_frame() -> None:
     for one, other in zip(with_lanes, without, strict=True):
         assert one.tracks == other.tracks
         assert (one.frame.image == other.frame.image).all()
-
-
-def test_every_frame_is_undistorted() -> None:
-    undistorter = Undistorter(LENS, WIDTH, HEIGHT)
-    for result in follow(drive(5), lanes=LaneRequest(LENS), threads=2):
-        assert result.road is not None
-        np.testing.assert_array_equal(result.road.image, undistorter.image(result.frame.image))
 
 
 @pytest.mark.parametrize("threads", [1, 3])

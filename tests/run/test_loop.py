@@ -33,8 +33,8 @@ from run.red_runs import (
 )
 from running import write_drive
 from vdet.config.schema import Settings
-from vdet.errors import OutputError, VdetError, VideoError
-from vdet.media import Frame, VideoWriter
+from vdet.errors import VdetError, VideoError
+from vdet.media import Frame
 from vdet.media.images import Image, read_image
 from vdet.media.planes import Planes
 from vdet.run.loop import FIRST_FRAMES
@@ -104,12 +104,6 @@ class TestFirstFrames:
         assert len(images) == FIRST_FRAMES == 5
         for index, image in enumerate(images):
             np.testing.assert_array_equal(image, road(car_at(index)))
-
-    @pytest.mark.parametrize("frames", [0, 1, 4])
-    def test_a_clip_may_be_shorter(self, asked: list[list[Image]], frames: int) -> None:
-        results = list(follow(drive(frames), self.FREE))
-        assert [result.frame.index for result in results] == list(range(frames))
-        assert [len(images) for images in asked] == [frames]
 
 
 class TestMemory:
@@ -210,14 +204,6 @@ class TestBreakage:
             monkeypatch.setattr(RulesTracker, "update", _breaking(RulesTracker.update, error))
 
         return breaks
-
-    @pytest.mark.parametrize("error", [OutputError("disk full"), OSError(28, "disk full")])
-    def test_the_writer_breaks(
-        self, job: VideoJob, monkeypatch: pytest.MonkeyPatch, error: OSError
-    ) -> None:
-        monkeypatch.setattr(VideoWriter, "write", _breaking(VideoWriter.write, error))
-        with pytest.raises(OutputError, match="disk full"):
-            run_red(job)
 
     def test_the_reader_breaks(self, job: VideoJob, monkeypatch: pytest.MonkeyPatch) -> None:
         error = VideoError("its pixels cannot be converted")

@@ -86,14 +86,6 @@ def test_vehicles_of_a_picture_have_their_distance_and_lane() -> None:
     check(result.tracks)
 
 
-@pytest.mark.parametrize("with_roads", [False, True])
-def test_without_a_lane_they_have_none(*, with_roads: bool) -> None:
-    grey = [replace(f, picture=Picture(np.full_like(f.image, 90))) for f in frames(SCENE)]
-    found = list(followed(grey, LaneRequest() if with_roads else None))
-    assert len(found[-1].tracks) == 3
-    assert all((t.distance, t.lane) == (None, None) for t in found[-1].tracks)
-
-
 @pytest.fixture(scope="module")
 def road() -> Road:
     finder = roads()
@@ -102,14 +94,6 @@ def road() -> Road:
 
 def track_at(box: Box) -> Track:
     return Track(1, box, 0.9, predicted=False)
-
-
-def test_boxes_that_end_below_the_tyres_can_be_shortened_by_a_setting(road: Road) -> None:
-    low, right = track_at(Box.sized(300, 200, 60, 50)), track_at(Box.sized(300, 200, 60, 45))
-    [shortened], [expected] = with_positions([low], road, 0.1), with_positions([right], road, 0)
-    assert expected.distance is not None
-    assert shortened.distance == pytest.approx(expected.distance)
-    assert shortened.box == low.box
 
 
 @pytest.mark.parametrize(

@@ -1,17 +1,15 @@
 """The detector searches some frames, and every frame has its tracks."""
 
-import json
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from red_cars import PERSPECTIVE, SETTINGS, drive
-from run.red_runs import COUNT, follow, outputs, run_red, write
+from run.red_runs import follow, write
 from vdet.config.schema import MotionTrackerSettings, Settings, SvmSettings
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
-from vdet.run.video import VideoJob
 
 
 def strided(stride: int, settings: Settings = PERSPECTIVE) -> Settings:
@@ -48,16 +46,6 @@ def test_a_tracker_that_cannot_carry_holds_its_vehicles() -> None:
         assert all(track.predicted for track in after.tracks)
 
 
-def test_the_output_has_every_frame(red_clip: Path, tmp_path: Path) -> None:
-    path = tmp_path / "tracks.jsonl"
-    run_red(VideoJob(red_clip, outputs(tracks=path)), strided(4))
-    records = [json.loads(line) for line in path.read_text().splitlines()]
-    assert [record["frame"] for record in records] == list(range(COUNT))
-    seen = {record["frame"] for record in records for t in record["tracks"] if not t["predicted"]}
-    assert seen
-    assert all(number % 4 == 0 for number in seen)
-
-
 def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
     results = followed(3, 6)
     write(Output("stages", tmp_path / "stages"), results[1:3])
@@ -69,7 +57,7 @@ def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rate", "stride"), [(1, 1), (7.9, 1), (15, 1), (24, 3), (25, 3), (30, 3), (50, 6), (60, 7)]
 )
-def test_at_least_so_many_frames_a_second_are_searched(rate: float, stride: int) -> None:
+def test_the_stride_follows_from_the_rate_of_the_video(rate: float, stride: int) -> None:
     settings = SvmSettings(searches=8)
     assert settings.stride_at(Fraction(rate)) == stride
     assert settings.model_copy(update={"stride": 2}).stride_at(Fraction(rate)) == 2

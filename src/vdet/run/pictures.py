@@ -1,16 +1,16 @@
 """Vehicles in still pictures: read the picture, detect, give the result to sinks."""
 
-from collections import Counter
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 from vdet.boxes import Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
-from vdet.errors import ImageError, OutputError
+from vdet.errors import ImageError
 from vdet.files import OutputFiles, make_folder
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
@@ -18,7 +18,7 @@ from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_ima
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import build, named_errors
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sink
+from vdet.run.sinks.protocol import Output, Sink, SinkContext, check_sinks, open_sinks
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,23 +72,20 @@ def plan_pictures(
     OutputError
         An output exists already (and not `overwrite`), is a source, or is that of two sources.
     """
-    is_file = out is not None and len(sources) == 1 and out.suffix.lower() in PICTURE_SUFFIXES
-    jobs = []
-    for source in sources:
-        picture = out if is_file or out is None else out / source.name
-        folder = stages / source.stem if stages and len(sources) > 1 else stages
-        named = {"picture": picture, "stages": folder}
-        own = tuple(Output(sink, path) for sink, path in named.items() if path is not None)
-        jobs.append(PictureJob(source, own))
+    several = len(sources) > 1
+    is_file = out is not None and not several and out.suffix.lower() in PICTURE_SUFFIXES
+
+    def wanted(source: Path) -> Iterator[Output]:
+        if out is not None:
+            yield Output("picture", out if is_file else out / source.name)
+        if stages is not None:
+            yield Output("stages", stages / source.stem if several else stages)
+
+    jobs = [PictureJob(source, tuple(wanted(source))) for source in sources]
     outputs = [output for job in jobs for output in job.outputs]
-    for output, count in Counter(outputs).items():
-        if count > 1:
-            raise OutputError(
-                f"{output.path}: is wanted by two inputs of one name; run them separately"
-            )
+    check_sinks(outputs, overwrite=overwrite, inputs=sources, makes_folder=not is_file)
     if out is not None and not is_file:
         make_folder(out)
-    check_sinks(outputs, overwrite=overwrite, inputs=sources)
     return jobs
 
 
@@ -115,16 +112,12 @@ def run_pictures(
         An output cannot be written.
     """
     failures: list[ImageError] = []
-    with ExitStack() as stack:
-        files = stack.enter_context(OutputFiles(overwrite=overwrite))
-        context = _context(files, model, settings)
-        sinks = [stack.enter_context(open_sink(output, context)) for output in shared]
+    with _open_sinks(shared, model, settings, overwrite=overwrite) as sinks:
+        run = partial(run_picture, shared=sinks, overwrite=overwrite)
         advance = progress(len(jobs))
         for job in jobs:
             try:
-                on_result(
-                    run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
-                )
+                on_result(run(job, model, settings, lanes))
             except ImageError as error:
                 failures.append(error)
             advance(1)
@@ -150,10 +143,7 @@ def run_picture(
         An output cannot be written.
     """
     result = detect_picture(job.source, read_image(job.source), model, settings, lanes)
-    with ExitStack() as stack:
-        files = stack.enter_context(OutputFiles(overwrite=overwrite))
-        context = _context(files, model, settings)
-        own = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
+    with _open_sinks(job.outputs, model, settings, overwrite=overwrite) as own:
         for sink in (*own, *shared):
             sink.write(result)
     return result
@@ -182,9 +172,15 @@ def detect_picture(
     return result
 
 
-def _context(files: OutputFiles, model: DetectorModel, settings: Settings) -> SinkContext:
+@contextmanager
+def _open_sinks(
+    outputs: Sequence[Output], model: DetectorModel, settings: Settings, *, overwrite: bool
+) -> Iterator[list[Sink]]:
     def stage_pictures(image: Image, detections: Boxes) -> dict[str, Image]:
         detector = build(model, settings, None, [image]).detector
         return stage_pictures_of(detector)(image, detections)
 
-    return SinkContext(files, settings, stage_pictures=stage_pictures)
+    with OutputFiles(overwrite=overwrite) as files:
+        context = SinkContext(files, settings, stage_pictures=stage_pictures)
+        with open_sinks(outputs, context) as sinks:
+            yield sinks

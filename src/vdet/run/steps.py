@@ -33,7 +33,7 @@ class Step(Protocol):
 
 @runtime_checkable
 class ParallelStep(Step, Protocol):
-    """A step of which a part needs one frame alone."""
+    """A step with a part that needs only one frame."""
 
     def prepare(self, frame: Frame) -> None:
         """Do that part; several threads call this at once, each before `apply` for its frame."""

@@ -20,13 +20,7 @@ from vdet.media import Frame, VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import (
-    Output,
-    SinkContext,
-    check_sinks,
-    open_sink,
-    sink_kind,
-)
+from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch, run_in_thread
 from vdet.track.protocol import VideoTracker
@@ -145,16 +139,15 @@ def open_video(
     """
     timeout = job.timeout + float(job.start or 0)
 
-    def open_reader() -> VideoReader:
-        return VideoReader(
-            job.source,
-            start=job.start,
-            end=job.end,
-            frames=job.frames,
-            threads=job.codec_threads or core_count(),
-            settings=settings.input,
-        )
-
+    open_reader = partial(
+        VideoReader,
+        job.source,
+        start=job.start,
+        end=job.end,
+        frames=job.frames,
+        threads=job.codec_threads or core_count(),
+        settings=settings.input,
+    )
     with ExitStack() as stack:
         stack.enter_context(named_errors(job.source, VideoError))
         stack.enter_context(_no_stall(job.source, timeout))
@@ -169,8 +162,7 @@ def open_video(
             log.warning("%s: gets no boxes: %s", job.source, error)
             pipeline = make(as_model(lambda _: NO_BOXES))
         del make, images  # else they stay in memory for the whole run
-        threads = job.threads or core_count()
-        results = pipeline.follow(frames, job.source, threads=threads)
+        results = pipeline.follow(frames, job.source, threads=job.threads or core_count())
         yield OpenVideo(reader, pipeline, stack.enter_context(closing(results)))
 
 
@@ -205,29 +197,17 @@ def run_video(
 
     No output is left after an error.
     """
-    began, writing = time.perf_counter(), 0.0
-    ids: set[int] = set()
-    frames, last = 0, None
+    began = time.perf_counter()
     only_at = job.needs_only_at
-    if only_at and job.frames is None:
-        job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
-    with ExitStack() as stack:
-        files = stack.enter_context(OutputFiles(overwrite=job.overwrite))
-        video = stack.enter_context(open_video(job, model, settings, tracker=tracker, steps=steps))
-        reader, info = video.reader, video.reader.info
-        context = SinkContext(
-            files,
-            settings,
-            info,
-            is_part=job.is_part,
-            at=job.at,
-            codec_threads=job.codec_threads or core_count(),
-            timeout=job.timeout,
-            outputs=job.outputs,
-            stage_pictures=stage_pictures_of(video.pipeline.detector),
-        )
-        sinks = [stack.enter_context(open_sink(output, context)) for output in job.outputs]
-        advance = progress(None if only_at else reader.expected)
+    job = _without_early_frames(job)
+    with (
+        OutputFiles(overwrite=job.overwrite) as files,
+        open_video(job, model, settings, tracker=tracker, steps=steps) as video,
+        open_sinks(job.outputs, _context(job, settings, files, video)) as sinks,
+    ):
+        info = video.reader.info
+        advance = progress(None if only_at else video.reader.expected)
+        frames, writing, last, ids = 0, 0.0, None, set[int]()
         for result in video.results:
             written = time.perf_counter()
             for sink in sinks:
@@ -236,16 +216,40 @@ def run_video(
             ids.update(track.id for track in result.tracks)
             frames += 1
             advance(1)
-            last = result.frame.time - info.start if result.searched else last
-            if only_at and result.searched and last is not None and last >= job.at:
-                break
-        _check_seen(job, last, reader.length)
+            if result.searched:
+                last = result.frame.time - info.start
+                if only_at and last >= job.at:
+                    break
+        _check_seen(job, last, video.reader.length)
     seconds = time.perf_counter() - began
     log.info(
         "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
         *(job.source, seconds - writing, writing),
     )
     return RunTotals(info.width, info.height, frames, len(ids), seconds)
+
+
+def _without_early_frames(job: VideoJob) -> VideoJob:
+    """Return a job that reads only the frames that are needed for the moment `at`."""
+    if not job.needs_only_at or job.frames is not None:
+        return job
+    return replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
+
+
+def _context(
+    job: VideoJob, settings: Settings, files: OutputFiles, video: OpenVideo
+) -> SinkContext:
+    return SinkContext(
+        files,
+        settings,
+        video.reader.info,
+        is_part=job.is_part,
+        at=job.at,
+        codec_threads=job.codec_threads or core_count(),
+        timeout=job.timeout,
+        outputs=job.outputs,
+        stage_pictures=stage_pictures_of(video.pipeline.detector),
+    )
 
 
 def _check_times(job: VideoJob, length: Fraction | None) -> None:

@@ -88,25 +88,6 @@ def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     np.testing.assert_array_equal(drawn, expected)
 
 
-def test_the_frames_of_the_result_are_not_drawn_on() -> None:
-    with_lane = replace(road_seen(LENS), lane=LANE)
-    undistorted = with_lane.image.copy()
-    for found in (None, with_lane):
-        result = result_of(CAR, found=found)
-        drawn_on(result, label=("id", "score"))
-        np.testing.assert_array_equal(result.frame.image, road(CAR))
-    np.testing.assert_array_equal(with_lane.image, undistorted)
-
-
-def test_the_lane_lies_under_the_boxes() -> None:
-    box = Box.sized(100, 150, 120, 60)
-    with_lane = replace(road_seen(None), lane=LANE)
-    drawn = drawn_on(result_of(box, found=with_lane))
-    assert (Box(box.x1, box.y2 - 1, box.x2, box.y2).cut(drawn)[0] == color_of(1)).all()
-    blue, green, red = drawn[180, 160].astype(int) - road(CAR)[180, 160]
-    assert green > max(blue, red)
-
-
 @pytest.mark.parametrize("settings", [{}, {"trails": 1.0, "time": True}])
 def test_a_frame_that_came_as_planes_stays_planes_and_looks_the_same(
     settings: dict[str, Any],
@@ -145,13 +126,6 @@ def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], t
     expected = road(CAR)
     draw_box(expected, CAR, color_of(3), text)
     np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
-
-
-def test_a_label_leaves_out_what_is_not_known() -> None:
-    expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "#1")
-    drawn = drawn_on(result_of(CAR), label=("distance", "id", "class"))
-    np.testing.assert_array_equal(drawn, expected)
 
 
 def test_a_still_picture_shows_ids_and_scores() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from pages.html import Elements
 from red_cars import CAR, road
-from run.red_runs import COUNT, outputs, read, result_of, run_red, video_info, write
+from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
 from vdet.media.images import Image, decode_image
 from vdet.pages.video import read_facts
@@ -45,15 +45,6 @@ def test_a_run_writes_a_page_that_shows_the_video_of_the_run(
     (thumbnail,) = (each for each in made.all("img") if each.get("alt") == "vehicle 1")
     blue, _, red = picture(thumbnail["src"]).reshape(-1, 3).mean(axis=0)
     assert red > blue + 50
-
-
-def test_its_moments_are_those_of_the_part_that_was_written(red_clip: Path, tmp_path: Path) -> None:
-    wanted = outputs(video=tmp_path / "out.mp4", page=tmp_path / "page")
-    run_red(VideoJob(red_clip, wanted, start=Fraction(1), end=Fraction(2)))
-    length = len(read(tmp_path / "out.mp4")) / 25
-    times = [float(link["data-time"] or "") for link in page_of(tmp_path / "page").all("a")]
-    assert times
-    assert all(0 <= time < length for time in times)
 
 
 def test_without_a_video_of_the_run_it_shows_the_source(red_clip: Path, tmp_path: Path) -> None:

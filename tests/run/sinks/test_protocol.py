@@ -14,7 +14,7 @@ from red_cars import HEIGHT, SETTINGS
 from run.conftest import Register
 from run.red_runs import COUNT, outputs, read, run_red, video_info
 from vdet.config.schema import OutputSettings
-from vdet.errors import ConfigError, OutputError
+from vdet.errors import OutputError
 from vdet.files import OutputFiles
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
@@ -216,32 +216,8 @@ def test_a_sink_refuses_results_that_it_cannot_take(
 
 
 class TestCheck:
-    def test_an_unknown_sink_is_refused_with_those_that_are_known(self, tmp_path: Path) -> None:
-        known = "video, tracks, stages, picture, json"
-        with pytest.raises(ConfigError, match=f"nosuch: is no sink; known are {known}"):
-            check_sinks([Output("nosuch", tmp_path / "a")], overwrite=False)
-
-    @pytest.mark.parametrize(
-        ("sink", "name", "what"),
-        [
-            ("video", "a.avi", "videos"),
-            ("tracks", "a.json", "tracks"),
-            ("picture", "a", "pictures"),
-        ],
-    )
-    def test_a_suffix_that_the_sink_does_not_write_is_refused(
-        self, tmp_path: Path, sink: str, name: str, what: str
-    ) -> None:
-        with pytest.raises(OutputError, match=rf"{name}: {what} are written as \.\w+, "):
-            check_sinks([Output(sink, tmp_path / name)], overwrite=False)
-
     def test_a_folder_that_was_written_before_is_refused(self, tmp_path: Path) -> None:
         (tmp_path / "3-boxes.png").touch()
         with pytest.raises(OutputError, match=r"3-boxes\.png: is there already"):
             check_sinks([Output("stages", tmp_path)], overwrite=False)
         check_sinks([Output("stages", tmp_path)], overwrite=True)
-
-    def test_one_path_for_two_outputs_is_refused(self, tmp_path: Path) -> None:
-        twice = outputs(tracks=tmp_path / "a.txt", json=tmp_path / "." / "a.txt")
-        with pytest.raises(OutputError, match=r"a\.txt: is given for two outputs"):
-            check_job(VideoJob(tmp_path / "in.mp4", twice))

@@ -9,10 +9,9 @@ import pytest
 
 from boxing import rounded
 from red_cars import CAR, HEIGHT, SETTINGS, WIDTH, road
-from run.red_runs import model_for, result_of, video_info, write
+from run.red_runs import model_for, result_of, write
 from run.sinks.test_overlay import LANE, LENS, road_seen
 from vdet.boxes import Box, Boxes
-from vdet.draw.boxes import color_of
 from vdet.lanes.road import Lane, Road
 from vdet.media.images import Image, read_image
 from vdet.run.result import FrameResult
@@ -41,17 +40,6 @@ def test_pictures_are_made_of_the_first_frame_at_or_after_the_moment(tmp_path: P
     assert stages(tmp_path / "a", Fraction(2), early) == []
     assert stages(tmp_path / "b", Fraction(2), early, late) == NAMES
     assert stages(tmp_path / "c", Fraction(3), early, late) == NAMES
-
-
-def test_the_moment_counts_from_the_first_frame(tmp_path: Path) -> None:
-    late = replace(video_info(), start=Fraction(100))
-    results = (
-        detected(*boxes, time=Fraction(time))
-        for time, boxes in ((100, ()), (101, (CAR,)), (102, ()))
-    )
-    write(Output("stages", tmp_path), results, at=Fraction(1), video=late)
-    picture = read_image(tmp_path / "5-boxes.png")
-    assert (Box(CAR.x1, CAR.y2 - 1, CAR.x2, CAR.y2).cut(picture)[0] == color_of(1)).all()
 
 
 @pytest.mark.parametrize("lane", [None, LANE])
@@ -86,15 +74,6 @@ class TestBoxes:
         name = stages(folder, Fraction(0), result)[-1]
         np.testing.assert_array_equal(result.frame.image, before)
         return read_image(folder / name)
-
-    def test_vehicles_are_drawn_with_their_ids_and_scores(self, tmp_path: Path) -> None:
-        plain, boxed = (
-            self.picture(tmp_path / name, result_of(*boxes, image=road()))
-            for name, boxes in (("a", ()), ("b", (CAR,)))
-        )
-        side = np.s_[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
-        assert (boxed[side] != plain[side]).any(axis=1).all()
-        assert (boxed[: CAR.y1] != plain[: CAR.y1]).any(), "the label stands above the box"
 
     def test_detections_are_drawn_even_where_no_vehicle_is_shown(self, tmp_path: Path) -> None:
         result = detected()

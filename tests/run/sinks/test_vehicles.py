@@ -10,7 +10,6 @@ from red_cars import CAR, SETTINGS, WIDTH
 from run.red_runs import COUNT, outputs, result_of, run_red, video_info, write
 from running import names
 from vdet.boxes import Box
-from vdet.config.schema import CropSettings
 from vdet.files import OutputFiles
 from vdet.media.images import read_image
 from vdet.run.sinks.protocol import Output, SinkContext, open_sink
@@ -38,15 +37,6 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
     assert time in {round(float(each["time"]), 3) for each in tracks}
     blue, _, red = read_image(tmp_path / "crops" / name).reshape(-1, 3).mean(axis=0)
     assert red > blue + 50
-
-
-def test_pictures_have_the_format_that_is_set(tmp_path: Path) -> None:
-    png = SETTINGS.model_copy(update={"crops": CropSettings(format="png")})
-    write(Output("crops", tmp_path), [result_of(CAR)], settings=png)
-    assert names(tmp_path) == ["vehicle-0001-at-0.000s.png"]
-    picture = read_image(tmp_path / "vehicle-0001-at-0.000s.png")
-    assert picture.shape == (58, 76, 3)
-    assert (picture[5:-5, 6:-6] == (0, 0, 255)).all()
 
 
 def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Path) -> None:

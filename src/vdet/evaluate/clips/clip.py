@@ -31,7 +31,7 @@ from vdet.progress import Progress
 from vdet.regions import Regions, lay_regions
 from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output, SinkContext, open_sink
+from vdet.run.sinks.protocol import Output, SinkContext, open_sinks
 from vdet.track.track import Track
 
 _KEPT = 4
@@ -137,7 +137,7 @@ def find_tracks(
                 reader.info,
                 stage_pictures=stage_pictures_of(pipelines[0].detector),
             )
-            sinks = [stack.enter_context(open_sink(output, context)) for output in outputs]
+            sinks = stack.enter_context(open_sinks(outputs, context))
             for results in follow_together(pipelines, read, clip.video):
                 for sink in sinks:
                     sink.write(results[0])

@@ -191,10 +191,9 @@ def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> lis
     placed = []
     for track in tracks:
         box = track.box.clipped(width, height)
-        foot = track.foot
+        (foot,) = _on_road([track.foot], road)
         if road:
-            x, y = road.undistorter.points(np.array([foot]))[0].tolist()
-            box, foot = road.undistorter.box(box), (x, y)
+            box = road.undistorter.box(box)
         if box.area:
             placed.append(replace(track, box=box, whole_foot=foot))
     return placed

@@ -1,7 +1,7 @@
 """The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -172,6 +172,8 @@ class SinkKind:
 
     def takes_name(self, name: str) -> bool:
         """Return whether an output may have this name, without its folder."""
+        if self.writes_standard_output and name == STANDARD_OUTPUT.name:
+            return True
         ends = [len(each) for each in self.endings if name.lower().endswith(each)]
         return not self.endings or 0 < max(ends, default=0) < len(name)
 
@@ -205,7 +207,7 @@ def check_sinks(
         if path.resolve() in seen:
             raise OutputError(f"{path}: is given for two outputs; name another file for one")
         seen.add(path.resolve())
-        if _is_standard_output(output):
+        if path == STANDARD_OUTPUT and kind.writes_standard_output:
             continue
         if kind.marker:
             if not makes_folder:
@@ -259,6 +261,13 @@ def open_sink(output: Output, context: SinkContext) -> Sink:
         return _NamedSink(kind.open(output.path, context), output.path)
 
 
+@contextmanager
+def open_sinks(outputs: Iterable[Output], context: SinkContext) -> Iterator[list[Sink]]:
+    """Open the sinks of several outputs; errors as of `open_sink`."""
+    with ExitStack() as stack:
+        yield [stack.enter_context(open_sink(output, context)) for output in outputs]
+
+
 class _NamedSink:
     """A `Sink` whose `OSError` becomes an `OutputError` with the path of its output."""
 
@@ -280,15 +289,9 @@ class _NamedSink:
             self._sink.write(result)
 
 
-def _is_standard_output(output: Output) -> bool:
-    return output.path == STANDARD_OUTPUT and sink_kind(output.sink).writes_standard_output
-
-
 def _kind_for(output: Output) -> SinkKind:
     """Return the kind of an output's sink; refuse a suffix that is not one of the sink's."""
     kind, path = sink_kind(output.sink), output.path
-    if _is_standard_output(output):
-        return kind
     if not kind.takes_name(path.name):
         names = ", ".join(kind.endings)
         raise OutputError(f"{path}: {kind.what} are written as {names}; name it so")
