@@ -15,7 +15,7 @@ from vdet.evaluate.scores import Scores, score
 from vdet.files import any_file, check_output, make_folder, staged
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.dataset import find_patches
-from vdet.learn.svm.mining import MiningJob, VideoSource, mine
+from vdet.learn.svm.mining import VideoSource, mine
 from vdet.learn.svm.training import train
 from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
@@ -149,7 +149,7 @@ def run_demo(
         busy = busy_road(rng)
         write_clip(source.path, busy, overwrite=overwrite)
         write_truth(source.truth, busy, overwrite=overwrite)
-    mine(MiningJob(sources, folder / PATCHES, overwrite), linear, None, steps=steps)
+    mine(sources, folder / PATCHES, linear, overwrite=overwrite, steps=steps)
     model, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
     save_model(model, folder / MODEL, overwrite=overwrite)
     metrics.write(folder / METRICS, overwrite=overwrite)

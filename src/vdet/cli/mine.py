@@ -65,20 +65,16 @@ def mine(
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     labels = dict(zip(videos, truths, strict=True))
-    job = mining.MiningJob(
-        tuple(
-            mining.VideoSource(path, labels[path], every, first, until)
-            if path in labels
-            else mining.PictureSource(path)
-            for path in sources
-        ),
-        output,
-        overwrite,
-    )
+    labelled = [
+        mining.VideoSource(path, labels[path], every, first, until)
+        if path in labels
+        else mining.PictureSource(path)
+        for path in sources
+    ]
     limit_library_threads()
     model = load_svm(settings.svm, choice.model_path)
     with progress_steps(" frames") as steps:
-        mined = mining.mine(job, settings, model, steps=steps)
+        mined = mining.mine(labelled, output, settings, model, overwrite=overwrite, steps=steps)
     print_lines(
         f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "
         f"{mined.false_alarms} false alarms, {mined.parts} more on parts of vehicles; "

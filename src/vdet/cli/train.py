@@ -47,7 +47,7 @@ def train(
     from vdet.detect.svm.model import save_model
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm.dataset import find_patches
-    from vdet.learn.svm.mining import MiningJob, PictureSource, mine
+    from vdet.learn.svm.mining import PictureSource, mine
     from vdet.learn.svm.training import train as fit_model
 
     if scheduler:  # the workers were started in other folders
@@ -60,8 +60,7 @@ def train(
     ):
         if pictures:
             archive = Path(folder) / "pictures.zip"
-            sources = tuple(PictureSource(path) for path in pictures)
-            mine(MiningJob(sources, archive), settings, None, steps=steps)
+            mine([PictureSource(path) for path in pictures], archive, settings, steps=steps)
             patches.append(archive)
         files = find_patches(patches)
         model, metrics = fit_model(files, settings, jobs=jobs, scheduler=scheduler, steps=steps)

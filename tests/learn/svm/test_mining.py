@@ -14,7 +14,7 @@ from vdet.config.schema import OutputSettings, Settings
 from vdet.errors import DataError, VideoError
 from vdet.learn.svm.choosing import MOST, Most
 from vdet.learn.svm.dataset import find_patches, read_patches
-from vdet.learn.svm.mining import MiningJob, PictureSource, VideoSource, mine
+from vdet.learn.svm.mining import PictureSource, VideoSource, mine
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image, write_image
 
@@ -68,7 +68,7 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
     video: VideoSource, tmp_path: Path
 ) -> None:
     archive = tmp_path / "mined.zip"
-    result = mine(MiningJob((video,), archive), Settings(), None)
+    result = mine([video], archive, Settings())
     assert result.frames == 3
     for box in boxes_of(archive, "vehicles/mined_road"):
         assert box.iou(CAR) > 0.35
@@ -87,7 +87,7 @@ def test_nothing_wanted_is_an_error(
 ) -> None:
     monkeypatch.setattr("vdet.learn.svm.mining.MOST", Most(0, 0, 0))
     with pytest.raises(DataError, match=r"road\.mp4: no window fits a vehicle or is a false alarm"):
-        mine(MiningJob((video,), tmp_path / "mined.zip"), Settings(), None)
+        mine([video], tmp_path / "mined.zip", Settings())
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -99,9 +99,8 @@ def test_frames_too_small_for_any_window_are_an_error_with_the_name_of_the_video
     with VideoWriter(source, info, OutputSettings()) as writer:
         writer.write(Frame(0, Fraction(0), Picture(np.zeros((8, 8, 3), np.uint8))))
     truth.write_text("1,1,1,1,4,4,1,3,1\n")
-    job = MiningJob((VideoSource(source, truth),), tmp_path / "mined.zip")
     with pytest.raises(VideoError, match=r"tiny\.mp4: no window fits into a frame of 8×8 pixels"):
-        mine(job, Settings(), None)
+        mine([VideoSource(source, truth)], tmp_path / "mined.zip", Settings())
     assert not (tmp_path / "mined.zip").exists()
 
 
@@ -125,14 +124,13 @@ class TestPictures:
         self, folder: Path, video: VideoSource, tmp_path: Path
     ) -> None:
         sources = (PictureSource(folder), replace(video, last=1))
-        job = MiningJob(sources, tmp_path / "mined.zip")
-        assert mine(job, Settings(), None).frames == 2
-        vehicles = boxes_of(job.output, "vehicles/mined_city")
-        assert vehicles == boxes_of(job.output, "vehicles/mined_road") != []
-        alarms = boxes_of(job.output, "non-vehicles/mined_city")
+        output = tmp_path / "mined.zip"
+        assert mine(sources, output, Settings()).frames == 2
+        vehicles = boxes_of(output, "vehicles/mined_city")
+        assert vehicles == boxes_of(output, "vehicles/mined_road") != []
+        alarms = boxes_of(output, "non-vehicles/mined_city")
         assert len(alarms) == MOST.false_alarms
 
     def test_two_sources_of_one_name_are_refused(self, folder: Path, tmp_path: Path) -> None:
-        job = MiningJob((PictureSource(folder), PictureSource(folder)), tmp_path / "mined.zip")
         with pytest.raises(DataError, match="2 sources are named city; rename them"):
-            mine(job, Settings(), None)
+            mine([PictureSource(folder)] * 2, tmp_path / "mined.zip", Settings())

@@ -17,9 +17,9 @@ def patch(number: int) -> Image:
 
 
 def write(path: Path) -> Path:
-    with patch_archive(path) as archive:
+    with patch_archive(path) as add:
         for number, (name, sides) in enumerate(zip(NAMES, BOXES, strict=True)):
-            archive.add(name, patch(number), sides)
+            add(name, patch(number), sides)
     return path
 
 
@@ -48,8 +48,8 @@ def test_the_files_in_it_can_be_read_when_unpacked(tmp_path: Path) -> None:
 def test_after_an_error_an_earlier_archive_is_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "a.zip"
     path.write_bytes(b"precious")
-    with pytest.raises(UnicodeEncodeError), patch_archive(path) as archive:
-        archive.add("vehicles/\udc80.png", patch(0))
+    with pytest.raises(UnicodeEncodeError), patch_archive(path) as add:
+        add("vehicles/\udc80.png", patch(0), None)
     assert path.read_bytes() == b"precious"
     assert list(tmp_path.iterdir()) == [path]
 

@@ -12,7 +12,7 @@ import math
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -31,9 +31,6 @@ BOXED = "boxes"
 TABLE = "boxes.csv"
 COLUMNS = ("name", "left", "top", "right", "bottom")
 MAX_PATCH_BYTES = 16_000_000
-
-_ZIP_TIME = (1980, 1, 1, 0, 0, 0)  # the earliest of the format; makes files reproducible
-_ZIP_MODE = 0o644 << 16
 
 Sides = tuple[float | None, float | None, float | None, float | None]
 """Left, top, right and bottom of a vehicle, from the patch's centre, in widths and heights of it.
@@ -177,39 +174,33 @@ def _sides(values: Sequence[str]) -> Sides:
     return left, top, right, bottom
 
 
-class PatchArchive:
-    """A zip file of patches, in the order in which they are added."""
-
-    def __init__(self, file: zipfile.ZipFile) -> None:
-        self._file = file
-        self._rows: list[list[str]] = [list(COLUMNS)]
-
-    def add(self, name: str, patch: Image, sides: Sides | None = None) -> None:
-        """Add a patch (BGR uint8) as a PNG picture, and the sides of its vehicle."""
-        self._write(name, cv2.imencode(".png", patch)[1].tobytes(), zipfile.ZIP_STORED)
-        if sides is not None:
-            self._rows.append([name, *("" if side is None else f"{side:.4f}" for side in sides)])
-
-    def add_table(self) -> None:
-        """Add the table of all sides, with four decimals, after the last patch."""
-        text = io.StringIO(newline="")
-        csv.writer(text, lineterminator="\n").writerows(self._rows)
-        self._write(TABLE, text.getvalue().encode("utf-8"), zipfile.ZIP_DEFLATED)
-
-    def _write(self, name: str, data: bytes, method: int) -> None:
-        info = zipfile.ZipInfo(name, _ZIP_TIME)
-        info.create_system = 3  # Unix; the default depends on the system
-        info.external_attr = _ZIP_MODE
-        self._file.writestr(info, data, method)
+AddPatch = Callable[[str, Image, Sides | None], None]
+"""Adds a patch (BGR uint8), by its name, with the sides of its vehicle."""
 
 
 @contextmanager
-def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[PatchArchive]:
-    """Yield an archive that appears at `path` if the block ends without an error.
+def patch_archive(path: Path, *, overwrite: bool = False) -> Iterator[AddPatch]:
+    """Write a zip file of patches, as PNG pictures, and a table of all sides with four decimals.
 
-    The same patches give the same bytes. Raises `OutputError`.
+    It appears at `path` if the block ends without an error. The same patches give the same bytes.
+    Raises `OutputError`.
     """
+    table = io.StringIO(newline="")
+    rows = csv.writer(table, lineterminator="\n")
+    rows.writerow(COLUMNS)
     with staged(path, overwrite=overwrite) as temporary, zipfile.ZipFile(temporary, "w") as file:
-        archive = PatchArchive(file)
-        yield archive
-        archive.add_table()
+
+        def add(name: str, patch: Image, sides: Sides | None) -> None:
+            _store(file, name, cv2.imencode(".png", patch)[1].tobytes(), zipfile.ZIP_STORED)
+            if sides is not None:
+                rows.writerow([name, *("" if side is None else f"{side:.4f}" for side in sides)])
+
+        yield add
+        _store(file, TABLE, table.getvalue().encode("utf-8"), zipfile.ZIP_DEFLATED)
+
+
+def _store(file: zipfile.ZipFile, name: str, data: bytes, method: int) -> None:
+    info = zipfile.ZipInfo(name)  # of the earliest time: makes files reproducible
+    info.create_system = 3  # Unix; the default depends on the system
+    info.external_attr = 0o644 << 16
+    file.writestr(info, data, method)

@@ -169,15 +169,6 @@ def _frame_labels(labelled: LabelledVideo | LabelledPicture) -> FrameLabels:
 
 
 @dataclass(frozen=True, slots=True)
-class MiningJob:
-    """What is mined, and the zip file to write; `overwrite`: replace one that is there."""
-
-    sources: tuple[VideoSource | PictureSource, ...]
-    output: Path
-    overwrite: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class MiningResult:
     """Number of frames searched, and of patches of each kind."""
 
@@ -189,7 +180,13 @@ class MiningResult:
 
 
 def mine(
-    job: MiningJob, settings: Settings, model: SvmModel | None, *, steps: Steps = no_steps
+    sources: Sequence[VideoSource | PictureSource],
+    output: Path,
+    settings: Settings,
+    model: SvmModel | None = None,
+    *,
+    overwrite: bool = False,
+    steps: Steps = no_steps,
 ) -> MiningResult:
     """Search the labelled frames and write patches for the training.
 
@@ -199,6 +196,8 @@ def mine(
 
     Parameters
     ----------
+    output
+        The zip file to write; `overwrite` replaces one that is there.
     model
         The model whose false alarms are searched for; None: any window without a vehicle may be
         taken.
@@ -216,14 +215,14 @@ def mine(
     OutputError
         The zip file cannot be written.
     """
-    names = [source.path.resolve().stem for source in job.sources]
+    names = [source.path.resolve().stem for source in sources]
     for name, count in Counter(names).items():
         if count > 1:
             raise DataError(f"{count} sources are named {name}; rename them, or mine one at a time")
     searched = 0
     counts: Counter[PatchKind] = Counter()
-    with patch_archive(job.output, overwrite=job.overwrite) as archive:
-        for stem, source in zip(names, job.sources, strict=True):
+    with patch_archive(output, overwrite=overwrite) as add:
+        for stem, source in zip(names, sources, strict=True):
             progress = partial(steps, source.path.name)
             for frame in source.frames(model, settings, progress):
                 searched += 1
@@ -240,10 +239,10 @@ def mine(
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
                     folder = _FOLDERS[each.kind].format(stem)
                     name = f"{folder}/{frame.name}_x{x:04}_y{y:04}_s{side:04}.png"
-                    archive.add(name, patch, each.sides)
+                    add(name, patch, each.sides)
                     counts[each.kind] += 1
         if not counts:
-            shown = ", ".join(str(source.path) for source in job.sources)
+            shown = ", ".join(str(source.path) for source in sources)
             raise DataError(f"{shown}: no window fits a vehicle or is a false alarm; try others")
     return MiningResult(searched, *(counts[kind] for kind in _FOLDERS))
 
