@@ -1,12 +1,11 @@
 """Training pictures: their boxes lie where the vehicles are, whatever was changed."""
 
-import cv2
 import numpy as np
 import pytest
 
 from learn.net.blocks import block_picture, block_source
 from vdet.config.train import NetworkTrainingSettings
-from vdet.learn.net.augmentation import LEAST_SIDE, Drawing, SampleDrawer, _turned
+from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.sources import MAX_PIXELS, Sample, Source
 from vdet.learn.net.weather import with_weather
 
@@ -60,14 +59,6 @@ def test_the_same_seed_draws_the_same_picture() -> None:
     assert not np.array_equal(draw(3, MOSAIC).image, draw(4, MOSAIC).image)
 
 
-def test_vehicles_that_are_too_small_are_ignored() -> None:
-    for seed in range(20):
-        sample = draw(seed, MOSAIC)
-        sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
-        small = sides.max(axis=1) < LEAST_SIDE
-        assert sample.ignored[small].all()
-
-
 def test_a_vehicle_of_which_little_is_left_is_ignored() -> None:
     image = np.zeros((128, 256, 3), np.uint8)
     wide = np.array([[0, 0, 256, 128]], np.float32)
@@ -101,15 +92,6 @@ def test_a_weight_makes_a_source_come_more_often() -> None:
     drawer = SampleDrawer([one, other], settings)
     picks = [drawer._pick(np.random.default_rng(seed)) for seed in range(200)]
     assert 130 <= sum(pick is other.samples[0] for pick in picks) <= 170  # three in four
-
-
-def test_a_turned_box_lies_around_the_ellipse_in_it() -> None:
-    turn = cv2.getRotationMatrix2D((0, 0), 90, 1.0)
-    [turned] = _turned(np.array([[10, 20, 50, 40]], np.float32), turn)
-    assert turned == pytest.approx([20, -50, 40, -10], abs=1e-4)
-    turn = cv2.getRotationMatrix2D((100, 100), 30, 1.0)
-    [circle] = _turned(np.array([[90, 90, 110, 110]], np.float32), turn)
-    assert circle == pytest.approx([90, 90, 110, 110], abs=1e-4)
 
 
 def test_weather_comes_in_some_pictures_and_night_is_dark() -> None:

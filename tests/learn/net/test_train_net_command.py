@@ -22,7 +22,6 @@ QUICK = tuple(
     for argument in ("--set", f"train.net.{value}")
 )
 CAR = Boxed("car", (20, 30, 60, 40))
-IGNORED = Boxed("ignore", (90, 0, 70, 96))
 
 
 def write_set(folder: Path, form: str = "COCO", *boxes: Boxed) -> Path:
@@ -44,14 +43,6 @@ def test_it_learns_from_pictures_labelled_in_each_form(run: Run, tmp_path: Path,
     picture = next(folder.rglob("a.png"))
     found = run("detect-image", picture, "-c", "net", "--model", output, "--json", "-")
     assert found.code == 0, found.err
-
-
-def test_pictures_without_a_vehicle_are_refused(run: Run, tmp_path: Path) -> None:
-    folder = write_set(tmp_path / "set", "COCO", IGNORED)
-    result = run("train-net", folder, "-o", tmp_path / "net.onnx", *QUICK)
-    assert result.code == 1
-    assert result.err == "vdet: no picture has a vehicle; give labelled pictures\n"
-    assert [path.name for path in tmp_path.iterdir()] == ["set"]
 
 
 def test_a_network_that_is_there_is_kept_unless_it_may_be_replaced(

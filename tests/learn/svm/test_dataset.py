@@ -9,13 +9,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import (
-    MAX_PATCH_BYTES,
-    PatchFile,
     find_patches,
     read_patches,
 )
@@ -78,12 +74,6 @@ def test_patches_come_in_numeric_order_of_their_names(tmp_path: Path) -> None:
     ]
 
 
-def test_any_picture_format_counts_with_upper_or_lower_case_suffix(tmp_path: Path) -> None:
-    names = [f"vehicles/far/{name}" for name in ("1.jpg", "2.JPEG", "3.PNG", "4.bmp")]
-    make_folder(tmp_path, [*names, "non-vehicles/road/1.png"])
-    assert [name for name, _ in listed(tmp_path)][1:] == names
-
-
 @pytest.mark.parametrize("make", [make_folder, make_zip])
 def test_other_files_than_patches_are_skipped(tmp_path: Path, make: Maker) -> None:
     junk = [
@@ -105,19 +95,6 @@ def test_a_missing_class_is_named(tmp_path: Path, present: str, missing: str) ->
     make_folder(tmp_path, [f"{present}/far/1.png"])
     with pytest.raises(DataError, match=f"no patches of the class {missing}; expected pictures in"):
         find_patches([tmp_path])
-
-
-@pytest.mark.parametrize("make", [make_folder, make_zip])
-def test_a_source_without_patches_is_named(tmp_path: Path, make: Maker) -> None:
-    good = make_folder(tmp_path / "good", BOTH)
-    empty = make(tmp_path / "poor", ["cars/1.png"])
-    with pytest.raises(DataError, match="poor: no pictures in vehicles/<group>/"):
-        find_patches([good, empty])
-
-
-def test_a_missing_source_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"no\.zip: no such folder or zip file"):
-        find_patches([tmp_path / "no.zip"])
 
 
 @pytest.mark.parametrize("data", [b"", b"text", b"PK\x03\x04 and no more"])
@@ -162,40 +139,6 @@ def test_a_broken_patch_has_no_image_and_the_others_are_read(tmp_path: Path) -> 
     assert [patch.image is None for patch in patches] == [False, True, True, False]
 
 
-def test_an_archive_that_is_gone_when_it_is_read_has_broken_patches(tmp_path: Path) -> None:
-    archive = make_zip(tmp_path / "set.zip", BOTH)
-    files = find_patches([archive])
-    archive.unlink()
-    assert [patch.image for patch in read_patches(files)] == [None, None]
-
-
-def first_of(archive: Path) -> PatchFile:
-    return find_patches([archive])[0]
-
-
-def test_a_patch_whose_checksum_is_wrong_is_broken(tmp_path: Path) -> None:
-    archive = tmp_path / "set.zip"
-    with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as file:
-        for name in BOTH:
-            file.writestr(name, PNG)
-    data = archive.read_bytes()
-    at = data.find(PNG) + len(PNG) // 2
-    archive.write_bytes(data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :])
-    assert sorted(patch.image is None for patch in read_patches(find_patches([archive]))) == [
-        False,
-        True,
-    ]
-
-
-def test_a_patch_of_unreasonable_size_is_not_unpacked(tmp_path: Path) -> None:
-    archive = make_zip(tmp_path / "set.zip", BOTH)
-    with zipfile.ZipFile(archive, "a", zipfile.ZIP_DEFLATED) as file:
-        file.writestr("non-vehicles/bomb/1.png", PNG + bytes(MAX_PATCH_BYTES))
-    (patch,) = read_patches([first_of(archive)])
-    assert patch.file.group == "non-vehicles/bomb"
-    assert patch.image is None
-
-
 @pytest.mark.parametrize(
     ("name", "words"),
     [
@@ -236,16 +179,6 @@ def test_a_folder_whose_name_is_no_text_is_a_group(tmp_path: Path) -> None:
     groups = [file.group for file in find_patches([tmp_path])]
     assert groups == ["non-vehicles/road", r"vehicles/\udcff\x1b[2J", "vehicles/far"]
     assert all(patch.image is not None for patch in read_patches(find_patches([tmp_path])))
-
-
-@given(st.lists(st.integers(0, 10**30), min_size=2, max_size=6, unique=True), st.integers(0, 3))
-def test_numbers_of_any_length_are_ordered_by_value(
-    tmp_path_factory: pytest.TempPathFactory, numbers: list[int], zeros: int
-) -> None:
-    names = [f"vehicles/{'0' * zeros}{number}.png" for number in numbers]
-    path = make_zip(tmp_path_factory.getbasetemp() / "numbers.zip", [*names, BOTH[1]])
-    ordered = [name for _, name in sorted(zip(numbers, names, strict=True))]
-    assert [name for name, _ in listed(path)][1:] == ordered
 
 
 def test_devices_and_pipes_in_a_folder_are_no_patches(tmp_path: Path) -> None:

@@ -26,7 +26,6 @@ from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.dataset import PatchFile
 from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
-from vdet.learn.svm.fitting import LinearSvm
 from vdet.learn.svm.fitting import fit as fit_rows
 
 COLOUR = FeatureSettings(hog=HogSettings(channels=()), histogram=HistogramSettings(bins=8))
@@ -87,13 +86,6 @@ def test_the_folded_model_gives_the_probabilities_of_scikit_learn(ensemble: bool
     assert kinds == {np.dtype(np.float32)}
 
 
-def test_the_same_seed_gives_the_same_model_bit_for_bit() -> None:
-    one, same, other = (fit(*clouds(), seed=seed) for seed in (0, 0, 1))
-    np.testing.assert_array_equal(one.weights, same.weights)
-    np.testing.assert_array_equal(one.slopes, same.slopes)
-    assert (one.weights != other.weights).any()
-
-
 @pytest.mark.parametrize(("vehicles", "others"), [(2, 30), (30, 0)])
 def test_too_few_patches_of_a_class_for_the_folds_are_an_error(vehicles: int, others: int) -> None:
     vehicle = np.array([True] * vehicles + [False] * others, bool)
@@ -140,25 +132,6 @@ def test_augmented_samples_do_not_count_in_the_calibration() -> None:
     assert model.probabilities(vectors).mean() == pytest.approx(vehicle.mean(), abs=0.04)
 
 
-@pytest.mark.parametrize("penalty", [1e-4, 1.0])
-def test_the_svm_has_the_loss_of_scikit_learn_or_less(penalty: float) -> None:
-    vectors, vehicle = clouds()
-    scaled = StandardScaler().fit_transform(vectors)
-    reference = LinearSVC(C=penalty, random_state=0).fit(scaled, vehicle)
-    rows = np.arange(len(scaled))
-    found = LinearSvm(scaled, C=penalty).fit(rows, vehicle)
-
-    def loss(svm: LinearSVC | LinearSvm) -> float:
-        distances = scaled.astype(np.float64) @ svm.coef_[0] + svm.intercept_[0]
-        errors = np.maximum(0, 1 - np.where(vehicle, 1, -1) * distances)
-        penalties = np.square(svm.coef_).sum() + np.square(svm.intercept_).sum()
-        return float(penalties / 2 + penalty * np.square(errors).sum())
-
-    assert loss(found) <= loss(reference) * (1 + 1e-5)
-    agree = (found.decision_function(rows) > 0) == reference.predict(scaled)
-    assert agree.mean() > 0.99
-
-
 def peak_memory(call: Callable[[], object]) -> int:
     """Return the bytes that `call` had at once."""
     tracemalloc.start()
@@ -166,13 +139,6 @@ def peak_memory(call: Callable[[], object]) -> int:
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     return peak
-
-
-def test_the_svm_copies_no_data() -> None:
-    vectors = np.random.default_rng(0).normal(size=(4000, 500)).astype(np.float32)
-    vehicle = vectors[:, 0] > 0
-    svm = LinearSvm(vectors, C=0.01)
-    assert peak_memory(lambda: svm.fit(np.arange(4000), vehicle)) < vectors.nbytes / 2
 
 
 def test_a_fit_has_the_training_part_in_memory_once(monkeypatch: pytest.MonkeyPatch) -> None:

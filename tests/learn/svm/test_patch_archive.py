@@ -4,7 +4,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vdet.errors import OutputError
 from vdet.learn.svm.dataset import Sides, find_patches, patch_archive, read_patches
 from vdet.media.images import Image
 
@@ -52,8 +51,3 @@ def test_after_an_error_an_earlier_archive_is_unchanged(tmp_path: Path) -> None:
         add("vehicles/\udc80.png", patch(0), None)
     assert path.read_bytes() == b"precious"
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="cannot be written"):
-        write(tmp_path / "no" / "a.zip")

@@ -31,7 +31,6 @@ from vdet.errors import DataError
 from vdet.learn.svm.augmentation import Augmenter, augment
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import MAX_NAMED, TEST_SHARE, LabelledVectors, extract, hold_out
-from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.training import train
 from vdet.media.images import Image, read_image, write_image
 from vdet.workers import LocalProcesses, ThisProcess, Workers
@@ -120,7 +119,6 @@ def but(**changes: object) -> Settings:
 
 
 SERIAL = ThisProcess()
-NO_AUGMENTATION = AugmentationSettings(mirror=False, cut=0, parts=0)
 AUGMENTER = partial(augment, settings=SETTINGS.train.svm.augmentation)
 
 
@@ -150,12 +148,6 @@ def test_patches_are_described_in_order_with_their_class_and_group(files: list[P
     np.testing.assert_array_equal(data.vectors[-1], expected)
 
 
-def test_patches_of_another_size_are_resized(files: list[PatchFile]) -> None:
-    larger = SETTINGS.svm.features.model_copy(update={"patch": 32})
-    vectors = describe(files, features=larger).vectors
-    np.testing.assert_array_equal(vectors[:, -24:].sum(axis=1), 3 * 32 * 32)
-
-
 def test_several_processes_give_the_same_as_one(
     files: list[PatchFile], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -182,13 +174,6 @@ def test_augmented_samples_follow_and_have_the_row_of_their_patch(
     last = read_image(files[-1].source / files[-1].name)
     expected = FeatureExtractor(SETTINGS.svm.features).describe(np.ascontiguousarray(last[:, ::-1]))
     np.testing.assert_array_equal(rows.vectors[-1], expected)
-
-
-def test_a_patch_is_augmented_in_the_same_way_in_any_set(files: list[PatchFile]) -> None:
-    whole = describe(files, augmenter=AUGMENTER, seed=7)
-    one = describe(files[40:41], augmenter=AUGMENTER, seed=7)
-    assert len(one.origins) > 1
-    np.testing.assert_array_equal(whole.vectors[whole.origins == 40], one.vectors)
 
 
 def test_only_the_kept_patches_and_the_samples_made_of_them_are_used() -> None:
@@ -275,14 +260,6 @@ def test_the_tail_split_holds_out_the_last_of_each_group(seed: int) -> None:
     assert np.flatnonzero(scattered).tolist() == [6, 7, 8, 9]
 
 
-def test_the_random_split_depends_on_the_seed_alone() -> None:
-    one, same, other = (hold_out(TAILS, "random", 0.3, seed) for seed in (0, 0, 1))
-    np.testing.assert_array_equal(one, same)
-    np.testing.assert_array_equal(one, hold_out(TAILS[::-1], "random", 0.3, seed=0))
-    assert (one != other).any()
-    assert one[:-6].any(), "it is not the tail"
-
-
 @given(st.integers(2, 500), st.floats(0.01, 0.99), st.integers(0, 10))
 def test_the_random_split_holds_out_the_fraction_but_never_nothing_or_all(
     count: int, fraction: float, seed: int
@@ -290,41 +267,6 @@ def test_the_random_split_holds_out_the_fraction_but_never_nothing_or_all(
     held = hold_out(np.array(["a"] * count), "random", fraction, seed)
     assert 1 <= held.sum() <= count - 1
     assert abs(held.sum() - count * fraction) <= 1
-
-
-@pytest.mark.parametrize("fraction", [0.01, 0.5, 0.99])
-def test_the_tail_split_holds_out_some_of_each_group_of_two_or_more(fraction: float) -> None:
-    held = hold_out(TAILS, "tail", fraction, seed=0)
-    for group in "abc":
-        of_group = held[np.isin(TAILS, group)]
-        assert 1 <= of_group.sum() < len(of_group)
-
-
-def test_the_report_has_the_numbers_of_patches_features_and_results(
-    files: list[PatchFile],
-) -> None:
-    _, report = train(files, SETTINGS, jobs=1)
-    assert (report.vehicles, report.non_vehicles, report.broken) == (32, 25, 0)
-    assert report.features == FeatureExtractor(SETTINGS.svm.features).layout.length
-    for split in report.splits:
-        assert split.train_accuracy == 1
-        assert (split.test.accuracy.value or 0) >= 0.9
-        assert split.train_patches + split.test.patches == 57
-    groups = ["non-vehicles/road", "non-vehicles/sky", "vehicles/far", "vehicles/near"]
-    assert list(report.splits[1].test.groups) == groups
-
-
-@pytest.mark.parametrize("name", ["random", "tail"])
-def test_without_augmentation_the_model_is_fitted_to_the_patches_that_are_not_held_out(
-    files: list[PatchFile], name: Literal["random", "tail"]
-) -> None:
-    settings = but(split=name, augmentation=NO_AUGMENTATION)
-    model, report = train(files, settings, jobs=1)
-    data = describe(files)
-    held = hold_out(data.groups, name, TEST_SHARE, settings.train.svm.seed)
-    expected = fit(data.of(~held), settings)
-    np.testing.assert_array_equal(model.weights, expected.weights)
-    assert [split.train_augmented for split in report.splits] == [0, 0]
 
 
 @pytest.mark.parametrize("name", ["random", "tail"])
@@ -393,25 +335,12 @@ def test_a_trained_model_has_its_provenance_and_can_be_saved(
     np.testing.assert_array_equal(loaded.weights, model.weights)
 
 
-def test_too_few_patches_for_the_folds_are_an_error(files: list[PatchFile]) -> None:
-    few = [files[0], files[1], *[file for file in files if file.vehicle]]
-    with pytest.raises(DataError, match=r"a class has [0-2] training patches"):
-        train(few, SETTINGS, jobs=1)
-
-
 def test_groups_of_one_patch_each_have_no_tail_to_test(
     files: list[PatchFile],
 ) -> None:
     lonely = [replace(file, group=f"{file.group}/{i}") for i, file in enumerate(files)]
     with pytest.raises(DataError, match="no folder has two patches"):
         train(lonely, SETTINGS, jobs=1)
-
-
-def test_without_boxes_a_model_finds_no_sides(files: list[PatchFile]) -> None:
-    model, report = train(files, SETTINGS, jobs=1)
-    assert model.box_regression is None
-    assert report.boxed == 0
-    assert {split.box_error for split in report.splits} == {None}
 
 
 def test_with_boxes_a_model_finds_the_sides_of_vehicles(

@@ -1,13 +1,10 @@
 """The metrics of `vdet train` as text and as JSON."""
 
-import json
-from dataclasses import asdict, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vdet.errors import OutputError
 from vdet.learn.svm.metrics import Classification, Rate, SplitMetrics, TrainingMetrics
 
 TEST = Classification(
@@ -62,11 +59,3 @@ def test_a_model_of_patches_alone_is_told_what_it_lacks() -> None:
     assert "augmented" not in text
     assert "sides of" not in text
     assert words not in "\n".join(lines(METRICS))
-
-
-def test_the_metrics_are_written_as_json(tmp_path: Path) -> None:
-    METRICS.write(tmp_path / "model.json")
-    written = json.loads((tmp_path / "model.json").read_text())
-    assert written == json.loads(json.dumps(asdict(METRICS)))
-    with pytest.raises(OutputError, match="cannot be written"):
-        METRICS.write(tmp_path / "no" / "model.json")
