@@ -8,7 +8,6 @@ from vdet.boxes import Box, from_sizes
 from vdet.detect.svm.windows import Windows
 from vdet.learn.svm.choosing import (
     ChosenWindow,
-    FrameLabels,
     Most,
     PatchKind,
     WindowComparison,
@@ -22,12 +21,12 @@ OTHER = Box.sized(700, 300, 100, 70)
 GENEROUS = Most(per_vehicle=1000, false_alarms=1000, parts=1000)
 
 
-def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> FrameLabels:
-    tables = [
-        np.array([(box.x1, box.y1, box.x2, box.y2) for box in boxes], np.float64)
-        for boxes in (vehicles, ignored)
-    ]
-    return FrameLabels(*(table.reshape(-1, 4) for table in tables))
+Truth = tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]
+
+
+def truth(*vehicles: Box, ignored: tuple[Box, ...] = ()) -> Truth:
+    boxes = [(box.x1, box.y1, box.x2, box.y2) for box in (*vehicles, *ignored)]
+    return np.array(boxes, np.float64), np.arange(len(boxes)) >= len(vehicles)
 
 
 def about(x: float, side: int = 100, y: float = 335) -> Box:
@@ -47,13 +46,13 @@ def windows(*boxes: Box, probability: float = 1.0) -> Windows:
 
 def chosen(
     found: Windows,
-    labels: FrameLabels,
+    labels: Truth,
     most: Most = GENEROUS,
     seed: int = 0,
     probability: float = 0.2,
 ) -> list[ChosenWindow]:
     rng = np.random.default_rng(seed)
-    return list(choose_windows(found, labels, WIDTH, rng, probability=probability, most=most))
+    return list(choose_windows(found, *labels, WIDTH, rng, probability=probability, most=most))
 
 
 def kinds(choices: list[ChosenWindow]) -> dict[Box, str]:

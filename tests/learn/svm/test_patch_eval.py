@@ -77,7 +77,6 @@ def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(bright_and_dar
 
     files = find_patches([bright_and_dark])
     scores = evaluate_patches(files, SETTINGS, jobs=1, steps=start)
-    assert (scores.vehicles, scores.non_vehicles, scores.broken) == (24, 23, 1)
     (mistake,) = scores.mistakes
     assert str(mistake.file).endswith("non-vehicles/b/11.png"), "beside a broken patch"
     assert (scores.test.patches, scores.test.accuracy.value) == (8, 7 / 8)

@@ -43,17 +43,6 @@ _MAX_COVERED = 0.3
 _EDGE = 0.002  # of the frame's width: a box this close to a side of the frame is cut off by it
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class FrameLabels:
-    """The true vehicles and the ignore regions of a frame.
-
-    Both are float64 `(n, 4)`: x1, y1, x2, y2, pixels.
-    """
-
-    vehicles: Float64Array
-    ignored: Float64Array
-
-
 @dataclass(frozen=True, slots=True)
 class ChosenWindow:
     """A window that becomes a patch, and the sides of the vehicle in it."""
@@ -65,7 +54,8 @@ class ChosenWindow:
 
 def choose_windows(
     windows: Windows,
-    labels: FrameLabels,
+    labelled: Float64Array,
+    ignored: BoolArray,
     frame_width: int,
     rng: np.random.Generator,
     *,
@@ -78,19 +68,22 @@ def choose_windows(
     ----------
     windows
         All windows of the frame, with the probabilities of the model that is to be improved.
+    labelled, ignored
+        float64 `(n, 4)`: x1, y1, x2, y2, pixels, of the true vehicles and the ignore regions of the
+        frame; bool `(n,)`: which are ignore regions.
     frame_width
         Width of the frame, pixels.
     probability
         Least one of a false alarm or a part.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
-    boxes = from_sizes(windows.boxes[first])
+    boxes, vehicles = from_sizes(windows.boxes[first]), labelled[~ignored]
     is_hit = windows.probabilities[first] >= probability
-    comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in labels.vehicles]
+    comparisons = [compare_windows(boxes, vehicle, frame_width) for vehicle in vehicles]
     distances = [np.full(len(boxes), np.inf)]  # of no vehicle
     distances += [np.where(each.near, each.distances, np.inf) for each in comparisons]
     nearest = np.argmin(distances, axis=0) - 1
-    is_covered = coverage(boxes, np.concatenate([labels.vehicles, labels.ignored])) > _MAX_COVERED
+    is_covered = coverage(boxes, np.concatenate([vehicles, labelled[ignored]])) > _MAX_COVERED
     is_alarm = is_hit & (nearest < 0) & ~is_covered.any(axis=1)
     is_part = np.zeros(len(boxes), np.bool_)
 

@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 
-from vdet.boxes import Float64Array
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.svm.detector import SvmModel, horizon_of
 from vdet.detect.svm.features import cut_window, to_patch
@@ -28,7 +27,6 @@ from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.choosing import (
     MOST,
-    FrameLabels,
     PatchKind,
     choose_windows,
     cut_sides,
@@ -66,7 +64,7 @@ class LabelledFrame:
     number: int
     image: Image
     windows: Windows
-    labels: FrameLabels
+    labels: LabelledVideo | LabelledPicture
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +106,8 @@ class VideoSource:
                 raise VideoError(f"{self.path}: {error}") from error
             for frame in frames:
                 number = frame.index + 1
-                labels = _frame_labels(truth.frame(number))
-                if self._uses(number, labels.vehicles, info.width):
+                labels = truth.frame(number)
+                if self._uses(number, labels, info.width):
                     image, name = frame.image, f"frame{number:06}"
                     yield LabelledFrame(name, frame.index, image, search(image), labels)
                 advance(1)
@@ -124,10 +122,10 @@ class VideoSource:
             )
         return last
 
-    def _uses(self, number: int, vehicles: Float64Array, width: int) -> bool:
+    def _uses(self, number: int, labels: LabelledVideo, width: int) -> bool:
         """Return whether a frame is used. One that cuts a vehicle off is rare and hard to learn."""
         is_regular = (number - self.first) % self.every == 0
-        cuts_off = any(cut_sides(box, width).any() for box in vehicles)
+        cuts_off = any(cut_sides(box, width).any() for box in labels.boxes[~labels.ignored])
         return number >= self.first and (is_regular or cuts_off)
 
 
@@ -158,14 +156,8 @@ class PictureSource:
                 windows = search_windows(model, width, height, [image])(image)
             except ImageError as error:
                 raise ImageError(f"{labelled.path}: {error}") from error
-            labels = _frame_labels(labelled)
-            yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labels)
+            yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labelled)
             advance(1)
-
-
-def _frame_labels(labelled: LabelledVideo | LabelledPicture) -> FrameLabels:
-    boxes, ignored = labelled.boxes, labelled.ignored
-    return FrameLabels(boxes[~ignored], boxes[ignored])
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +221,8 @@ def mine(
                 rng = np.random.default_rng((settings.train.svm.seed, frame.number))
                 for each in choose_windows(
                     frame.windows,
-                    frame.labels,
+                    frame.labels.boxes,
+                    frame.labels.ignored,
                     frame.image.shape[1],
                     rng,
                     probability=settings.train.mine.probability,

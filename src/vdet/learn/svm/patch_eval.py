@@ -5,7 +5,7 @@ a split that leaks nothing, because patches in a row are near-duplicates.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
@@ -52,8 +52,6 @@ class PatchScores:
 
     Attributes
     ----------
-    vehicles, non_vehicles, broken
-        Number of patches of the data.
     meaning
         How the tested patches are related to those of the training.
     roc_auc, log_loss
@@ -64,9 +62,6 @@ class PatchScores:
         The worst ones of either kind, the worst first.
     """
 
-    vehicles: int
-    non_vehicles: int
-    broken: int
     meaning: str
     test: Classification
     precision: Rate
@@ -121,17 +116,11 @@ def evaluate_patches(
     steps("computing scores", None)
     rows = np.flatnonzero(tested)
     probabilities = model.probabilities(data.vectors[rows]).astype(np.float64)
-    scores = score_patches([data.files[row] for row in rows.tolist()], probabilities, meaning)
-    return replace(
-        scores,
-        vehicles=int(np.count_nonzero(data.labels)),
-        non_vehicles=int(np.count_nonzero(~data.labels)),
-        broken=len(files) - len(data.files),
-    )
+    return score_patches([data.files[row] for row in rows.tolist()], probabilities, meaning)
 
 
 def score_patches(
-    files: Sequence[PatchFile], probabilities: Float64Array, meaning: str = ""
+    files: Sequence[PatchFile], probabilities: Float64Array, meaning: str
 ) -> PatchScores:
     """Compute the metrics of patches, at least one, and their probabilities, float64 `(n,)`."""
     from sklearn import metrics
@@ -141,9 +130,6 @@ def score_patches(
     both = 0 < np.count_nonzero(vehicle) < len(vehicle)
     roc = metrics.roc_curve(vehicle, probabilities)[:2] if both else (np.empty(0), np.empty(0))
     return PatchScores(
-        vehicles=int(np.count_nonzero(vehicle)),
-        non_vehicles=int(np.count_nonzero(~vehicle)),
-        broken=0,
         meaning=meaning,
         test=Classification.of(vehicle, positive, np.array([file.group for file in files])),
         precision=Rate.of(vehicle[positive]),
@@ -168,8 +154,6 @@ def _worst(vehicle: BoolArray, probabilities: Float64Array) -> list[int]:
 
 def lines(scores: PatchScores) -> Iterator[str]:
     """Yield the scores as lines of text."""
-    broken = f" ({scores.broken} broken ones skipped)" if scores.broken else ""
-    yield f"patches: {scores.vehicles} vehicles, {scores.non_vehicles} non-vehicles{broken}"
     yield scores.meaning
     yield ""
     yield from table(("metric", "95 % interval"), metric_rows(scores))
@@ -199,17 +183,10 @@ def values(scores: PatchScores) -> dict[str, Any]:
 
 def patch_page(scores: PatchScores, run: RunName) -> str:
     """Return the page as HTML."""
-    counts = f"{scores.vehicles} patches of vehicles, {scores.non_vehicles} of other things"
     return render(
         "eval_patches.html",
-        subtitle="; ".join([counts, *run_lines(run)]),
+        subtitle="; ".join(run_lines(run)),
         scores=scores,
-        figures=[
-            ("accuracy", share(scores.test.accuracy.value)),
-            ("precision", share(scores.precision.value)),
-            ("recall", share(scores.recall.value)),
-            ("ROC AUC", share(scores.roc_auc)),
-        ],
         metrics=metric_rows(scores),
         confusion_headings=CONFUSION_HEADINGS,
         roc=_roc_plot(scores),
