@@ -51,7 +51,7 @@ def test_the_text_has_both_splits_with_accuracies_confusion_and_groups() -> None
     assert "sides of vehicles' boxes: mean error 0.043 of a patch's side" in text
 
 
-def test_a_model_of_patches_alone_is_told_what_it_lacks() -> None:
+def test_the_text_says_what_a_model_of_patches_alone_lacks() -> None:
     words = "no patch came from vdet mine: in video, such a model finds far fewer vehicles"
     bare = replace(SPLITS[0], train_augmented=0, box_error=None)
     text = "\n".join(lines(replace(METRICS, boxed=0, splits=(bare,))))

@@ -1,4 +1,4 @@
-"""Which cells of the network shall find which vehicle.
+"""Which cells of the network are to find which vehicle.
 
 The cost of a cell for a vehicle is low where the cell's box and score already fit and its middle
 is close. Each vehicle gets its cheapest cells: as many as the sum of its best overlaps.
@@ -62,7 +62,7 @@ class Assignment:
 def assign(
     scores: Tensor, boxes: Tensor, vehicles: Vehicles, centers: Tensor, strides: Tensor
 ) -> Assignment:
-    """Return which cells shall find which vehicle.
+    """Return which cells are to find which vehicle.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def giou(a: Tensor, b: Tensor) -> Tensor:
 def quality_focal_loss(logits: Tensor, targets: Tensor) -> Tensor:
     """Return the loss of each score against its target, 0 to 1; both of the same shape.
 
-    The target of a cell that shall find a vehicle is the overlap of their boxes, of others 0.
+    The target of a cell that is to find a vehicle is the overlap of their boxes; others have 0.
     Source: Li et al., "Generalized Focal Loss", 2020.
     """
     distance = (targets - logits.sigmoid()).abs()
