@@ -93,12 +93,8 @@ class Box:
 
     def union(self, other: "Box") -> "Box":
         """Return the smallest box that covers both."""
-        return Box(
-            min(self.x1, other.x1),
-            min(self.y1, other.y1),
-            max(self.x2, other.x2),
-            max(self.y2, other.y2),
-        )
+        x1, y1 = min(self.x1, other.x1), min(self.y1, other.y1)
+        return Box(x1, y1, max(self.x2, other.x2), max(self.y2, other.y2))
 
     def intersection(self, other: "Box") -> "Box":
         """Return the part in common; its area is 0 where there is none."""
@@ -183,25 +179,26 @@ class Boxes:
     ) -> None:
         box_column = _column(sides, np.float64, (-1, 4), "sides")
         rows = (len(box_column),)
-        score_column = _column(scores, np.float64, rows, "scores")
-        class_column = None if classes is None else _column(classes, np.int32, rows, "classes")
-        if ((box_column[:, 2:] - box_column[:, :2]) <= 0).any():
-            raise ValueError("sides: a box has no area; give x1 < x2 and y1 < y2")
-        if ((score_column < 0) | (score_column > 1)).any():
-            raise ValueError("scores: a score is not in 0 to 1")
-        if class_column is not None and ((class_column < 0) | (class_column >= len(names))).any():
-            raise ValueError("classes: an index that `names` does not have")
         columns = {
             "sides": box_column,
-            "scores": score_column,
-            "classes": class_column,
+            "scores": _column(scores, np.float64, rows, "scores"),
+            "classes": _column(classes, np.int32, rows, "classes"),
             "names": tuple(names),
-            "ids": None if ids is None else _column(ids, np.int64, rows, "ids"),
-            "data": {name: _data_column(values, *rows, name) for name, values in data.items()},
+            "ids": _column(ids, np.int64, rows, "ids"),
+            "data": {
+                name: _column(values, np.float64, (*rows, *np.shape(values)[1:]), name)
+                for name, values in data.items()
+            },
             "trace": trace,
         }
         for name, column in columns.items():
             object.__setattr__(self, name, column)
+        if (self.sides[:, 2:] <= self.sides[:, :2]).any():
+            raise ValueError("sides: a box has no area; give x1 < x2 and y1 < y2")
+        if ((self.scores < 0) | (self.scores > 1)).any():
+            raise ValueError("scores: a score is not in 0 to 1")
+        if self.classes is not None and not np.isin(self.classes, range(len(names))).all():
+            raise ValueError("classes: an index that `names` does not have")
 
     def __len__(self) -> int:
         return len(self.sides)
@@ -235,11 +232,6 @@ class Boxes:
             data={name: column[rows] for name, column in self.data.items()},
             trace=self.trace,
         )
-
-    @property
-    def centers(self) -> Float64Array:
-        """The middles of the boxes, float64 `(n, 2)` of x and y."""
-        return np.asarray((self.sides[:, :2] + self.sides[:, 2:]) / 2)
 
     @property
     def class_names(self) -> list[str | None]:
@@ -285,25 +277,20 @@ class Boxes:
 
 
 def _column(
-    values: npt.ArrayLike, kind: type[np.generic], shape: tuple[int, ...], name: str
-) -> npt.NDArray[Any]:
-    """Return a read-only copy; -1 in `shape` stands for any length."""
+    values: npt.ArrayLike | None, kind: type[np.generic], shape: tuple[int, ...], name: str
+) -> Any:
+    """Return a read-only copy, None of None; -1 in front of `shape` stands for any length."""
+    if values is None:
+        return None
     column = np.array(values, kind)
     if column.size == 0 and shape[0] <= 0:
         column = column.reshape(0, *shape[1:])
-    if column.ndim != len(shape) or any(
-        wanted not in (-1, length) for wanted, length in zip(shape, column.shape, strict=True)
-    ):
+    if column.shape != (shape if shape[0] >= 0 else (*column.shape[:1], *shape[1:])):
         raise ValueError(f"{name}: of shape {column.shape}, expected {shape}")
     if not np.isfinite(column).all():
         raise ValueError(f"{name}: a value is not a finite number")
     column.flags.writeable = False
     return column
-
-
-def _data_column(values: npt.ArrayLike, count: int, name: str) -> npt.NDArray[Any]:
-    column = np.asarray(values, np.float64)
-    return _column(column, np.float64, (count, *column.shape[1:]), name)
 
 
 NO_BOXES = Boxes(np.empty((0, 4)), np.empty(0))

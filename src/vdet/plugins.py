@@ -19,15 +19,6 @@ FORMATS = "vdet.formats"
 PICTURE_FORMATS = "vdet.picture_formats"
 COMMANDS = "vdet.commands"
 
-_NOUNS = {
-    DETECTORS: "detector",
-    TRACKERS: "tracker",
-    STEPS: "step",
-    SINKS: "sink",
-    FORMATS: "format of tracks",
-    PICTURE_FORMATS: "form of labelled pictures",
-    COMMANDS: "command",
-}
 _BUILT_IN: dict[str, dict[str, str]] = {
     DETECTORS: {"svm": "vdet.detect.svm.kind:SVM", "net": "vdet.detect.onnx.detector:NET"},
     TRACKERS: {"motion": "vdet.track.factory:MOTION", "rules": "vdet.track.factory:RULES"},
@@ -61,14 +52,13 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "yolo": "vdet.labels.yolo:YOLO_PICTURES",
         "voc": "vdet.labels.voc:VOC_PICTURES",
     },
-    COMMANDS: {},
 }
 """The names of vdet itself: where each is defined."""
 
 
 def built_in_names(group: str) -> list[str]:
     """Return the names of a group that are those of vdet."""
-    return list(_BUILT_IN[group])
+    return list(_BUILT_IN.get(group, {}))
 
 
 def plugin_names(group: str) -> list[str]:
@@ -85,7 +75,7 @@ def load_plugin(group: str, name: str) -> Any:
     ConfigError
         Nothing is registered under this name, or it cannot be imported.
     """
-    if name in _BUILT_IN[group]:
+    if name in built_in_names(group):
         return resolve_name(_BUILT_IN[group][name])
     for point in entry_points(group=group, name=name):
         try:
@@ -96,4 +86,5 @@ def load_plugin(group: str, name: str) -> Any:
                 "repair or reinstall that package"
             ) from error
     known = ", ".join(plugin_names(group))
-    raise ConfigError(f"{printable(name)}: is no {_NOUNS[group]}; known are {known}")
+    noun = group.removeprefix("vdet.").removesuffix("s").replace("_", " ")
+    raise ConfigError(f"{printable(name)}: is no {noun}; known are {known}")

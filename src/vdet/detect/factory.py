@@ -15,15 +15,6 @@ from vdet.media.images import Image
 from vdet.plugins import DETECTORS, load_plugin
 
 
-def _no_model(_: Any) -> None:
-    """Say that a kind needs no model file."""
-
-
-def _nothing(_: Path) -> tuple[str, ...]:
-    """Say that a model file does not tell what it was trained on."""
-    return ()
-
-
 @dataclass(frozen=True, slots=True)
 class DetectorKind:
     """What is registered under the name of a kind of detector.
@@ -42,8 +33,8 @@ class DetectorKind:
 
     settings: type[DetectorSettings]
     load: Callable[[Any, Path | None], DetectorModel]
-    shipped: Callable[[Any], Path | None] = _no_model
-    trained_on: Callable[[Path], tuple[str, ...]] = _nothing
+    shipped: Callable[[Any], Path | None] = lambda _: None
+    trained_on: Callable[[Path], tuple[str, ...]] = lambda _: ()
 
 
 def load_detector(settings: DetectorSettings, model: Path | None = None) -> DetectorModel:

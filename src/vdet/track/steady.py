@@ -8,9 +8,11 @@ that a vehicle that brakes or comes near is not left behind.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
-from vdet.boxes import Box
+import numpy as np
+
+from vdet.boxes import Box, Float64Array
 from vdet.track.track import Track
 
 LIMIT = 0.025
@@ -28,10 +30,10 @@ SHORTEST_STEP = 0.001
 
 @dataclass(slots=True)
 class _Sides:
-    """Left, top, right and bottom of a box, pixels, with their speeds; `count` of boxes so far."""
+    """The four sides of a box, pixels, with their speeds; `count` of boxes so far."""
 
-    places: list[float]
-    speeds: list[float]
+    places: Float64Array
+    speeds: Float64Array
     time: float
     count: int = 1
 
@@ -58,27 +60,23 @@ class SteadyBoxes:
         return [_with_box(track, self._smoothed(track, time)) for track in tracks]
 
     def _smoothed(self, track: Track, time: float) -> Box:
-        box = track.box
-        given = [box.x1, box.y1, box.x2, box.y2]
+        given = np.array(astuple(track.box), np.float64)
         sides = self._sides.get(track.id)
         if sides is None:
-            self._sides[track.id] = _Sides(given, [0.0] * 4, time)
-            return box
+            self._sides[track.id] = _Sides(given, np.zeros(4), time)
+            return track.box
         elapsed = max(time - sides.time, SHORTEST_STEP)
         kept = math.exp(-elapsed / self._seconds)
         sides.time, sides.count = time, sides.count + 1
         together = sides.count * (sides.count + 1)
         g = max(1 - kept**2, 2 * (2 * sides.count - 1) / together)
         h = max((1 - kept) ** 2, 6 / together)
-        for number, side in enumerate(given):
-            length = box.height if number % 2 else box.width
-            expected = sides.places[number] + sides.speeds[number] * elapsed
-            error, limit = side - expected, LIMIT * length
-            place = expected + g * error
-            kept_near = min(max(place, side - limit), side + limit)
-            sides.places[number] = kept_near
-            sides.speeds[number] += (h * error + SETTLING * (kept_near - place)) / elapsed
-        return Box(*sides.places)
+        limits = LIMIT * np.array([track.box.width, track.box.height] * 2)
+        error = given - sides.places - sides.speeds * elapsed
+        places = given - (1 - g) * error
+        sides.places = np.clip(places, given - limits, given + limits)
+        sides.speeds = sides.speeds + (h * error + SETTLING * (sides.places - places)) / elapsed
+        return Box(*sides.places.tolist())
 
 
 def _with_box(track: Track, box: Box) -> Track:
