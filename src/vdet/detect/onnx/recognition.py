@@ -22,7 +22,7 @@ from vdet.detect.onnx.layouts import (
     our_cells,
 )
 from vdet.detect.onnx.preparation import GREY, InputForm, Placement, size_of_area
-from vdet.detect.onnx.session import Array, Session, first_line
+from vdet.detect.onnx.session import TYPES, Array, Session, first_line
 from vdet.errors import ModelError
 from vdet.media import Picture
 
@@ -119,7 +119,7 @@ class Recognized:
         size = [[self.form.width, self.form.height]]
         return self.session.run(
             {
-                slot.name: np.array(size, slot.dtype) if slot.name == _SIZES else values
+                slot.name: np.array(size, TYPES[slot.type]) if slot.name == _SIZES else values
                 for slot in self.session.inputs
             }
         )
@@ -185,7 +185,7 @@ def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
 def _by_shape(session: Session, names: Sequence[str]) -> Recognized:
     metadata = _ultralytics_metadata(session)
     form = _form(session, metadata.size)
-    shape = session.inputs[0].shape
+    shape = _shape(session)
     if len(shape) != 4 or shape[1] not in (3, None):
         raise _unknown(session, f"its input is {_listed([shape])}, not (1, 3, height, width)")
     names = tuple(names) or metadata.names
@@ -281,17 +281,21 @@ def _ultralytics_metadata(session: Session) -> _Metadata:
 
 def _form(session: Session, size: tuple[int, int] | None) -> InputForm:
     """Return the usual input, of fixed size, or of the `size` in the metadata, or of 640×640."""
-    slot = next(slot for slot in session.inputs if slot.name != _SIZES)
-    height, width = slot.shape[2:4] if len(slot.shape) == 4 else (None, None)
+    height, width = shape[2:4] if len(shape := _shape(session)) == 4 else (None, None)
     usual = size or (_DEFAULT_SIDE, _DEFAULT_SIDE)
-    return InputForm(
-        width or usual[0],
-        height or usual[1],
-        "center",
-        is_rgb=True,
-        factor=1 / 255,
-        dtype=slot.dtype,
-    )
+    size = width or usual[0], height or usual[1]
+    dtype = TYPES[_picture_input(session).type]
+    return InputForm(*size, "center", is_rgb=True, factor=1 / 255, dtype=dtype)
+
+
+def _picture_input(session: Session) -> Any:
+    return next(each for each in session.inputs if each.name != _SIZES)
+
+
+def _shape(session: Session) -> tuple[int | None, ...]:
+    """Return the shape of the input for the picture; None stands for any length."""
+    sides = _picture_input(session).shape
+    return tuple(side if isinstance(side, int) and side > 0 else None for side in sides)
 
 
 def _listed(shapes: Sequence[tuple[int | None, ...]]) -> str:

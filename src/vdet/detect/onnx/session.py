@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,27 +16,25 @@ Array = npt.NDArray[Any]
 MAX_BYTES = 1_000_000_000
 """Largest ONNX file that is read."""
 
-_TYPES: dict[str, type[np.generic]] = {
+TYPES: dict[str, type[np.generic]] = {
     "tensor(float)": np.float32,
     "tensor(float16)": np.float16,
     "tensor(uint8)": np.uint8,
     "tensor(int64)": np.int64,
     "tensor(int32)": np.int32,
 }
+"""What onnxruntime calls the types of inputs."""
+
 _ERRORS_ONLY = 3
-
-
-@dataclass(frozen=True, slots=True)
-class InputSlot:
-    """An input of a network: its name, its shape (None: any length), and its type."""
-
-    name: str
-    shape: tuple[int | None, ...]
-    dtype: type[np.generic]
 
 
 class Session:
     """A network that is ready to run; threads may share it.
+
+    Attributes
+    ----------
+    inputs
+        Each has a `name`, a `shape` and a `type`, one of `TYPES`.
 
     Raises
     ------
@@ -61,7 +58,11 @@ class Session:
             reason = first_line(error)
             raise ModelError(f"{path}: cannot be loaded by onnxruntime: {reason:.200}") from error
         self.path = path
-        self.inputs = tuple(_slot(path, each) for each in self._session.get_inputs())
+        self.inputs = self._session.get_inputs()
+        for each in self.inputs:
+            if each.type not in TYPES:
+                message = f"its input {each.name} is a {each.type}; give a detector"
+                raise ModelError(f"{path}: {message}")
         self.output_names = [each.name for each in self._session.get_outputs()]
         self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
 
@@ -73,10 +74,3 @@ class Session:
 def first_line(error: Exception) -> str:
     """Return the first line of what onnxruntime says of an error."""
     return str(error).partition("\n")[0]
-
-
-def _slot(path: Path, value: Any) -> InputSlot:
-    if value.type not in _TYPES:
-        raise ModelError(f"{path}: its input {value.name} is a {value.type}; give a detector")
-    shape = tuple(each if isinstance(each, int) and each > 0 else None for each in value.shape)
-    return InputSlot(value.name, shape, _TYPES[value.type])
