@@ -224,16 +224,6 @@ def test_a_hidden_vehicle_is_forgotten_after_some_seconds() -> None:
     assert id_at(shown[-1], CAR) not in ids(shown[:20])
 
 
-def test_two_vehicles_seen_as_one_are_both_shown_and_keep_their_places() -> None:
-    truck = Box.sized(490, 380, 160, 120)
-    clip = [*[[CAR, truck]] * 20, *[[CAR.union(truck)]] * 20, *[[CAR, truck]] * 5]
-    shown = follow(clip)
-    assert ids(shown) == {1, 2}
-    for tracks in shown[10:]:
-        assert id_at(tracks, CAR) == id_at(shown[10], CAR)
-        assert id_at(tracks, truck) == id_at(shown[10], truck)
-
-
 # The frame's sides
 
 

@@ -94,27 +94,6 @@ def is_part(box: Float64Array, other: Float64Array) -> bool:
     return bool(coverage(box[np.newaxis], other[np.newaxis]) > PART)
 
 
-def around(boxes: Float64Array) -> Float64Array:
-    """Return the smallest box, `(4,)`, that covers all of `boxes`, `(n, 4)`."""
-    return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
-
-
-def shows_both(found: Float64Array, expected: Float64Array) -> bool:
-    """Tell whether the region `found`, `(4,)`, shows both vehicles `expected`, `(2, 4)`, as one.
-
-    That is where most of the second lies in it and it fits the box around both better than the
-    first one alone.
-    """
-    alone, together = iou(found, expected[0]), iou(found, around(expected))
-    return is_part(expected[1], found) and bool(together > alone)
-
-
-def stretched(box: Float64Array, before: Float64Array, after: Float64Array) -> Float64Array:
-    """Return `box` moved and scaled as `before` was to become `after`; all of shape `(4,)`."""
-    scale = (after[2:] - after[:2]) / (before[2:] - before[:2])
-    return after[[0, 1, 0, 1]] + (box - before[[0, 1, 0, 1]]) * scale[[0, 1, 0, 1]]
-
-
 def buffered_iou(
     expected: Float64Array, buffers: Float64Array, found: Float64Array
 ) -> Float64Array:

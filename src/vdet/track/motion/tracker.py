@@ -1,8 +1,8 @@
 """The motion tracker: which vehicles there are, frame after frame."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import count, product
+from itertools import count
 
 import numpy as np
 
@@ -12,11 +12,8 @@ from vdet.media import Picture
 from vdet.track.motion.association import (
     are_hidden,
     are_parts,
-    around,
     buffered_iou,
     pair,
-    shows_both,
-    stretched,
     take_over_ids,
     without_duplicates,
 )
@@ -59,14 +56,10 @@ class MotionTracker:
         """
         observations = self._observations(detections)
         seconds, self._unsearched = self._unsearched + self._move_to(time), 0.0
-        expected = self._boxes()
-        hidden = self._hidden(expected)
-        pairs = self._pair(expected, hidden, observations)
-        found = {row: observations[number] for row, number in pairs.items()}
-        found |= self._seen_as_one(expected, hidden, found)
+        pairs = self._pair(observations)
         for row, vehicle in enumerate(self._vehicles):
-            if row in found:
-                vehicle.see(found[row], seconds, self._size)
+            if row in pairs:
+                vehicle.see(observations[pairs[row]], seconds, self._size)
             else:
                 vehicle.miss(seconds)
         left = [o for number, o in enumerate(observations) if number not in pairs.values()]
@@ -116,9 +109,7 @@ class MotionTracker:
         each = zip(self._vehicles, self._boxes(), strict=True)
         return [vehicle for vehicle, box in each if _least_side(box) >= 1 and not vehicle.is_over]
 
-    def _pair(
-        self, expected: Float64Array, hidden: BoolArray, observations: Sequence[Observation]
-    ) -> dict[int, int]:
+    def _pair(self, observations: Sequence[Observation]) -> dict[int, int]:
         """Pair rows of vehicles with numbers of observations; present vehicles choose first."""
         present: list[int] = []
         lost: list[int] = []
@@ -126,6 +117,7 @@ class MotionTracker:
         for row, vehicle in enumerate(self._vehicles):
             group = present if vehicle.is_present else lost if vehicle.confirmed else new
             group.append(row)
+        expected = self._boxes()
         boxes = np.reshape([observation.box for observation in observations], (-1, 4))
         buffers = np.reshape([v.state.deviation for v in self._vehicles], (-1, 2))
         values = buffered_iou(expected, buffers, boxes)
@@ -133,7 +125,7 @@ class MotionTracker:
         weak = [number for number, o in enumerate(observations) if not self._adds_evidence(o)]
         values[np.ix_(lost, weak)] = 0  # weak detections must not re-identify lost tracks
         parts = are_parts(boxes, np.array([observation.score for observation in observations]))
-        values[np.ix_(hidden, parts)] = 0  # parts of the vehicle that hides it
+        values[np.ix_(self._hidden(expected), parts)] = 0  # parts of the vehicle that hides it
         return pair(values, [present, lost, new])
 
     def _adds_evidence(self, observation: Observation) -> bool:
@@ -142,22 +134,6 @@ class MotionTracker:
 
     def _hidden(self, boxes: Float64Array) -> BoolArray:
         return are_hidden(boxes, np.array([each.is_present for each in self._vehicles], bool))
-
-    def _seen_as_one(
-        self, expected: Float64Array, hidden: BoolArray, found: Mapping[int, Observation]
-    ) -> dict[int, Observation]:
-        """Share a detection among two vehicles that it shows as one."""
-        shared: dict[int, Observation] = {}
-        confirmed = [row for row, vehicle in enumerate(self._vehicles) if vehicle.confirmed]
-        seen = [row for row in found if row in confirmed]
-        missed = [row for row in confirmed if row not in found and not hidden[row]]
-        for row, other in product(seen, missed):
-            observation, both = found[row], expected[[row, other]]
-            if other not in shared and shows_both(observation.box, both):
-                for each in (row, other):
-                    box = stretched(expected[each], around(both), observation.box)
-                    shared[each] = replace(observation, box=box)
-        return shared
 
     def _tracks(self, seconds: float) -> list[Track]:
         """Return the vehicles that are shown, by id; `seconds` since the latest searched frame."""
