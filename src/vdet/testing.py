@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import astuple
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -81,10 +82,9 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
         time, picture = index / RATE, Picture(_scene(index))
         tracks = list(first.update(_detections(index), time, picture))
         _check_tracks(tracks)
-        assert list(second.update(_detections(index), time, picture)) == tracks, (
-            "two trackers with the same input differ: they share something"
-        )
-        assert np.array_equal(picture.image, _scene(index)), "the tracker changed the frame"
+        again = list(second.update(_detections(index), time, picture))
+        assert again == tracks, "two trackers differ: they share something"
+        assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
     assert not any(track.predicted for track in tracks), "a detected vehicle is called predicted"
@@ -123,13 +123,13 @@ def check_sink(
     """
     folder = path if kind.marker else path.parent
     folder.mkdir(parents=True, exist_ok=True)
+    write = partial(_write, kind, path, settings or Settings(), still)
     with suppress(_RunFailsError):
-        _write(kind, path, settings or Settings(), still=still, fails=True)
+        write(fails=True)
     assert not _content(path), "a failed run left its output"
-    _write(kind, path, settings or Settings(), still=still)
+    write()
     assert _content(path), "a run that ended well left no output"
-    left = [file.name for file in folder.iterdir() if ".vdet-" in file.name]
-    assert not left, f"temporary files are left: {', '.join(left)}"
+    assert not list(folder.glob("*.vdet-*")), "temporary files are left"
 
 
 class _RunFailsError(Exception):
@@ -137,7 +137,7 @@ class _RunFailsError(Exception):
 
 
 def _write(
-    kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool = False
+    kind: SinkKind, path: Path, settings: Settings, still: bool, *, fails: bool = False
 ) -> None:
     """Write a picture or three frames through the sink."""
     rate = Fraction(RATE)
@@ -152,8 +152,7 @@ def _write(
                 for step in steps:
                     result = step.apply(result)
                 sink.write(result)
-                is_same = np.array_equal(result.frame.image, _scene(index))
-                assert is_same, "the sink changed the frame"
+                assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
             assert not _content(path), "the output is there before the run has ended"
             if fails:
                 raise _RunFailsError
