@@ -82,12 +82,6 @@ def test_the_overlaps_of_columns_are_those_of_single_boxes(one: Box, other: Box)
         assert visible(columns(one), (20, 30)).tolist() == columns(part).tolist()
 
 
-def test_no_boxes_have_no_overlaps() -> None:
-    assert iou_matrix(columns(), columns(Box(0, 0, 1, 1))).shape == (0, 1)
-    assert coverage(columns(Box(0, 0, 1, 1)), columns()).shape == (1, 0)
-    assert are_nested(columns(), []).tolist() == []
-
-
 @pytest.mark.parametrize(
     ("scores", "nested"),
     [((0.9, 0.8), [False, True]), ((0.5, 0.5), [False, True]), ((0.8, 0.9), [True, False])],

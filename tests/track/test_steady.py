@@ -52,13 +52,6 @@ def test_a_vehicle_that_moves_and_grows_steadily_is_shown_without_lag(speed: int
         assert box.iou(place) > 0.98
 
 
-def test_a_vehicle_that_stops_at_once_is_hardly_overshot() -> None:
-    given = [Box.sized(100 + 6 * min(n, 20), 200, 200, 160) for n in range(100)]
-    lag = [abs(box.x1 - place.x1) for box, place in zip(smoothed(given), given, strict=True)]
-    assert max(lag) <= LIMIT * 200 + 1
-    assert max(lag[90:]) <= 1
-
-
 @given(
     st.lists(
         st.builds(

@@ -131,15 +131,6 @@ def test_only_the_classes_that_are_asked_for_count(tmp_path: Path) -> None:
         assert class_names(found) == expected
 
 
-def test_names_are_read_with_small_letters_and_their_synonyms(tmp_path: Path) -> None:
-    metadata = {**ULTRALYTICS, "names": "{0: 'Lorry', 1: 'Van', 2: 'Motorbike'}"}
-    box = RedBox(64, 32, 16, 8, class_id=0)
-    form = ultralytics(SIZE, box, 3)
-    path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=metadata)
-    found = detect(path, frame_with_red(128, 128))
-    assert class_names(found) == ["truck"]
-
-
 def test_a_network_of_one_class_without_a_name_finds_vehicles(tmp_path: Path) -> None:
     form = ultralytics(SIZE, RedBox(64, 32, 16, 8), 1)
     path = write_network(tmp_path / "net.onnx", form, SIZE, (64, 32))

@@ -31,9 +31,3 @@ def test_each_row_and_column_is_used_once_and_none_for_nothing(values: Float64Ar
     assert list(rows) == sorted(set(rows))
     assert len(set(columns)) == len(columns)
     assert all(values[row, column] > 0 for row, column in pairs)
-
-
-def test_many_rows_and_columns() -> None:
-    values = np.random.default_rng(1).random((60, 40))
-    rows, columns = linear_sum_assignment(values, maximize=True)
-    assert assign(values) == list(zip(rows.tolist(), columns.tolist(), strict=True))

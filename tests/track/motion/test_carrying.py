@@ -45,11 +45,6 @@ def test_a_vehicle_moves_on_between_the_searched_frames() -> None:
         assert (track.id, track.box.iou(place) > 0.9) == (1, True)
 
 
-def test_it_is_predicted_where_it_was_not_looked_for() -> None:
-    shown = follow_strided([CAR] * 40, 4)
-    assert [tracks[0].predicted for tracks in shown[20:]] == [False, True, True, True] * 5
-
-
 def test_what_is_not_looked_for_is_not_missed() -> None:
     long_gaps = 2 * round(DEFAULTS.carried * RATE)
     places: list[Box | None] = [CAR] * (6 * long_gaps)
@@ -74,11 +69,6 @@ def test_a_lost_vehicle_keeps_its_id_for_about_the_same_time(stride: int) -> Non
         gap: list[Box | None] = [None] * round(missed * RATE)
         shown = follow_strided([*[CAR] * 50, *gap, *[CAR] * 50], stride)
         assert ids(shown[-1:]) == expected
-
-
-def test_one_searched_frame_is_not_enough_for_a_vehicle() -> None:
-    shown = follow_strided([CAR, *[None] * 40], 20)
-    assert ids(shown) == set()
 
 
 def scores_at(stride: int, seed: int) -> Scores:

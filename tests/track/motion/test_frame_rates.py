@@ -1,6 +1,5 @@
 """The same scene at any frame rate gives about the same tracks."""
 
-from dataclasses import astuple
 from functools import cache
 
 import numpy as np
@@ -12,7 +11,6 @@ from track.motion.traffic import (
     PERFECT,
     Noise,
     RoadVehicle,
-    TrueVehicle,
     random_traffic,
     track_scores,
     truth_at,
@@ -20,8 +18,6 @@ from track.motion.traffic import (
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
-from vdet.synthetic import demo_scene
-from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker
 
 RATES = (5, 10, 25, 50)
@@ -145,28 +141,3 @@ def test_many_weak_false_detections_do_not_become_tracks(rate: int) -> None:
     assert scores.f1 > 0.93
     shown_after = [(first.delay or 0) / rate for first in scores.first_detections]
     assert max(shown_after) <= max(0.4, 3 / rate)
-
-
-@cache
-def drawn_clip() -> list[list[TrueVehicle]]:
-    scene = demo_scene(1, width=1280, height=720)
-    return [
-        [
-            TrueVehicle(
-                each.id,
-                np.array(astuple(each.box), np.float64),
-                each.hidden,
-            )
-            for each in true_boxes(scene, index)
-        ]
-        for index in range(scene.frames)
-    ]
-
-
-def test_the_clip_of_the_demo_is_followed_at_five_frames_a_second() -> None:
-    usual = track_scores(drawn_clip(), 25, Noise())
-    thinned = track_scores(drawn_clip()[::5], 5, Noise())
-    assert usual.f1 > 0.95
-    assert thinned.f1 > usual.f1 - 0.1
-    assert thinned.mota > usual.mota - 0.1
-    assert usual.id_switches == 0

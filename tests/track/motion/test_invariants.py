@@ -44,12 +44,6 @@ def test_ids_are_unique_and_ordered_in_a_frame_and_given_without_gaps(clip: Clip
 
 
 @few
-@given(clips)
-def test_the_same_detections_give_the_same_tracks(clip: Clip) -> None:
-    assert follow(clip) == follow(clip)
-
-
-@few
 @given(clips, st.integers(0, 25))
 def test_the_future_does_not_change_the_past(clip: Clip, frames: int) -> None:
     assert follow(clip[:frames]) == follow(clip)[:frames]

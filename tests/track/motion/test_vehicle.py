@@ -58,25 +58,12 @@ def test_a_carried_vehicle_keeps_its_velocity_and_a_lost_one_comes_to_rest() -> 
 # Score and class
 
 
-def test_the_score_is_the_mean_of_the_detections() -> None:
-    vehicle = Vehicle(observation(score=0.4), FRAME, SETTINGS)
-    assert vehicle.scores.value == pytest.approx(0.4)
-    vehicle.see(observation(score=0.8), FRAME, SIZE)
-    assert vehicle.scores.value == pytest.approx(0.6, abs=0.02)
-
-
 @pytest.mark.parametrize("rate", [5, 10, 25, 50])
 def test_older_detections_count_less_at_the_same_pace_at_any_frame_rate(rate: int) -> None:
     vehicle = seen(10 * rate, score=1.0, seconds=1 / rate)
     for _ in range(rate):
         vehicle.see(observation(score=0.5), 1 / rate, SIZE)
     assert vehicle.scores.value == pytest.approx(0.5 + 0.5 * np.exp(-1 / SCORE_TIME), abs=1e-3)
-
-
-def test_the_score_falls_while_a_vehicle_is_not_seen() -> None:
-    scores = [missed(seen(40), frames).scores.value for frames in (0, 1, 4, 8)]
-    assert scores == sorted(scores, reverse=True)
-    assert scores[-1] == pytest.approx(np.exp(-8 * FRAME / SCORE_TIME), abs=0.05)
 
 
 def test_the_class_is_the_one_with_the_highest_sum_of_scores() -> None:
