@@ -1,4 +1,4 @@
-"""What other packages can add, by name: detectors, trackers, steps, sinks, formats and commands.
+"""Plug-ins by name: detectors, trackers, steps, sinks, formats and commands.
 
 A package registers its own as entry points of these groups. It is imported when one of its names is
 used, not before.

@@ -1,7 +1,7 @@
-"""What vehicles are called: the names in all outputs, and the words of others for them."""
+"""Classes of vehicles: their names in all outputs, and the words that others use for them."""
 
 OUR_NAMES = ("car", "truck", "bus", "motorcycle", "vehicle")
-"""What vehicles are called in all outputs; a vehicle is one of which no more is known."""
+"""The classes in all outputs; `vehicle` is one whose class is not known more exactly."""
 
 WORDS = {
     "car": ("car", "van", "suv", "taxi"),
@@ -30,11 +30,11 @@ class ClassScores(dict[str, float]):
     """The sum of the scores with which a vehicle was taken for each class."""
 
     def add(self, name: str | None, score: float) -> None:
-        """Add what one frame says; a name of None says nothing."""
+        """Add the class in one frame; None is ignored."""
         if name is not None:
             self[name] = self.get(name, 0.0) + score
 
     @property
     def best(self) -> str | None:
-        """The class with the highest sum, the earliest one among equals; None if none was told."""
+        """The class with the highest sum, the earliest among equals; None without any class."""
         return max(self, key=self.__getitem__, default=None)

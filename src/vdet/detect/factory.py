@@ -28,7 +28,7 @@ class DetectorKind:
     shipped
         Returns the shipped model file for some settings; None where the kind needs no file.
     trained_on
-        Returns the names of the data that a model file was trained on, as far as it says.
+        Returns the names of the data that a model file was trained on, if the file names them.
     """
 
     settings: type[DetectorSettings]
@@ -62,7 +62,7 @@ def model_file(settings: DetectorSettings, model: Path | None = None) -> Path | 
 
 
 def trained_on(settings: DetectorSettings, path: Path | None) -> tuple[str, ...]:
-    """Return the names of the data that a model file was trained on, as far as it says."""
+    """Return the names of the data that a model file was trained on, if the file names them."""
     return _kind(settings).trained_on(path) if path else ()
 
 

@@ -1,4 +1,4 @@
-"""The protocol of all detectors, which is all that the rest of the program knows of them."""
+"""The protocol of all detectors; the rest of the program uses nothing else of them."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
@@ -23,10 +23,10 @@ class VideoDetector(Protocol):
         Parameters
         ----------
         picture
-            The frame; its `image` is BGR, its `planes` are those of the decoder, if it has such.
+            The frame; its `image` is BGR, its `planes` are those of the decoder, if there are any.
         index
             Number of the frame in its video, from 0; None for a still picture. With a `stride`
-            in the settings, only every so many frames are searched.
+            in the settings, only every `stride`-th frame is searched.
         """
 
     def detect(self, candidates: Any) -> Boxes:
@@ -51,13 +51,13 @@ StagePictures = Callable[[Image, Boxes], dict[str, Image]]
 
 
 def stage_pictures_of(detector: VideoDetector) -> StagePictures:
-    """Return the function that makes the stage pictures of a detector, if it has such."""
+    """Return the function that makes the stage pictures of a detector, if it makes any."""
     return detector.stage_pictures if isinstance(detector, StagedDetector) else lambda *_: {}
 
 
 @runtime_checkable
 class LimitableDetector(VideoDetector, Protocol):
-    """A detector that can leave out the parts of the frame in which nothing is looked for."""
+    """A detector that can leave out the parts of the frame that need no search."""
 
     def limited_to(self, area: SearchArea) -> VideoDetector:
         """Return a detector for the same video that need not search outside `area`.

@@ -1,4 +1,4 @@
-"""What the rest of the program knows of a tracker."""
+"""The protocol of all trackers; the rest of the program uses nothing else of them."""
 
 from typing import Protocol, runtime_checkable
 
@@ -37,15 +37,14 @@ class VideoTracker(Protocol):
 class CarryingTracker(VideoTracker, Protocol):
     """A tracker that moves its vehicles on into frames that the detector did not search.
 
-    A tracker without `carry` is given one by `vdet.track.factory.make_tracker`: there the vehicles
-    stay where they were.
+    `vdet.track.factory.make_tracker` adds `carry` to a tracker without it; vehicles then stay where
+    they were.
     """
 
     def carry(self, time: float, picture: Picture | None = None) -> list[Track]:
         """Follow the vehicles into the next frame, which was not searched.
 
-        A vehicle that is not looked for is not missed: it must not be forgotten for it. All tracks
-        are `predicted`.
+        This frame does not count as a missed one for any vehicle. All tracks are `predicted`.
 
         Parameters
         ----------

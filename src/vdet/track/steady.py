@@ -1,9 +1,9 @@
-"""Boxes that do not tremble: each side is smoothed in time, for the eye.
+"""Smooths the sides of boxes in time, for display.
 
-Each side of a box has a g-h filter with fading memory, which follows a side that moves steadily
-without lag, and which begins with growing memory (Brookner, "Tracking and Kalman Filtering Made
-Easy", 1998, chapter 1). A side stays within a small share of the box from where it was given, so
-that a vehicle that brakes or comes near is not left behind.
+Each side of a box has a g-h filter with fading memory. It follows a side that moves steadily
+without lag, and begins with growing memory (Brookner, "Tracking and Kalman Filtering Made
+Easy", 1998, chapter 1). A side stays close to its input, so that a vehicle that
+brakes or comes near is not left behind.
 """
 
 import math
@@ -16,16 +16,16 @@ from vdet.boxes import Box, Float64Array
 from vdet.track.track import Track
 
 LIMIT = 0.025
-"""Largest distance of a side from where it was given, share of the box's width or height."""
+"""Largest distance of a side from its input, as a share of the box's width or height."""
 
 SETTLING = 0.05
-"""Share of what a side is put back by the limit that its speed is corrected for."""
+"""Share of the limit's correction of a side that also corrects its speed."""
 
 GAP = 0.5
-"""Seconds after which a vehicle that comes back is a new one to the filter."""
+"""Seconds after which the filter starts again for a vehicle that comes back."""
 
 SHORTEST_STEP = 0.001
-"""Seconds between frames at least."""
+"""Least number of seconds between two frames."""
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class SteadyBoxes:
     Parameters
     ----------
     seconds
-        How long the filter remembers: what it was given that long ago counts 1/e.
+        Memory of the filter: a box of this long ago has a weight of 1/e.
     """
 
     def __init__(self, seconds: float) -> None:

@@ -1,4 +1,4 @@
-"""What a tracker says about a frame: the vehicles that are shown in it."""
+"""The output of a tracker: the vehicles that are shown in a frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,10 +23,10 @@ class Track:
     score
         0 to 1: the share of shown boxes with such a score that are vehicles.
     predicted
-        Whether the detector did not see the vehicle in this frame: it is shown where its motion
-        leads or, by the rules, where its image was found again.
+        Whether the detector did not see the vehicle in this frame. It is then shown where its
+        motion leads or, by the rules, where its image was found again.
     class_name
-        Its class, one of `Boxes.names`; None where the detector does not tell classes.
+        Its class, one of `Boxes.names`; None where the detector does not know classes.
     whole_foot
         Middle of the lower edge of the whole box, with its part outside the frame; x and y, pixels.
         None where the tracker does not know it: see `foot`.

@@ -19,7 +19,7 @@ Fit = Literal["stretch", "center", "corner"]
 
 @dataclass(frozen=True, slots=True)
 class InputForm:
-    """What a network wants to see.
+    """The form of a network's input.
 
     Attributes
     ----------

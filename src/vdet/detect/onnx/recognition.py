@@ -1,4 +1,4 @@
-"""What kind of network an ONNX file holds: by its metadata, then its names, then its shapes."""
+"""Finds the form of a network in an ONNX file, by its metadata, then its names, then its shapes."""
 
 import ast
 from collections.abc import Sequence
@@ -62,11 +62,11 @@ class Recognized:
     name
         Name of the form, for people.
     reasons
-        Why it was taken for this form.
+        Why it has this form, in words.
     names
         Names of the classes, as the network counts them.
     form
-        What the network wants to see.
+        The form of its input.
     layout
         Turns its outputs into boxes.
     header
@@ -113,7 +113,7 @@ class Recognized:
 
 
 def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
-    """Find out what a network wants and gives.
+    """Find the form of a network's inputs and outputs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""An ONNX file as it is loaded by onnxruntime, with what it says of itself."""
+"""An ONNX file that onnxruntime has loaded, with its inputs and metadata."""
 
 import os
 from collections.abc import Mapping
@@ -72,5 +72,5 @@ class Session:
 
 
 def first_line(error: Exception) -> str:
-    """Return the first line of what onnxruntime says of an error."""
+    """Return the first line of an error's message."""
     return str(error).partition("\n")[0]

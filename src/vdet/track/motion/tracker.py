@@ -1,4 +1,4 @@
-"""The motion tracker: which vehicles there are, frame after frame."""
+"""The motion tracker, frame by frame."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +27,7 @@ _OVERLAP = 0.3
 """Least intersection over union of a detection with the expected box of its vehicle."""
 
 SHORTEST_STEP = 0.001
-"""Seconds between frames at least, also where two have the same time or the clock goes back."""
+"""Least seconds between frames, also where two have the same time or the clock goes back."""
 
 
 class MotionTracker:

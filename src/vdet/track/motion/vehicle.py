@@ -100,7 +100,7 @@ class Vehicle:
     detection_scores
         The same, without the frames that have no detection.
     classes
-        What its detections were taken for.
+        The classes of its detections.
     """
 
     def __init__(self, first: Observation, seconds: float, settings: MotionTrackerSettings) -> None:
