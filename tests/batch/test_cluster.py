@@ -181,7 +181,7 @@ def test_training_on_a_cluster_gives_the_same_model(run: Run, address: str, tmp_
 def test_workers_with_another_version_are_refused(
     run: Run, address: str, clips: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("vdet.__version__", "9.9")
+    monkeypatch.setattr("vdet.workers.__version__", "9.9")
     result = run("detect-video", clips, "-d", tmp_path / "out", "--scheduler", address)
     assert result.code == 1
     assert "this worker has vdet 0." in result.err
