@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.drawn_traffic import TruePlace, lane_view, traffic_scene, true_places
 from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
@@ -23,11 +24,10 @@ from vdet.media import Frame, Picture, VideoInfo
 from vdet.media.images import Image
 from vdet.run.loop import build, peek
 from vdet.run.steps import LaneStep, with_positions
-from vdet.synthetic import must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import TruePlace, true_places
+from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.track.track import Track
 
 FRAMES = 100
@@ -78,7 +78,7 @@ class Drive:
         """Return the lane finder, set to the road from 6 m, or the nearest seen, to 42 m."""
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
-        view = camera.lane_view(near=max(6.0, nearest), far=42.0)
+        view = lane_view(camera, near=max(6.0, nearest), far=42.0)
         settings = view
         return RoadFinder(LaneRequest(), settings, camera.width, camera.height)
 

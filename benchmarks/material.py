@@ -10,7 +10,8 @@ from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.kind import shipped_model
 from vdet.detect.svm.model import LinearModel, load_model
 from vdet.media import Picture, VideoReader
-from vdet.synthetic import demo_scene, write_clip
+from vdet.synthetic.random_scenes import demo_scene
+from vdet.synthetic.render import write_clip
 
 FRAMES_SEARCHED = (20, 240, 470, 690, 760)  # of the project video, within its labelled part
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from vdet.media import VideoReader
 from vdet.media.images import Image, read_image
-from vdet.synthetic import write_clip
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road
+from vdet.synthetic.render import write_clip
 from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 FOLDER = Path(__file__).parent

@@ -9,7 +9,7 @@ from conftest import Run
 from vdet.demo import check_demo
 from vdet.errors import OutputError
 from vdet.media import VideoReader
-from vdet.synthetic import demo_scene
+from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.scene import Scene
 
 FRAMES = 60

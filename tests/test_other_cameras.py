@@ -14,6 +14,7 @@ from statistics import median
 
 import numpy as np
 import pytest
+from benchmarks.drawn_traffic import traffic_scene
 
 from vdet.boxes import Box, Float64Array
 from vdet.config.schema import Settings, SvmSettings
@@ -28,9 +29,10 @@ from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, Planes, VideoInfo
 from vdet.media.coding import Coding
 from vdet.run.loop import build, peek
-from vdet.synthetic import frames, must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.render import frames
 from vdet.synthetic.scene import Light, Scene
+from vdet.synthetic.truth import must_be_found, true_boxes
 
 LINEAR = Settings(detector=SvmSettings())
 FRAMES = 30

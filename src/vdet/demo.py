@@ -21,7 +21,9 @@ from vdet.media.writer import may_replace_video
 from vdet.progress import Steps, no_steps
 from vdet.run.sinks.protocol import Output
 from vdet.run.video import VideoJob, check_job, run_video
-from vdet.synthetic import busy_road, demo_scene, write_clip, write_truth
+from vdet.synthetic.random_scenes import busy_road, demo_scene
+from vdet.synthetic.render import write_clip
+from vdet.synthetic.truth import write_truth
 from vdet.traffic.counter import count_file
 
 ROADS = 6

@@ -10,8 +10,9 @@ import pytest
 from conftest import Run
 from quick import QUICK_OPTIONS, only_windows
 from vdet.media.images import read_image, write_image
-from vdet.synthetic import render, true_boxes
+from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene
+from vdet.synthetic.truth import true_boxes
 
 FEW_WINDOWS = only_windows("size: 160, overlap: 0.7, top: 380, bottom: 600")
 

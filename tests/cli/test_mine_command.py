@@ -21,8 +21,8 @@ from vdet.labels.mot import read_mot
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.media import VideoReader
-from vdet.synthetic import write_truth
 from vdet.synthetic.scene import Scene
+from vdet.synthetic.truth import write_truth
 from vdet.track.track import FrameTracks
 
 SETS = ", ".join(

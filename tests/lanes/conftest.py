@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+from benchmarks.drawn_traffic import lane_view
 
 from vdet.config.lanes import LaneSettings
 from vdet.lanes.camera import CalibratedCamera
@@ -20,7 +21,7 @@ def settings_for() -> Callable[[PinholeCamera], LaneSettings]:
     """Make settings whose top view shows the road from 6 m to 42 m ahead of a level camera."""
 
     def make(camera: PinholeCamera) -> LaneSettings:
-        return camera.lane_view(near=NEAR, far=FAR)
+        return lane_view(camera, near=NEAR, far=FAR)
 
     return make
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from benchmarks.drawn_traffic import lane_view, traffic_scene, true_places
 
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder
-from vdet.synthetic import must_be_found, traffic_scene, true_boxes
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import true_places
+from vdet.synthetic.truth import must_be_found, true_boxes
 
 FRAMES = 14
 SETTLED = 4
@@ -67,7 +67,7 @@ def placed_in(scene: Scene, index: int, road: Road) -> Iterable[Placed]:
 def finder_of(scene: Scene) -> RoadFinder:
     camera = scene.camera
     nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
-    view = camera.lane_view(near=max(6.0, nearest), far=42)
+    view = lane_view(camera, near=max(6.0, nearest), far=42)
     return RoadFinder(LaneRequest(), view, camera.width, camera.height)
 
 

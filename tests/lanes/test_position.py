@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.drawn_traffic import lane_view
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -32,7 +33,7 @@ def pixel_of(
 
 
 def place(foot: tuple[float, float], curves: LaneCurves = STRAIGHT) -> RoadPosition | None:
-    view = TopView(CAMERA.lane_view(near=6, far=FAR), CAMERA.width, CAMERA.height)
+    view = TopView(lane_view(CAMERA, near=6, far=FAR), CAMERA.width, CAMERA.height)
     return position_on_road(foot, curves, view)
 
 
@@ -60,7 +61,7 @@ def test_a_point_on_a_known_road_gets_its_metres_and_its_lane(
     width: float,
 ) -> None:
     camera = PinholeCamera(1280, 720, focal * 720, 330, height, curvature=1 / radius)
-    view = TopView(camera.lane_view(near=20, far=FAR), 1280, 720)
+    view = TopView(lane_view(camera, near=20, far=FAR), 1280, 720)
     curves = LaneCurves(0.5 / radius, heading, shift - width / 2, shift + width / 2, pitch)
     pitched = replace(camera, horizon=330 + pitch * camera.focal * height)
     foot = pixel_of(distance, lateral + heading * distance, pitched)
@@ -91,7 +92,7 @@ def test_the_lane_reaches_a_quarter_farther_than_it_is_fitted() -> None:
 
 def test_where_a_row_is_worth_too_many_metres_the_distance_is_not_known() -> None:
     small = PinholeCamera.dashboard(160, 90)
-    view = TopView(small.lane_view(near=6, far=FAR), small.width, small.height)
+    view = TopView(lane_view(small, near=6, far=FAR), small.width, small.height)
     feet = [(80, small.horizon + rows) for rows in (10.5, 9.5)]
     positions = [position_on_road(foot, STRAIGHT, view) for foot in feet]
     assert [each is not None for each in positions] == [True, False]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.drawn_traffic import lane_view, true_places
 
 from red_cars import NullDetector
 from run.red_runs import follow
@@ -16,17 +17,17 @@ from vdet.media import Frame, Picture
 from vdet.run.pictures import detect_picture
 from vdet.run.result import FrameResult
 from vdet.run.steps import with_positions
-from vdet.synthetic import frames, render, true_boxes
 from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.render import frames, render
 from vdet.synthetic.scene import Carriageway, Light, Line, Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import true_places
+from vdet.synthetic.truth import true_boxes
 from vdet.track.track import Track
 
 WIDTH, HEIGHT = 640, 360
 AHEAD = 18.0
 CAMERA = PinholeCamera.dashboard(WIDTH, HEIGHT)
 SETTINGS = Settings(
-    lanes=CAMERA.lane_view(near=6, far=42),
+    lanes=lane_view(CAMERA, near=6, far=42),
     tracker=MotionTrackerSettings(needed=0.05),
 )
 SCENE = Scene(

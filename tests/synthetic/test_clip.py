@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vdet.media import VideoReader
-from vdet.synthetic import frames, write_clip, write_truth
+from vdet.synthetic.render import frames, write_clip
 from vdet.synthetic.scene import Scene, SceneVehicle
-from vdet.synthetic.truth import true_boxes
+from vdet.synthetic.truth import true_boxes, write_truth
 
 MakeScene = Callable[..., Scene]
 Parked = Callable[[int, float, float], SceneVehicle]

@@ -1,9 +1,10 @@
 from itertools import pairwise
 
 import pytest
+from benchmarks.drawn_traffic import traffic_scene
 
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.random_scenes import demo_scene, traffic_scene
+from vdet.synthetic.random_scenes import demo_scene
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 

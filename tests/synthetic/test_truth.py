@@ -5,11 +5,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
+from benchmarks.drawn_traffic import true_places
 
 from vdet.boxes import Box
 from vdet.synthetic.render import render
 from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes, true_places
+from vdet.synthetic.truth import TrueBox, must_be_found, true_boxes
 from vdet.synthetic.vehicle import STANDS
 
 MakeScene = Callable[..., Scene]

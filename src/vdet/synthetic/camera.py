@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float64Array
-from vdet.config.lanes import LaneSettings
 from vdet.draw.paint import Color
 from vdet.media.images import Image
 
@@ -53,30 +52,6 @@ class PinholeCamera:
     def draw(self, image: Image, polygon: Float64Array, color: Color) -> None:
         """Fill the part of a polygon `(n, 3)` beyond `NEAR`."""
         fill(image, self.project(beyond_near(polygon)), color)
-
-    def lane_view(self, *, near: float, far: float, width: float = 3.7) -> LaneSettings:
-        """Return the settings of a lane finder that shows the road from `near` to `far` metres.
-
-        The camera is in the middle of a lane that is `width` metres wide; it sees the road at
-        `near`.
-        """
-
-        def column(lateral: float, distance: float) -> float:
-            return 0.5 + self.focal * lateral / distance / self.width
-
-        def row(distance: float) -> float:
-            return (self.horizon + self.focal * self.above_ground / distance) / self.height
-
-        return LaneSettings(
-            top=row(far),
-            bottom=row(near),
-            top_left=column(-width / 2, far),
-            top_right=column(width / 2, far),
-            bottom_left=column(-width / 2, near),
-            bottom_right=column(width / 2, near),
-            lane_width=width,
-            length=far - near,
-        )
 
 
 def beyond_near(polygon: Float64Array) -> Float64Array:

@@ -70,37 +70,6 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     return replace(scene, roadside=roadside, vehicles=vehicles, rate=Fraction(25), frames=250)
 
 
-def traffic_scene(
-    camera: PinholeCamera,
-    *,
-    lane: int,
-    lanes: int,
-    frames: int,
-    seed: int,
-    light: Light | None = None,
-) -> Scene:
-    """Return a scene at 25 frames a second with a near and a far vehicle in each lane.
-
-    All vehicles drive at constant speeds, a little faster than the camera. The camera is in lane
-    `lane` of `lanes`, counted from 0 at the left. Ids count from 1 at the left, near before far.
-    Without `light`, the light is random like the rest.
-    """
-    rng = np.random.default_rng(seed)
-    scene = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
-    rate = Fraction(25)
-    end = float(frames / rate)
-    paths = [
-        (Waypoint(0.0, ahead, lateral), Waypoint(end, ahead + gained, lateral))
-        for lateral in ((number - lane) * LANE_WIDTH for number in range(lanes))
-        for ahead, gained in ((9 + 1.2 * abs(lateral), 2 * end), (24 + abs(lateral), 3 * end))
-    ]
-    vehicles = tuple(
-        SceneVehicle(number, path, random_paint(rng), random_body(rng))
-        for number, path in enumerate(paths, start=1)
-    )
-    return replace(scene, light=light or scene.light, vehicles=vehicles, rate=rate, frames=frames)
-
-
 def busy_road(rng: np.random.Generator) -> Scene:
     """Return a road of 40 frames, each with its own vehicles, two in each lane, to learn from.
 

@@ -1,6 +1,5 @@
-"""The true boxes of the vehicles in a scene, from the outlines drawn, and their places."""
+"""The true boxes of the vehicles in a scene, from the outlines drawn."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +10,8 @@ from vdet.boxes import Box, Float64Array
 from vdet.files import staged
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera, fill_mask
-from vdet.synthetic.scene import Line, Scene
-from vdet.synthetic.vehicle import STANDS, outlines
+from vdet.synthetic.scene import Scene
+from vdet.synthetic.vehicle import outlines
 
 SMALLEST = (40, 24)
 """Least width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
@@ -34,31 +33,6 @@ class TrueBox:
     box: Box
     visibility: float
     hidden: float
-
-
-@dataclass(frozen=True, slots=True)
-class TruePlace:
-    """Where a vehicle stands on the road."""
-
-    id: int
-    distance: float
-    """Metres along the road from the camera to the vehicle's rear tyres."""
-    lateral: float
-    """Metres from the camera to the vehicle's middle, along the curve of the road; positive: right.
-    """
-    lane: int
-    """Number of lane lines between the camera and the vehicle's middle; negative: to the left."""
-
-
-def true_places(scene: Scene, index: int) -> tuple[TruePlace, ...]:
-    """Return where the vehicles that exist at frame `index` are, seen or not, ordered by id."""
-    places = []
-    for vehicle in scene.vehicles:
-        if position := vehicle.position(scene.time(index)):
-            ahead, lateral = position
-            lane = _lane(lateral, scene.road.lines)
-            places.append(TruePlace(vehicle.id, ahead + STANDS, lateral, lane))
-    return tuple(sorted(places, key=lambda place: place.id))
 
 
 def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
@@ -84,12 +58,6 @@ def must_be_found(vehicle: TrueBox, frame_height: int) -> bool:
     width, height = (length * frame_height / 720 for length in SMALLEST)
     large = vehicle.box.width >= width and vehicle.box.height >= height
     return large and vehicle.hidden <= 0.5
-
-
-def _lane(lateral: float, lines: Iterable[Line]) -> int:
-    """Count the lines between the camera and a point to its side; to the left they are negative."""
-    to_right = sum(0 < line.lateral < lateral for line in lines)
-    return to_right or -sum(lateral < line.lateral < 0 for line in lines)
 
 
 def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox:

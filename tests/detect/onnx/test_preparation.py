@@ -11,7 +11,8 @@ from vdet.boxes import Float64Array
 from vdet.detect.onnx.preparation import Fit, InputForm
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
-from vdet.synthetic import demo_scene, render
+from vdet.synthetic.random_scenes import demo_scene
+from vdet.synthetic.render import render
 
 ROAD = render(demo_scene(1, width=1280, height=720), 200)
 FITS = get_args(Fit)

@@ -18,7 +18,8 @@ from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.windows import WindowGrid, lay_grid
 from vdet.media import Picture, Planes
 from vdet.media.images import Image
-from vdet.synthetic import demo_scene, render
+from vdet.synthetic.random_scenes import demo_scene
+from vdet.synthetic.render import render
 
 Exact = npt.NDArray[np.float64]
 

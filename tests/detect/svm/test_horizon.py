@@ -9,8 +9,9 @@ import pytest
 
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.media.images import Image
-from vdet.synthetic import Renderer, demo_scene, empty_road, frames
 from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import demo_scene, empty_road
+from vdet.synthetic.render import Renderer, frames
 
 STEP = 0.01  # between the rows that get votes
 RNG = np.random.default_rng(0)

@@ -17,7 +17,8 @@ from vdet.detect.svm.search import FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
 from vdet.media.images import Image
-from vdet.synthetic import demo_scene, true_boxes
+from vdet.synthetic.random_scenes import demo_scene
+from vdet.synthetic.truth import true_boxes
 
 HORIZON = 0.57
 """Row of the horizon of the drawn road."""

@@ -28,8 +28,8 @@ from vdet.progress import no_progress
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output
-from vdet.synthetic import write_truth
 from vdet.synthetic.scene import Scene
+from vdet.synthetic.truth import write_truth
 
 FRAMES = 10
 

@@ -1,0 +1,98 @@
+"""Drawn roads with traffic in every lane, how a lane finder sees them, and the true places."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from vdet.config.lanes import LaneSettings
+from vdet.synthetic.camera import PinholeCamera
+from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
+from vdet.synthetic.scene import Light, Line, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.vehicle import STANDS
+
+
+def traffic_scene(
+    camera: PinholeCamera,
+    *,
+    lane: int,
+    lanes: int,
+    frames: int,
+    seed: int,
+    light: Light | None = None,
+) -> Scene:
+    """Return a scene at 25 frames a second with a near and a far vehicle in each lane.
+
+    All vehicles drive at constant speeds, a little faster than the camera. The camera is in lane
+    `lane` of `lanes`, counted from 0 at the left. Ids count from 1 at the left, near before far.
+    Without `light`, the light is random like the rest.
+    """
+    rng = np.random.default_rng(seed)
+    scene = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
+    rate = Fraction(25)
+    end = float(frames / rate)
+    paths = [
+        (Waypoint(0.0, ahead, lateral), Waypoint(end, ahead + gained, lateral))
+        for lateral in ((number - lane) * LANE_WIDTH for number in range(lanes))
+        for ahead, gained in ((9 + 1.2 * abs(lateral), 2 * end), (24 + abs(lateral), 3 * end))
+    ]
+    vehicles = tuple(
+        SceneVehicle(number, path, random_paint(rng), random_body(rng))
+        for number, path in enumerate(paths, start=1)
+    )
+    return replace(scene, light=light or scene.light, vehicles=vehicles, rate=rate, frames=frames)
+
+
+def lane_view(
+    camera: PinholeCamera, *, near: float, far: float, width: float = 3.7
+) -> LaneSettings:
+    """Return the settings of a lane finder that shows the road from `near` to `far` metres.
+
+    The camera is in the middle of a lane that is `width` metres wide; it sees the road at `near`.
+    """
+    ends = np.array([[x, 0, z] for z in (far, near) for x in (-width / 2, width / 2)])
+    straight = replace(camera, curvature=0.0)
+    [(top_left, top), (top_right, _), (bottom_left, bottom), (bottom_right, _)] = (
+        straight.project(ends) / (camera.width, camera.height)
+    ).tolist()
+    return LaneSettings(
+        top=top,
+        bottom=bottom,
+        top_left=top_left,
+        top_right=top_right,
+        bottom_left=bottom_left,
+        bottom_right=bottom_right,
+        lane_width=width,
+        length=far - near,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class TruePlace:
+    """Where a vehicle stands on the road."""
+
+    id: int
+    distance: float
+    """Metres along the road from the camera to the vehicle's rear tyres."""
+    lateral: float
+    """Metres from the camera to the vehicle's middle, along the curve of the road; positive: right.
+    """
+    lane: int
+    """Number of lane lines between the camera and the vehicle's middle; negative: to the left."""
+
+
+def true_places(scene: Scene, index: int) -> tuple[TruePlace, ...]:
+    """Return where the vehicles that exist at frame `index` are, seen or not, ordered by id."""
+    places = []
+    for ahead, vehicle in scene.nearest_first(scene.time(index)):
+        _, lateral = vehicle.position(scene.time(index)) or (0.0, 0.0)
+        lane = _lane(lateral, scene.road.lines)
+        places.append(TruePlace(vehicle.id, ahead + STANDS, lateral, lane))
+    return tuple(sorted(places, key=lambda place: place.id))
+
+
+def _lane(lateral: float, lines: Iterable[Line]) -> int:
+    """Count the lines between the camera and a point to its side; to the left they are negative."""
+    to_right = sum(0 < line.lateral < lateral for line in lines)
+    return to_right or -sum(lateral < line.lateral < 0 for line in lines)
