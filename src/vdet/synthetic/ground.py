@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 
-from vdet.boxes import Float32Array, Float64Array
+from vdet.boxes import Float32Array
 from vdet.media.images import Image
 from vdet.synthetic.camera import NEAR, distances, mixed
-from vdet.synthetic.scene import PERIOD, Carriageway, Line, Scene, Shadow
+from vdet.synthetic.scene import PERIOD, Carriageway, Line, Scene
 
 _TEXEL = 0.1  # metres a pixel of the finest texture
 _HALF_WIDTH = 30.0  # metres of texture to either side of the camera
@@ -54,16 +54,10 @@ class Ground:
 
     def _gain(self, station: float) -> Image:
         """Return the texture projected to the image, uint8 `(rows below the horizon, W)`."""
-        parts = [
-            cv2.remap(
-                self._texture[level],
-                x,
-                y + np.float32(station / _texel(level)),
-                cv2.INTER_LINEAR,
-                borderMode=cv2.BORDER_WRAP,
-            )
-            for level, x, y in self._maps
-        ]
+        parts = []
+        for level, x, y in self._maps:
+            texture, rows = self._texture[level], y + np.float32(station / _texel(level))
+            parts.append(cv2.remap(texture, x, rows, cv2.INTER_LINEAR, None, cv2.BORDER_WRAP))
         return np.asarray(np.concatenate(parts), dtype=np.uint8)
 
     def _levels(self) -> Iterator[tuple[int, Float32Array, Float32Array]]:
@@ -100,17 +94,10 @@ def _texture(scene: Scene) -> Image:
     gain = 1 + np.where(paved, 0.04, 0.12) * grain + np.where(paved, 0.04, 0.14) * patches
     gain += np.where(paved, 0.03, 0.0) * tracks
     for shadow in scene.light.shadows:
-        _cast(gain, shadow, patches)
+        start, end = (int(s / _TEXEL) for s in (shadow.station, shadow.station + shadow.length))
+        dark = patches[start:end] > 0 if shadow.dappled else np.True_
+        gain[start:end] *= np.where(dark, 1 - shadow.strength, 1.0)
     return np.clip(gain * _NEUTRAL, 0, 255).astype(np.uint8)
-
-
-def brightness(scene: Scene, station: float) -> float:
-    """Return the light on a vehicle at a station, 0 to 1."""
-    light = 1.0
-    for shadow in scene.light.shadows:
-        if (station - shadow.station) % PERIOD < shadow.length:
-            light *= 1 - shadow.strength * (0.5 if shadow.dappled else 1.0)
-    return light
 
 
 def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Float32Array:
@@ -118,13 +105,6 @@ def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Flo
     shape = (max(1, rows // grain), max(1, columns // grain))
     noise = rng.standard_normal(shape, dtype=np.float32)
     return np.asarray(cv2.resize(noise, (columns, rows), interpolation=cv2.INTER_CUBIC))
-
-
-def _cast(gain: Float64Array, shadow: Shadow, patches: Float32Array) -> None:
-    """Darken the texture where a shadow lies."""
-    start, end = (int(s / _TEXEL) for s in (shadow.station, shadow.station + shadow.length))
-    dark = patches[start:end] > 0 if shadow.dappled else np.True_
-    gain[start:end] *= np.where(dark, 1 - shadow.strength, 1.0)
 
 
 def _pyramid(finest: Image) -> list[Image]:

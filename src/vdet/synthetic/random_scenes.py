@@ -78,14 +78,8 @@ def busy_road(rng: np.random.Generator) -> Scene:
     lanes = int(rng.integers(2, 5))
     lane = int(rng.integers(lanes))
     seed = int(rng.integers(2**31))
-    camera = PinholeCamera(
-        width=960,
-        height=320,
-        focal=864.0,
-        horizon=120.0,
-        above_ground=float(rng.uniform(1.1, 1.6)),
-        curvature=float(rng.uniform(-1, 1) / 600),
-    )
+    height, curvature = rng.uniform(1.1, 1.6), rng.uniform(-1, 1) / 600
+    camera = PinholeCamera(960, 320, 864.0, 120.0, height, curvature)
     road = empty_road(rng, camera, lane=lane, lanes=lanes, seed=seed)
     scene = replace(road, frames=40, speed=400.0)
     cars = [(random_paint(rng), random_body(rng)) for _ in range(50)]
@@ -131,12 +125,8 @@ def empty_road(
 def random_body(rng: np.random.Generator) -> Body:
     """Return a saloon, hatchback, off-roader, van or coupé of a random size."""
     shape = _SHAPES[rng.integers(len(_SHAPES))]
-    return replace(
-        shape,
-        width=shape.width * float(rng.uniform(0.96, 1.04)),
-        height=shape.height * float(rng.uniform(0.96, 1.04)),
-        length=shape.length * float(rng.uniform(0.96, 1.04)),
-    )
+    sides = {side: getattr(shape, side) for side in ("width", "height", "length")}
+    return replace(shape, **{side: v * rng.uniform(0.96, 1.04) for side, v in sides.items()})
 
 
 def random_paint(rng: np.random.Generator) -> Color:
@@ -149,20 +139,11 @@ def random_paint(rng: np.random.Generator) -> Color:
 def _random_light(rng: np.random.Generator) -> Light:
     stations = np.arange(15.0, PERIOD - 20, 45.0) + rng.uniform(0, 15)
     shadows = tuple(
-        Shadow(
-            station=float(station),
-            length=float(rng.uniform(4, 14)),
-            strength=float(rng.uniform(0.25, 0.5)),
-            dappled=bool(rng.random() < 0.7),
-        )
-        for station in stations
+        Shadow(station, rng.uniform(4, 14), rng.uniform(0.25, 0.5), dappled=rng.random() < 0.7)
+        for station in stations.tolist()
     )
-    return Light(
-        gain=float(rng.uniform(0.75, 1.2)),
-        noise=float(rng.uniform(1.5, 4.0)),
-        sun=float(rng.uniform(-0.8, 0.8)),
-        shadows=shadows,
-    )
+    gain, noise, sun = rng.uniform(0.75, 1.2), rng.uniform(1.5, 4.0), rng.uniform(-0.8, 0.8)
+    return Light(gain, noise, sun, shadows)
 
 
 def _random_walls(rng: np.random.Generator, left: float, right: float) -> tuple[Wall, ...]:
@@ -175,32 +156,24 @@ def _random_walls(rng: np.random.Generator, left: float, right: float) -> tuple[
 def _random_roadside(
     rng: np.random.Generator, left: float, right: float
 ) -> tuple[RoadsideObject, ...]:
-    trees = [_random_plant(rng, side, edge) for side, edge in ((-1, left), (1, right)) * 28]
-    others = [_random_box(rng, right) for _ in range(14)]
-    return (*trees, *others)
+    plants = [_random_plant(rng, side, edge) for side, edge in ((-1, left), (1, right)) * 28]
+    return (*plants, *(_random_box(rng, right) for _ in range(14)))
 
 
 def _random_plant(rng: np.random.Generator, side: int, edge: float) -> RoadsideObject:
+    """Return a tree or a bush."""
     tall = rng.random() < 0.6
-    height = float(rng.uniform(4, 9) if tall else rng.uniform(1.0, 2.0))
+    height = rng.uniform(4, 9) if tall else rng.uniform(1.0, 2.0)
     green = int(rng.integers(60, 110))
-    return RoadsideObject(
-        kind="tree" if tall else "bush",
-        station=float(rng.uniform(0, PERIOD)),
-        lateral=edge + side * float(rng.uniform(6, 28) if tall else rng.uniform(1, 12)),
-        width=height * float(rng.uniform(0.6, 1.1) if tall else rng.uniform(1.0, 1.8)),
-        height=height,
-        color=(green - int(rng.integers(10, 40)), green, green - int(rng.integers(-10, 30))),
-    )
+    station = rng.uniform(0, PERIOD)
+    lateral = edge + side * (rng.uniform(6, 28) if tall else rng.uniform(1, 12))
+    width = height * (rng.uniform(0.6, 1.1) if tall else rng.uniform(1.0, 1.8))
+    color = (green - int(rng.integers(10, 40)), green, green - int(rng.integers(-10, 30)))
+    return RoadsideObject("plant", station, lateral, width, height, color)
 
 
 def _random_box(rng: np.random.Generator, edge: float) -> RoadsideObject:
     width, height = _BOXES[rng.integers(len(_BOXES))]
-    return RoadsideObject(
-        kind="box",
-        station=float(rng.uniform(0, PERIOD)),
-        lateral=edge + width + float(rng.uniform(0, 7)),
-        width=width,
-        height=height,
-        color=((60, 96, 40), (110, 60, 30), (80, 84, 88), (70, 110, 130))[rng.integers(4)],
-    )
+    station, lateral = rng.uniform(0, PERIOD), edge + width + rng.uniform(0, 7)
+    color = ((60, 96, 40), (110, 60, 30), (80, 84, 88), (70, 110, 130))[rng.integers(4)]
+    return RoadsideObject("box", station, lateral, width, height, color)

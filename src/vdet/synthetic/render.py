@@ -14,8 +14,7 @@ from vdet.files import staged
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
 from vdet.media.writer import may_replace_video
-from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.ground import Ground, brightness
+from vdet.synthetic.ground import Ground
 from vdet.synthetic.roadside import Roadside
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import draw_vehicle
@@ -43,14 +42,10 @@ class Renderer:
         image = self._background.copy()
         self._ground.draw(image, station)
         self._roadside.draw(image, station)
-        self._draw_vehicles(image, index)
+        time = self._scene.time(index)
+        for _, vehicle in reversed(self._scene.nearest_first(time)):
+            draw_vehicle(image, vehicle, self._scene, time)
         return self._expose(image, index)
-
-    def _draw_vehicles(self, image: Image, index: int) -> None:
-        scene, time = self._scene, self._scene.time(index)
-        for ahead, vehicle in reversed(scene.nearest_first(time)):
-            light = brightness(scene, scene.station(index) + ahead)
-            draw_vehicle(image, vehicle, scene.camera, time, light=light, sun=scene.light.sun)
 
     def _expose(self, image: Image, index: int) -> Image:
         """Return the image with the blur of a lens, and the exposure and noise of a sensor."""
@@ -85,14 +80,8 @@ def write_clip(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     OutputError
         The file cannot be written, or its suffix is not that of a video.
     """
-    info = VideoInfo(
-        path=path,
-        width=scene.camera.width,
-        height=scene.camera.height,
-        rate=scene.rate,
-        time_base=1 / scene.rate,
-        frames=scene.frames,
-    )
+    camera, rate = scene.camera, scene.rate
+    info = VideoInfo(path, camera.width, camera.height, rate, 1 / rate, frames=scene.frames)
     with (
         staged(path, overwrite=overwrite, may_replace=may_replace_video) as temporary,
         VideoWriter(temporary, info, OutputSettings(crf=_CRF), name=path) as writer,
@@ -118,8 +107,8 @@ def _paint_sky(image: Image, scene: Scene) -> None:
     sky[:] = np.clip(up * np.array([168, 118, 78]) + (1 - up) * np.array([206, 186, 165]), 0, 255)
     _paint_clouds(sky, rng)
     unit = scene.camera.height / 720
-    _paint_range(sky, rng, scene.camera, (88 * unit, 30 * unit), (94, 80, 66))
-    _paint_range(sky, rng, scene.camera, (34 * unit, 26 * unit), (44, 62, 60))
+    for mean, variation, color in ((88, 30, (94, 80, 66)), (34, 26, (44, 62, 60))):
+        _paint_range(sky, rng, scene.camera.horizon - mean * unit, variation * unit, color)
 
 
 def _paint_clouds(sky: Image, rng: np.random.Generator) -> None:
@@ -131,18 +120,13 @@ def _paint_clouds(sky: Image, rng: np.random.Generator) -> None:
 
 
 def _paint_range(
-    sky: Image,
-    rng: np.random.Generator,
-    camera: PinholeCamera,
-    heights: tuple[float, float],
-    color: Color,
+    sky: Image, rng: np.random.Generator, mean: float, variation: float, color: Color
 ) -> None:
-    """Paint a skyline of a mean height and a variation, in pixels above the horizon."""
+    """Paint the part of the sky below a skyline; `mean` is the mean of its rows."""
     height, width = sky.shape[:2]
-    mean, variation = heights
     smooth = cv2.resize(rng.standard_normal((1, 8)), (width, 1), interpolation=cv2.INTER_CUBIC)
     rough = cv2.resize(rng.standard_normal((1, 90)), (width, 1))
-    skyline = camera.horizon - mean - variation * (0.5 * smooth[0] + 0.22 * rough[0])
+    skyline = mean - variation * (0.5 * smooth[0] + 0.22 * rough[0])
     rows = np.arange(height)[:, None]
     share = np.clip(rows - skyline[None, :], 0, 1)[..., None]
     grain = 1 + 0.16 * cv2.resize(rng.standard_normal((height // 4, width // 4)), (width, height))

@@ -82,7 +82,7 @@ class Light:
 class RoadsideObject:
     """An object beside the road; a `box` looks a little like a vehicle."""
 
-    kind: Literal["tree", "bush", "box"]
+    kind: Literal["plant", "box"]
     station: float
     lateral: float
     width: float
@@ -155,6 +155,14 @@ class Scene:
     def station(self, index: int) -> float:
         """Return the camera's station at a frame, metres."""
         return self.speed * self.time(index)
+
+    def brightness(self, station: float) -> float:
+        """Return the light on a vehicle at a station, 0 to 1."""
+        light = 1.0
+        for shadow in self.light.shadows:
+            if (station - shadow.station) % PERIOD < shadow.length:
+                light *= 1 - shadow.strength * (0.5 if shadow.dappled else 1.0)
+        return light
 
     def nearest_first(self, time: float) -> list[tuple[float, SceneVehicle]]:
         """Return the vehicles that exist at a time, each with its distance, the nearest first."""

@@ -15,7 +15,7 @@ from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
-from vdet.synthetic.scene import Body, SceneVehicle
+from vdet.synthetic.scene import Body, Scene, SceneVehicle
 
 _SHADOW: Color = (34, 32, 32)
 _GLASS: Color = (62, 52, 46)
@@ -57,74 +57,45 @@ def outlines(
     return visible
 
 
-def draw_vehicle(
-    image: Image,
-    vehicle: SceneVehicle,
-    camera: PinholeCamera,
-    time: float,
-    *,
-    light: float,
-    sun: float,
-) -> None:
-    """Draw a vehicle and the shadow below it onto a frame.
-
-    `light` scales its colours (below 1 in a shadow); `sun` is `Light.sun`.
-    """
-    position = vehicle.position(time)
-    if position is None:
-        return
-    ahead, lateral = position
-    half, front = vehicle.body.width / 2, vehicle.body.length
+def draw_vehicle(image: Image, vehicle: SceneVehicle, scene: Scene, time: float) -> None:
+    """Draw a vehicle and the shadow below it onto a frame."""
+    ahead, lateral = vehicle.position(time) or (np.nan, np.nan)
+    half, front, sun = vehicle.body.width / 2, vehicle.body.length, scene.light.sun
     left, right = min(0.0, sun) - half, max(0.0, sun) + half
     shadow = _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
-    camera.draw(image, shadow + np.array([lateral, 0.0, ahead]), _SHADOW)
-    for outline, color in outlines(vehicle, camera, time):
+    scene.camera.draw(image, shadow + np.array([lateral, 0.0, ahead]), _SHADOW)
+    light = scene.brightness(scene.speed * time + ahead)
+    for outline, color in outlines(vehicle, scene.camera, time):
         fill(image, outline, shaded(color, light))
 
 
 @lru_cache(maxsize=64)
-def _facets(body: Body, color: Color) -> tuple[_Facet, ...]:
+def _facets(body: Body, color: Color) -> list[_Facet]:
     """Return the facets of a car in painting order."""
-    return (
-        *_underside(body),
-        *_lower_body(body, color),
-        *_wheels(body, color),
-        *_rear(body, color),
-        *_cabin(body, color),
-    )
+    lower = _underside(body) + _lower_body(body, color) + _wheels(body, color)
+    return lower + _rear(body, color) + _cabin(body, color)
 
 
 def _underside(body: Body) -> list[_Facet]:
-    half = body.width / 2
-    tyre = 0.24
-    tyres = [
-        (_upright(left, left + tyre, 0.0, _SILL + 0.05, STANDS), _TYRE)
-        for left in (-half + 0.04, half - 0.04 - tyre)
+    half, top = body.width / 2, _SILL + 0.05
+    return [
+        (_upright(-half + 0.1, half - 0.1, 0.1, top, STANDS), _UNDERSIDE),
+        (_upright(-half + 0.04, -half + 0.28, 0.0, top, STANDS), _TYRE),
+        (_upright(half - 0.28, half - 0.04, 0.0, top, STANDS), _TYRE),
     ]
-    below = _upright(-half + 0.1, half - 0.1, 0.1, _SILL + 0.05, STANDS)
-    return [(below, _UNDERSIDE), *tyres]
 
 
 def _lower_body(body: Body, color: Color) -> list[_Facet]:
     """Extrude the outline of the rear along the car."""
     half, belt = body.width / 2, body.belt
-    outline = [
-        (-half + 0.06, _SILL),
-        (-half, _SILL + 0.14),
-        (-half, belt - 0.2),
-        (-half + 0.1, belt),
-        (half - 0.1, belt),
-        (half, belt - 0.2),
-        (half, _SILL + 0.14),
-        (half - 0.06, _SILL),
-    ]
+    left = [(-half + 0.06, _SILL), (-half, _SILL + 0.14), (-half, belt - 0.2), (-half + 0.1, belt)]
+    outline = left + [(-x, y) for x, y in reversed(left)]
     parts = []
     for (x0, y0), (x1, y1) in pairwise(outline):
-        corners = [[x0, y0, 0], [x0, y0, body.length], [x1, y1, body.length], [x1, y1, 0]]
+        corners = _quad((x0, y0, 0), (x0, y0, body.length), (x1, y1, body.length), (x1, y1, 0))
         upward = (x1 - x0) / np.hypot(x1 - x0, y1 - y0)
-        parts.append((np.array(corners, dtype=float), shaded(color, 0.78 + 0.3 * upward)))
-    parts.append((np.array([[x, y, 0.0] for x, y in outline]), shaded(color, 0.92)))
-    return parts
+        parts.append((corners, shaded(color, 0.78 + 0.3 * upward)))
+    return [*parts, (_quad(*((x, y, 0.0) for x, y in outline)), shaded(color, 0.92))]
 
 
 def _wheels(body: Body, color: Color) -> list[_Facet]:
@@ -162,29 +133,24 @@ def _cabin(body: Body, color: Color) -> list[_Facet]:
     rear_low, rear_high = body.boot, body.boot + body.slope
     front_low = max(rear_high + 1.2, body.length - 1.3)
     front_high = max(rear_high + 0.8, front_low - 0.8)
-    left, right = (
-        [
-            (side * low, belt, rear_low),
-            (side * high, roof, rear_high),
-            (side * high, roof, front_high),
-            (side * low, belt, front_low),
-        ]
-        for side in (-1, 1)
+    right = _quad(
+        (low, belt, rear_low),
+        (high, roof, rear_high),
+        (high, roof, front_high),
+        (low, belt, front_low),
     )
-    rear = _quad(left[0], left[1], right[1], right[0])
-    top = _quad(left[1], left[2], right[2], right[1])
-    parts = [(top, shaded(color, 1.1))]
-    for side in (_quad(*reversed(left)), _quad(*right)):
+    left = right * (-1, 1, 1)
+    rear = np.array([left[0], left[1], right[1], right[0]])
+    parts = [(np.array([left[1], left[2], right[2], right[1]]), shaded(color, 1.1))]
+    for side in (left[::-1], right):
         parts.append((side, shaded(color, 0.85)))
         parts.append((_inset(side, 0.08, 0.47), shaded(_GLASS, 0.8)))
         parts.append((_inset(side, 0.53, 0.92), shaded(_GLASS, 0.8)))
-    parts.append((rear, shaded(color, 0.95)))
-    parts.append((_inset(rear, 0.1, 0.9), _GLASS))
-    return parts
+    return [*parts, (rear, shaded(color, 0.95)), (_inset(rear, 0.1, 0.9), _GLASS)]
 
 
 def _quad(*corners: tuple[float, float, float]) -> Float64Array:
-    return np.array(corners)
+    return np.array(corners, np.float64)
 
 
 def _upright(left: float, right: float, bottom: float, top: float, z: float) -> Float64Array:
@@ -203,11 +169,8 @@ def _inset(quad: Float64Array, left: float, right: float) -> Float64Array:
 
     The corners of a quad are lower left, upper left, upper right, lower right.
     """
-    lower_left, upper_left, upper_right, lower_right = quad
-
-    def at(across: float, up: float) -> Float64Array:
-        lower = lower_left + across * (lower_right - lower_left)
-        upper = upper_left + across * (upper_right - upper_left)
-        return np.asarray(lower + up * (upper - lower))
-
-    return np.array([at(left, 0.14), at(left, 0.86), at(right, 0.86), at(right, 0.14)])
+    across = np.array([[left], [left], [right], [right]])
+    up = np.array([[0.14], [0.86], [0.86], [0.14]])
+    lower = quad[0] + across * (quad[3] - quad[0])
+    upper = quad[1] + across * (quad[2] - quad[1])
+    return np.asarray(lower + up * (upper - lower))
