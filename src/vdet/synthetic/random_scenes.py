@@ -1,7 +1,6 @@
 """Random scenes from a seed: empty roads, roads with traffic, and the road of the demo."""
 
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 
@@ -29,6 +28,7 @@ _PAINTS: tuple[Color, ...] = (
     (228, 228, 226), (170, 168, 165), (112, 110, 108), (34, 32, 32), (40, 34, 128), (110, 62, 34),
     (70, 84, 60), (128, 140, 150), (52, 46, 44), (150, 110, 74),
 )  # fmt: skip
+_VERGES: tuple[Color, ...] = ((92, 132, 150), (60, 104, 96), (100, 122, 128))
 _SHAPES: tuple[Body, ...] = (
     Body(),
     Body(length=4.2, boot=0.15, slope=0.5, height=1.48),
@@ -57,17 +57,12 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
         ((3.0, -8.0, near), (5.0, 7.0, near), (6.5, 13.0, near), (10.0, 26.0, near)),
     )
     paints = rng.permutation(len(_PAINTS))
-    vehicles = tuple(
-        SceneVehicle(
-            id=number,
-            path=tuple(Waypoint(*point) for point in path),
-            color=_PAINTS[paints[number]],
-            body=random_body(rng),
-        )
-        for number, path in enumerate(paths, start=1)
-    )
+    vehicles = []
+    for number, path in enumerate(paths, start=1):
+        points = tuple(Waypoint(*point) for point in path)
+        vehicles.append(SceneVehicle(number, points, _PAINTS[paints[number]], random_body(rng)))
     roadside = tuple(each for each in scene.roadside if each.kind != "box")
-    return replace(scene, roadside=roadside, vehicles=vehicles, rate=Fraction(25), frames=250)
+    return replace(scene, roadside=roadside, vehicles=tuple(vehicles), frames=250)
 
 
 def busy_road(rng: np.random.Generator) -> Scene:
@@ -104,22 +99,14 @@ def empty_road(
     left = -(lane + 0.5) * LANE_WIDTH
     right = left + lanes * LANE_WIDTH
     dashed = [Line(left + number * LANE_WIDTH, dash=3.0, gap=9.0) for number in range(1, lanes)]
-    asphalt = int(rng.integers(58, 120))
-    road = Carriageway(
-        left=left - 1.5,
-        right=right + 2.0,
-        lines=(Line(left, _YELLOW), *dashed, Line(right)),
-        walls=_random_walls(rng, left - 1.8, right + 2.6),
-        asphalt=(asphalt + 4, asphalt, asphalt - 3),
-        verge=((92, 132, 150), (60, 104, 96), (100, 122, 128))[rng.integers(3)],
-    )
-    return Scene(
-        camera=camera,
-        road=road,
-        light=_random_light(rng),
-        roadside=_random_roadside(rng, left - 3.0, right + 4.0),
-        seed=seed,
-    )
+    lines = (Line(left, _YELLOW), *dashed, Line(right))
+    grey = int(rng.integers(58, 120))
+    asphalt = (grey + 4, grey, grey - 3)
+    walls = _random_walls(rng, left - 1.8, right + 2.6)
+    verge = _VERGES[rng.integers(len(_VERGES))]
+    road = Carriageway(left - 1.5, right + 2.0, lines, walls, asphalt, verge)
+    light = _random_light(rng)
+    return Scene(camera, road, light, _random_roadside(rng, left - 3, right + 4), seed=seed)
 
 
 def random_body(rng: np.random.Generator) -> Body:

@@ -14,8 +14,7 @@ from vdet.files import staged
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
 from vdet.media.writer import may_replace_video
-from vdet.synthetic.ground import Ground
-from vdet.synthetic.roadside import Roadside
+from vdet.synthetic.road import Ground, Roadside
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import draw_vehicle
 

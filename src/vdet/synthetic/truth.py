@@ -9,7 +9,7 @@ import numpy as np
 from vdet.boxes import Box, Float64Array
 from vdet.files import staged
 from vdet.media.images import Image
-from vdet.synthetic.camera import PinholeCamera, fill_mask
+from vdet.synthetic.camera import fill_mask
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
 
@@ -42,7 +42,7 @@ def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
     found = []
     for _, vehicle in scene.nearest_first(time):
         parts = [outline for outline, _color in outlines(vehicle, camera, time)]
-        mask = _mask(parts, camera)
+        mask = _mask(parts, covered.shape)
         if mask.any():
             found.append(_true_box(vehicle.id, mask, covered, _area(parts)))
         covered |= mask
@@ -67,8 +67,8 @@ def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox
     return TrueBox(number, box, visibility=min(1.0, free / whole), hidden=1 - free / inside)
 
 
-def _mask(parts: list[Float64Array], camera: PinholeCamera) -> Image:
-    mask = np.zeros((camera.height, camera.width), np.uint8)
+def _mask(parts: list[Float64Array], shape: tuple[int, ...]) -> Image:
+    mask = np.zeros(shape, np.uint8)
     for part in parts:
         fill_mask(mask, part)
     return mask
@@ -83,9 +83,7 @@ def _area(parts: list[Float64Array]) -> float:
     points = np.concatenate(parts)
     low = points.min(axis=0)
     scale = (_RASTER - 1) / max(1.0, float((points.max(axis=0) - low).max()))
-    mask = np.zeros((_RASTER, _RASTER), np.uint8)
-    for part in parts:
-        fill_mask(mask, (part - low) * scale)
+    mask = _mask([(part - low) * scale for part in parts], (_RASTER, _RASTER))
     return cv2.countNonZero(mask) / scale**2
 
 
@@ -101,13 +99,13 @@ def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     OutputError
         The file cannot be written.
     """
-    with (
-        staged(path, overwrite=overwrite) as temporary,
-        temporary.open("w", encoding="ascii", newline="\n") as file,
-    ):
-        for index in range(scene.frames):
-            for box in true_boxes(scene, index):
-                file.write(_line(index + 1, box, scene.camera.height))
+    lines = [
+        _line(index + 1, box, scene.camera.height)
+        for index in range(scene.frames)
+        for box in true_boxes(scene, index)
+    ]
+    with staged(path, overwrite=overwrite) as temporary:
+        temporary.write_text("".join(lines), encoding="ascii", newline="\n")
 
 
 def _line(number: int, vehicle: TrueBox, frame_height: int) -> str:
