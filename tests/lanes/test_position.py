@@ -68,7 +68,6 @@ def test_a_point_on_a_known_road_gets_its_metres_and_its_lane(
     position = position_on_road(foot, curves, view)
     assert position is not None
     assert position.distance == pytest.approx(distance, rel=1e-3)
-    assert position.lateral == pytest.approx(lateral - shift, abs=0.02)
     share = (lateral - shift) / width
     if abs(share - np.floor(share) - 0.5) > 0.01:  # not on a line
         assert position.lane == (round(share) if abs(share) < 3.5 else None)

@@ -7,6 +7,7 @@ were found, and whether straight lines become straight.
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import cv2
 import numpy as np
 from pydantic import ValidationError
 
-from vdet.boxes import Float32Array, Float64Array
+from vdet.boxes import Float32Array
 from vdet.errors import ImageError, OutputError
 from vdet.files import check_output, make_folder
 from vdet.lanes.camera import CalibratedCamera, Undistorter
@@ -72,14 +73,22 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     boards = {path: _find_board(path, pattern) for path in paths}
     skipped = {path: board for path, board in boards.items() if isinstance(board, str)}
     photos = [board for board in boards.values() if isinstance(board, BoardPhoto)]
-    skipped |= _of_other_sizes(photos)
+    sizes = Counter(photo.size for photo in photos)
+    size = max(sizes, key=sizes.__getitem__, default=(0, 0))
+    skipped |= _of_other_sizes(photos, size)
     photos = _without(skipped, photos, pattern)
-    fit = _fit(photos, pattern)
-    if outliers := _outliers(photos, fit.errors):
+    camera, errors = _fit(photos, pattern, size)
+    if outliers := _outliers(photos, errors):
         skipped |= outliers
         photos = _without(skipped, photos, pattern)
-        fit = _fit(photos, pattern)
-    return Calibration(_camera_of(fit, _common_size(photos)), photos, skipped)
+        camera, _ = _fit(photos, pattern, size)
+    if camera is None:
+        raise ImageError(
+            "the focal length cannot be found: all photographs show the board from much the same "
+            f"side; take some with the board slanted by {MIN_ANGLE:.0f}° or more, to the left and "
+            "to the right, up and down"
+        )
+    return Calibration(camera, photos, skipped)
 
 
 def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
@@ -138,19 +147,12 @@ def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
     return BoardPhoto(path, (image.shape[1], image.shape[0]), corners)
 
 
-def _of_other_sizes(photos: Sequence[BoardPhoto]) -> dict[Path, str]:
-    sizes = {photo.path: np.array(photo.size) for photo in photos}
-    common = _common_size(photos)
+def _of_other_sizes(photos: Sequence[BoardPhoto], common: tuple[int, int]) -> dict[Path, str]:
     return {
-        path: f"is {_text(size)}, the others are {_text(common)}"
-        for path, size in sizes.items()
-        if np.abs(size - common).max() > SIZE_TOLERANCE
+        photo.path: f"is {_text(photo.size)}, the others are {_text(common)}"
+        for photo in photos
+        if np.abs(np.subtract(photo.size, common)).max() > SIZE_TOLERANCE
     }
-
-
-def _common_size(photos: Sequence[BoardPhoto]) -> tuple[int, int]:
-    sizes = Counter(photo.size for photo in photos)
-    return max(sizes, key=sizes.__getitem__, default=(0, 0))
 
 
 def _without(
@@ -167,55 +169,37 @@ def _without(
     return kept
 
 
-@dataclass(frozen=True, slots=True)
-class _Fit:
-    """What OpenCV finds: the camera, and how each photograph shows the board."""
+def _fit(
+    photos: Sequence[BoardPhoto], pattern: Pattern, size: tuple[int, int]
+) -> tuple[CalibratedCamera | None, list[float]]:
+    """Fit a camera to the corners of all photographs; return it and each photograph's error.
 
-    rms: float
-    matrix: Float64Array
-    distortion: Float64Array
-    rotations: Float64Array
-    """Rotation vectors of the boards, `(n, 3, 1)`."""
-    errors: Float64Array
-    """Root mean square distance of the corners to the model's, pixels, for each photograph."""
-
-
-def _fit(photos: Sequence[BoardPhoto], pattern: Pattern) -> _Fit:
-    """Fit a camera to the corners of all photographs; a square of the board is 1 unit long."""
-    board = np.zeros((pattern[0] * pattern[1], 3), np.float32)
+    There is no camera if all boards are seen from one side: these fit any focal length. An error
+    is the root mean square distance of the corners to the model's, pixels.
+    """
+    board = np.zeros((pattern[0] * pattern[1], 3), np.float32)  # a square is 1 unit long
     board[:, :2] = np.mgrid[: pattern[0], : pattern[1]].T.reshape(-1, 2)
     corners = [photo.corners for photo in photos]
     rms, matrix, distortion, rotations, *_, errors = cv2.calibrateCameraExtended(
-        [board] * len(photos), corners, _common_size(photos), np.eye(3), np.zeros(5)
+        [board] * len(photos), corners, size, np.eye(3), np.zeros(5)
     )
-    return _Fit(rms, *(np.asarray(a, np.float64) for a in (matrix, distortion, rotations, errors)))
+    normals = np.array([cv2.Rodrigues(np.asarray(each))[0][:, 2] for each in rotations])
+    camera = None
+    if np.clip(normals @ normals.T, -1, 1).min() <= math.cos(math.radians(MIN_ANGLE)):
+        k1, k2, p1, p2, k3 = np.ravel(distortion).tolist()
+        with suppress(ValidationError):  # no real camera has such values
+            camera = CalibratedCamera(*size, matrix.tolist(), (k1, k2, p1, p2, k3), rms)
+    return camera, np.ravel(errors).tolist()
 
 
-def _outliers(photos: Sequence[BoardPhoto], errors: Float64Array) -> dict[Path, str]:
+def _outliers(photos: Sequence[BoardPhoto], errors: Sequence[float]) -> dict[Path, str]:
     median = float(np.median(errors))
     return {
         photo.path: f"is an outlier: error {error:.2f} px, more than {OUTLIER_RATIO:g} times the "
         f"median of {median:.2f} px"
-        for photo, error in zip(photos, errors.ravel().tolist(), strict=True)
+        for photo, error in zip(photos, errors, strict=True)
         if error > OUTLIER_RATIO * median
     }
-
-
-def _camera_of(fit: _Fit, size: tuple[int, int]) -> CalibratedCamera:
-    """Refuse boards that are all seen from one side: these fit cameras of any focal length."""
-    normals = np.array([cv2.Rodrigues(rotation)[0][:, 2] for rotation in fit.rotations])
-    angle = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1, 1).min())))
-    try:
-        if angle >= MIN_ANGLE:
-            k1, k2, p1, p2, k3 = fit.distortion.ravel().tolist()
-            return CalibratedCamera(*size, fit.matrix.tolist(), (k1, k2, p1, p2, k3), fit.rms)
-    except ValidationError:  # no real camera has such values
-        pass
-    raise ImageError(
-        "the focal length cannot be found: all photographs show the board from much the same "
-        f"side (they differ by {angle:.0f}°, {MIN_ANGLE:.0f}° are needed); take some with "
-        "the board slanted, to the left and to the right, up and down"
-    )
 
 
 def _text(size: Iterable[int]) -> str:

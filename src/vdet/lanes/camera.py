@@ -7,17 +7,22 @@ import cv2
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 from pydantic.dataclasses import dataclass
-from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ValidationInfo
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.document import Document, config_error, format_key, read_document
+from vdet.config.document import config_error, format_key, read_document
 from vdet.errors import ConfigError
 from vdet.files import staged
 from vdet.media.images import Image
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
 _OUTLINE_POINTS = 16  # on each side of a box
+
+_MISTAKES = {
+    "missing": "is missing; `vdet calibrate` writes camera files",
+    "unexpected_keyword_argument": "is not a key of camera files",
+}
+"""What is said of a camera file, by pydantic's type of the mistake."""
 
 _Side = Annotated[int, Field(ge=16, le=100_000)]
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
@@ -48,18 +53,14 @@ class CalibratedCamera:
         cls, matrix: tuple[_Row, _Row, _Row], info: ValidationInfo
     ) -> tuple[_Row, _Row, _Row]:
         (fx, skew, x), (zero, fy, y), last = matrix
-        if (skew, zero, last) != (0, 0, (0, 0, 1)):
-            raise ValueError("should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
-        if {"width", "height"} <= info.data.keys():  # else they are wrong themselves
-            width, height = info.data["width"], info.data["height"]
-            shortest, longest = 0.1 * width, 100.0 * width
-            if not (shortest <= min(fx, fy) and max(fx, fy) <= longest):
+        width, height = (info.data.get(side) for side in ("width", "height"))
+        if width and height:  # else they are wrong themselves
+            is_real = 0.1 * width <= min(fx, fy) and max(fx, fy) <= 100 * width
+            in_frame = 0 <= x < width and 0 <= y < height
+            if not (is_real and in_frame and (skew, zero, last) == (0, 0, (0, 0, 1))):
                 raise ValueError(
-                    f"focal lengths should be {shortest:g} to {longest:g} px at this frame size"
-                )
-            if not (0 <= x < width and 0 <= y < height):
-                raise ValueError(
-                    f"the principal point should lie in the frame (is {x:.6g}, {y:.6g})"
+                    "should be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], with focal lengths of 0.1 to "
+                    "100 times the width, and the principal point in the frame"
                 )
         return matrix
 
@@ -74,9 +75,8 @@ class CalibratedCamera:
         across, down = width / self.width, height / self.height
         if abs(across / down - 1) > _ASPECT_TOLERANCE:
             raise ConfigError(
-                f"the camera was calibrated for {self.width}×{self.height} and cannot be scaled "
-                f"to {width}×{height}, another aspect ratio; calibrate with photographs of that "
-                "aspect ratio"
+                f"the camera was calibrated for {self.width}×{self.height}, {width}×{height} has "
+                "another aspect ratio; calibrate with photographs of that aspect ratio"
             )
         (fx, _, cx), (_, fy, cy), last = self.matrix
         x, y = (cx + 0.5) * across - 0.5, (cy + 0.5) * down - 0.5
@@ -115,9 +115,8 @@ class Undistorter:
         """Return where pixels `(n, 2)` of the frame lie in the undistorted frame, `(n, 2)`."""
         if not self._camera:
             return points
-        moved = cv2.undistortPoints(
-            points.reshape(-1, 1, 2), self._matrix, self._distortion, P=self._matrix
-        )
+        matrix, distortion = self._matrix, self._distortion
+        moved = cv2.undistortPoints(points[:, None], matrix, distortion, P=matrix)
         return np.asarray(moved, np.float64).reshape(-1, 2)
 
     def box(self, box: Box) -> Box:
@@ -174,17 +173,10 @@ def load_camera(path: Path) -> CalibratedCamera:
     try:
         return TypeAdapter(CalibratedCamera).validate_python(document.values)
     except ValidationError as error:
-        lines = (_describe(detail, document) for detail in error.errors())
-        raise config_error(lines, error.error_count()) from error
-
-
-def _describe(detail: ErrorDetails, document: Document) -> str:
-    match detail["type"]:
-        case "missing":
-            text = "is missing; `vdet calibrate` writes camera files"
-        case "unexpected_keyword_argument":
-            text = "is not a key of camera files"
-        case _:
-            text = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    key = tuple(detail["loc"])
-    return f"{document.place_of(key)}: {format_key(key)}: {text}"
+        lines = []
+        for detail in error.errors():
+            key = tuple(detail["loc"])
+            said = detail["msg"].removeprefix("Value error, ").removeprefix("Input ")
+            text = _MISTAKES.get(detail["type"], said)
+            lines.append(f"{document.place_of(key)}: {format_key(key)}: {text}")
+        raise config_error(lines, len(lines)) from error

@@ -72,12 +72,11 @@ def lane_record(lane: Lane | None) -> dict[str, Any] | None:
     """
     if lane is None:
         return None
-    metres = {"radius": lane.radius, "offset": lane.offset, "width": lane.width}
-    lines = {"left": lane.left.tolist(), "right": lane.right.tolist()}
-    record: dict[str, Any] = {name: value and round(value, 3) for name, value in metres.items()}
-    return record | {
-        name: [[round(x, 1), round(y, 1)] for x, y in line] for name, line in lines.items()
-    }
+    record: dict[str, Any] = {"radius": lane.radius and round(lane.radius, 3)}
+    record |= {"offset": round(lane.offset, 3), "width": round(lane.width, 3)}
+    for side, line in (("left", lane.left), ("right", lane.right)):
+        record[side] = [[round(x, 1), round(y, 1)] for x, y in line.tolist()]
+    return record
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +85,6 @@ class RoadPosition:
 
     distance: float
     """Metres along the road from below the camera's lens."""
-    lateral: float
-    """Metres from the middle of the own lane, along the curve of the road; positive: right."""
     lane: int | None
     """0 for the own lane, 1 for the next one to the right, -1 to the left and so on; None for one
     that is too far to the side."""
@@ -117,8 +114,7 @@ def position_on_road(
     shift = curves.heading * distance + curves.bend * distance**2  # of all lines, at the distance
     from_left = slope * distance - shift - curves.left
     lane = math.floor(from_left / curves.width)
-    shown = lane if abs(lane) <= _LANES else None
-    return RoadPosition(distance, from_left - curves.width / 2, shown)
+    return RoadPosition(distance, lane if abs(lane) <= _LANES else None)
 
 
 @dataclass(frozen=True, slots=True)
