@@ -83,13 +83,6 @@ def test_photographs_that_cannot_be_used_are_skipped_with_a_reason(
     }
 
 
-def test_a_photograph_one_pixel_larger_is_used(photos: list[Path], tmp_path: Path) -> None:
-    image = np.pad(read_image(photos[0]), ((0, 1), (0, 1), (0, 0)), mode="edge")
-    found = calibrate([written(image, tmp_path / "grown.png"), *photos[1:]], PATTERN)
-    assert found.skipped == {}
-    assert (found.camera.width, found.camera.height) == (640, 480)
-
-
 def test_an_outlier_is_dropped_with_a_reason(photos: list[Path], tmp_path: Path) -> None:
     rows, columns = np.indices((480, 640), dtype=np.float32)
     waves = columns + 3 * np.sin(rows / 20, dtype=np.float32)

@@ -61,25 +61,6 @@ def test_the_fit_to_the_paint_of_a_lane_is_that_lane(curves: LaneCurves) -> None
     assert 2 * found.bend == pytest.approx(2 * curves.bend, abs=1e-4)
 
 
-def test_an_unseen_line_is_placed_at_the_known_width() -> None:
-    found = solve(equations_of(LAST, np.s_[:0]), width=3.5)
-    assert found.left == pytest.approx(-1.8, abs=0.05)
-    assert found.width == pytest.approx(3.5, abs=0.01)
-
-
-def test_several_frames_together_are_less_noisy_than_one() -> None:
-    curves = LaneCurves(1 / 1600, 0.0, -1.85, 1.85, 0.0)
-    rng = np.random.default_rng(1)
-    one, together, before = [], [], None
-    for _ in range(40):
-        x = curves.at(Z) + rng.normal(0, 0.3, (2, len(Z)))
-        now = normal_equations(LinePaint(Z, x[0]), LinePaint(Z, x[1]), curves)
-        before = now.plus_earlier(before, 0.8) if before else now
-        one.append(solve(now, 3.7).left)
-        together.append(solve(before, 3.7).left)
-    assert np.std(together[10:]) < 0.7 * np.std(one[10:])
-
-
 def test_the_pitch_of_earlier_frames_is_ignored() -> None:
     nodding, level = (LaneCurves(0, 0, -1.85, 1.85, pitch) for pitch in (0.005, 0.0))
     both = equations_of(level).plus_earlier(equations_of(nodding), 0.9)
@@ -98,19 +79,6 @@ def masked(curves: LaneCurves, left: slice = ALL, right: slice = ALL, spread: fl
             middle = round(float(columns[row]))
             mask[row, middle - 2 : middle + 3] = PAINT
     return mask
-
-
-@pytest.mark.parametrize("right", [ALL, DASH])
-def test_lines_are_fitted_where_they_are(right: slice) -> None:
-    mask = masked(LAST, right=right)
-    for fit in (
-        fit_new(mask, TOP_VIEW),
-        fit_near(mask, TOP_VIEW, replace(LAST, left=-1.7, right=2.0)),
-    ):
-        assert fit is not None
-        assert fit.seen == (True, True)
-        assert fit.curves.left == pytest.approx(-1.8, abs=0.03)
-        assert fit.curves.width == pytest.approx(3.7, abs=0.03)
 
 
 @pytest.mark.parametrize(

@@ -50,12 +50,6 @@ def test_area_and_lines_are_drawn_and_nothing_beside_them(frame: Image) -> None:
     assert (frame[130:440] == 100).all()
 
 
-def test_only_the_visible_part_of_a_lane_is_drawn() -> None:
-    small = np.full((480, 640, 3), 100, np.uint8)
-    draw_lane(small, LANE)
-    assert (small != 100).any()
-
-
 def test_the_text_describes_the_bend_and_the_place_of_the_camera() -> None:
     bend = ("lane 3.7 m wide, bends left, radius 812 m", "0.25 m left of its middle")
     assert lane_text(LANE) == bend

@@ -48,12 +48,6 @@ def test_yellow_is_paint_even_if_it_is_not_lighter_than_the_road() -> None:
     assert paint_mask(painted(asphalt((168, 172, 176)), (100, 170, 195)))[:, 149:152].all()
 
 
-def test_a_line_in_shadow_is_paint() -> None:
-    image = painted(asphalt(90), WHITE)
-    image[20:60] = (image[20:60] * 0.3).astype(np.uint8)
-    assert paint_mask(image)[:, 149:152].all()
-
-
 @pytest.mark.parametrize(
     "image",
     [
@@ -123,13 +117,6 @@ def test_paint_along_a_line_is_the_middle_of_each_painted_row() -> None:
     assert len(paint_along(drawn(line), VIEW, line + 0.5, margin=0.3).z) == 0
 
 
-@pytest.mark.parametrize("lateral", [-4.8, 20.0])
-def test_paint_along_a_line_outside_the_top_view_stays_inside_it(lateral: float) -> None:
-    mask = np.full((len(VIEW.distances), len(VIEW.laterals)), PAINT, np.uint8)
-    paint = paint_along(mask, VIEW, constant(lateral)[0], margin=0.3)
-    assert ((paint.x >= VIEW.laterals[0]) & (paint.x <= VIEW.laterals[-1])).all()
-
-
 def box_from(left: float, right: float, distance: float) -> Box:
     """Return the box of a thing on the road that rises far above the horizon."""
     ends = np.array([left, right]), np.array([distance, distance])
@@ -144,12 +131,6 @@ def test_a_vehicle_hides_the_road_behind_it_and_nothing_else() -> None:
     assert set(np.unique(after[after != before])) == {HIDDEN}
     assert not changed[VIEW.distances < 19.5].any()
     assert changed[VIEW.distances > 20.5].all()
-
-
-def test_above_the_farthest_row_a_vehicle_hides_nothing() -> None:
-    above = Box.sized(600, 0, 100, int(VIEW.outline[:, 1].min()) - 2)
-    mask = drawn(*constant(-1.85, 1.85))
-    assert (hide(mask, VIEW, [above]) == mask).all()
 
 
 def test_rows_that_are_hidden_in_part_are_left_out() -> None:

@@ -78,12 +78,6 @@ def test_nothing_stands_above_the_horizon_or_nowhere(row: float) -> None:
     assert place((640, row)) is None
 
 
-def test_the_horizon_moves_with_the_pitch() -> None:
-    foot = (640.0, CAMERA.horizon + 30)
-    assert place(foot) is not None
-    assert place(foot, replace(STRAIGHT, pitch=30 / (CAMERA.focal * 1.2))) is None
-
-
 def test_the_lane_reaches_a_quarter_farther_than_it_is_fitted() -> None:
     assert place(pixel_of(1.25 * FAR - 0.5, 0)) is not None
     assert place(pixel_of(1.25 * FAR + 0.5, 0)) is None

@@ -19,7 +19,6 @@ from vdet.synthetic.scene import Light, Line, Scene, Shadow
 MakeRoad = Callable[..., Scene]
 Drive = Callable[..., list[Lane | None]]
 
-YELLOW = (60, 180, 225)
 SHADOWS = tuple(
     Shadow(station, 8.0, 0.45, dappled)
     for station, dappled in ((0.0, True), (14.0, False), (30.0, True), (44.0, False))
@@ -86,17 +85,6 @@ def test_finds_lanes_of_all_kinds(
 ) -> None:
     scene = make_road(**changes)
     check(drive(scene)[-1], scene.camera)
-
-
-@pytest.mark.parametrize("shift", [-0.8, 0.8])
-def test_offset_is_the_distance_from_the_middle_of_the_lane(
-    make_road: MakeRoad, drive: Drive, shift: float
-) -> None:
-    scene = make_road(lines=(Line(-1.85 - shift), Line(1.85 - shift, dash=3.0)))
-    lane = drive(scene)[-1]
-    check(lane, scene.camera, -1.85 - shift, 1.85 - shift)
-    assert lane is not None
-    assert lane.offset == pytest.approx(shift, abs=0.1)  # positive: the camera is to the right
 
 
 @pytest.mark.parametrize("missing", [-1.85, 1.85])
@@ -179,18 +167,3 @@ def test_unusual_frame_sizes_raise_no_error(size: tuple[int, int]) -> None:
     image = np.random.default_rng(0).integers(0, 256, (size[1], size[0], 3), dtype=np.uint8)
     finder = RoadFinder(LaneRequest(), LaneSettings(), *size)
     assert finder.update(finder.observe(image)).lane is None
-
-
-def test_all_frames_may_be_observed_before_the_first_update(
-    make_road: MakeRoad,
-    drive: Drive,
-    settings_for: Callable[[PinholeCamera], LaneSettings],
-) -> None:
-    scene = make_road(curvature=1 / 900, frames=3)
-    finder = RoadFinder(LaneRequest(), settings_for(scene.camera), 1280, 720)
-    views = [finder.observe(render(scene, index)) for index in range(3)]
-    for view, other in zip(views, drive(scene), strict=True):
-        lane = finder.update(view).lane
-        assert lane is not None
-        assert other is not None
-        assert (lane.left == other.left).all()

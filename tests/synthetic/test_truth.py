@@ -48,16 +48,6 @@ def test_the_true_box_bounds_what_is_drawn(
     assert found.visibility == pytest.approx(1, abs=0.01)
 
 
-@pytest.mark.parametrize("curvature", [-1 / 300, 1 / 300])
-def test_the_true_box_bounds_what_is_drawn_in_a_bend(
-    make_scene: MakeScene, parked: Parked, curvature: float
-) -> None:
-    scene = make_scene(parked(1, 30.0, 0.0), curvature=curvature)
-    [found] = true_boxes(scene, 0)
-    assert sides(found.box) == pytest.approx(sides(drawn_box(scene)), abs=2)
-    assert (found.box.center[0] > 640) == (curvature > 0)
-
-
 @pytest.mark.parametrize("ahead", [1.0, 3.0, 4.5])
 def test_a_vehicle_beside_the_camera_is_clipped_to_the_frame(
     make_scene: MakeScene, parked: Parked, ahead: float
@@ -113,16 +103,6 @@ def test_places_are_those_of_the_rear_tyres_and_lanes_are_counted_by_lines(
         number: pytest.approx((ahead + STANDS, lateral, lane))
         for (number, ahead, lateral), lane in zip(vehicles, (0, -1, 1, 1), strict=True)
     }
-
-
-@pytest.mark.parametrize("lateral", [-3.7, 0.0, 3.7])
-def test_a_vehicle_stands_on_the_lower_edge_of_its_box(
-    make_scene: MakeScene, parked: Parked, lateral: float
-) -> None:
-    scene = make_scene(parked(1, 15.0, lateral))
-    [box], [place] = true_boxes(scene, 0), true_places(scene, 0)
-    [[_, row]] = scene.camera.project(np.array([[place.lateral, 0.0, place.distance]]))
-    assert box.box.y2 - 0.5 == pytest.approx(row, abs=1.0)
 
 
 @pytest.mark.parametrize(
