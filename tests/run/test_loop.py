@@ -40,9 +40,6 @@ from vdet.media.planes import Planes
 from vdet.run.loop import FIRST_FRAMES
 from vdet.run.threads import map_ordered
 from vdet.run.video import VideoJob, run_video
-from vdet.synthetic.render import frames
-from vdet.synthetic.scene import Scene
-from vdet.synthetic.truth import true_boxes
 from vdet.track.rules.tracker import RulesTracker
 
 QUEUED = 24

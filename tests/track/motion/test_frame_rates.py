@@ -18,8 +18,6 @@ from track.motion.traffic import (
 from vdet.boxes import Box
 from vdet.config.schema import MotionTrackerSettings
 from vdet.evaluate.scores import Scores
-from vdet.synthetic.random_scenes import demo_scene
-from vdet.synthetic.truth import true_boxes
 from vdet.track.motion.tracker import MotionTracker
 
 RATES = (5, 10, 25, 50)
