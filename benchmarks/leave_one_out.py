@@ -23,13 +23,11 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
-from vdet.evaluate.clips.clip import Variant, open_clip
-from vdet.evaluate.clips.evaluate import evaluate_clips
-from vdet.evaluate.clips.text import result_lines
 from vdet.evaluate.comparison import pool
 from vdet.evaluate.detection_metrics import rank_predictions
-from vdet.evaluate.images.evaluate import ImagesResult, evaluate_images
-from vdet.evaluate.images.scores import Counting, Source
+from vdet.evaluate.images import Counting, ImagesResult, Source, evaluate_images
+from vdet.evaluate.show_video import result_lines
+from vdet.evaluate.video import Variant, evaluate_clips, open_clip
 from vdet.labels.reading import read_labelled_pictures
 from vdet.learn.net.run import NetworkJob, train_to_file
 from vdet.workers import core_count

@@ -12,7 +12,7 @@ from types import ModuleType
 import pytest
 
 from doc_pages import blocks
-from evaluate.images.writers import Boxed, Labelled, show, write_coco
+from labels.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, WIDTH, car_at, drive
 from running import frames_of, write_drive
 from vdet.config.schema import Settings

@@ -21,8 +21,7 @@ from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import horizon_of
-from vdet.evaluate.comparison import Comparison, compare
-from vdet.evaluate.matching import match
+from vdet.evaluate.comparison import Comparison, compare, match
 from vdet.evaluate.scores import score, score_comparison
 from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo

@@ -29,8 +29,8 @@ from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import VdetError
-from vdet.evaluate.clips.evaluate import score_files
 from vdet.evaluate.scores import Scores
+from vdet.evaluate.video import score_files
 from vdet.lanes.camera import load_camera
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture

@@ -7,7 +7,7 @@ import pytest
 
 import vdet
 from conftest import Run
-from evaluate.images.writers import WRITERS, Boxed, Labelled, show
+from labels.writers import WRITERS, Boxed, Labelled, show
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.config.rendering import render
 from vdet.detect.svm.model import save_model

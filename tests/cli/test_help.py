@@ -13,7 +13,7 @@ from vdet.cli.command import Command
 from vdet.cli.main import cli
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.evaluate.clips.sweep import grid
+from vdet.evaluate.sweep import grid
 
 
 def commands(group: click.Group, *names: str) -> Iterator[tuple[tuple[str, ...], click.Command]]:

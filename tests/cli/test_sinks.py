@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from conftest import Run
-from quick import QUICK_OPTIONS
 from red_cars import CAR, road
 from running import frames_of, names, write_drive
 from vdet.draw.boxes import color_of
@@ -250,50 +249,6 @@ class TestDetectImage:
         assert (result.code, result.out) == (code, "")
         assert words in result.err
         assert names(picture.parent) == ["old.json", "red.png"]
-
-
-class TestEvalVideo:
-    def test_a_sink_gets_the_results_of_the_video(
-        self, run: Run, clip_path: Path, model_path: Path, truth_path: Path, out: Path
-    ) -> None:
-        common = ("--model", model_path, *QUICK_OPTIONS)
-        sinks = ("--sink", f"tracks={out}/a.csv", "--sink", f"video={out}/a.mp4")
-        done = run("eval", "video", clip_path, "--truth", truth_path, *sinks, *common)
-        assert done.code == 0, done.err
-        assert frames_of(out / "a.mp4") == 8
-        tracks = ("--no-video", "--tracks", out / "b.csv", "--frames", "8")
-        assert run("detect-video", clip_path, *tracks, *common).code == 0
-        assert (out / "a.csv").read_text() == (out / "b.csv").read_text()
-
-    @pytest.mark.parametrize(
-        ("arguments", "code", "words"),
-        [
-            (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
-            (("--sink", "tallies=a.csv"), 1, f"tallies: is no sink; {KNOWN}"),
-            (("--sink", "tracks=a.json"), 1, "a.json: tracks are written as"),
-            (
-                ("--sink", "tracks=a.csv", "--sweep", "output.crf=1,2"),
-                2,
-                "--sink is for one video under one setting",
-            ),
-        ],
-    )
-    def test_an_output_that_cannot_be_is_refused_before_any_work(
-        self,
-        run: Run,
-        clip_path: Path,
-        truth_path: Path,
-        out: Path,
-        arguments: tuple[str, ...],
-        code: int,
-        words: str,
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
-        monkeypatch.chdir(out)
-        result = run("eval", "video", clip_path, "--truth", truth_path, *arguments)
-        assert (result.code, result.out) == (code, "")
-        assert words in result.err
-        assert names(out) == []
 
 
 class TestBatch:

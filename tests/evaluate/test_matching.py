@@ -1,6 +1,5 @@
 from evaluate.scenes import drive, video
-from vdet.evaluate.comparison import compare
-from vdet.evaluate.matching import match
+from vdet.evaluate.comparison import compare, match
 from vdet.labels.video import LabelledVideo
 
 

@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from vdet.evaluate.output import RunName, run_lines, share, table
+from vdet.evaluate.output import RunName, share, table
 
 
 def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
@@ -12,10 +12,10 @@ def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
 
 
 def test_a_run_says_what_its_model_was_trained_on_where_that_is_known() -> None:
-    first, second = run_lines(RunName("net", Path("x/a.onnx"), None, ("b=1",), ("idd", "uk")))
+    first, second = RunName("net", Path("x/a.onnx"), None, ("b=1",), ("idd", "uk")).lines()
     assert first.endswith(", detector net, model a.onnx, settings default b=1")
     assert second == "trained on idd, uk"
-    assert len(run_lines(RunName("net", Path("x/a.onnx"), None, ()))) == 1
+    assert len(RunName("net", Path("x/a.onnx"), None, ()).lines()) == 1
 
 
 def test_a_missing_share_is_a_dash() -> None:

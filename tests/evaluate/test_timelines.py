@@ -1,36 +1,54 @@
 import pytest
 
-from evaluate.scenes import drive, video
+from evaluate.scenes import TEN, drive, video
 from labels.saving import row
-from vdet.evaluate.comparison import compare
-from vdet.evaluate.matching import match
+from vdet.evaluate.comparison import compare, match
 from vdet.evaluate.scores import score
-from vdet.evaluate.timelines import FirstDetection, Stretch, Timeline, timelines
+from vdet.evaluate.timelines import (
+    FirstDetection,
+    Mistake,
+    Timeline,
+    mistakes,
+    track_timelines,
+    vehicle_timelines,
+)
 from vdet.labels.video import LabelledVideo
 
+Stretch = tuple[int, int, int | None]
 
-def found_timelines(found: LabelledVideo, truth: LabelledVideo) -> list[Timeline]:
+
+def found_timelines(found: LabelledVideo, truth: LabelledVideo) -> tuple[Timeline, ...]:
     comparison = compare(found, truth)
-    return timelines(comparison, match(comparison))
+    return vehicle_timelines(comparison, match(comparison))
+
+
+def stretches(timeline: Timeline) -> list[Stretch]:
+    return [(each.first, each.last, each.partner) for each in timeline.stretches]
+
+
+def found_mistakes(found: LabelledVideo, truth: LabelledVideo) -> tuple[Mistake, ...]:
+    comparison = compare(found, truth)
+    matched = match(comparison)
+    return mistakes(vehicle_timelines(comparison, matched), track_timelines(comparison, matched))
 
 
 def test_a_vehicle_is_missed_and_then_found() -> None:
     (timeline,) = found_timelines(video(drive(4, range(3, 11))), video(drive(7, range(1, 11))))
-    assert timeline == Timeline(7, (Stretch(1, 2, None), Stretch(3, 10, 4)), ())
+    assert timeline.id == 7
+    assert stretches(timeline) == [(1, 2, None), (3, 10, 4)]
 
 
-def test_another_track_after_any_gap_is_a_switch() -> None:
+def test_each_track_has_its_own_stretch() -> None:
     found = video(drive(4, range(1, 4)), drive(9, range(6, 11)))
     (timeline,) = found_timelines(found, video(drive(7, range(1, 11))))
-    assert timeline.stretches == (Stretch(1, 3, 4), Stretch(4, 5, None), Stretch(6, 10, 9))
-    assert timeline.switches == (6,)
+    assert stretches(timeline) == [(1, 3, 4), (4, 5, None), (6, 10, 9)]
 
 
 def test_frames_without_the_vehicle_are_in_no_stretch() -> None:
     truth = video(drive(7, range(1, 4)), drive(7, range(8, 11)), drive(8, range(1, 11), x=300))
     first, second = found_timelines(video(drive(4, range(1, 11))), truth)
-    assert first.stretches == (Stretch(1, 3, 4), Stretch(8, 10, 4))
-    assert second.stretches == (Stretch(1, 10, None),)
+    assert stretches(first) == [(1, 3, 4), (8, 10, 4)]
+    assert stretches(second) == [(1, 10, None)]
 
 
 def test_the_delay_is_from_the_first_true_frame_to_the_first_match() -> None:
@@ -69,3 +87,30 @@ def test_false_tracks_per_minute_use_the_length_of_the_video() -> None:
     found = video(drive(1, range(1, 9), x=300), drive(2, range(20, 30), x=300))
     truth = video(drive(8, range(741, 751)))
     assert score(found, truth, rate=25).false_tracks_per_minute == pytest.approx(4)
+
+
+def test_frames_in_a_row_are_one_mistake_and_the_longest_comes_first() -> None:
+    found = video(drive(1, range(3, 6)), drive(1, range(7, 11)))
+    late, gap = found_mistakes(found, video(drive(7, TEN)))
+    assert late == Mistake("missed", 7, 1, 2, 0)
+    assert gap == Mistake("missed", 7, 6, 6, 0)
+    assert (late.boxes, late.middle, gap.boxes, gap.middle) == (2, 1, 1, 6)
+
+
+def test_a_false_alarm_is_a_mistake_too() -> None:
+    found = video(drive(1, TEN), drive(2, range(4, 8), x=300))
+    assert found_mistakes(found, video(drive(7, TEN))) == (Mistake("false alarm", 2, 4, 7, 0),)
+
+
+def test_a_box_that_fits_badly_is_lost_on_both_sides_with_its_overlap() -> None:
+    # 100 wide against 250 wide over it: IoU 0.4
+    alarm, missed = found_mistakes(video(drive(1, TEN, width=250)), video(drive(7, TEN)))
+    assert (alarm.kind, missed.kind) == ("false alarm", "missed")
+    assert alarm.overlap == missed.overlap == pytest.approx(0.4)
+
+
+def test_frames_in_which_the_vehicle_is_ignored_split_a_mistake() -> None:
+    ignored = [row(0, 5, 7, 0, 0, 100, 100, ignored=True)]
+    truth = video(drive(7, range(1, 5)) + ignored + drive(7, range(6, 11)))
+    spans = [(mistake.first, mistake.last) for mistake in found_mistakes(video(), truth)]
+    assert spans == [(6, 10), (1, 4)]

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evaluate.images.writers import (
+from labels.writers import (
     NAMES,
     WRITERS,
     Boxed,

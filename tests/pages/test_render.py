@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from vdet.evaluate.tiles import Tile
+from vdet.evaluate.output import Tile
 from vdet.pages.charts import Bar, Line, Plot, number_axis
 from vdet.pages.render import counted, link_to, render, write_page
 
@@ -26,7 +26,7 @@ def html() -> str:
         headings=[NASTY],
         rows=[[NASTY]],
         others=[NASTY],
-        plots=[Plot(NASTY, axis, axis, bars, lines, [(NASTY, "#fff")])],
+        plot=Plot(NASTY, axis, axis, bars, lines, [(NASTY, "#fff")]),
         size_headings=[NASTY],
         size_rows=[[NASTY]],
         sheets=[(NASTY, [tile])],

@@ -47,11 +47,9 @@ def images(
     settings = choice.read_for_whole_frames()
     detector = settings.detector
     from vdet.detect.factory import model_file
-    from vdet.evaluate.images.evaluate import evaluate_images
-    from vdet.evaluate.images.page import images_page
-    from vdet.evaluate.images.scores import Counting
-    from vdet.evaluate.images.text import lines, plain
-    from vdet.evaluate.output import run_name
+    from vdet.evaluate.images import Counting, evaluate_images
+    from vdet.evaluate.output import RunName
+    from vdet.evaluate.show_images import images_page, lines, plain
     from vdet.labels.reading import read_labelled_pictures
     from vdet.labels.roles import Roles
     from vdet.workers import core_count
@@ -68,7 +66,7 @@ def images(
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
-    run = run_name(detector, choice.model_path, choice.config_name, choice.assignments)
+    run = RunName.of(detector, choice.model_path, choice.config_name, choice.assignments)
     results.print(lines(result, run), plain(result, run), lambda: images_page(result, run))
 
 
@@ -99,7 +97,7 @@ def patches(
     settings = choice.read(detector="svm")
     from vdet.detect.svm.kind import requested_features, trained_on
     from vdet.detect.svm.model import load_model
-    from vdet.evaluate.output import RunName, plain_run, run_lines
+    from vdet.evaluate.output import RunName
     from vdet.learn.svm.dataset import find_patches
     from vdet.learn.svm.patch_eval import evaluate_patches, lines, patch_page, values
 
@@ -112,8 +110,8 @@ def patches(
     sources = trained_on(model_path) if model_path else ()
     name = RunName("svm", model_path, choice.config_name, choice.assignments, sources)
     results.print(
-        [*run_lines(name), *lines(result)],
-        plain_run(name) | values(result),
+        [*name.lines(), *lines(result)],
+        name.values() | values(result),
         lambda: patch_page(result, name),
     )
 
@@ -145,9 +143,8 @@ def tracks(
     PRED is a file of vdet detect-video --tracks. TRUTH is MOTChallenge gt.txt, KITTI tracking
     labels, CVAT for video 1.1, COCO or YOLO with tracks, or a .csv or .jsonl of vdet.
     """
-    from vdet.evaluate.clips.evaluate import score_files
-    from vdet.evaluate.clips.page import video_page
-    from vdet.evaluate.clips.text import plain_clip, result_lines
+    from vdet.evaluate.show_video import plain_clip, result_lines, video_page
+    from vdet.evaluate.video import score_files
     from vdet.labels.roles import Roles
 
     roles = Roles.from_settings(choice.read())
@@ -176,8 +173,6 @@ def tracks(
     name="sweeps",
     multiple=True,
 )
-@options.sink_option
-@options.lane_options
 @options.settings_options("tracker.needed=0.3", options.regions_option, options.model_option)
 @results_options
 def video(
@@ -185,7 +180,6 @@ def video(
     truths: tuple[Path, ...],
     until: int | None,
     sweeps: tuple[str, ...],
-    lanes: options.LaneChoice,
     choice: options.SettingsChoice,
     results: Results,
 ) -> None:
@@ -198,48 +192,31 @@ def video(
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     base = choice.read()
     from vdet.detect.factory import model_file
-    from vdet.evaluate.clips.clip import Variant, open_clip
-    from vdet.evaluate.clips.evaluate import evaluate_clips
-    from vdet.evaluate.clips.page import video_page
-    from vdet.evaluate.clips.sweep import grid, with_values_in_force
-    from vdet.evaluate.clips.text import plain, result_lines
-    from vdet.evaluate.output import run_lines, run_name
+    from vdet.evaluate.output import RunName
+    from vdet.evaluate.show_video import plain, result_lines, video_page
+    from vdet.evaluate.sweep import grid
+    from vdet.evaluate.video import Variant, evaluate_clips, open_clip
     from vdet.labels.roles import Roles
     from vdet.regions import check_mask
-    from vdet.run.sinks.protocol import check_sinks
 
     check_mask(base.regions)
-    request = lanes.read()
-    swept = grid(with_values_in_force(sweeps, base))
-    outputs = options.as_outputs(options.wanted_outputs())
-    if outputs and (len(swept) > 1 or len(videos) > 1):
-        raise click.UsageError("--sink is for one video under one setting; leave out the others")
     variants = []
-    for extra in swept:
+    for extra in grid(sweeps):
         settings = choice.read(*extra)
         model = choice.load_detector(settings.detector)
         variants.append(Variant(settings, model, extra))
     detectors = [variant.settings.detector for variant in variants]
     files = [path for each in detectors if (path := model_file(each, choice.model_path))]
-    inputs = [*videos, *truths, *files]
-    results.check(inputs)
-    check_sinks(outputs, overwrite=results.overwrite, inputs=inputs)
+    results.check([*videos, *truths, *files])
     roles = Roles.from_settings(base)
     clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
     with progress_steps(" frames") as steps:
-        runs = evaluate_clips(
-            clips,
-            variants,
-            partial(steps, ""),
-            outputs=outputs,
-            lanes=request,
-            overwrite=results.overwrite,
-        )
-    name = run_name(detectors[0], choice.model_path, choice.config_name, choice.assignments)
+        runs = evaluate_clips(clips, variants, partial(steps, ""))
+    name = RunName.of(detectors[0], choice.model_path, choice.config_name, choice.assignments)
     results.print(
-        [*run_lines(name), *result_lines(runs)],
+        [*name.lines(), *result_lines(runs)],
         plain(runs, name),
-        lambda: video_page(runs, "; ".join(run_lines(name))),
+        lambda: video_page(runs, "; ".join(name.lines())),
     )
 
 

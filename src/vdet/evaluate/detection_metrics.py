@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
-from vdet.evaluate.comparison import ComparedFrame, Comparison
-from vdet.evaluate.matching import MatchedFrame
+from vdet.evaluate.comparison import ComparedFrame, Comparison, MatchedFrame
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 

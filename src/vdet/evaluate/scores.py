@@ -2,10 +2,9 @@
 
 from dataclasses import asdict, dataclass
 
-from vdet.evaluate.comparison import Comparison, compare
+from vdet.evaluate.comparison import Comparison, compare, match
 from vdet.evaluate.detection_metrics import DetectionMetrics, detection_metrics
-from vdet.evaluate.matching import match
-from vdet.evaluate.timelines import FirstDetection, first_detections, timelines
+from vdet.evaluate.timelines import FirstDetection, first_detections, vehicle_timelines
 from vdet.evaluate.tracking_metrics import (
     ClearMetrics,
     HotaMetrics,
@@ -65,7 +64,7 @@ def score(prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None
 def score_comparison(comparison: Comparison) -> Scores:
     """Score a comparison: one video, or several that `pool` has joined."""
     matched = match(comparison)
-    first = first_detections(timelines(comparison, matched))
+    first = first_detections(vehicle_timelines(comparison, matched))
     delays = [each.delay for each in first if each.delay is not None]
     wrong = false_tracks(comparison, matched)
     minutes = comparison.seconds / 60 if comparison.seconds else None

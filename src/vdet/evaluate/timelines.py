@@ -1,32 +1,38 @@
-"""When each true vehicle was found, by which track, and when it was missed."""
+"""When each vehicle was found and by which track, and when vehicle and track have no partner."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from typing import Literal
 
-from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.matching import MatchedFrame
+from vdet.boxes import Float64Array, Int64Array
+from vdet.evaluate.comparison import Comparison, MatchedFrame
+
+MistakeKind = Literal["missed", "false alarm"]
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Consecutive frames, `first` to `last` from 1, found by one `track`; None: not found."""
+    """Consecutive frames, `first` to `last` from 1, with the same partner.
+
+    `partner` is the id of the matched track or vehicle; None: there is no match. `overlap` is the
+    mean over the frames of the best IoU with any box of the other side.
+    """
 
     first: int
     last: int
-    track: int | None
+    partner: int | None
+    overlap: float
 
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """The stretches of a vehicle in order; frames in which it does not count are in none.
+    """The stretches of the vehicle or track `id`, in order.
 
-    `switches` are the frames in which another track found it than the last time.
+    Frames in which it does not count are in no stretch.
     """
 
-    vehicle: int
+    id: int
     stretches: tuple[Stretch, ...]
-    switches: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,43 +53,118 @@ class FirstDetection:
         return None if self.found is None else self.found - self.appears
 
 
-def timelines(comparison: Comparison, matched: Sequence[MatchedFrame]) -> list[Timeline]:
-    """Return the timeline of every vehicle, in order of index; `matched` is `match(comparison)`."""
-    seen: list[dict[int, int | None]] = [{} for _ in comparison.vehicle_ids]
-    for pairs in matched:
-        for vehicle in pairs.frame.vehicles.tolist():
-            seen[vehicle][pairs.frame.number] = None
-        tracks = comparison.track_ids[pairs.tracks].tolist()
-        for vehicle, track in zip(pairs.vehicles.tolist(), tracks, strict=True):
-            seen[vehicle][pairs.frame.number] = track
-    return [
-        Timeline(vehicle, _stretches(frames), _switches(frames))
-        for vehicle, frames in zip(comparison.vehicle_ids.tolist(), seen, strict=True)
-    ]
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """Consecutive frames with the same mistake.
+
+    Attributes
+    ----------
+    kind
+        `missed`: the vehicle `id` of the truth; `false alarm`: the track `id`.
+    first, last
+        Numbers of the frames, from 1.
+    overlap
+        Mean over the frames of the best IoU with any box of the other side. Near 0: there is no
+        such box. Below 0.5: the box fits badly. Above: the box is matched with another one.
+    """
+
+    kind: MistakeKind
+    id: int
+    first: int
+    last: int
+    overlap: float
+
+    @property
+    def boxes(self) -> int:
+        """Number of boxes lost."""
+        return self.last - self.first + 1
+
+    @property
+    def middle(self) -> int:
+        """Number of the middle frame."""
+        return (self.first + self.last) // 2
 
 
-def first_detections(found: Sequence[Timeline]) -> tuple[FirstDetection, ...]:
+def vehicle_timelines(
+    comparison: Comparison, matched: Sequence[MatchedFrame]
+) -> tuple[Timeline, ...]:
+    """Return the timeline of each vehicle, in order of index; `matched` is `match(comparison)`."""
+    sides = (
+        (each.frame.number, each.frame.vehicles, each.frame.iou, each.vehicles, each.tracks)
+        for each in matched
+    )
+    return _timelines(comparison.vehicle_ids, comparison.track_ids, sides)
+
+
+def track_timelines(
+    comparison: Comparison, matched: Sequence[MatchedFrame]
+) -> tuple[Timeline, ...]:
+    """Return the timeline of each track, in order of index; `matched` is `match(comparison)`."""
+    sides = (
+        (each.frame.number, each.frame.tracks, each.frame.iou.T, each.tracks, each.vehicles)
+        for each in matched
+    )
+    return _timelines(comparison.track_ids, comparison.vehicle_ids, sides)
+
+
+def first_detections(vehicles: Sequence[Timeline]) -> tuple[FirstDetection, ...]:
     """Return when the vehicle of each timeline was first found."""
     return tuple(
         FirstDetection(
-            timeline.vehicle,
-            timeline.stretches[0].first,
-            next((each.first for each in timeline.stretches if each.track is not None), None),
+            vehicle.id,
+            vehicle.stretches[0].first,
+            next((each.first for each in vehicle.stretches if each.partner is not None), None),
         )
-        for timeline in found
+        for vehicle in vehicles
     )
 
 
-def _stretches(frames: dict[int, int | None]) -> tuple[Stretch, ...]:
-    found: list[Stretch] = []
-    for number, track in frames.items():
-        if found and found[-1].last == number - 1 and found[-1].track == track:
-            found[-1] = Stretch(found[-1].first, number, track)
-        else:
-            found.append(Stretch(number, number, track))
-    return tuple(found)
+def mistakes(vehicles: Sequence[Timeline], tracks: Sequence[Timeline]) -> tuple[Mistake, ...]:
+    """Return the stretches without a partner, the longest first."""
+    sides: tuple[tuple[MistakeKind, Sequence[Timeline]], ...]
+    sides = ("missed", vehicles), ("false alarm", tracks)
+    found = [
+        Mistake(kind, timeline.id, each.first, each.last, each.overlap)
+        for kind, timelines in sides
+        for timeline in timelines
+        for each in timeline.stretches
+        if each.partner is None
+    ]
+    return tuple(sorted(found, key=lambda each: (-each.boxes, each.first, each.kind, each.id)))
 
 
-def _switches(frames: dict[int, int | None]) -> tuple[int, ...]:
-    finds = [(number, track) for number, track in frames.items() if track is not None]
-    return tuple(number for (_, before), (number, now) in pairwise(finds) if now != before)
+_Seen = tuple[int, int | None, float]
+"""Number of a frame, the id of the partner in it, and the best IoU."""
+
+
+def _timelines(
+    ids: Int64Array,
+    other_ids: Int64Array,
+    sides: Iterable[tuple[int, Int64Array, Float64Array, Int64Array, Int64Array]],
+) -> tuple[Timeline, ...]:
+    """Return the timelines of one side.
+
+    For each frame, `sides` has its number, the indices in it, a row of IoU for each of these, the
+    indices that are matched, and the indices of their partners.
+    """
+    seen: list[list[_Seen]] = [[] for _ in ids]
+    for number, indices, iou, paired, partners in sides:
+        partner_of = dict(zip(paired.tolist(), other_ids[partners].tolist(), strict=True))
+        overlaps = iou.max(axis=1, initial=0).tolist()
+        for index, overlap in zip(indices.tolist(), overlaps, strict=True):
+            seen[index].append((number, partner_of.get(index), overlap))
+    return tuple(
+        Timeline(id_, _stretches(each)) for id_, each in zip(ids.tolist(), seen, strict=True)
+    )
+
+
+def _stretches(seen: Sequence[_Seen]) -> tuple[Stretch, ...]:
+    runs: list[list[_Seen]] = []
+    for number, partner, overlap in seen:
+        if not runs or runs[-1][-1][:2] != (number - 1, partner):
+            runs.append([])
+        runs[-1].append((number, partner, overlap))
+    return tuple(
+        Stretch(run[0][0], run[-1][0], run[0][1], sum(each[2] for each in run) / len(run))
+        for run in runs
+    )

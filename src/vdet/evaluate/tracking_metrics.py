@@ -13,9 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Float64Array, Int64Array
-from vdet.evaluate.comparison import MATCH_IOU, Comparison, assign, at_least, counts, joined
+from vdet.evaluate.comparison import (
+    MATCH_IOU,
+    UNMATCHED,
+    Comparison,
+    MatchedFrame,
+    assign,
+    at_least,
+    counts,
+    joined,
+)
 from vdet.evaluate.detection_metrics import ratio
-from vdet.evaluate.matching import UNMATCHED, MatchedFrame
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
 """The overlap thresholds of HOTA, 0.05 … 0.95; the metrics are the mean over them."""

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from conftest import Run
-from evaluate.images.writers import WRITERS, Boxed, Labelled
+from labels.writers import WRITERS, Boxed, Labelled
 from vdet.config.schema import NetworkSettings
 from vdet.detect.factory import trained_on
 from vdet.detect.onnx.recognition import recognize

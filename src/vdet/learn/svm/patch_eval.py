@@ -15,8 +15,7 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.evaluate.output import RunName, run_lines, share, table
-from vdet.evaluate.tiles import Tile
+from vdet.evaluate.output import RunName, Tile, share, table
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
 from vdet.learn.svm.extraction import TEST_SHARE, extract, hold_out
@@ -185,7 +184,7 @@ def patch_page(scores: PatchScores, run: RunName) -> str:
     """Return the page as HTML."""
     return render(
         "eval_patches.html",
-        subtitle="; ".join(run_lines(run)),
+        subtitle="; ".join(run.lines()),
         scores=scores,
         metrics=metric_rows(scores),
         confusion_headings=CONFUSION_HEADINGS,

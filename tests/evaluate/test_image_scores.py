@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.boxes import Boxes
-from vdet.evaluate.images.scores import (
+from vdet.evaluate.images import (
     Counting,
     ImageScores,
     MeasuredImage,

@@ -1,6 +1,6 @@
 """Labelled videos under several settings: what is shared, and which frames are read."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -14,20 +14,10 @@ from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
-from vdet.evaluate.clips.clip import (
-    Variant,
-    build_variants,
-    find_tracks,
-    follow_together,
-    open_clip,
-)
-from vdet.evaluate.clips.evaluate import evaluate_clips
-from vdet.labels.reading import read_predictions
+from vdet.evaluate.video import Variant, evaluate_clips, find_tracks, follow_together, open_clip
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
-from vdet.progress import no_progress
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import Output
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
 
@@ -77,7 +67,7 @@ def test_settings_side_by_side_give_what_each_gives_alone(
     ]
     with VideoReader(clip_path, frames=FRAMES) as reader:
         frames, info = list(reader), reader.info
-    together = list(follow_variants(frames, variants, info))
+    together = list(follow_together(variants, frames, info))
     for results, frame in zip(together, frames, strict=True):
         assert all(result.frame is frame for result in results)
         assert all(result.source == info.path for result in results)
@@ -96,13 +86,6 @@ def follow_alone(frames: Sequence[Frame], variant: Variant, info: VideoInfo) -> 
     images, frames_again = peek(frames)
     pipeline = build(variant.model, variant.settings, info, images)
     return list(pipeline.follow(frames_again, info.path))
-
-
-def follow_variants(
-    frames: Iterable[Frame], variants: Sequence[Variant], info: VideoInfo
-) -> list[tuple[FrameResult, ...]]:
-    images, frames_again = peek(frames)
-    return list(follow_together(build_variants(variants, info, images), frames_again, info.path))
 
 
 @pytest.fixture
@@ -130,7 +113,7 @@ def test_settings_that_search_alike_share_the_search(
         variant("detector.search.probability=0.9"),
     ]
     with VideoReader(clip_path, frames=3) as reader:
-        results = list(follow_variants(reader, variants, reader.info))
+        results = list(follow_together(variants, reader, reader.info))
     assert [len(each) for each in results] == [4, 4, 4]
     assert sorted(searched) == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
 
@@ -164,7 +147,7 @@ def test_truth_beyond_the_video_is_refused_with_its_line(
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
-        find_tracks(open_clip(clip_path, truth), [variant()], no_progress)
+        find_tracks(open_clip(clip_path, truth), [variant()])
 
 
 def test_clips_are_pooled_under_each_setting(
@@ -178,32 +161,3 @@ def test_clips_are_pooled_under_each_setting(
     for run in runs:
         boxes = [clip.scores.vehicle_boxes for clip in run.clips]
         assert run.total.vehicle_boxes == sum(boxes) > 0
-
-
-def test_no_output_appears_where_the_truth_covers_frames_beyond_the_video(
-    clip_path: Path, tmp_path: Path, variant: OfModel
-) -> None:
-    truth, tracks = tmp_path / "gt.txt", tmp_path / "found.csv"
-    truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
-    clip = open_clip(clip_path, truth)
-    with pytest.raises(TruthError):
-        find_tracks(clip, [variant()], no_progress, [Output("tracks", tracks)])
-    assert [path.name for path in tmp_path.iterdir()] == ["gt.txt"]
-
-
-def test_outputs_get_the_results_under_the_first_of_the_settings(
-    clip_path: Path, truth_path: Path, variant: OfModel, tmp_path: Path
-) -> None:
-    tracks = tmp_path / "found.csv"
-    variants = [variant(), variant("detector.heat.threshold=5000")]
-    (first, _), (second, _) = find_tracks(
-        open_clip(clip_path, truth_path),
-        variants,
-        no_progress,
-        [Output("tracks", tracks)],
-    )
-    written = read_predictions(tracks)
-    assert len(first) > len(second) == 0
-    np.testing.assert_array_equal(written.frames, first.frames)
-    np.testing.assert_array_equal(written.ids, first.ids)
-    np.testing.assert_array_equal(written.boxes, first.boxes)

@@ -1,12 +1,8 @@
 """Combinations of settings to compare: `tracker.needed=0.1,0.2` gives an assignment per value."""
 
 import itertools
-import json
 from collections.abc import Sequence
-from typing import Any
 
-from vdet.config.document import parse_assignment
-from vdet.config.schema import Settings
 from vdet.errors import ConfigError
 
 _OPENING, _CLOSING = "[{", "]}"
@@ -36,37 +32,6 @@ def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
         if keys.count(key) > 1:
             raise ConfigError(f"--sweep {key}: is given twice; put all its values in one")
     return list(itertools.product(*axes))
-
-
-def with_values_in_force(sweeps: Sequence[str], settings: Settings) -> list[str]:
-    """Put the value that a key has in `settings` before the others, if it is not one of them.
-
-    A section has no single value, and stays as it is.
-    """
-    values = settings.model_dump(mode="json")
-    return [_with_value_in_force(text, values) for text in sweeps]
-
-
-def _with_value_in_force(text: str, values: Any) -> str:
-    assignments = _axis(text)
-    key = assignments[0].partition("=")[0]
-    swept = [_value_at(parse_assignment(each).values, key) for each in assignments]
-    value = _value_at(values, key)
-    if value is None or isinstance(value, dict) or value in swept:
-        return text
-    shown = value if isinstance(value, str) else json.dumps(value)
-    return f"{key}={shown},{text.partition('=')[2]}"
-
-
-def _value_at(values: Any, key: str) -> Any:
-    """Return the value of a key; None if there is none."""
-    for part in key.split("."):
-        if isinstance(values, list):
-            values = dict(enumerate(values))
-        if not isinstance(values, dict):
-            return None
-        values = values.get(int(part) if part.isdecimal() else part)
-    return values
 
 
 def _axis(text: str) -> list[str]:

@@ -4,13 +4,17 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluate.images.writers import Boxed, Labelled, write_coco
+from labels.writers import Boxed, Labelled, write_coco
 from vdet.boxes import Boxes
-from vdet.evaluate.images.evaluate import ImagesResult
-from vdet.evaluate.images.page import images_page, worst_tiles
-from vdet.evaluate.images.scores import Counting, MeasuredImage, mean_scores, score_source
-from vdet.evaluate.output import RunName
-from vdet.evaluate.tiles import FOUND, TRUE
+from vdet.evaluate.images import (
+    Counting,
+    ImagesResult,
+    MeasuredImage,
+    mean_scores,
+    score_source,
+)
+from vdet.evaluate.output import FOUND, TRUE, RunName
+from vdet.evaluate.show_images import images_page, worst_tiles
 from vdet.labels.label import from_size
 from vdet.labels.reading import read_labelled_pictures
 

@@ -1,22 +1,27 @@
-"""How well vehicles are found in pictures: at one score, at every score, and by size."""
+"""Scores of a detector in labelled pictures: at one score, at every score, and by size."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
 from vdet.boxes import BoolArray, Boxes, Float64Array, Int64Array
-from vdet.evaluate.comparison import Comparison, compare, pool
+from vdet.config.schema import Settings
+from vdet.detect.protocol import DetectorModel
+from vdet.evaluate.comparison import Comparison, MatchedFrame, compare, match, pool
 from vdet.evaluate.detection_metrics import (
     RankedPredictions,
     detection_metrics,
     rank_predictions,
     ratio,
 )
-from vdet.evaluate.matching import MatchedFrame, match
 from vdet.labels.label import MAX_IN_FRAME
-from vdet.labels.pictures import LabelledPicture
+from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.video import LabelledVideo
+from vdet.progress import Progress, no_progress
+from vdet.run.pictures import detect_picture
+from vdet.run.threads import map_ordered
 
 SIZES = (0.03, 0.06, 0.12)
 """Where the classes of width begin and end, shares of the picture's width."""
@@ -51,10 +56,7 @@ class MeasuredImage:
 
     @staticmethod
     def of(
-        picture: LabelledPicture,
-        width: int,
-        found: Boxes,
-        counting: Counting,
+        picture: LabelledPicture, width: int, found: Boxes, counting: Counting
     ) -> "MeasuredImage":
         """Mark what is an ignore region, and which detections need not find anything.
 
@@ -129,8 +131,8 @@ class ImageScores:
     sizes: tuple[SizeScores, ...]
 
 
-RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
-"""The ratios of `ImageScores` of which there is a mean."""
+_COUNTS = ("images", "vehicles", "matches", "false_positives")
+_RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,6 +169,58 @@ class Source:
     scores: ImageScores
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ImagesResult:
+    """What counted, the sets of pictures, the scores of each, and their mean."""
+
+    counting: Counting
+    sets: tuple[LabelledPictures, ...]
+    sources: tuple[Source, ...]
+    mean: ImageScores
+
+
+def evaluate_images(
+    sets: Sequence[LabelledPictures],
+    model: DetectorModel,
+    counting: Counting,
+    *,
+    threads: int = 1,
+    progress: Progress = no_progress,
+) -> ImagesResult:
+    """Search all pictures, each on its own, and score each set.
+
+    Parameters
+    ----------
+    model
+        A detector that shows detections of every score, or at least those of `counting.score`.
+    progress
+        Called with the number of pictures; what it returns is called with 1 for each.
+
+    Raises
+    ------
+    ImageError
+        A picture cannot be read or searched; the message names it.
+    """
+    advance = progress(sum(len(each.pictures) for each in sets))
+
+    settings = Settings()  # the whole picture, and no step
+
+    def search(labelled: LabelledPicture) -> MeasuredImage:
+        image = labelled.read()
+        found = detect_picture(labelled.path, image, model, settings).detections
+        return MeasuredImage.of(labelled, image.shape[1], found, counting)
+
+    sources = []
+    for each in sets:
+        measured = []
+        with map_ordered(search, each.pictures, threads) as results:
+            for _, result in results:
+                measured.append(result)
+                advance(1)
+        sources.append(score_source(measured, counting))
+    return ImagesResult(counting, tuple(sets), tuple(sources), mean_scores(sources, counting))
+
+
 def score_source(images: Sequence[MeasuredImage], counting: Counting) -> Source:
     """Return the scores of one source."""
     shown = [image.compare(counting.score) for image in images]
@@ -174,6 +228,7 @@ def score_source(images: Sequence[MeasuredImage], counting: Counting) -> Source:
     metrics = detection_metrics(pool(shown), [frame for frames in matched for frame in frames])
     ranked = rank_predictions(pool([image.compare(0) for image in images]))
     precisions = ranked.average_precisions()
+    values = asdict(metrics) | {"ap50": float(precisions[0]), "ap50_95": float(precisions.mean())}
     curve = F1Curve.of(ranked)
     best_f1, best_score = _best([images], [curve], counting.score)
     scores = ImageScores(
@@ -181,18 +236,11 @@ def score_source(images: Sequence[MeasuredImage], counting: Counting) -> Source:
         vehicles=ranked.vehicles,
         matches=metrics.matches,
         false_positives=metrics.false_positives,
-        precision=metrics.precision,
-        recall=metrics.recall,
-        f1=metrics.f1,
-        mean_iou=metrics.mean_iou,
-        ap50=float(precisions[0]),
-        ap50_95=float(precisions.mean()),
         best_f1=best_f1,
         best_score=best_score,
         sizes=_by_size(images, matched),
+        **{name: values[name] if ranked.vehicles else None for name in _RATIOS},
     )
-    if not ranked.vehicles:
-        scores = replace(scores, **dict.fromkeys(RATIOS))  # type: ignore[arg-type]
     return Source(tuple(images), curve, scores)
 
 
@@ -203,15 +251,12 @@ def mean_scores(sources: Sequence[Source], counting: Counting) -> ImageScores:
     best_f1, best_score = _best(
         [source.images for source in counted], [source.curve for source in counted], counting.score
     )
+    sizes = zip(*(each.sizes for each in scores), strict=True)
     return ImageScores(
-        images=sum(each.images for each in scores),
-        vehicles=sum(each.vehicles for each in scores),
-        matches=sum(each.matches for each in scores),
-        false_positives=sum(each.false_positives for each in scores),
         best_f1=best_f1,
         best_score=best_score,
-        sizes=tuple(map(_mean_size, zip(*(each.sizes for each in scores), strict=True))),
-        **{name: _mean([getattr(each, name) for each in scores]) for name in RATIOS},
+        sizes=tuple(SizeScores(**_mean(column, SizeScores.__slots__)) for column in sizes),
+        **_mean(scores, (*_COUNTS, *_RATIOS)),
     )
 
 
@@ -277,16 +322,13 @@ def _size_scores(vehicles: int, matches: int, wrong: int) -> SizeScores:
     return SizeScores(vehicles, matches, wrong, ratio(matches, vehicles), f1)
 
 
-def _mean_size(sizes: Sequence[SizeScores]) -> SizeScores:
-    return SizeScores(
-        sum(each.vehicles for each in sizes),
-        sum(each.matches for each in sizes),
-        sum(each.false_positives for each in sizes),
-        _mean([each.recall for each in sizes]),
-        _mean([each.f1 for each in sizes]),
-    )
+def _mean(scores: Sequence[Any], names: Iterable[str]) -> dict[str, Any]:
+    """Return the sum of each count and the mean of each ratio that is known."""
+    return {name: _total([getattr(each, name) for each in scores]) for name in names}
 
 
-def _mean(values: Sequence[float | None]) -> float | None:
+def _total(values: Sequence[int | float | None]) -> float | None:
     known = [value for value in values if value is not None]
-    return sum(known) / len(known) if known else None
+    if not known:
+        return None
+    return sum(known) if isinstance(known[0], int) else sum(known) / len(known)

@@ -1,8 +1,7 @@
 import pytest
 
-from vdet.config.loading import load_settings
 from vdet.errors import ConfigError
-from vdet.evaluate.clips.sweep import grid, with_values_in_force
+from vdet.evaluate.sweep import grid
 
 
 def test_without_sweeps_there_is_one_setting() -> None:
@@ -45,22 +44,3 @@ def test_other_text_than_a_sweep_is_refused(text: str) -> None:
 def test_a_key_swept_twice_is_refused() -> None:
     with pytest.raises(ConfigError, match="--sweep a: is given twice"):
         grid(("a=1,2", "b=1", "a=3"))
-
-
-@pytest.mark.parametrize(
-    ("sweep", "expected"),
-    [
-        ("tracker.needed=0.2,0.3", "tracker.needed=0.1,0.2,0.3"),
-        ("tracker.needed=0.2, 1e-1", "tracker.needed=0.2, 1e-1"),
-        ("detector.heat.regions=outline", "detector.heat.regions=votes,outline"),
-        ("output.crf=1", "output.crf=30,1"),
-        ("train.svm.augmentation.mirror=no", "train.svm.augmentation.mirror=true,no"),
-        ("detector.search.perspective.sizes.0=0.2", "detector.search.perspective.sizes.0=0.1,0.2"),
-        ("detector.features={patch: 64}", "detector.features={patch: 64}"),
-        ("no.such=1", "no.such=1"),
-    ],
-)
-def test_the_value_in_force_is_always_compared(sweep: str, expected: str) -> None:
-    given = ["output.crf=30", "detector.search.perspective.sizes=[0.1]"]
-    settings = load_settings(None, given, detector="svm")
-    assert with_values_in_force([sweep], settings) == [expected]

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from boxing import moved_to
-from evaluate.images.writers import Boxed, Labelled, show, write_coco
+from labels.writers import Boxed, Labelled, show, write_coco
 from red_cars import CAR, HEIGHT, PERSPECTIVE, WIDTH, red_finder, road
 from vdet.boxes import Box
 from vdet.detect.svm.detector import SvmModel
 from vdet.errors import ImageError
-from vdet.evaluate.images.evaluate import evaluate_images, measure
-from vdet.evaluate.images.scores import Counting
+from vdet.evaluate.images import Counting, evaluate_images
 from vdet.labels.pictures import LabelledPictures
 from vdet.labels.reading import read_labelled_pictures
 
@@ -49,10 +48,11 @@ def write_set(folder: Path, cars: dict[str, Box | None]) -> LabelledPictures:
 
 def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmModel) -> None:
     done: list[int] = []
-    alone = measure(red_set.pictures, model, COUNTING, advance=done.append)
-    together = measure(red_set.pictures, model, COUNTING, threads=3)
+    alone = evaluate_images([red_set], model, COUNTING, progress=lambda _: done.append)
+    together = evaluate_images([red_set], model, COUNTING, threads=3)
     assert done == [1] * 6
-    for one, other, image in zip(alone, together, red_set.pictures, strict=True):
+    images = [result.sources[0].images for result in (alone, together)]
+    for one, other, image in zip(*images, red_set.pictures, strict=True):
         assert one.picture is image is other.picture
         assert one.width == WIDTH
         assert np.array_equal(one.found.boxes, other.found.boxes)
@@ -74,16 +74,15 @@ def test_each_set_is_scored_and_progress_counts_all_pictures(
     assert [source.scores.vehicles for source in result.sources] == [5, 0]
     assert result.sources[0].scores.f1 == 1
     assert result.mean.f1 == 1
-    assert [name for name, _ in result.named] == [red_set.name, empty.name, "mean of 1"]
 
 
 def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model: SvmModel) -> None:
     red_set.pictures[2].path.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
-        measure(red_set.pictures, model, COUNTING, threads=2)
+        evaluate_images([red_set], model, COUNTING, threads=2)
 
 
 def test_a_picture_that_is_too_small_is_named(tmp_path: Path, model: SvmModel) -> None:
     path = write_coco(tmp_path, {"small": Labelled(8, 8)})
     with pytest.raises(ImageError, match=r"small\.png: "):
-        measure(read_labelled_pictures(path).pictures, model, COUNTING)
+        evaluate_images([read_labelled_pictures(path)], model, COUNTING)

@@ -1,1 +1,0 @@
-"""Detection run on labelled videos, under one or many settings, and scored."""

@@ -1,1 +1,0 @@
-"""Labelled pictures: read from the usual forms, searched and scored."""

@@ -1,0 +1,314 @@
+"""Scores of labelled videos, whose vehicles are found under one or several settings.
+
+The search takes nearly all the time, so settings that search alike share it: every frame is
+searched once for them, and only what follows the search runs for each.
+"""
+
+import itertools
+import threading
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vdet.boxes import Box, Boxes
+from vdet.config.schema import Settings
+from vdet.detect.protocol import DetectorModel
+from vdet.errors import VideoError
+from vdet.evaluate.comparison import Comparison, compare, match, pool
+from vdet.evaluate.scores import Scores, score_comparison
+from vdet.evaluate.timelines import (
+    Mistake,
+    Timeline,
+    mistakes,
+    track_timelines,
+    vehicle_timelines,
+)
+from vdet.labels.label import Label
+from vdet.labels.reading import read_predictions, read_truth
+from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.labels.video import LabelledVideo
+from vdet.media import Frame, Picture, VideoInfo, VideoReader
+from vdet.media.images import Image
+from vdet.progress import Progress, no_progress
+from vdet.regions import Regions, lay_regions
+from vdet.run.loop import Pipeline, build, named_errors, peek
+from vdet.run.result import FrameResult
+from vdet.track.track import Track
+
+_KEPT = 4
+"""Searches that are kept for the other settings; each runs at most two ahead of the results."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clip:
+    """A video and the truth of its first frames; `until` is the last of these, None for all."""
+
+    video: Path
+    truth_path: Path
+    truth: LabelledVideo
+    until: int | None
+    roles: Roles = DEFAULT_ROLES
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variant:
+    """Settings to compare with others, and the detector that was loaded with them.
+
+    `assignments` are those in which the settings differ from the others, as `--set` takes them.
+    """
+
+    settings: Settings
+    model: DetectorModel
+    assignments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClipResult:
+    """The scores of one video under one of the settings.
+
+    `name` stands in tables; `video` is the file, None where a file of tracks is scored. The frames
+    up to `until`, counted from 1, are compared. `left_out` is the number of boxes in later ones.
+    """
+
+    name: str
+    video: Path | None
+    comparison: Comparison
+    scores: Scores
+    mistakes: tuple[Mistake, ...]
+    timelines: tuple[Timeline, ...]
+    until: int
+    left_out: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunResult:
+    """The scores of all videos under one of the settings, and their total.
+
+    `assignments` are those of the `Variant`.
+    """
+
+    assignments: tuple[str, ...]
+    clips: tuple[ClipResult, ...]
+    total: Scores
+
+    @staticmethod
+    def of(assignments: tuple[str, ...], clips: Sequence[ClipResult]) -> "RunResult":
+        """Add the scores of all clips, taken as one."""
+        total = score_comparison(pool([clip.comparison for clip in clips]))
+        return RunResult(assignments, tuple(clips), total)
+
+
+def open_clip(
+    video: Path, truth_path: Path, until: int | None = None, roles: Roles = DEFAULT_ROLES
+) -> Clip:
+    """Read the truth of a video.
+
+    Parameters
+    ----------
+    until
+        Number of the last frame to use, from 1; None: the last that the truth covers.
+    roles
+        What the labels of the truth mean.
+
+    Raises
+    ------
+    TruthError
+        The truth cannot be used.
+    """
+    truth = read_truth(truth_path, roles)
+    if until is not None:
+        truth = truth.until(until)
+    return Clip(video, truth_path, truth, until or truth.last_frame or None, roles)
+
+
+def evaluate_clips(
+    clips: Sequence[Clip], variants: Sequence[Variant], progress: Progress = no_progress
+) -> list[RunResult]:
+    """Find the vehicles in every clip, in one pass for all settings, and score each.
+
+    Arguments and errors as of `find_tracks`, which is called for each clip.
+    """
+    found = [find_tracks(clip, variants, progress) for clip in clips]
+    return [
+        RunResult.of(
+            variant.assignments,
+            [
+                score_video(str(clip.video), *compared, video=clip.video)
+                for clip, compared in zip(clips, of_clips, strict=True)
+            ],
+        )
+        for variant, of_clips in zip(variants, zip(*found, strict=True), strict=True)
+    ]
+
+
+def score_video(
+    name: str,
+    prediction: LabelledVideo,
+    truth: LabelledVideo,
+    *,
+    video: Path | None = None,
+    rate: float | None = None,
+) -> ClipResult:
+    """Score the predictions for a video and list their mistakes; arguments as in `compare`."""
+    comparison = compare(prediction, truth, rate=rate)
+    matched = match(comparison)
+    vehicles = vehicle_timelines(comparison, matched)
+    return ClipResult(
+        name,
+        video,
+        comparison,
+        score_comparison(comparison),
+        mistakes(vehicles, track_timelines(comparison, matched)),
+        vehicles,
+        max(prediction.last_frame, truth.last_frame),
+    )
+
+
+def score_files(
+    prediction: Path,
+    truth: Path,
+    roles: Roles = DEFAULT_ROLES,
+    *,
+    until: int | None = None,
+    rate: float | None = None,
+) -> RunResult:
+    """Score a file of tracks against a file of truth.
+
+    Parameters
+    ----------
+    roles
+        What the labels of the truth mean.
+    until
+        Number of the last frame to use, from 1; None: the last that the truth covers.
+    rate
+        As `compare` takes it.
+
+    Raises
+    ------
+    TruthError
+        A file cannot be used.
+    """
+    found, true = read_predictions(prediction), read_truth(truth, roles)
+    last = until or true.last_frame
+    compared = found.until(last)
+    result = score_video(str(prediction), compared, true.until(last), rate=rate)
+    result = replace(result, until=last, left_out=len(found) - len(compared))
+    return RunResult((), (result,), result.scores)
+
+
+def best(runs: Sequence[RunResult]) -> RunResult:
+    """Return the run with the highest F1, the first of equal ones."""
+    return max(runs, key=lambda run: run.total.f1)
+
+
+def find_tracks(
+    clip: Clip, variants: Sequence[Variant], progress: Progress = no_progress
+) -> list[tuple[LabelledVideo, LabelledVideo]]:
+    """Find and follow the vehicles of a clip under each of the settings, in one pass.
+
+    Return the tracks and the truth for each of them. Vehicles of the truth that stand outside the
+    regions are ignored.
+
+    Parameters
+    ----------
+    progress
+        Called with the expected number of frames (None: unknown); what it returns is called with
+        the number of frames done since the last call.
+
+    Raises
+    ------
+    VideoError
+        The video cannot be read or searched.
+    TruthError
+        The truth covers frames beyond the end of the video.
+    """
+    rows: list[list[Label]] = [[] for _ in variants]
+    frames = 0
+    source = variants[0].settings.input
+    with VideoReader(clip.video, frames=clip.until, settings=source) as reader:
+        advance = progress(reader.expected)
+        with named_errors(clip.video, VideoError):
+            for results in follow_together(variants, reader, reader.info):
+                for row, result in zip(rows, results, strict=True):
+                    row += [_label(result.frame.index + 1, track) for track in result.tracks]
+                frames = results[0].frame.index + 1
+                advance(1)
+        info = reader.info
+    if clip.until is not None and frames < clip.until:
+        # raises an error that names the line
+        read_truth(clip.truth_path, clip.roles, frame_count=frames)
+    truth = clip.truth.until(frames)
+    return [
+        (
+            LabelledVideo.of(each, frame_count=frames, rate=float(info.rate)),
+            _in_regions(truth, lay_regions(variant.settings.regions, info.width, info.height)),
+        )
+        for each, variant in zip(rows, variants, strict=True)
+    ]
+
+
+def follow_together(
+    variants: Sequence[Variant], frames: Iterable[Frame], video: VideoInfo
+) -> Iterator[tuple[FrameResult, ...]]:
+    """Yield for each frame the results under all settings.
+
+    Errors as of `vdet.run.loop.build`.
+    """
+    images, read = peek(frames)
+    pipelines = _build(variants, video, images)
+    del images  # else they stay in memory for the whole run
+    copies = itertools.tee(read, len(pipelines))
+    runs = [each.follow(copy, video.path) for each, copy in zip(pipelines, copies, strict=True)]
+    yield from zip(*runs, strict=True)
+
+
+_Search = Callable[[Picture, int | None], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class _Sharing:
+    """A detector whose search is that of several."""
+
+    search: _Search
+    detect: Callable[[Any], Boxes]
+
+
+def _build(
+    variants: Sequence[Variant], video: VideoInfo, images: Sequence[Image]
+) -> list[Pipeline]:
+    """Build what the frames go through under each of the settings; `images` are from `peek`."""
+    searches: dict[Hashable, _Search] = {}
+    pipelines = []
+    for each in variants:
+        own = build(each.model, each.settings, video, images)
+        key = each.settings.detector.search_key, own.stride, each.settings.regions
+        search = searches.setdefault(key, _shared(own.detector.search))
+        pipelines.append(replace(own, detector=_Sharing(search, own.detector.detect)))
+    return pipelines
+
+
+def _shared(search: _Search) -> _Search:
+    """Return a search that runs once for each frame, whichever thread asks for it first."""
+    cached, lock = lru_cache(_KEPT)(search), threading.Lock()
+
+    def locked(picture: Picture, index: int | None) -> Any:
+        with lock:
+            return cached(picture, index)
+
+    return locked
+
+
+def _label(number: int, track: Track) -> Label:
+    return Label(0, track.box.pixels, frame=number, id=track.id, score=track.score)
+
+
+def _in_regions(truth: LabelledVideo, regions: Regions | None) -> LabelledVideo:
+    """Return the truth of a video, in which vehicles outside the regions are ignored."""
+    if regions is None:
+        return truth
+    outside = [not regions.contains(Box(*sides).foot) for sides in truth.boxes.tolist()]
+    return replace(truth, ignored=truth.ignored | np.array(outside, np.bool_))
