@@ -40,8 +40,8 @@ _BUILT_IN: dict[str, dict[str, str]] = {
     },
     FORMATS: {
         "mot": "vdet.labels.mot:MOT",
-        "csv": "vdet.labels.csv_table:CSV",
-        "jsonl": "vdet.labels.json_lines:JSON_LINES",
+        "csv": "vdet.labels.records:CSV",
+        "jsonl": "vdet.labels.records:JSON_LINES",
         "coco": "vdet.labels.coco:COCO",
         "cvat": "vdet.labels.cvat:CVAT",
         "kitti": "vdet.labels.kitti:KITTI",

@@ -13,12 +13,11 @@ from vdet.boxes import Box
 from vdet.detect.classes import OUR_NAMES
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO
-from vdet.labels.csv_table import CSV
 from vdet.labels.cvat import CVAT
 from vdet.labels.formats import Format, SourceVideo, track_formats
-from vdet.labels.json_lines import JSON_LINES
 from vdet.labels.kitti import KITTI
 from vdet.labels.mot import MOT
+from vdet.labels.records import CSV, JSON_LINES
 from vdet.labels.video import SavedTracks
 from vdet.labels.yolo import YOLO
 from vdet.track.track import FrameTracks, Track

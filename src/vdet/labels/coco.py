@@ -13,20 +13,23 @@ from collections.abc import Container, Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO, TypeVar
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
 from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
 from vdet.files import printable
 from vdet.labels.formats import UNKNOWN, Format, SourceVideo
 from vdet.labels.label import Label, from_size, limited, line_error
-from vdet.labels.parsing import LIMIT, JsonNumber, first_mistake, read_text, text_of
+from vdet.labels.parsing import LIMIT, Index, Number, first_mistake, read_text, text_of
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
 
 _VIDEO = 1
 """Id of the only video."""
+
+_ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
+_MAX_NAME = 255  # bytes, as in most file systems
 
 
 class CocoWriter:
@@ -96,26 +99,24 @@ class CocoWriter:
         self._file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
 
-_Id = Annotated[int, Field(ge=-LIMIT, le=LIMIT, strict=True)]
-_AnyId = Annotated[int, Field(strict=True)]
-_Index = Annotated[int, Field(ge=0, le=LIMIT, strict=True)]
-_Side = Annotated[int, Field(ge=1, le=LIMIT, strict=True)]
+_Id = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
+_Side = Annotated[int, Field(ge=1, le=LIMIT)]
 
 
 class _Category(BaseModel, frozen=True):
-    id: _AnyId
+    id: int
     name: str = Field(max_length=1000)
 
 
 class _Annotation(BaseModel, frozen=True):
-    image_id: _AnyId
-    category_id: _AnyId
-    bbox: tuple[JsonNumber, JsonNumber, JsonNumber, JsonNumber]
-    iscrowd: int = Field(0, ge=0, le=1)
+    image_id: int
+    category_id: int
+    bbox: tuple[Number, Number, Number, Number]
+    iscrowd: int = Field(0, ge=0, le=1, strict=False)
 
 
 class _Image(BaseModel, frozen=True):
-    id: _AnyId
+    id: int
     width: _Side | None = None
     height: _Side | None = None
 
@@ -124,23 +125,33 @@ class _Image(BaseModel, frozen=True):
         return (self.width, self.height) if self.width and self.height else None
 
 
+def _inside(name: str) -> str:
+    """Refuse the name of a picture that leads out of the set, or cannot be one."""
+    inside = PurePosixPath(name)
+    if inside.is_absolute() or ".." in inside.parts:
+        raise ValueError(f"{printable(name)} leads out of the set")
+    if not name.isprintable() or any(len(part.encode()) > _MAX_NAME for part in inside.parts):
+        raise ValueError(f"{printable(name):.100} is not the name of a file")
+    return name
+
+
 class _Picture(_Image, frozen=True):
-    file_name: str = Field(min_length=1, max_length=1000)
+    file_name: Annotated[str, Field(min_length=1, max_length=1000), AfterValidator(_inside)]
 
 
 class _Frame(_Image, frozen=True):
-    frame_index: _Index
+    frame_index: Index
     video_id: _Id = _VIDEO
-    time: JsonNumber | None = None
+    time: Number | None = None
 
 
 class _Attributes(BaseModel, frozen=True):
-    occluded: bool = False
+    occluded: bool = Field(False, strict=False)
 
 
 class _TrackAnnotation(_Annotation, frozen=True):
     track_id: _Id
-    score: JsonNumber = 1.0
+    score: Number = 1.0
     attributes: _Attributes = _Attributes()
 
 
@@ -163,7 +174,7 @@ E = TypeVar("E", _Category, _Picture, _Frame)
 
 def _document(path: Path, text: str, form: type[D], name: str) -> D:
     try:
-        return form.model_validate_json(text)
+        return form.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise TruthError(f"{path}: is not {name}: {first_mistake(error)}") from error
 
@@ -229,10 +240,6 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
 COCO = Format("COCO", ".coco.json", read_coco, CocoWriter, needs_video=True)
 
 
-_ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
-_MAX_NAME = 255  # bytes, as in most file systems
-
-
 def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     """Yield every picture of a COCO file; `iscrowd: 1` marks an ignore region.
 
@@ -251,40 +258,21 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
         label = Label(place, from_size(*each.bbox), name, ignored=bool(each.iscrowd))
         labels[each.image_id].append(label)
     folder = _picture_folder(path, found.images)
-    for number, image in enumerate(found.images):
-        picture = folder / _inside(path, number, image.file_name)
-        yield LabelledPicture(picture, path, tuple(labels[image.id]), image.size)
-
-
-def _inside(path: Path, number: int, name: str) -> PurePosixPath:
-    """Refuse the name of a picture that leads out of the set, or cannot be one."""
-    inside = PurePosixPath(name)
-    place = f"images.{number}"
-    if inside.is_absolute() or ".." in inside.parts:
-        raise line_error(path, place, f"the file_name {printable(name)} leads out of the set")
-    if not name.isprintable() or any(len(part.encode()) > _MAX_NAME for part in inside.parts):
-        raise line_error(path, place, f"{printable(name)} is no name of a file")
-    return inside
+    for image in found.images:
+        yield LabelledPicture(folder / image.file_name, path, tuple(labels[image.id]), image.size)
 
 
 def _picture_folder(path: Path, images: Sequence[_Picture]) -> Path:
     """Return the folder that the names of pictures are relative to: that with the first one."""
     near = path.parent
-    if not images:
+    if not images or (near / images[0].file_name).is_file():
         return near
-    name = _inside(path, 0, images[0].file_name)
-    if (near / name).is_file():
-        return near
-    others = _folders_in(near)
-    if near.name == _ANNOTATIONS:
-        others += [near.parent, *_folders_in(near.parent)]
-    found = [folder for folder in others if (folder / name).is_file()]
+    above = [near, near.parent] if near.name == _ANNOTATIONS else [near]
+    below = (each for folder in above for each in sorted(folder.iterdir()) if each.is_dir())
+    name = images[0].file_name
+    found = [folder for folder in (*above, *below) if (folder / name).is_file()]
     if len(found) != 1:
         which = " and ".join(str(folder) for folder in found[:2])
         what = f"lies in {which}" if found else "is missing: it should lie beside it or below"
-        raise TruthError(f"{path}: its first picture, {printable(str(name))}, {what}")
+        raise TruthError(f"{path}: its first picture, {name}, {what}")
     return found[0]
-
-
-def _folders_in(folder: Path) -> list[Path]:
-    return sorted(each for each in folder.iterdir() if each.is_dir())

@@ -18,8 +18,9 @@ LIMIT = 10_000_000
 MAX_BYTES = 64_000_000
 """Largest size of a file of boxes."""
 
-JsonNumber = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False, strict=True)]
-"""A number in JSON."""
+Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
+Index = Annotated[int, Field(ge=0, le=LIMIT)]
+"""Fields of JSON documents and of tables."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -137,7 +138,7 @@ def parse_whole(text: str) -> int:
 
 
 def first_mistake(error: ValidationError) -> str:
-    """Say in a line what is wrong in a JSON text, and where."""
+    """Say in one line what is wrong in a document, and where."""
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
     place = ".".join(str(part) for part in first["loc"])
     return f"{place}: {first['msg']}" if place else first["msg"]

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO, Self
 from vdet.errors import OutputError
 from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
-from vdet.labels.json_lines import JSON_LINES
+from vdet.labels.records import JSON_LINES
 from vdet.lanes.road import lane_record
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import (

@@ -1,0 +1,195 @@
+"""The formats of vdet itself, JSON lines and CSV; frames and pixels count from 0.
+
+JSON lines have a record for each frame, even one without a box. CSV has a row for each box.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field, ValidationError
+
+from vdet.errors import TruthError
+from vdet.labels.formats import Format, LineWriter
+from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
+from vdet.labels.parsing import LIMIT, Index, Number, first_mistake, numbered_lines, text_of
+from vdet.labels.video import SavedTracks
+from vdet.track.track import FrameTracks, Track
+
+_NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
+_OPTIONAL = ("score", "predicted", "class", "foot_x", "foot_y", "distance", "lane")
+
+
+class _TrackRecord(BaseModel, frozen=True):
+    id: Index
+    x: Number
+    y: Number
+    width: Number
+    height: Number
+    score: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1.0
+    predicted: bool = False
+    label: str | None = Field(None, alias="class")
+    foot: tuple[Number, Number] | None = None
+    distance: Number | None = None
+    lane: Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None = None
+
+    def labelled(self, line: int, frame: int) -> Label:
+        """Return the label in a frame, counted from 0."""
+        return Label(
+            line,
+            from_size(self.x, self.y, self.width, self.height),
+            self.label or None,
+            frame + 1,
+            self.id,
+            self.score,
+            predicted=self.predicted,
+            foot=self.foot,
+            distance=self.distance,
+            lane=self.lane,
+        )
+
+
+class _FrameRecord(BaseModel, frozen=True):
+    frame: Index
+    time: Number
+    tracks: tuple[_TrackRecord, ...]
+
+
+class _Row(_TrackRecord, frozen=True):
+    frame: Index
+    time: Number
+
+
+def _json_lines(frame: FrameTracks) -> Iterator[str]:
+    """Yield a record: `frame`, `time`, `tracks`, and the facts that are known about the frame."""
+    tracks = [_track_record(track) for track in frame.tracks]
+    record = {"frame": frame.index, "time": round(frame.time, 6), "tracks": tracks}
+    yield json.dumps({**record, **frame.facts}) + "\n"
+
+
+def _track_record(track: Track) -> dict[str, Any]:
+    return {
+        "id": track.id,
+        **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
+        "score": round(track.score, 4),
+        "predicted": track.predicted,
+        "class": track.class_name,
+        "foot": [round(value, 2) for value in track.foot],
+        "distance": None if track.distance is None else round(track.distance, 2),
+        "lane": track.lane,
+    }
+
+
+def _csv_lines(frame: FrameTracks) -> Iterator[str]:
+    """Yield a row for each box; what is not known is an empty cell."""
+    for track in frame.tracks:
+        record = _track_record(track)
+        known = {
+            "frame": frame.index,
+            "time": f"{frame.time:.6f}",
+            "score": f"{track.score:.4f}",
+            "predicted": int(track.predicted),
+            "foot_x": record["foot"][0],
+            "foot_y": record["foot"][1],
+        }
+        yield _csv_line((record | known)[name] for name in (*_NEEDED, *_OPTIONAL))
+
+
+def _csv_line(cells: Iterable[object]) -> str:
+    file = io.StringIO()
+    csv.writer(file, lineterminator="\n").writerow(cells)
+    return file.getvalue()
+
+
+def read_json_lines(path: Path, data: bytes) -> SavedTracks:
+    """Read a record for every frame; keys that vdet does not know are ignored.
+
+    Raises
+    ------
+    TruthError
+        The file is empty, a line is not such a record, or frames do not ascend.
+    """
+    times: dict[int, float] = {}
+    labels = tuple(limited(path, _json_labels(path, text_of(path, data), times)))
+    if not times:
+        raise TruthError(f"{path}: is empty; it should have a record for every frame")
+    return SavedTracks(labels, listed=tuple(times), times=times)
+
+
+def _json_labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Label]:
+    """Yield the boxes of every record, and put the time of every frame into `times`."""
+    last = -1
+    for line, content in numbered_lines(text):
+        if len(times) == MAX_LABELS:
+            raise line_error(path, line, f"has more than {MAX_LABELS:,} frames; cut it into parts")
+        try:
+            record = _FrameRecord.model_validate_json(content, strict=True)
+        except ValidationError as error:
+            raise line_error(path, line, first_mistake(error)) from error
+        if record.frame <= last:
+            raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
+        last = record.frame
+        times[last] = record.time
+        for each in record.tracks:
+            yield each.labelled(line, last)
+
+
+def read_csv(path: Path, data: bytes) -> SavedTracks:
+    """Read a table that has at least the columns frame, time, id, x, y, width and height.
+
+    Columns that vdet does not write are ignored. An empty cell counts as no cell.
+
+    Raises
+    ------
+    TruthError
+        A column is missing or comes twice, a row has another number of cells, or a cell is not
+        what its column needs.
+    """
+    times: dict[int, float] = {}
+    labels = tuple(limited(path, _csv_labels(path, text_of(path, data), times)))
+    return SavedTracks(labels, times=times)
+
+
+def _csv_labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Label]:
+    """Yield the label of every row, and put the time of its frame into `times`."""
+    table = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        header = next(table, [])
+        _check_header(header)
+        for cells in filter(None, table):
+            row = _row(header, cells)
+            times[row.frame] = row.time
+            yield row.labelled(table.line_num, row.frame)
+    except ValidationError as error:
+        raise line_error(path, table.line_num, first_mistake(error)) from error
+    except (ValueError, csv.Error) as error:
+        raise line_error(path, max(1, table.line_num), str(error)) from error
+
+
+def _check_header(header: Sequence[str]) -> None:
+    if any(header.count(name) != 1 for name in _NEEDED):
+        raise ValueError(f"the header must name each of these columns once: {', '.join(_NEEDED)}")
+    for name in _OPTIONAL:
+        if header.count(name) > 1:
+            raise ValueError(f"the header names the column {name} twice")
+
+
+def _row(header: Sequence[str], cells: Sequence[str]) -> _Row:
+    if len(cells) != len(header):
+        raise ValueError(f"the header has {len(header)} columns; this line has {len(cells)}")
+    known: dict[str, Any] = {
+        name: text.strip() for name, text in zip(header, cells, strict=True) if text.strip()
+    }
+    if "foot_x" in known and "foot_y" in known:
+        known["foot"] = known["foot_x"], known["foot_y"]
+    return _Row.model_validate(known)
+
+
+JSON_LINES = Format(
+    "JSON lines", ".jsonl", read_json_lines, lambda file, _: LineWriter(file, _json_lines)
+)
+_HEADING = _csv_line([*_NEEDED, *_OPTIONAL])
+CSV = Format("CSV", ".csv", read_csv, lambda file, _: LineWriter(file, _csv_lines, _HEADING))
