@@ -5,8 +5,8 @@ import pytest
 from labels.saving import car, frame, row, written
 from vdet.errors import TruthError
 from vdet.labels.label import Label
-from vdet.labels.mot import MOT, flagged, read_mot
-from vdet.labels.reading import read_tracks
+from vdet.labels.mot import MOT, read_mot
+from vdet.labels.reading import read_tracks, read_truth
 
 FILE = Path("gt.txt")
 
@@ -24,18 +24,10 @@ def test_flag_0_marks_an_ignore_region() -> None:
     assert [row.ignored for row in rows(text)] == [True, False]
 
 
-def test_truth_of_the_older_form_has_ten_columns_and_a_flag() -> None:
-    found = rows("4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1\n4,8,1,1,9,9,0,-1,-1,-1")
-    assert [flagged(FILE, row) for row in found] == [
-        row(1, 4, 7, 10.5, 20, 20, 10),
-        row(2, 4, 8, 0, 0, 9, 9, ignored=True),
-    ]
-
-
-def test_tracks_are_no_truth() -> None:
-    (row,) = rows("4,7,11,21,20,10,0.9,-1,-1,-1")
-    with pytest.raises(TruthError, match=r"gt\.txt:1: the flag \(column 7\) is 0\.9; it must be 0"):
-        flagged(FILE, row)
+def test_truth_of_the_older_form_has_ten_columns_and_a_flag(tmp_path: Path) -> None:
+    path = tmp_path / "gt.txt"
+    path.write_text("4, 7, 11.5, 21, 20, 10, 1, -1, -1, -1\n4,8,1,1,9,9,0,-1,-1,-1")
+    assert read_truth(path).ignored.tolist() == [False, True]
 
 
 def test_tracks_have_a_confidence() -> None:

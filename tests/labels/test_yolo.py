@@ -85,7 +85,7 @@ class TestReading:
         ),
         (
             described(DATA.replace("200", "0")),
-            ":data.yaml: 0×100 pixels is no size",
+            ":data.yaml: does not say how large",
         ),
         (
             described(DATA.replace("[car, truck]", "car")),

@@ -23,7 +23,7 @@ from vdet.evaluate.timelines import Mistake
 from vdet.evaluate.video import ClipResult, RunResult, best
 from vdet.media import VideoReader
 from vdet.media.images import Image
-from vdet.pages.charts import BAD, FILL, Line, Plot, Span, Timeline, number_axis
+from vdet.pages.charts import BAD, FILL, Span, Timeline, number_axis
 from vdet.pages.render import render
 
 HEADINGS = (
@@ -162,8 +162,7 @@ def video_page(runs: Sequence[RunResult], what: str) -> str:
         headings=HEADINGS,
         rows=clip_rows(top) if len(top.clips) > 1 else [],
         details=detail_lines(top),
-        sweep=_sweep(runs, top) if len(runs) > 1 else None,
-        sweep_rows=sweep_rows(runs),
+        sweep_rows=sweep_rows(runs) if len(runs) > 1 else [],
         best=runs.index(top),
         mistake_headings=MISTAKE_HEADINGS,
         clips=[
@@ -171,19 +170,6 @@ def video_page(runs: Sequence[RunResult], what: str) -> str:
             for clip in top.clips
         ],
     )
-
-
-def _sweep(runs: Sequence[RunResult], top: RunResult) -> Plot:
-    """Return a chart with a point for each setting."""
-    points = [(run.total.recall, run.total.precision) for run in runs]
-    lines = [
-        Line([point], BAD if run is top else FILL, dots=True, labels=[_setting(run)])
-        for run, point in zip(runs, points, strict=True)
-    ]
-    recalls, precisions = zip(*points, strict=True)
-    x = number_axis(min(recalls), max(recalls), "recall", least=0.01)
-    y = number_axis(min(precisions), max(precisions), least=0.01)
-    return Plot("Precision by recall", x, y, lines=lines, legend=[("best F1", BAD)])
 
 
 def _timeline(clip: ClipResult) -> Timeline:

@@ -4,11 +4,10 @@ Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tabl
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from vdet.labels.formats import Format, LineWriter
-from vdet.labels.label import Label, from_size, limited, line_error
+from vdet.labels.label import Label, from_size, limited
 from vdet.labels.parsing import label_lines, parse_number, parse_whole, text_of
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks
@@ -45,29 +44,12 @@ def read_mot(path: Path, data: bytes) -> SavedTracks:
     return SavedTracks(tuple(limited(path, labels)))
 
 
-def flagged(path: Path, label: Label) -> Label:
-    """Return a label of ten columns as truth of the older form, in which column 7 is the flag.
-
-    Raises
-    ------
-    TruthError
-        The flag is neither 0 nor 1.
-    """
-    if label.score not in {0, 1}:
-        raise line_error(path, label.place, _flag_mistake(label.score))
-    return replace(label, score=1.0, ignored=label.ignored or label.score == 0)
-
-
-def _flag_mistake(flag: float) -> str:
-    return f"the flag (column 7) is {flag:g}; it must be 0 or 1"
-
-
 def _label(place: int | str, columns: Sequence[str]) -> Label:
     seventh, *_ = [parse_number(column) for column in columns[6:]]
     left, top, width, height = (parse_number(column) for column in columns[2:6])
     is_truth = len(columns) == _TRUTH_COLUMNS
     if is_truth and seventh not in {0, 1}:
-        raise ValueError(_flag_mistake(seventh))
+        raise ValueError(f"the flag (column 7) is {seventh:g}; it must be 0 or 1")
     return Label(
         place,
         from_size(left - 1, top - 1, width, height),

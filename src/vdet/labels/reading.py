@@ -8,7 +8,7 @@ from vdet.errors import TruthError
 from vdet.labels.coco import read_coco_pictures
 from vdet.labels.formats import picture_formats, recognise, track_formats
 from vdet.labels.label import Label, checked_labels, line_error
-from vdet.labels.mot import MOT, flagged
+from vdet.labels.mot import MOT
 from vdet.labels.parsing import read_bytes
 from vdet.labels.pictures import LabelledPicture, LabelledPictures, checked_pictures
 from vdet.labels.roles import DEFAULT_ROLES, Roles, is_region
@@ -76,8 +76,8 @@ def read_truth(
         raise TruthError(f"{path}: is empty; give {names}")
     form = recognise(path, data)
     labels: Iterable[Label] = form.read(path, data).labels
-    if form is MOT:
-        labels = (flagged(path, label) for label in labels)
+    if form is MOT:  # in the older form, the column of the score is the flag
+        labels = (replace(each, ignored=each.score == 0 or each.ignored) for each in labels)
     checked = checked_labels(path, _with_roles(path, labels, roles), frame_count=frame_count)
     return LabelledVideo.of(checked, frame_count=frame_count)
 

@@ -148,15 +148,13 @@ def _described(
     text = text_of(path, read_member(archive, first, most=document.MAX_BYTES))
     values = _values(lambda: document.parse_document(text, where))
     names = _class_names(values, where)
-    width, height = values.get("width"), values.get("height")
-    if not (isinstance(width, int) and isinstance(height, int)):
+    size = values.get("width"), values.get("height")
+    if not all(isinstance(side, int) and 0 < side <= LIMIT for side in size):
         raise TruthError(
             f"{where}: does not say how large the frames are; add the lines 'width: 1280' and "
             "'height: 720' with the pixels of yours"
         )
-    if not (0 < width <= LIMIT and 0 < height <= LIMIT):
-        raise TruthError(f"{where}: {width}×{height} pixels is no size of frames")
-    return names, (width, height)
+    return names, size  # type: ignore[return-value]  # checked above
 
 
 def _values(read: Callable[[], document.Document]) -> Mapping[str, Any]:
@@ -173,9 +171,7 @@ def _class_names(values: Mapping[str, Any], where: str) -> list[str]:
     if isinstance(names, dict):  # number: name
         names = [names.get(str(number)) for number in range(len(names))]
     if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
-        raise TruthError(
-            f"{where}: names must be a list of the names of all classes, or number them"
-        )
+        raise TruthError(f"{where}: names must be a list with all classes, or number them from 0")
     return names
 
 
