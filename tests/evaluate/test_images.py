@@ -80,9 +80,3 @@ def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model
     red_set.pictures[2].path.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
         evaluate_images([red_set], model, COUNTING, threads=2)
-
-
-def test_a_picture_that_is_too_small_is_named(tmp_path: Path, model: SvmModel) -> None:
-    path = write_coco(tmp_path, {"small": Labelled(8, 8)})
-    with pytest.raises(ImageError, match=r"small\.png: "):
-        evaluate_images([read_labelled_pictures(path)], model, COUNTING)

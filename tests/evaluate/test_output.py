@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from vdet.evaluate.output import RunName, share, table
+from vdet.evaluate.output import RunName, table
 
 
 def test_the_first_column_is_to_the_left_and_the_others_to_the_right() -> None:
@@ -16,7 +16,3 @@ def test_a_run_says_what_its_model_was_trained_on_where_that_is_known() -> None:
     assert first.endswith(", detector net, model a.onnx, settings default b=1")
     assert second == "trained on idd, uk"
     assert len(RunName("net", Path("x/a.onnx"), None, ()).lines()) == 1
-
-
-def test_a_missing_share_is_a_dash() -> None:
-    assert (share(0.12345), share(None), share(0.5, 1)) == ("0.123", "–", "0.5")

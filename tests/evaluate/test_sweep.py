@@ -4,10 +4,6 @@ from vdet.errors import ConfigError
 from vdet.evaluate.sweep import grid
 
 
-def test_without_sweeps_there_is_one_setting() -> None:
-    assert grid(()) == [()]
-
-
 def test_the_values_of_a_key_in_their_order() -> None:
     assert grid(("detector.heat.threshold=4,1, 2",)) == [
         ("detector.heat.threshold=4",),
@@ -29,10 +25,6 @@ def test_a_comma_in_brackets_belongs_to_the_value() -> None:
         ("detector.search.windows=[{size: 64, top: 1}]",),
         ("detector.search.windows=[{size: 96, top: 2}]",),
     ]
-
-
-def test_a_value_given_twice_is_run_once() -> None:
-    assert grid(("a=1,1",)) == [("a=1",)]
 
 
 @pytest.mark.parametrize("text", ["heat.threshold", "=1,2", "a=", "a=1,,2", "a=1,"])

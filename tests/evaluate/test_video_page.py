@@ -36,11 +36,6 @@ def test_a_timeline_names_vehicles_tracks_and_false_alarms() -> None:
         assert name in text
 
 
-def test_a_page_without_vehicles_can_be_made() -> None:
-    clip = score_video("clip", video(), video())
-    assert "false alarms" in video_page([RunResult.of((), [clip])], "")
-
-
 def test_a_sweep_has_a_row_for_each_setting() -> None:
     grid = [run((f"a={a}", f"b={b}"), range(1, 3 + a + b)) for a in (1, 2) for b in (1, 2)]
     seen = Elements(video_page(grid, "<what>"))
@@ -68,7 +63,3 @@ def test_the_picture_of_a_mistake_at_the_edge_lies_inside_the_frame(clip_path: P
     result = score_video("clip", video(), video(*drive(7, TEN, x=290)), video=clip_path)
     (picture,) = mistake_tiles(result)
     assert picture.image[:, -8:].any(axis=2).mean() > 0.9, "no black border"
-
-
-def test_without_a_video_there_are_no_pictures() -> None:
-    assert mistake_tiles(score_video("clip", video(), video(*drive(7, TEN)))) == []

@@ -24,11 +24,6 @@ def test_frames_count_from_0_and_boxes_are_corners() -> None:
     assert rows(kitti_line(0, 3, "Car")) == (row(1, 1, 3, 10.5, 20, 30, 40, name="Car"),)
 
 
-def test_results_have_a_score() -> None:
-    (row,) = rows(kitti_line(0, 3, "Car") + " 0.25")
-    assert row.score == 0.25
-
-
 def test_what_is_not_known_is_written_as_the_format_says() -> None:
     assert written(KITTI, [frame(4, car())]) == (
         b"4 1 Car -1 -1 -10 10.00 20.00 40.00 60.00 -1 -1 -1 -1000 -1000 -1000 -10 0.7500\n"

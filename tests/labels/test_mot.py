@@ -30,11 +30,6 @@ def test_truth_of_the_older_form_has_ten_columns_and_a_flag(tmp_path: Path) -> N
     assert read_truth(path).ignored.tolist() == [False, True]
 
 
-def test_tracks_have_a_confidence() -> None:
-    (row,) = rows("3,1,11,21,30,40,0.5,-1,-1,-1")
-    assert (row.score, row.frame, row.box) == (0.5, 3, (10, 20, 40, 60))
-
-
 def test_tracks_are_written_without_a_heading() -> None:
     assert written(MOT, [frame(4, car())]) == b"5,1,11,21,30,40,0.7500,-1,-1,-1\n"
 
@@ -65,8 +60,3 @@ def test_a_wrong_line_is_refused_with_its_number(second: str, message: str) -> N
     with pytest.raises(TruthError) as caught:
         rows(f"1,7,1,1,20,10,1,3,1\n\n{second}\n")
     assert str(caught.value).startswith(f"gt.txt:3: {message}")
-
-
-def test_lines_have_nine_columns_or_ten() -> None:
-    with pytest.raises(TruthError, match="has 9 or 10 columns between commas; this line has 3"):
-        rows("1,7,1")

@@ -155,14 +155,6 @@ class TestWhichForm:
         with pytest.raises(TruthError, match=r"\(annotations\.json, other\.json\); give the one"):
             read_labelled_pictures(tmp_path)
 
-    @pytest.mark.parametrize("form", ["KITTI", "VOC"])
-    def test_without_a_label_file_there_is_nothing(self, tmp_path: Path, form: str) -> None:
-        WRITERS[form](tmp_path, SCENE)
-        for path in [*tmp_path.rglob("*.txt"), *tmp_path.rglob("*.xml")]:
-            path.unlink()
-        with pytest.raises(TruthError, match="has no labelled picture"):
-            read_labelled_pictures(tmp_path)
-
 
 class TestCoco:
     def edited(self, folder: Path, key: str, index: int, **values: Any) -> Path:
@@ -185,13 +177,6 @@ class TestCoco:
             "val"
         ] * 2
         assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
-
-    def test_pictures_of_another_set_are_not_taken(self, tmp_path: Path) -> None:
-        path = write_coco(tmp_path / "one", SCENE)
-        write_coco(tmp_path / "two", SCENE)
-        (path.parent / "a.png").unlink()
-        with pytest.raises(TruthError, match=r"first picture, a\.png, is missing"):
-            read_labelled_pictures(tmp_path / "one")
 
     def test_two_folders_with_the_first_picture_are_refused(self, tmp_path: Path) -> None:
         path = write_coco(tmp_path / "train", SCENE).rename(tmp_path / "labels.json")
@@ -238,18 +223,6 @@ class TestCoco:
         assert words in str(caught.value)
         assert str(caught.value).isprintable()
 
-    def test_sizes_and_iscrowd_may_be_missing(self, tmp_path: Path) -> None:
-        path = write_coco(tmp_path, SCENE)
-        document = json.loads(path.read_text(encoding="utf-8"))
-        for each in document["images"]:
-            del each["width"], each["height"]
-        for each in document["annotations"]:
-            del each["iscrowd"]
-        path.write_text(json.dumps(document), encoding="utf-8")
-        image = read_labelled_pictures(path).pictures[0]
-        assert image.size is None
-        assert not image.ignored.any()
-
 
 class TestKitti:
     def test_what_each_type_means(self, tmp_path: Path) -> None:
@@ -278,13 +251,6 @@ class TestKitti:
         with pytest.raises(TruthError, match=rf"a\.txt:3: {words}"):
             read_labelled_pictures(tmp_path)
 
-    def test_two_pictures_of_one_name_are_refused(self, tmp_path: Path) -> None:
-        write_kitti(tmp_path, SCENE)
-        shutil.copy(tmp_path / "image_2" / "a.png", tmp_path / "image_2" / "a.PNG.jpg")
-        shutil.copy(tmp_path / "image_2" / "a.png", tmp_path / "image_2" / "a.jpg")
-        with pytest.raises(TruthError, match=r"a\.txt: there are two pictures a in"):
-            read_labelled_pictures(tmp_path)
-
 
 class TestYolo:
     def test_names_may_lie_above_and_be_numbered(self, tmp_path: Path) -> None:
@@ -294,14 +260,6 @@ class TestYolo:
         (tmp_path / "data.yaml").write_text(f"names:\n{names}", encoding="utf-8")
         image = read_labelled_pictures(tmp_path / "train").pictures[0]
         assert image.classes == ("car", "truck", "vehicle")
-
-    def test_folders_below_are_searched(self, tmp_path: Path) -> None:
-        write_yolo(tmp_path, SCENE)
-        for name in ("images", "labels"):
-            (tmp_path / name).rename(tmp_path / "val")
-            (tmp_path / name).mkdir()
-            (tmp_path / "val").rename(tmp_path / name / "val")
-        assert [len(each.boxes) for each in read_labelled_pictures(tmp_path).pictures] == [3, 0]
 
     @pytest.mark.parametrize(
         ("line", "words"),
@@ -379,10 +337,6 @@ class TestVoc:
             ("<annotations/>", "1: <annotations> where the format has <annotation>"),
             ("<annotation>", "1: broken XML: no element found"),
             (
-                '<!DOCTYPE a [<!ENTITY b "x">]>\n<annotation>&b;</annotation>',
-                "1: the XML declares a document type",
-            ),
-            (
                 "<annotation>\n<object><name>car</name></object></annotation>",
                 "2: <object> without its <xmin>",
             ),
@@ -399,7 +353,6 @@ class TestVoc:
                 "1: 'x' is not a number",
             ),
             ("<annotation><size><width>3</width></size></annotation>", "without its <height>"),
-            ("<annotation>" + "<a>" * 100, "more than 32 nested elements"),
         ],
     )
     def test_a_wrong_file_is_refused_with_its_line(

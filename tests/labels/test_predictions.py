@@ -30,16 +30,6 @@ def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
     return read_predictions(path)
 
 
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_the_same_tracks_are_read_from_every_format(tmp_path: Path, suffix: str) -> None:
-    video = read(tmp_path, suffix, FORMATS[suffix])
-    assert video.frames.tolist() == [1, 3]
-    assert video.ids.tolist() == [1, 1]
-    assert video.boxes.tolist() == [[10, 20, 40, 60], [11, 20, 41, 60]]
-    assert video.scores.tolist() == [1, 1]
-    assert not video.ignored.any()
-
-
 SCORED_CSV = "frame,time,id,x,y,width,height,score,predicted\n0,0.0,1,10,20,30,40,{score},False\n"
 SCORED_JSONL = (
     '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
@@ -82,11 +72,6 @@ def test_only_jsonl_tells_how_many_frames_the_video_has(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])
 def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, content: str) -> None:
     assert len(read(tmp_path, suffix, content)) == 0
-
-
-def test_the_columns_of_a_csv_may_have_any_order(tmp_path: Path) -> None:
-    video = read(tmp_path, "csv", "id,x,y,width,height,time,frame\n1,10,20,30,40,0.0,0\n")
-    assert video.boxes.tolist() == [[10, 20, 40, 60]]
 
 
 def record(**changes: object) -> str:

@@ -18,10 +18,6 @@ def test_every_format_has_an_ending_of_its_own() -> None:
     assert [format_for(Path(f"a.b{each.upper()}")) for each in suffixes] == track_formats()
 
 
-def test_a_name_that_ends_otherwise_has_no_format() -> None:
-    assert format_for(Path("a.json")) is None
-
-
 @pytest.mark.parametrize(
     ("name", "form"),
     [
@@ -47,9 +43,3 @@ def test_an_empty_file_of_another_name_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.json").touch()
     with pytest.raises(TruthError, match=r"a\.json: is empty; give tracks or truth, as in \.txt"):
         read_tracks(tmp_path / "a.json")
-
-
-def test_a_broken_zip_file_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.zip").write_bytes(b"PK")
-    with pytest.raises(TruthError, match=r"a\.zip: is neither a folder nor a readable zip file"):
-        read_tracks(tmp_path / "a.zip")

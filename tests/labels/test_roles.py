@@ -3,7 +3,7 @@
 import pytest
 
 from vdet.config.loading import load_settings
-from vdet.detect.classes import OUR_NAMES, our_name
+from vdet.detect.classes import OUR_NAMES
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 
 
@@ -52,7 +52,3 @@ def test_classes_that_the_detector_does_not_look_for_are_ignored(
 def test_an_unknown_label_is_refused_with_the_known_ones() -> None:
     with pytest.raises(ValueError, match=r"label 'cow' is unknown; give it a role .* car, van, .*"):
         DEFAULT_ROLES.known_role_of("cow")
-
-
-def test_our_names_mean_themselves() -> None:
-    assert [our_name(name) for name in OUR_NAMES] == list(OUR_NAMES)

@@ -2,15 +2,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels import mot
 from vdet.labels.formats import Format, track_formats
 from vdet.labels.reading import read_truth
-from vdet.labels.video import LabelledVideo
 
 MOT = "1,7,11,21,30,40,1,3,1\n2,7,11,21,30,40,1,3,1\n"
 KITTI = "".join(
@@ -33,15 +30,6 @@ def write(tmp_path: Path, content: str) -> Path:
 
 
 @pytest.mark.parametrize("content", [MOT, KITTI, CVAT], ids=["MOT", "KITTI", "CVAT"])
-def test_the_same_truth_is_read_from_every_format(tmp_path: Path, content: str) -> None:
-    video = read_truth(write(tmp_path, content))
-    assert video.frames.tolist() == [1, 2]
-    assert video.ids.tolist() == [7, 7]
-    assert video.boxes.tolist() == [[10, 20, 40, 60]] * 2
-    assert not video.ignored.any()
-
-
-@pytest.mark.parametrize("content", [MOT, KITTI, CVAT], ids=["MOT", "KITTI", "CVAT"])
 def test_a_frame_beyond_the_video_is_refused_with_its_line(tmp_path: Path, content: str) -> None:
     with pytest.raises(TruthError, match=r"truth:[23]: the frame is number 2 of a video of 1;"):
         read_truth(write(tmp_path, content), frame_count=1)
@@ -59,24 +47,6 @@ def test_mixed_formats_are_refused_where_the_second_begins(tmp_path: Path, conte
         read_truth(write(tmp_path, content))
 
 
-def read_or_refuse(path: Path) -> None:
-    """Fail on any other exception, and on a message of several lines."""
-    try:
-        result: LabelledVideo | str = read_truth(path)
-    except TruthError as error:
-        result = str(error)
-    assert isinstance(result, LabelledVideo) or "\n" not in result
-
-
-@given(st.binary(max_size=200))
-def test_any_bytes_are_truth_or_a_truth_error(
-    tmp_path_factory: pytest.TempPathFactory, content: bytes
-) -> None:
-    path = tmp_path_factory.getbasetemp() / "any-bytes"
-    path.write_bytes(content)
-    read_or_refuse(path)
-
-
 KITTI_REST = "1.5 1.6 4.0 2.0 1.5 20.0 -1.6"
 
 
@@ -92,10 +62,6 @@ def kitti(*names: str) -> str:
 def cvat(label: str, occluded: int = 0) -> str:
     box = f'<box frame="0" outside="0" occluded="{occluded}" xtl="1" ytl="2" xbr="4" ybr="6"/>'
     return f'<annotations>\n<track id="3" label="{label}">{box}</track></annotations>'
-
-
-def test_an_occluded_vehicle_counts(tmp_path: Path) -> None:
-    assert read_truth(write(tmp_path, cvat("car", occluded=1))).ignored.tolist() == [False]
 
 
 @pytest.mark.parametrize("content", [kitti("Car", "Spaceship"), cvat("cow")])

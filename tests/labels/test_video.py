@@ -13,12 +13,6 @@ def scene(frame_count: int | None = None) -> LabelledVideo:
     return checked_video(rows, Path("scene"), frame_count=frame_count, rate=25)
 
 
-def test_a_frame_consists_of_its_rows() -> None:
-    frame = scene().frame(3)
-    assert frame.ids.tolist() == [1, 2]
-    assert frame.boxes.tolist() == [[10, 0, 15, 5], [20, 0, 25, 5]]
-
-
 def test_until_keeps_the_frames_up_to_the_last() -> None:
     part = scene(frame_count=9).until(3)
     assert part.frames.tolist() == [2, 2, 3, 3]
@@ -26,22 +20,7 @@ def test_until_keeps_the_frames_up_to_the_last() -> None:
     assert part.rate == 25
 
 
-def test_where_keeps_every_column_of_the_chosen_rows() -> None:
-    whole = scene()
-    second = whole.where(whole.ids == 2)
-    assert second.frames.tolist() == [2, 3, 5]
-    assert second.boxes[:, 0].tolist() == [20, 20, 20]
-    assert len(second.scores) == len(second.ignored) == 3
-
-
 FILE = Path("gt.txt")
-
-
-def test_rows_are_ordered_by_frame_and_keep_their_order_within_one() -> None:
-    rows = [row(1, 2, 5, 0, 0, 1, 1), row(2, 1, 9, 0, 0, 1, 1), row(3, 1, 4, 0, 0, 1, 1)]
-    video = checked_video(rows, FILE)
-    assert video.frames.tolist() == [1, 1, 2]
-    assert video.ids.tolist() == [9, 4, 5]
 
 
 @pytest.mark.parametrize(

@@ -42,9 +42,6 @@ class TestWriting:
         text = member(data, "labels/train/frame_000012.txt")
         assert text == "0 0.250000 0.250000 0.500000 0.500000 7\n"
 
-    def test_a_frame_without_a_box_has_an_empty_file(self) -> None:
-        assert member(written(YOLO, [frame(0)]), "labels/train/frame_000000.txt") == ""
-
     def test_names_of_classes_and_pictures_stand_in_files(self) -> None:
         data = written(YOLO, [frame(0, car(1, class_name="bus"), car(2))])
         assert member(data, "data.yaml") == (
@@ -64,10 +61,6 @@ class TestReading:
         (row,) = saved.labels
         assert (row.frame, row.id, row.name) == (8, 4, "truck")
         assert row.box == pytest.approx((90, 40, 110, 60))
-
-    def test_files_may_lie_in_a_folder(self) -> None:
-        data = archive_of({"a/data.yaml": DATA, "a/labels/x1": "0 0.5 0.5 0.1 0.1 4"})
-        assert len(read_yolo(FILE, data).labels) == 1
 
     def test_a_score_before_the_id_is_read(self) -> None:
         (row,) = read_yolo(FILE, archive(labels__f0="1 0.5 0.5 0.1 0.2 0.75 4")).labels

@@ -37,7 +37,7 @@ def detection_metrics(comparison: Comparison, matched: Sequence[MatchedFrame]) -
     matches = sum(len(frame) for frame in matched)
     vehicles = int(comparison.vehicle_lengths().sum())
     predictions = int(comparison.track_lengths().sum())
-    precisions = average_precisions(comparison)
+    precisions = rank_predictions(comparison).average_precisions()
     return DetectionMetrics(
         matches=matches,
         false_positives=predictions - matches,
@@ -98,11 +98,6 @@ def rank_predictions(comparison: Comparison) -> RankedPredictions:
     order = np.argsort(scores, kind="stable")
     vehicles = int(comparison.vehicle_lengths().sum())
     return RankedPredictions(-scores[order], right[:, order], vehicles)
-
-
-def average_precisions(comparison: Comparison) -> Float64Array:
-    """Return the average precision at each of `IOU_THRESHOLDS`, float64 `(10,)`, 0 to 1."""
-    return rank_predictions(comparison).average_precisions()
 
 
 def _right_predictions(frame: ComparedFrame) -> BoolArray:
