@@ -193,7 +193,7 @@ class TestCoco:
             ("annotations", 1, {"bbox": [1, 2, 3, "4"]}, "annotations.1.bbox.3: Input should be"),
             ("annotations", 1, {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
             ("annotations", 1, {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
-            ("images", 1, {"id": 0}, "an id of images comes twice"),
+            ("images", 1, {"id": 0}, "images: Value error, an id comes twice"),
             ("images", 1, {"file_name": "a.png"}, "has the picture a.png twice"),
             (
                 "images",
@@ -210,7 +210,7 @@ class TestCoco:
             ("images", 1, {"file_name": "x" * 300}, "is not the name of a file"),
             ("images", 1, {"file_name": "a\u202eb"}, "is not the name of a file"),
             ("images", 1, {"width": -3}, "images.1.width: Input should be greater"),
-            ("categories", 1, {"id": 1}, "an id of categories comes twice"),
+            ("categories", 1, {"id": 1}, "categories: Value error, an id comes twice"),
             ("categories", 1, {"name": None}, "categories.1.name: Input should be a valid string"),
         ],
     )

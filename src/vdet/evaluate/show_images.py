@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.evaluate.comparison import match
+from vdet.evaluate.comparison import Comparison, match
 from vdet.evaluate.images import (
     SIZE_NAMES,
     ImageScores,
@@ -29,7 +29,7 @@ from vdet.files import printable
 from vdet.labels.pictures import LabelledPictures
 from vdet.media.images import Image
 from vdet.pages.charts import SOFT, Line, Plot, color, curve, number_axis
-from vdet.pages.render import render
+from vdet.pages.render import counted, render
 
 HEADINGS = (
     *("source", "pictures", "vehicles", "precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
@@ -68,8 +68,8 @@ def _named(result: ImagesResult) -> list[tuple[str, ImageScores]]:
     """Return the name and the scores of each set, and of the mean of several."""
     scores = [source.scores for source in result.sources]
     named = [(each.name, one) for each, one in zip(result.sets, scores, strict=True)]
-    counted = sum(one.vehicles > 0 for one in scores)
-    return [*named, (f"mean of {counted}", result.mean)] if len(named) > 1 else named
+    sets = sum(one.vehicles > 0 for one in scores)
+    return [*named, (f"mean of {sets}", result.mean)] if len(named) > 1 else named
 
 
 def rows(result: ImagesResult) -> list[list[str]]:
@@ -167,27 +167,25 @@ def worst_tiles(source: Source, score: float) -> list[Tile]:
 
     Raises `ImageError` if a picture can no longer be read.
     """
-    mistakes = [_mistakes(image, score) for image in source.images]
-    ranked = sorted(zip(mistakes, source.images, strict=True), key=lambda each: -sum(each[0]))
+    ranked = [(image, *_count(image.compare(score))) for image in source.images]
+    ranked.sort(key=lambda each: -each[1] - each[2])
     return [
         Tile(
             _drawn(image, score),
             image.picture.path.name,
-            f"{missed} missed, {wrong} false alarm{'s' if wrong != 1 else ''}",
+            f"{missed} missed, {counted(wrong, 'false alarm')}",
         )
-        for (missed, wrong), image in ranked[:_MOST_TILES]
+        for image, missed, wrong in ranked[:_MOST_TILES]
         if missed or wrong
     ]
 
 
-def _mistakes(image: MeasuredImage, score: float) -> tuple[int, int]:
+def _count(comparison: Comparison) -> tuple[int, int]:
     """Return the number of missed vehicles and of false alarms."""
-    comparison = image.compare(score)
     found = sum(map(len, match(comparison)))
-    return (
-        int(comparison.vehicle_lengths().sum()) - found,
-        int(comparison.track_lengths().sum()) - found,
-    )
+    lengths = comparison.vehicle_lengths(), comparison.track_lengths()
+    missed, wrong = (int(each.sum()) - found for each in lengths)
+    return missed, wrong
 
 
 def _drawn(image: MeasuredImage, score: float) -> Image:

@@ -9,9 +9,10 @@ format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 20
 
 import json
 from collections import defaultdict
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, BinaryIO, TypeVar
+from typing import Annotated, Any, BinaryIO, Generic, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError
 
@@ -155,49 +156,46 @@ class _TrackAnnotation(_Annotation, frozen=True):
     attributes: _Attributes = _Attributes()
 
 
-class _Set(BaseModel, frozen=True):
-    images: tuple[_Picture, ...]
-    annotations: tuple[_Annotation, ...]
-    categories: tuple[_Category, ...]
+ImageT = TypeVar("ImageT", _Picture, _Frame)
+AnnotationT = TypeVar("AnnotationT", bound=_Annotation)
+EntryT = TypeVar("EntryT", _Category, _Picture, _Frame)
 
 
-class _Video(BaseModel, frozen=True):
-    images: tuple[_Frame, ...]
-    annotations: tuple[_TrackAnnotation, ...]
-    categories: tuple[_Category, ...]
+def _unique(entries: tuple[EntryT, ...]) -> tuple[EntryT, ...]:
+    if len({each.id for each in entries}) < len(entries):
+        raise ValueError("an id comes twice")
+    return entries
 
 
-A = TypeVar("A", bound=_Annotation)
-D = TypeVar("D", _Set, _Video)
-E = TypeVar("E", _Category, _Picture, _Frame)
+class _Document(BaseModel, Generic[ImageT, AnnotationT], frozen=True):
+    images: Annotated[tuple[ImageT, ...], AfterValidator(_unique)]
+    annotations: tuple[AnnotationT, ...]
+    categories: Annotated[tuple[_Category, ...], AfterValidator(_unique)]
 
+    @classmethod
+    def of(cls, path: Path, text: str, name: str) -> Self:
+        """Read the text of a file. Raises `TruthError`."""
+        try:
+            return cls.model_validate_json(text, strict=True)
+        except ValidationError as error:
+            raise TruthError(f"{path}: is not {name}: {first_mistake(error)}") from error
 
-def _document(path: Path, text: str, form: type[D], name: str) -> D:
-    try:
-        return form.model_validate_json(text, strict=True)
-    except ValidationError as error:
-        raise TruthError(f"{path}: is not {name}: {first_mistake(error)}") from error
-
-
-def _by_id(path: Path, what: str, entries: Sequence[E]) -> dict[int, E]:
-    found = {each.id: each for each in entries}
-    if len(found) < len(entries):
-        raise TruthError(f"{path}: an id of {what} comes twice")
-    return found
-
-
-def _named(
-    path: Path, images: Container[int], annotations: Sequence[A], categories: Sequence[_Category]
-) -> Iterator[tuple[str, A, str]]:
-    """Yield the place of each annotation, the annotation, and the name of its category."""
-    names = _by_id(path, "categories", categories)
-    for number, each in enumerate(annotations):
-        place = f"annotations.{number}"
-        if each.image_id not in images:
-            raise line_error(path, place, f"no image has the id {each.image_id}")
-        if each.category_id not in names:
-            raise line_error(path, place, f"no category has the id {each.category_id}")
-        yield place, each, names[each.category_id].name
+    def labels(self, path: Path) -> Iterator[tuple[ImageT, AnnotationT, Label]]:
+        """Yield each annotation with its image and as a label. Raises `TruthError`."""
+        images = {each.id: each for each in self.images}
+        names = {each.id: each.name for each in self.categories}
+        for number, each in enumerate(self.annotations):
+            place = f"annotations.{number}"
+            if each.image_id not in images:
+                raise line_error(path, place, f"no image has the id {each.image_id}")
+            if each.category_id not in names:
+                raise line_error(path, place, f"no category has the id {each.category_id}")
+            box, ignored = from_size(*each.bbox), bool(each.iscrowd)
+            yield (
+                images[each.image_id],
+                each,
+                Label(place, box, names[each.category_id], ignored=ignored),
+            )
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -209,25 +207,22 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         The file is not of this form, has several videos, an id of images or categories or a frame
         comes twice, or an annotation names an image or a category that is not there.
     """
-    video = _document(path, text_of(path, data), _Video, "COCO with tracks")
-    images = _by_id(path, "images", video.images)
+    form = _Document[_Frame, _TrackAnnotation]
+    video = form.of(path, text_of(path, data), "COCO with tracks")
     if len({image.video_id for image in video.images}) > 1:
         raise TruthError(f"{path}: has images of several videos; give a file for each")
     frames = {image.frame_index: image for image in video.images}
-    if len(frames) < len(images):
+    if len(frames) < len(video.images):
         raise TruthError(f"{path}: a frame_index of images comes twice")
     labels = (
-        Label(
-            place,
-            from_size(*each.bbox),
-            name,
-            images[each.image_id].frame_index + 1,
-            each.track_id,
-            each.score,
-            bool(each.iscrowd),
-            each.attributes.occluded,
+        replace(
+            label,
+            frame=image.frame_index + 1,
+            id=each.track_id,
+            score=each.score,
+            predicted=each.attributes.occluded,
         )
-        for place, each, name in _named(path, images, video.annotations, video.categories)
+        for image, each, label in video.labels(path)
     )
     return SavedTracks(
         tuple(limited(path, labels)),
@@ -252,11 +247,10 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
         The file is not of this form, an annotation names a picture or a category that is not
         there, an id comes twice, or a picture lies outside.
     """
-    found = _document(path, read_text(path), _Set, "COCO")
-    labels: dict[int, list[Label]] = {id_: [] for id_ in _by_id(path, "images", found.images)}
-    for place, each, name in _named(path, labels, found.annotations, found.categories):
-        label = Label(place, from_size(*each.bbox), name, ignored=bool(each.iscrowd))
-        labels[each.image_id].append(label)
+    found = _Document[_Picture, _Annotation].of(path, read_text(path), "COCO")
+    labels: dict[int, list[Label]] = defaultdict(list)
+    for image, _, label in found.labels(path):
+        labels[image.id].append(label)
     folder = _picture_folder(path, found.images)
     for image in found.images:
         yield LabelledPicture(folder / image.file_name, path, tuple(labels[image.id]), image.size)
