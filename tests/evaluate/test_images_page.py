@@ -6,13 +6,7 @@ import numpy as np
 
 from labels.writers import Boxed, Labelled, write_coco
 from vdet.boxes import Boxes
-from vdet.evaluate.images import (
-    Counting,
-    ImagesResult,
-    MeasuredImage,
-    mean_scores,
-    score_source,
-)
+from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, mean_scores, score_source
 from vdet.evaluate.output import FOUND, TRUE, RunName
 from vdet.evaluate.show_images import images_page, worst_tiles
 from vdet.labels.label import from_size

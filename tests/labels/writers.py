@@ -66,12 +66,7 @@ def write_coco(folder: Path, pictures: Pictures) -> Path:
         {"id": number, "name": "vehicle" if name == "ignore" else name}
         for number, name in enumerate(NAMES, start=1)
     ]
-    document = {
-        "info": {},
-        "images": images,
-        "annotations": annotations,
-        "categories": categories,
-    }
+    document = {"info": {}, "images": images, "annotations": annotations, "categories": categories}
     path = folder / "annotations.json"
     path.write_text(json.dumps(document), encoding="utf-8")
     return path

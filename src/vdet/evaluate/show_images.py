@@ -102,11 +102,7 @@ def plain(result: ImagesResult, run: RunName) -> dict[str, Any]:
         **asdict(result.counting),
         "mean": _plain_scores(result.mean),
         "sources": [
-            {
-                "source": each.name,
-                **_plain_scores(source.scores),
-                "not_vehicles": dict(each.others),
-            }
+            {"source": each.name, **_plain_scores(source.scores), "not_vehicles": dict(each.others)}
             for each, source in sources
         ],
     }

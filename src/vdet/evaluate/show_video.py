@@ -8,16 +8,7 @@ from typing import Any
 from vdet.boxes import Box
 from vdet.config.schema import InputSettings
 from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.output import (
-    ABSENT,
-    FOUND,
-    TRUE,
-    RunName,
-    Tile,
-    draw_tile,
-    share,
-    table,
-)
+from vdet.evaluate.output import ABSENT, FOUND, TRUE, RunName, Tile, draw_tile, share, table
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.timelines import Mistake
 from vdet.evaluate.video import ClipResult, RunResult, best

@@ -20,13 +20,7 @@ from vdet.detect.protocol import DetectorModel
 from vdet.errors import VideoError
 from vdet.evaluate.comparison import Comparison, compare, match, pool
 from vdet.evaluate.scores import Scores, score_comparison
-from vdet.evaluate.timelines import (
-    Mistake,
-    Timeline,
-    mistakes,
-    track_timelines,
-    vehicle_timelines,
-)
+from vdet.evaluate.timelines import Mistake, Timeline, mistakes, track_timelines, vehicle_timelines
 from vdet.labels.label import Label
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import DEFAULT_ROLES, Roles
