@@ -105,7 +105,7 @@ def test_narrow_vehicles_are_left_out(
     ("arguments", "code", "words"),
     [
         ((), 2, "Missing argument 'DATA...'"),
-        (("none",), 1, "none: is no folder and no .json file"),
+        (("none",), 1, "none: is not a set of labelled pictures"),
         (("set", "--score", "2"), 2, "2.0 is not in the range"),
         (("set", "--page", "set/a.png"), 1, "cannot be made a folder"),
         (("set", "--set", "detector.kind=sonar"), 1, "sonar: is no detector"),

@@ -43,14 +43,14 @@ def changed(name: str, number: int, **values: object) -> bytes:
         (b'{"images": []}', ": is not COCO with tracks: annotations: Field required"),
         (
             changed("images", 1, id=1),
-            ": is not COCO with tracks: images: Value error, an id comes twice",
+            ": is not COCO with tracks: images: Value error, an id appears twice",
         ),
-        (changed("images", 1, frame_index=4), ": a frame_index of images comes twice"),
+        (changed("images", 1, frame_index=4), ": a frame_index of images appears twice"),
         (changed("images", 1, video_id=2), ": has images of several videos"),
         (changed("images", 1, frame_index=-1), ": is not COCO with tracks: images.1.frame_index"),
         (
             changed("categories", 1, id=1),
-            ": is not COCO with tracks: categories: Value error, an id comes twice",
+            ": is not COCO with tracks: categories: Value error, an id appears twice",
         ),
         (changed("annotations", 2, image_id=9), ":annotations.2: no image has the id 9"),
         (changed("annotations", 2, category_id=9), ":annotations.2: no category has the id 9"),

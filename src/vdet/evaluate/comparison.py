@@ -24,9 +24,9 @@ MATCH_IOU = 0.5
 """A prediction with at least this overlap finds a vehicle."""
 
 MAX_IDS = 10_000
-"""Most vehicles, and most tracks, in one video."""
+"""Largest number of vehicles, and of tracks, in one video."""
 MAX_PAIRS = 25_000_000
-"""Most pairs of a vehicle and a track; also most pairs of their boxes, summed over the frames."""
+"""Largest number of pairs of a vehicle and a track, and of their boxes over all frames."""
 
 UNMATCHED = -1
 """Stands for the partner of a vehicle that no track has found."""
@@ -136,7 +136,7 @@ def compare(
 def pool(comparisons: Sequence[Comparison]) -> Comparison:
     """Join the comparisons of several videos; the scores of the result are their total.
 
-    The same id in two videos stands for two vehicles or tracks. The length is known only if that of
+    The same id in two videos means two vehicles or tracks. The length is known only if that of
     every video is.
     """
     frames: list[ComparedFrame] = []

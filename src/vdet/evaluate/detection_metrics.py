@@ -90,7 +90,7 @@ class RankedPredictions:
 
 
 def rank_predictions(comparison: Comparison) -> RankedPredictions:
-    """Take the predictions by descending score, and tell which of them are right."""
+    """Sort the predictions by descending score, and mark those that are right."""
     none = np.zeros((len(IOU_THRESHOLDS), 0), np.bool_)
     frames = comparison.frames
     scores = np.concatenate([np.empty(0), *(np.sort(-frame.scores) for frame in frames)])

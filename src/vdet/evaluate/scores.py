@@ -34,7 +34,7 @@ class Scores(DetectionMetrics, ClearMetrics, IdentityMetrics, HotaMetrics):
     never_found
         Vehicles without any match.
     false_tracks
-        Number of tracks of which more than half of the boxes match nothing.
+        Number of tracks with more than half of their boxes unmatched.
     false_tracks_per_minute
         None if the length of the video is not known.
     """

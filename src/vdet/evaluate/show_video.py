@@ -27,7 +27,7 @@ _LARGEST = 10  # mistakes that are listed for a video
 _DETAILS = """\
 boxes: {vehicle_boxes} true ones (vehicles: {vehicles}); {matches} found, {misses} missed, \
 {false_positives} false alarms
-tracks: {tracks}, of which {false_tracks} false{per_minute}; {id_switches} id switches, \
+tracks: {tracks}, {false_tracks} of them false{per_minute}; {id_switches} id switches, \
 {fragmentations} fragmentations
 vehicles: {mostly_tracked} mostly tracked, {partly_tracked} partly, {mostly_lost} mostly lost, \
 {never_found} never found; mean time to the first detection {delay}

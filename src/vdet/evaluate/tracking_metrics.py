@@ -103,7 +103,7 @@ def _fragmentations(comparison: Comparison, matched: Sequence[MatchedFrame]) -> 
 
 
 def false_tracks(comparison: Comparison, matched: Sequence[MatchedFrame]) -> int:
-    """Return the number of tracks of which more than half of the boxes match nothing.
+    """Return the number of tracks with more than half of their boxes unmatched.
 
     Boxes dropped for an ignore region do not count, so a track without other boxes is not false.
     """

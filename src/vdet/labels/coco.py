@@ -163,7 +163,7 @@ EntryT = TypeVar("EntryT", _Category, _Picture, _Frame)
 
 def _unique(entries: tuple[EntryT, ...]) -> tuple[EntryT, ...]:
     if len({each.id for each in entries}) < len(entries):
-        raise ValueError("an id comes twice")
+        raise ValueError("an id appears twice")
     return entries
 
 
@@ -205,7 +205,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     ------
     TruthError
         The file is not of this form, has several videos, an id of images or categories or a frame
-        comes twice, or an annotation names an image or a category that is not there.
+        appears twice, or an annotation names an image or a category that is not there.
     """
     form = _Document[_Frame, _TrackAnnotation]
     video = form.of(path, text_of(path, data), "COCO with tracks")
@@ -213,7 +213,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
         raise TruthError(f"{path}: has images of several videos; give a file for each")
     frames = {image.frame_index: image for image in video.images}
     if len(frames) < len(video.images):
-        raise TruthError(f"{path}: a frame_index of images comes twice")
+        raise TruthError(f"{path}: a frame_index of images appears twice")
     labels = (
         replace(
             label,
@@ -245,7 +245,7 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     ------
     TruthError
         The file is not of this form, an annotation names a picture or a category that is not
-        there, an id comes twice, or a picture lies outside.
+        there, an id appears twice, or a picture lies outside.
     """
     found = _Document[_Picture, _Annotation].of(path, read_text(path), "COCO")
     labels: dict[int, list[Label]] = defaultdict(list)

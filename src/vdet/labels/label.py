@@ -1,4 +1,4 @@
-"""A labelled box as it stands in a file, and the checks that hold for every format."""
+"""A labelled box as it is in a file, and the checks that hold for every format."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -7,10 +7,10 @@ from pathlib import Path
 from vdet.errors import TruthError
 
 MAX_LABELS = 500_000
-"""Most boxes in one file: five hours of video with one vehicle in sight."""
+"""Largest number of boxes in one file: five hours of video with one vehicle in sight."""
 
 MAX_IN_FRAME = 1000
-"""Most boxes of either kind, true or predicted, in one frame."""
+"""Largest number of boxes of either kind, true or predicted, in one frame."""
 
 NO_ID = -1
 """Id of a box without an id; in video, only ignore regions may have it."""
@@ -23,7 +23,7 @@ Corners = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A box as it stands in a file.
+    """A box as it is in a file.
 
     Attributes
     ----------

@@ -112,7 +112,7 @@ def parse_number(text: str) -> float:
     Raises
     ------
     ValueError
-        The text is no decimal number (words, NaN, infinity), or the number is beyond `LIMIT`.
+        The text is not a decimal number (words, NaN, infinity), or the number is beyond `LIMIT`.
     """
     stripped = text.strip()
     if not _NUMBER.fullmatch(stripped):
@@ -129,7 +129,7 @@ def parse_whole(text: str) -> int:
     Raises
     ------
     ValueError
-        The text is no whole number, or the number is beyond `LIMIT`.
+        The text is not a whole number, or the number is beyond `LIMIT`.
     """
     value = parse_number(text)
     if not value.is_integer():

@@ -16,7 +16,7 @@ from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import Image, is_picture_name, read_image
 
 MAX_PICTURES = 100_000
-"""Most pictures in one set."""
+"""Largest number of pictures in one set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class LabelledPicture:
     path, file
         The file of the picture, and that of the labels.
     labels
-        From a reader, as they stand in the file. In `LabelledPictures` only vehicles and ignore
+        From a reader, as they are in the file. In `LabelledPictures` only vehicles and ignore
         regions, each with an area; `name` is one of `OUR_NAMES`.
     size
         Width and height of the picture in pixels; None if the labels do not say.
@@ -88,12 +88,12 @@ class LabelledPictures:
 def checked_pictures(
     name: str, pictures: Iterable[LabelledPicture], roles: Roles = DEFAULT_ROLES
 ) -> LabelledPictures:
-    """Check the labels of a set, and leave out what is no vehicle.
+    """Check the labels of a set, and leave out the labels that are not vehicles.
 
     Raises
     ------
     TruthError
-        There is no picture, a picture is missing or comes twice, a box has no area, or there are
+        There is no picture, a picture is missing or appears twice, a box has no area, or there are
         more than `MAX_PICTURES`, `MAX_LABELS` in all or `MAX_IN_FRAME` in one picture.
     """
     checked: dict[Path, LabelledPicture] = {}

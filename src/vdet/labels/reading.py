@@ -99,7 +99,7 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
     Parameters
     ----------
     path
-        A COCO file, or a folder; what lies in it tells the form.
+        A COCO file, or a folder in one of the forms.
     roles
         Which labels are vehicles, and which are ignore regions; the others are left out.
 
@@ -123,22 +123,17 @@ def _coco_files(folder: Path) -> list[Path]:
 
 
 def _pictures(path: Path) -> Iterable[LabelledPicture]:
-    if not path.is_dir():
-        if path.suffix.lower() != ".json":
-            raise TruthError(f"{path}: is no folder and no .json file; give labelled pictures")
-        return read_coco_pictures(path)
     forms = picture_formats()
     for form in forms:
         if form.is_in(path):
             return form.read(path)
-    files = _coco_files(path)
+    files = [path] if path.suffix.lower() == ".json" and not path.is_dir() else _coco_files(path)
     if len(files) == 1:
         return read_coco_pictures(files[0])
     if files:
         names = ", ".join(str(file.relative_to(path)) for file in files[:5])
         raise TruthError(f"{path}: holds several .json files ({names}); give the one with labels")
-    looked_for = (f"{' and '.join(form.folders)} ({form.name})" for form in forms)
+    wanted = ", ".join(f"{' and '.join(form.folders)} ({form.name})" for form in forms)
     raise TruthError(
-        f"{path}: holds no labelled pictures; looked for one .json file (COCO), "
-        + ", ".join(looked_for)
+        f"{path}: is not a set of labelled pictures; looked for one .json file (COCO), {wanted}"
     )

@@ -86,16 +86,10 @@ def _track_record(track: Track) -> dict[str, Any]:
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a row for each box; what is not known is an empty cell."""
     for track in frame.tracks:
-        record = _track_record(track)
-        known = {
-            "frame": frame.index,
-            "time": f"{frame.time:.6f}",
-            "score": f"{track.score:.4f}",
-            "predicted": int(track.predicted),
-            "foot_x": record["foot"][0],
-            "foot_y": record["foot"][1],
-        }
-        yield _csv_line((record | known)[name] for name in (*_NEEDED, *_OPTIONAL))
+        known = _track_record(track)
+        cells = frame.index, f"{frame.time:.6f}", track.id, *track.box.xywh, f"{track.score:.4f}"
+        flag, extra = int(track.predicted), (known["distance"], known["lane"])
+        yield _csv_line([*cells, flag, track.class_name, *known["foot"], *extra])
 
 
 def _csv_line(cells: Iterable[object]) -> str:
@@ -145,7 +139,7 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        A column is missing or comes twice, a row has another number of cells, or a cell is not
+        A column is missing or appears twice, a row has another number of cells, or a cell is not
         what its column needs.
     """
     times: dict[int, float] = {}

@@ -1,4 +1,4 @@
-"""XML files of labels, read so that a file from a stranger can do no harm."""
+"""XML files of labels, read with limits, so that a hostile file can do no harm."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from xml.parsers import expat
 from vdet.labels.label import line_error
 
 MAX_DEPTH = 32
-"""Most nested XML elements; label files have 5."""
+"""Largest number of nested XML elements; label files have 5."""
 
 _MAX_TEXT = 1000  # characters
 
