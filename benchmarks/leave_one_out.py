@@ -219,7 +219,7 @@ def summarize(results: Sequence[ImagesResult]) -> Summary:
     return Summary(
         sets=tuple(
             SetScores(
-                Path(labelled.name).name,
+                Path(source.labelled.name).name,
                 source.scores.vehicles,
                 float(source.curve.at(common)),
                 source.scores.best_f1,
@@ -227,7 +227,7 @@ def summarize(results: Sequence[ImagesResult]) -> Summary:
                 source.scores.ap50,
             )
             for result in results
-            for labelled, source in zip(result.sets, result.sources, strict=True)
+            for source in result.sources
             if source.scores.vehicles
         ),
         score=float(common),

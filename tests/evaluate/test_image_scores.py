@@ -18,7 +18,7 @@ from vdet.evaluate.images import (
     score_source,
 )
 from vdet.labels.label import Label
-from vdet.labels.pictures import LabelledPicture
+from vdet.labels.pictures import LabelledPicture, LabelledPictures
 
 PLAIN = Counting(score=0.5, least_width=0)
 WIDTH = 1000
@@ -50,7 +50,9 @@ class Searched:
 
 
 def source(*pictures: Searched, counting: Counting = PLAIN) -> Source:
-    return score_source([each.measured(counting) for each in pictures], counting)
+    measured = [each.measured(counting) for each in pictures]
+    labelled = LabelledPictures("set", tuple(each.picture for each in measured))
+    return score_source(labelled, measured, counting)
 
 
 def scores(*pictures: Searched, counting: Counting = PLAIN) -> ImageScores:

@@ -26,8 +26,8 @@ def result_of(folder: Path, *found: tuple[float, float, float, float]) -> Images
     boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
     shown = Boxes(boxes, np.full(len(found), 0.9))
     measured = [MeasuredImage.of(each, 100, shown, COUNTING) for each in labelled.pictures]
-    source = score_source(measured, COUNTING)
-    return ImagesResult(COUNTING, (labelled,), (source,), mean_scores([source], COUNTING))
+    source = score_source(labelled, measured, COUNTING)
+    return ImagesResult(COUNTING, (source,), mean_scores([source], COUNTING))
 
 
 def test_the_page_names_detector_source_and_labels_left_out(tmp_path: Path) -> None:

@@ -162,8 +162,9 @@ class F1Curve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """The measured pictures of one source, their curve and their scores."""
+    """The pictures of one source, as labelled and as measured, their curve and their scores."""
 
+    labelled: LabelledPictures
     images: tuple[MeasuredImage, ...]
     curve: F1Curve
     scores: ImageScores
@@ -171,10 +172,9 @@ class Source:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImagesResult:
-    """What counted, the sets of pictures, the scores of each, and their mean."""
+    """What counted, the sources of pictures with their scores, and the mean of these."""
 
     counting: Counting
-    sets: tuple[LabelledPictures, ...]
     sources: tuple[Source, ...]
     mean: ImageScores
 
@@ -217,11 +217,13 @@ def evaluate_images(
             for _, result in results:
                 measured.append(result)
                 advance(1)
-        sources.append(score_source(measured, counting))
-    return ImagesResult(counting, tuple(sets), tuple(sources), mean_scores(sources, counting))
+        sources.append(score_source(each, measured, counting))
+    return ImagesResult(counting, tuple(sources), mean_scores(sources, counting))
 
 
-def score_source(images: Sequence[MeasuredImage], counting: Counting) -> Source:
+def score_source(
+    labelled: LabelledPictures, images: Sequence[MeasuredImage], counting: Counting
+) -> Source:
     """Return the scores of one source."""
     shown = [image.compare(counting.score) for image in images]
     matched = [match(comparison) for comparison in shown]
@@ -241,7 +243,7 @@ def score_source(images: Sequence[MeasuredImage], counting: Counting) -> Source:
         sizes=_by_size(images, matched),
         **{name: values[name] if ranked.vehicles else None for name in _RATIOS},
     )
-    return Source(tuple(images), curve, scores)
+    return Source(labelled, tuple(images), curve, scores)
 
 
 def mean_scores(sources: Sequence[Source], counting: Counting) -> ImageScores:

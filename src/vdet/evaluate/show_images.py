@@ -66,9 +66,8 @@ def counting_line(result: ImagesResult) -> str:
 
 def _named(result: ImagesResult) -> list[tuple[str, ImageScores]]:
     """Return the name and the scores of each set, and of the mean of several."""
-    scores = [source.scores for source in result.sources]
-    named = [(each.name, one) for each, one in zip(result.sets, scores, strict=True)]
-    sets = sum(one.vehicles > 0 for one in scores)
+    named = [(source.labelled.name, source.scores) for source in result.sources]
+    sets = sum(scores.vehicles > 0 for _, scores in named)
     return [*named, (f"mean of {sets}", result.mean)] if len(named) > 1 else named
 
 
@@ -84,7 +83,8 @@ def size_rows(result: ImagesResult) -> list[list[str]]:
 
 def others_lines(result: ImagesResult) -> list[str]:
     """Return the labels that are not vehicles, a line for each set that has such labels."""
-    return [_others_line(each) for each in result.sets if each.others]
+    sets = [source.labelled for source in result.sources]
+    return [_others_line(each) for each in sets if each.others]
 
 
 def _others_line(labelled: LabelledPictures) -> str:
@@ -96,14 +96,17 @@ def _others_line(labelled: LabelledPictures) -> str:
 
 def plain(result: ImagesResult, run: RunName) -> dict[str, Any]:
     """Return all numbers, and what was measured, as values for JSON."""
-    sources = zip(result.sets, result.sources, strict=True)
     return {
         **run.values(),
         **asdict(result.counting),
         "mean": _plain_scores(result.mean),
         "sources": [
-            {"source": each.name, **_plain_scores(source.scores), "not_vehicles": dict(each.others)}
-            for each, source in sources
+            {
+                "source": each.labelled.name,
+                **_plain_scores(each.scores),
+                "not_vehicles": dict(each.labelled.others),
+            }
+            for each in result.sources
         ],
     }
 
@@ -130,8 +133,7 @@ def _cells(scores: ImageScores) -> list[str]:
 def images_page(result: ImagesResult, run: RunName) -> str:
     """Return the page as HTML. Raises `ImageError` if a picture can no longer be read."""
     score = result.counting.score
-    named = zip(result.sets, result.sources, strict=True)
-    sheets = [(labelled.name, worst_tiles(source, score)) for labelled, source in named]
+    sheets = [(each.labelled.name, worst_tiles(each, score)) for each in result.sources]
     return render(
         "eval_images.html",
         subtitle="; ".join([*run.lines(), counting_line(result)]),
@@ -147,14 +149,12 @@ def images_page(result: ImagesResult, run: RunName) -> str:
 
 
 def _f1_plot(result: ImagesResult) -> Plot:
-    score, colors = result.counting.score, [color(n) for n in range(len(result.sets))]
-    lines = [
-        curve(source.curve.scores, source.curve.f1, one)
-        for one, source in zip(colors, result.sources, strict=True)
-    ]
+    score = result.counting.score
+    colored = [(each, color(number)) for number, each in enumerate(result.sources)]
+    lines = [curve(each.curve.scores, each.curve.f1, one) for each, one in colored]
     lines.append(Line([(score, 0), (score, 1)], SOFT, dashed=True))
+    legend = [(each.labelled.name, one) for each, one in colored]
     title = "F1 by the lowest score that counts (dashed: here)"
-    legend = [(labelled.name, one) for labelled, one in zip(result.sets, colors, strict=True)]
     return Plot(title, number_axis(0, 1, "score"), number_axis(0, 1), (), lines, legend)
 
 

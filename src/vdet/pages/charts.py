@@ -57,12 +57,10 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line through points `(x, y)`; `dots` marks each, `labels` has a text for each dot."""
+    """A line through points `(x, y)`."""
 
     points: Sequence[tuple[float, float]]
     color: str = FILL
-    dots: bool = False
-    labels: Sequence[str] = ()
     dashed: bool = False
 
 
