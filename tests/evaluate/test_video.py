@@ -14,7 +14,7 @@ from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
-from vdet.evaluate.video import Variant, evaluate_clips, find_tracks, follow_together, open_clip
+from vdet.evaluate.video import Variant, find_tracks, follow_together, open_clip
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
@@ -148,16 +148,3 @@ def test_truth_beyond_the_video_is_refused_with_its_line(
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
         find_tracks(open_clip(clip_path, truth), [variant()])
-
-
-def test_clips_are_pooled_under_each_setting(
-    clip_path: Path, truth_path: Path, variant: OfModel
-) -> None:
-    clips = [open_clip(clip_path, truth_path, until=3), open_clip(clip_path, truth_path, until=2)]
-    swept = [f"detector.heat.threshold={threshold}" for threshold in (1, 2)]
-    variants = [variant(assignment) for assignment in swept]
-    runs = evaluate_clips(clips, variants)
-    assert [run.assignments for run in runs] == [(assignment,) for assignment in swept]
-    for run in runs:
-        boxes = [clip.scores.vehicle_boxes for clip in run.clips]
-        assert run.total.vehicle_boxes == sum(boxes) > 0

@@ -30,23 +30,6 @@ def test_what_is_not_known_is_written_as_the_format_says() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("name", "kitti"),
-    [
-        ("car", "Car"),
-        ("truck", "Truck"),
-        ("bus", "Truck"),
-        ("motorcycle", "Misc"),
-        ("vehicle", "Car"),
-        ("tractor", "Misc"),
-        (None, "Car"),
-    ],
-)
-def test_every_class_has_a_type_and_there_is_no_bus(name: str | None, kitti: str) -> None:
-    (line,) = written(KITTI, [frame(0, car(class_name=name))]).decode().splitlines()
-    assert line.split()[2] == kitti
-
-
 def test_read_as_tracks_regions_are_left_out_and_types_are_classes(tmp_path: Path) -> None:
     path = tmp_path / "0000.txt"  # as KITTI calls it
     names = ("Van", "Truck", "Pedestrian", "DontCare")

@@ -21,7 +21,6 @@ JSONL = "".join(
         ]
     )
 )
-FORMATS = {"txt": TXT, "csv": CSV, "jsonl": JSONL}
 
 
 def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
@@ -62,11 +61,6 @@ def test_a_score_outside_0_to_1_is_refused_with_its_line(
 def test_a_header_with_two_scores_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TruthError, match=r":1: the header names the column score twice"):
         read(tmp_path, "csv", "frame,time,id,x,y,width,height,score,score\n")
-
-
-def test_only_jsonl_tells_how_many_frames_the_video_has(tmp_path: Path) -> None:
-    counts = {suffix: read(tmp_path, suffix, text).frame_count for suffix, text in FORMATS.items()}
-    assert counts == {"txt": None, "csv": None, "jsonl": 4}
 
 
 @pytest.mark.parametrize(("suffix", "content"), [("txt", ""), ("csv", HEADER)])

@@ -14,7 +14,7 @@ from vdet.detect.classes import OUR_NAMES
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO
 from vdet.labels.cvat import CVAT
-from vdet.labels.formats import Format, SourceVideo, track_formats
+from vdet.labels.formats import Format, track_formats
 from vdet.labels.kitti import KITTI
 from vdet.labels.mot import MOT
 from vdet.labels.records import CSV, JSON_LINES
@@ -138,12 +138,3 @@ def test_a_box_may_reach_out_of_the_frame(tmp_path: Path, form: Format) -> None:
     saved = read_back(form, tmp_path, written(form, [frame(2, car(1, box))]))
     inside = box.clipped(1280, 720)
     assert saved.frames[0].tracks[0].box == (inside if form is YOLO else box)
-
-
-@every_format
-@pytest.mark.parametrize("size", [(1, 1), (319, 241), (7680, 4320)])
-def test_frames_may_have_any_size(tmp_path: Path, form: Format, size: tuple[int, int]) -> None:
-    box = Box.sized(size[0] // 3, size[1] // 3, max(1, size[0] // 7), max(1, size[1] // 7))
-    video = SourceVideo("in.mp4", *size)
-    saved = read_back(form, tmp_path, written(form, [frame(0, car(1, box))], video))
-    assert saved.frames[0].tracks[0].box == box
