@@ -134,7 +134,7 @@ def test_vehicles_outside_the_regions_do_not_count(
     clip = open_clip(clip_path, truth_path)
     middle = 220  # of 320 pixels; two of the three vehicles are to the left of it
     left = "{name: left, points: [[0, 0], [0.6875, 0], [0.6875, 1], [0, 1]]}"
-    ((found, truth),) = find_tracks(clip, [variant(f"regions.polygons=[{left}]")], no_progress)
+    ((found, truth),) = find_tracks(clip, [variant(f"regions.polygons=[{left}]")])
     assert (found.boxes[:, [0, 2]].mean(axis=1) <= middle).all()
     outside = truth.boxes[:, [0, 2]].mean(axis=1) > middle
     assert 0 < outside.sum() < len(truth)
