@@ -22,8 +22,7 @@ from vdet.media.images import Image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.run.steps import StepContext, make_steps
-from vdet.track.protocol import CarryingTracker, VideoTracker
-from vdet.track.track import Track
+from vdet.track.track import CarryingTracker, Track, VideoTracker
 
 RATE = 25
 """Frames a second of the scenes that the checks make."""

@@ -19,8 +19,7 @@ from vdet.run.result import FrameResult
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import carrying, make_tracker
-from vdet.track.protocol import VideoTracker
-from vdet.track.track import Track
+from vdet.track.track import Track, VideoTracker
 
 FIRST_FRAMES = 5
 """Number of frames that `DetectorModel.for_video` gets."""

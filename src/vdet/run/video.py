@@ -23,7 +23,7 @@ from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
 from vdet.run.threads import StalledError, prefetch, run_in_thread
-from vdet.track.protocol import VideoTracker
+from vdet.track.track import VideoTracker
 from vdet.workers import core_count
 
 log = logging.getLogger("vdet")

@@ -15,9 +15,8 @@ from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.motion.tracker import MotionTracker
-from vdet.track.protocol import CarryingTracker, VideoTracker
 from vdet.track.rules.tracker import RulesTracker
-from vdet.track.track import Track
+from vdet.track.track import CarryingTracker, Track, VideoTracker
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,11 @@
-"""The output of a tracker: the vehicles that are shown in a frame."""
+"""The protocol of all trackers, and the vehicles that they show in a frame."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-from vdet.boxes import Box
+from vdet.boxes import Box, Boxes
+from vdet.media import Picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,3 +73,53 @@ class FrameTracks:
     time: float
     tracks: tuple[Track, ...]
     facts: Mapping[str, Any] = field(default_factory=dict)
+
+
+class VideoTracker(Protocol):
+    """Follows the vehicles of one video; a new one is made for every video."""
+
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
+        """Follow the vehicles into the next frame.
+
+        Parameters
+        ----------
+        detections
+            What the detector sees in the frame.
+        time
+            When the frame is shown, seconds; it increases from frame to frame.
+        picture
+            The frame; only trackers that look at pixels need it.
+
+        Returns
+        -------
+        The vehicles shown in this frame, by id.
+
+        Raises
+        ------
+        ValueError
+            The tracker looks at pixels, and `picture` is None.
+        """
+
+
+@runtime_checkable
+class CarryingTracker(VideoTracker, Protocol):
+    """A tracker that moves its vehicles on into frames that the detector did not search.
+
+    `vdet.track.factory.make_tracker` adds `carry` to a tracker without it; vehicles then stay where
+    they were.
+    """
+
+    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:
+        """Follow the vehicles into the next frame, which was not searched.
+
+        This frame does not count as a missed one for any vehicle. All tracks are `predicted`.
+
+        Parameters
+        ----------
+        time, picture
+            As `update` takes them.
+
+        Returns
+        -------
+        The vehicles shown in this frame, by id.
+        """
