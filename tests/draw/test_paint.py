@@ -55,16 +55,13 @@ Draw = Callable[[Surface], object]
 AREAS: dict[str, Draw] = {
     "fill": lambda surface: fill(surface, Box.sized(30, 40, 120, 76), RED),
     "fill, odd corners": lambda surface: fill(surface, Box.sized(31, 41, 120, 77), RED),
-    "fill, over the first corner": lambda surface: fill(surface, Box.sized(-31, -41, 120, 77), RED),
     "fill, over the last corner": lambda surface: fill(surface, Box.sized(251, 201, 120, 77), RED),
     "blend": lambda surface: blend(surface, triangle(), (76, 50), RED),
-    "blend, odd corner": lambda surface: blend(surface, triangle(), (77, 51), RED),
     "blend, half": lambda surface: blend(surface, triangle(), (77, 50), RED, 0.5),
 }
 """Drawings with hardly an edge."""
 STROKES: dict[str, Draw] = {
     "line": lambda surface: draw_lines(surface, CORNERS, RED, 3),
-    "thin line": lambda surface: draw_lines(surface, CORNERS, RED, 1),
     "thick line, closed": lambda surface: draw_lines(surface, CORNERS, RED, 6, closed=True),
     "line beyond the frame": lambda surface: draw_lines(surface, BEYOND, RED, 3, closed=True),
     "line between pixels": lambda surface: draw_lines(surface, 16 * CORNERS + 5, RED, 4, shift=4),
@@ -73,10 +70,6 @@ STROKES: dict[str, Draw] = {
         surface, "#12 car", (41, 121), 1.2, RED, within=Box.sized(30, 60, 250, 90)
     ),
     "box": lambda surface: draw_box(surface, Box.sized(51, 61, 101, 83), RED, "#1 0.9"),
-    "dashed box": lambda surface: draw_box(surface, Box.sized(50, 60, 100, 80), RED, dashed=True),
-    "box beyond the frame": lambda surface: draw_box(
-        surface, Box.sized(-11, 181, 101, 83), RED, "#1"
-    ),
     "label": lambda surface: draw_label(surface, "0:01:02.500", (0, HEIGHT), RED),
     "trail": lambda surface: draw_trail(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
     "zone": lambda surface: draw_zone(surface, [(-20, 20), (150, 30), (90, 120)], "z: 4"),
@@ -150,33 +143,6 @@ class TestFill:
             np.testing.assert_array_equal(layer, np.where(halved(inside), 128, old))
 
 
-class TestBlend:
-    def test_chroma_is_mixed_by_the_share_of_its_pixels(self) -> None:
-        planes = ground(Coding(), 32, 32)
-        before, (_, blue, _) = planes.copy(), _coded(RED)
-        blend(planes, np.full((1, 1), 255, np.uint8), (5, 7), RED)
-        old = float(before.blue[3, 2])
-        assert planes.blue[3, 2] == pytest.approx(old + (blue - old) / 4, abs=1)
-
-
-class TestText:
-    @pytest.mark.parametrize("within", [Box.sized(60, 100, 40, 20), Box.sized(61, 101, 41, 21)])
-    def test_no_stroke_lies_outside_its_box(self, within: Box) -> None:
-        planes = ground(Coding())
-        write_text(planes, "#12 car", (41, 121), 1.2, RED, within=within)
-        changed = planes.luma != ground(Coding()).luma
-        rows, columns = np.nonzero(changed)
-        assert within.x1 <= columns.min() <= columns.max() < within.x2
-        assert within.y1 <= rows.min() <= rows.max() < within.y2
-
-
-def _coded(color: Color) -> list[int]:
-    """Return luma, blue and red chroma of a colour in the default coding."""
-    planes = ground(Coding(), 2, 2)
-    fill(planes, Box.sized(0, 0, 2, 2), color)
-    return [int(layer[0, 0]) for layer in planes.layers]
-
-
 STRAIGHT = [(20.0 + 5 * n, 60.0) for n in range(40)]
 
 
@@ -196,11 +162,6 @@ def test_a_trail_goes_through_its_points_without_a_gap() -> None:
     rows = heights(trail(STRAIGHT))
     assert all(rows[20:215])
     assert not any(rows[:15] + rows[222:])
-
-
-def test_it_grows_thinner_into_the_past() -> None:
-    rows = heights(trail(STRAIGHT, width=8))
-    assert rows[30] < rows[90] < rows[150] < rows[205]
 
 
 def test_points_that_tremble_give_a_smooth_line() -> None:

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.pages.charts import (
-    Span,
     clock,
     curve,
     level_plot,
@@ -37,15 +36,6 @@ def test_axes_have_round_numbers() -> None:
     assert [text for _, text in number_axis(0, 1, least=1).ticks] == ["0", "1"]
     fixed = number_axis(0.5, 0.95, fixed=True)
     assert (fixed.low, fixed.high, fixed.ticks[0]) == (0.5, 0.95, (0.5, "0.5"))
-
-
-@given(low=st.floats(-1e6, 1e6), length=st.floats(0, 1e6))
-@settings(max_examples=50)
-def test_an_axis_holds_its_values_and_has_few_labels(low: float, length: float) -> None:
-    for axis in (number_axis(low, low + length), time_axis(low, low + length)):
-        assert len(axis.ticks) <= 7
-        assert 0 <= axis.at(low) <= axis.at(low + length) <= 100
-    assert (axis.at(low - 10), axis.at(low + length + 10)) == (0, 100)
 
 
 def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
@@ -77,11 +67,6 @@ def test_no_two_spans_at_one_time_share_a_row_and_no_row_is_needless(
                for time in range(121)]  # fmt: skip
     assert all(len(set(each)) == len(each) for each in at_once)
     assert len(set(rows)) == max(map(len, at_once))
-
-
-def test_a_label_that_does_not_fit_into_its_bar_is_left_out() -> None:
-    span = Span(0, 0, 1, "vehicle 1", "#fff", label="#1")
-    assert [span.fits(width, 700) for width in (1, 7)] == [False, True]
 
 
 def test_a_curve_keeps_its_ends_and_few_points() -> None:

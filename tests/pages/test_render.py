@@ -48,12 +48,6 @@ def test_nothing_is_loaded_from_elsewhere(html: str) -> None:
     assert "@import" not in html
 
 
-def test_a_page_fits_a_phone_and_both_colour_schemes(html: str) -> None:
-    assert '<meta name="viewport" content="width=device-width, initial-scale=1">' in html
-    assert "color-scheme: light dark" in html
-    assert "@media (prefers-color-scheme: dark)" in html
-
-
 def test_one_is_singular() -> None:
     assert [counted(n, "car") for n in (0, 1, 6000)] == ["0 cars", "1 car", "6,000 cars"]
     assert counted(2, "bus") == "2 buses"

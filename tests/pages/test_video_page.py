@@ -81,12 +81,6 @@ class TestVideoPage:
         assert link["href"] == "../a.mp4#t=1.250"
         assert len(seen(page()).all("video")) == 1
 
-    def test_moments_count_from_the_first_frame_of_the_video_that_is_shown(self) -> None:
-        late = replace(page(), player=replace(VIDEO, start=1.0))
-        times = {link["data-time"] for link in seen(late).all("a")}
-        assert "0.250" in times
-        assert "0.000" in times, "what is before the first frame leads to it"
-
     @pytest.mark.parametrize(
         ("player", "words"),
         [
@@ -104,34 +98,6 @@ class TestVideoPage:
         assert len(made.all("video")) == (player is not None)
         if player is None:
             assert all(each.startswith("data:") for each in made.addresses())
-
-    def test_every_vehicle_has_a_row(self) -> None:
-        made = seen(page())
-        assert len(made.all("tr")) == 1 + len(TWO)
-        assert "#1–0:000:02" in made.text
-        assert "#2truck0:020:02" in made.text
-        assert "30 × 30" in made.text
-
-    def test_only_the_vehicles_that_are_shown_longest_are_shown_one_by_one(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("vdet.pages.video._MOST_VEHICLES", 1)
-        made = seen(page())
-        assert "The 1 of 2 vehicles that are shown longest." in made.text
-        assert "#1–0:00" in made.text
-        assert "#2truck" not in made.text
-        assert "2vehicles" in made.text, "all of them count"
-
-    def test_a_long_table_is_closed_at_first(self) -> None:
-        many = records(*(frame(n, track(n + 1, Box.sized(5, 5, 30, 30))) for n in range(60)))
-        text = seen(replace(page(), records=many)).text
-        assert "Show 60 vehicles" in text
-
-    def test_vehicles_are_shown_by_minute_where_there_is_more_than_one(self) -> None:
-        assert "Vehicles by minute" not in seen(page()).text
-        longer = seen(page(end=130))
-        assert "Vehicles by minute" in longer.text
-        assert "vehicles: 2" in longer.text
 
     def test_counts_are_shown_by_minute_where_there_are_any(self) -> None:
         made = seen(
@@ -217,24 +183,6 @@ class TestIndex:
         assert all(
             each.startswith("data:image/jpeg;") or each in links for each in made.addresses()
         )
-
-    def test_counts_are_added_up_by_name(self, tmp_path: Path) -> None:
-        outputs = {name: tmp_path / name for name in "ab"}
-        for number, place in enumerate(outputs.values(), start=1):
-            place.mkdir()
-            counts = {"north": Counter({0: number})}
-            html = replace(page(), counts=counts).html()
-            (place / "page.html").write_text(html, encoding="utf-8")
-        write_index(outputs, tmp_path / "index.html")
-        assert "3north" in Elements((tmp_path / "index.html").read_text(encoding="utf-8")).text
-
-    def test_names_are_escaped_and_lead_to_their_pages(self, tmp_path: Path) -> None:
-        made = self.index(tmp_path, NASTY)
-        assert made.all("img", src="x") == []
-        assert NASTY in made.text
-        address = made.all("a")[0]["href"] or ""
-        assert (tmp_path / unquote(address)).is_file()
-        assert re.fullmatch(r"[\w./%~-]+", address)
 
     def test_of_no_video_it_says_so(self, tmp_path: Path) -> None:
         assert "No video could be searched." in self.index(tmp_path).text

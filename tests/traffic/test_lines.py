@@ -27,11 +27,6 @@ class TestDirections:
         assert (event.frame, event.name, event.id) == (50, "line", 1)
         assert (event.score, event.stitched, event.seconds) == (0.9, False, None)
 
-    def test_motion_along_a_line_crosses_nothing(self) -> None:
-        along = frames(through((0, 300, 400), (8, 900, 400)))
-        beside = frames(through((0, 300, 410), (8, 900, 410)))
-        assert events(along) == events(beside) == ()
-
 
 class TestFlicker:
     def test_one_frame_on_the_other_side_is_nothing(self) -> None:
@@ -47,13 +42,6 @@ class TestFlicker:
         assert ways(events(feet(*steps, *trembling, *goes_on))) == ["here"]
         assert events(feet(*steps, *trembling, *reversed(steps))) == ()
 
-    def test_stopping_exactly_on_the_line(self) -> None:
-        here = [(600.0, 340.0 + 3 * n) for n in range(21)]
-        stop = [(600.0, 400.0)] * 50
-        there = [(600.0, 400.0 + 3 * n) for n in range(1, 20)]
-        assert ways(events(feet(*here, *stop, *there))) == ["here"]
-        assert events(feet(*here, *stop, *reversed(here))) == ()
-
     def test_rocking_over_the_line_counts_once(self) -> None:
         """It moves back and forth over the dead band, as in a queue, and then drives on."""
         rocking = [ABOVE] * 10 + [BELOW] * 10
@@ -64,10 +52,6 @@ class TestFlicker:
 class TestWayBack:
     def test_a_u_turn_counts_both_ways(self) -> None:
         path = through((0, 600, 300), (4, 600, 500), (8, 600, 300))
-        assert ways(events(frames(path))) == ["here", "away"]
-
-    def test_reversing_out_again_counts_both_ways(self) -> None:
-        path = through((0, 600, 300), (3, 600, 420), (6, 600, 300))
         assert ways(events(frames(path))) == ["here", "away"]
 
     def test_a_turn_on_a_wide_road_counts_both_ways_at_once(self) -> None:
@@ -82,10 +66,6 @@ class TestEnds:
     ) -> None:
         assert len(events(frames(through((0, x, 300), (4, x, 500))))) == count
 
-    def test_the_extension_of_the_line_does_not_count(self) -> None:
-        around = through((0, 600, 300), (2, 1200, 300), (4, 1200, 500), (6, 600, 500))
-        assert events(frames(around)) == ()
-
     def test_a_way_around_and_back_through_counts_once(self) -> None:
         path = through((0, 600, 300), (2, 1200, 300), (4, 1200, 500), (6, 600, 500), (9, 600, 300))
         assert ways(events(frames(path))) == ["away"]
@@ -96,24 +76,12 @@ class TestEnds:
         path = through((0, 1100, 300), (2, WIDTH + 40, 440))
         assert ways(events(frames(path), to_the_edge)) == ["right"]
 
-    def test_a_line_along_the_edge_counts_what_leaves_there(self) -> None:
-        along = line((WIDTH - 3, 0), (WIDTH - 3, HEIGHT))
-        path = through((0, 1000, 400), (3, WIDTH + 60, 400))
-        assert ways(events(frames(path), along)) == ["left"]
-
 
 class TestJumps:
     def test_a_jump_over_the_line_in_one_frame(self) -> None:
         found = events(feet(*[(600.0, 300.0)] * 10, *[(600.0, 500.0)] * 10))
         assert ways(found) == ["here"]
         assert found[0].frame == 10
-
-    def test_a_vehicle_that_is_seen_once_beyond_the_line(self) -> None:
-        fast = feet((600, 100), (600, 200), (600, 300), (600, 480), rate=10)
-        assert ways(events(fast)) == ["here"]
-
-    def test_a_jump_beside_the_line_is_no_crossing(self) -> None:
-        assert events(feet(*[(1100.0, 300.0)] * 10, *[(1100.0, 500.0)] * 10)) == ()
 
 
 @pytest.mark.parametrize("rate", [10, 25, 30, 60])

@@ -59,13 +59,6 @@ def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better(
     assert [crop.image.shape[0] for crop in best.end()] == [72]
 
 
-def test_memory_holds_only_vehicles_that_are_shown() -> None:
-    best = BestCrops()
-    for number in range(1, 200):
-        best.add(frame(number, track(number, box(40)), track(number + 1, box(40, 150))), PICTURE)
-    assert len(best.end()) == 2
-
-
 STILL = np.full((HEIGHT, WIDTH, 3), (20, 90, 30), np.uint8)
 PLACE = Box.sized(200, 100, 60, 80)
 
@@ -87,20 +80,6 @@ def test_the_ground_under_a_vehicle_has_colour_and_nothing_else() -> None:
     assert seen[PLACE.pixels[3] - 10, 230] > 60
     assert seen[PLACE.pixels[1] + 20, 230] < 10, "the roof is not where it stands"
     assert seen[:, :180].max() < 10
-
-
-def test_it_lies_at_the_same_place_over_a_still_of_any_size() -> None:
-    small = color(heat(PLACE, still=np.ascontiguousarray(STILL[::2, ::2])))
-    assert small.shape == (HEIGHT // 2, WIDTH // 2)
-    assert small[(PLACE.pixels[3] - 10) // 2, 115] > 60
-
-
-def test_boxes_that_reach_beyond_the_frame_count_as_far_as_it_goes() -> None:
-    heat(
-        Box.sized(-50, -40, 30, 20),
-        Box.sized(WIDTH - 5, HEIGHT - 5, 50, 50),
-        Box.sized(-10, 20, 9000, 9000),
-    )
 
 
 def levels(*counts: int, rate: float = 25) -> Levels:

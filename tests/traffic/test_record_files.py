@@ -3,7 +3,6 @@
 import csv
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -66,18 +65,6 @@ class TestJoined:
         assert text.startswith(f"video,{HEADING}a,{FIRST}a,2,bus,")
         rows = list(csv.DictReader(text.splitlines(keepends=True)))
         assert [row["video"] for row in rows] == [name for name in self.NAMES for _ in range(2)]
-
-    def test_each_item_has_its_video(self, tmp_path: Path) -> None:
-        items: list[dict[str, Any]] = json.loads(self.join(tmp_path, ".json"))
-        assert [(item["video"], item["id"]) for item in items] == [
-            (name, number) for name in self.NAMES for number in (1, 2)
-        ]
-
-    @pytest.mark.parametrize("suffix", [".csv", ".json"])
-    def test_a_name_that_is_no_text_is_escaped(self, tmp_path: Path, suffix: str) -> None:
-        written(tmp_path / f"a{suffix}", *passing(2))
-        join_records({"clip\udcff": tmp_path / f"a{suffix}"}, tmp_path / f"all{suffix}")
-        assert "\\udcff" in (tmp_path / f"all{suffix}").read_text(encoding="utf-8")
 
     @pytest.mark.parametrize("suffix", [".csv", ".json"])
     @pytest.mark.parametrize("text", ["junk", "", "[1]", "id,class\n1,car\n", "\xff"])

@@ -1,11 +1,6 @@
 """A record of each vehicle."""
 
-import itertools
-from collections.abc import Sequence
-
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from traffic.passing import RATE, WIDTH, frame, passing, track
 from vdet.boxes import Box
@@ -62,10 +57,6 @@ class TestTime:
         assert (found.first, found.last) == (0, 11 / RATE)
         assert found.seconds == pytest.approx(3 / RATE)
 
-    def test_frames_without_vehicles_may_be_left_out(self) -> None:
-        found = record(frame(0, track(1, PLACE)), *(frame(n, track(1, PLACE)) for n in (10, 11)))
-        assert found.seconds == pytest.approx(3 / RATE)
-
     @pytest.mark.parametrize("rate", [10, 25, 30, 60])
     def test_seconds_and_length_do_not_depend_on_the_rate(self, rate: int) -> None:
         frames = [
@@ -97,14 +88,3 @@ class TestPath:
         found = record(*frames)
         assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
         assert (found.seen, found.predicted) == (3, 2)
-
-
-@given(xs=st.lists(st.integers(-50, 300), min_size=1, max_size=30))
-def test_a_path_is_never_longer_than_the_way_nor_shorter_than_from_start_to_end(
-    xs: Sequence[int],
-) -> None:
-    frames = [frame(n, track(1, Box.sized(x, 100, 40, 30))) for n, x in enumerate(xs)]
-    found = record(*frames)
-    way = sum(abs(b - a) for a, b in itertools.pairwise(xs))
-    assert abs(xs[-1] - xs[0]) - 1e-6 <= found.length <= way + 1e-6
-    assert len(found.path) <= len(xs)

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from traffic.scenes import ZONE, events, feet, frames, joined, numbered, through, track, ways
+from traffic.scenes import events, feet, frames, joined, numbered, through, track, ways
 from vdet.config.places import LineSettings
 from vdet.track.track import FrameTracks
 
@@ -17,18 +17,6 @@ def test_predicted_boxes_do_not_count() -> None:
         for n in range(20)
     ]
     assert events(video) == ()
-
-
-def test_a_crossing_while_it_is_not_seen_is_interpolated() -> None:
-    video = list(frames(DOWN))
-    hidden = [
-        replace(each, tracks=tuple(replace(t, predicted=True) for t in each.tracks))
-        if 1.6 < each.time < 2.4
-        else each
-        for each in video
-    ]
-    (event,), (expected,) = events(hidden), events(video)
-    assert (event.direction, event.time) == (expected.direction, expected.time)
 
 
 def test_a_vehicle_that_is_seen_for_a_moment_does_not_count() -> None:
@@ -68,18 +56,6 @@ class TestNewIds:
         assert [(event.id, event.direction) for event in found] == [(1, "in"), (2, "away")]
         assert not any(event.stitched for event in found)
 
-    def test_a_flag_stands_only_where_the_count_rests_on_the_old_id(self) -> None:
-        old = frames(through((0, 600, 100), (1, 600, 150)), seconds=1)
-        new = numbered(frames(through((1.2, 600, 160), (6, 600, 500))), 2)
-        (event,) = events(joined(old, new))
-        assert not event.stitched
-
-    def test_an_id_that_comes_back_after_that_counts_for_itself(self) -> None:
-        hides = through((0, 600, 300), (10, 600, 450), gone=((2, 5),))
-        new = numbered(frames(through((2.2, 600, 335), (4, 640, 500)), seconds=4), 2)
-        found = events(joined(frames(hides), new))
-        assert [(event.id, event.direction) for event in found] == [(2, "here"), (1, "here")]
-
     def test_stop_and_go_with_a_new_id_every_second(self) -> None:
         """A queue that rocks on the line while the tracker gives it new ids, and then moves on."""
         video = []
@@ -104,9 +80,3 @@ class TestClasses:
         ]
         (event,) = events(video)
         assert event.class_name == "car"
-
-
-def test_a_long_absence_ends_a_vehicle() -> None:
-    path = through((0, 600, 400), (30, 600, 401), gone=((2, 20),))
-    found = events(frames(path, seconds=30), ZONE)
-    assert ways(found) == ["appear", "vanish", "appear", "vanish"]

@@ -32,21 +32,6 @@ def test_one_that_is_first_seen_inside_appears() -> None:
     assert found[1].seconds == pytest.approx(2)
 
 
-def test_a_video_that_ends_inside_a_zone() -> None:
-    found = events(frames(ACROSS, seconds=5), ZONE)
-    assert ways(found) == ["enter", "vanish"]
-    assert found[1].time == pytest.approx(5)
-    assert found[1].seconds == pytest.approx(3)
-
-
-def test_trembling_at_the_border_is_one_entry() -> None:
-    path = through(
-        (0, 200, 400), (2, 396, 400), (2.4, 404, 400), (2.8, 396, 400), (3.2, 404, 400),
-        (8, 1000, 400),
-    )  # fmt: skip
-    assert ways(events(frames(path), ZONE)) == ["enter", "exit"]
-
-
 def test_a_new_id_inside_goes_on_with_the_stay() -> None:
     old = frames(through((0, 200, 400), (3.9, 590, 400)), seconds=4)
     new = numbered(frames(through((4.1, 610, 400), (8, 1000, 400))), 2)
