@@ -8,7 +8,6 @@ from vdet.polygons import (
     crosses_itself,
     meeting,
     side_of,
-    unclosed,
 )
 
 SQUARE = ((0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0))
@@ -51,7 +50,3 @@ class TestPolygons:
     )
     def test_others_are_left_in_peace(self, corners: list[Point]) -> None:
         assert not crosses_itself(corners)
-
-    def test_a_last_corner_that_repeats_the_first_is_dropped(self) -> None:
-        assert unclosed([*SQUARE, SQUARE[0]]) == SQUARE
-        assert unclosed(SQUARE) == SQUARE

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError, ImageError
 from vdet.media.images import write_image
-from vdet.regions import Regions, check_mask, lay_regions
+from vdet.regions import Regions, SearchArea, check_mask, lay_regions
 
 ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
 BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8]]}
@@ -93,4 +93,4 @@ def test_every_place_of_a_region_is_searched(
     y = data.draw(st.floats(0, 29.9))
     if regions.contains((x, y)):
         near = np.floor([[x - 1, y - 1, x + 2, y + 2]])
-        assert regions.area().touches(near)[0]
+        assert SearchArea(regions.pixels).touches(near)[0]

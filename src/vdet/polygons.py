@@ -48,12 +48,6 @@ def sides(corners: Sequence[Point]) -> list[Segment]:
     return [(corners[i - 1], corner) for i, corner in enumerate(corners)]
 
 
-def unclosed(corners: Sequence[Point]) -> tuple[Point, ...]:
-    """Return the corners without the last one where it only repeats the first."""
-    closed = len(corners) > 1 and corners[0] == corners[-1]
-    return tuple(corners[:-1] if closed else corners)
-
-
 def crosses_itself(corners: Sequence[Point]) -> bool:
     """Tell whether two sides of a polygon have more in common than a corner between neighbours.
 

@@ -87,10 +87,6 @@ class Regions:
         """Return the number, from 1, of the first included polygon around a point; 0 in none."""
         return int(self._numbers[self._place(point)])
 
-    def area(self) -> SearchArea:
-        """Return all pixels that they contain."""
-        return SearchArea(self.pixels)
-
     def _place(self, point: Point) -> tuple[int, int]:
         """Return the row and the column of a point."""
         height, width = self.pixels.shape

@@ -16,7 +16,7 @@ from traffic.passing import HEIGHT, WIDTH, frame, passing, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
 from vdet.pages.render import jpeg_uri, link_to
-from vdet.pages.video import Player, Thumbnail, VideoPage, read_facts, write_index
+from vdet.pages.video import Player, VideoPage, read_facts, write_index
 from vdet.track.track import FrameTracks
 from vdet.traffic.overview import Levels
 from vdet.traffic.records import VehicleRecord, summarize
@@ -47,7 +47,7 @@ def page(
         start=0.0,
         end=end,
         records=TWO,
-        thumbnails={1: Thumbnail(1.25, jpeg_uri(STILL))},
+        thumbnails={1: (1.25, jpeg_uri(STILL))},
         levels=levels,
         still=STILL,
         player=player,
@@ -119,7 +119,7 @@ class TestVideoPage:
             page(source=Path("clips") / NASTY, player=player_of(NASTY)),
             records=records(frame(0, bus), frame(1, bus)),
             settings=NASTY,
-            thumbnails={1: Thumbnail(0.0, jpeg_uri(STILL))},
+            thumbnails={1: (0.0, jpeg_uri(STILL))},
         )
         plain, nasty = seen(page()), seen(made)
         assert {tag for tag, _ in nasty.seen} == {tag for tag, _ in plain.seen}

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from vdet.config.section import Section
 from vdet.errors import ConfigError
-from vdet.polygons import Point, crosses_itself, unclosed
+from vdet.polygons import Point, crosses_itself
 
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Place = tuple[Coordinate, Coordinate]
@@ -82,7 +82,8 @@ class PolygonSection(Section):
     @field_validator("points")
     @classmethod
     def _is_a_polygon(cls, points: tuple[Point, ...]) -> tuple[Point, ...]:
-        corners = unclosed(points)
+        is_closed = len(points) > 1 and points[0] == points[-1]
+        corners = points[:-1] if is_closed else points
         if len(corners) < 3:
             raise ValueError(f"has {len(corners)} corners; give three or more")
         if crosses_itself(corners):

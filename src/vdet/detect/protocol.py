@@ -69,7 +69,7 @@ class LimitableDetector(VideoDetector, Protocol):
 def limited(detector: VideoDetector, regions: Regions | None) -> VideoDetector:
     """Return a detector that searches only the regions, if it can; else the detector itself."""
     if regions is not None and isinstance(detector, LimitableDetector):
-        return detector.limited_to(regions.area())
+        return detector.limited_to(SearchArea(regions.pixels))
     return detector
 
 

@@ -181,7 +181,7 @@ def level_plot(levels: Sequence[int], start: float, end: float, title: str) -> P
 
 def minute_plot(series: Minutes, minutes: range, title: str) -> Plot:
     """Return a bar for each minute, in which the series are stacked, with a legend."""
-    bars, most = [], 0
+    bars = []
     for minute in minutes:
         below = 0
         for number, (name, counts) in enumerate(series.items()):
@@ -190,14 +190,14 @@ def minute_plot(series: Minutes, minutes: range, title: str) -> Plot:
                 place = 60 * (minute + 0.1), 60 * (minute + 0.9), below, below + count
                 bars.append(Bar(*place, color(number), tip))
                 below += count
-        most = max(most, below)
-    names = [f"{name}: {counts.total()}" for name, counts in series.items()]
-    legend = [(name, color(number)) for number, name in enumerate(names)]
+    sums = [f"{name}: {counts.total()}" for name, counts in series.items()]
+    legend = [(text, color(number)) for number, text in enumerate(sums)]
     x = time_axis(60 * minutes.start, 60 * minutes.stop)
+    most = max((bar.high for bar in bars), default=0)
     return Plot(title, x, _counts(most), bars, legend=legend)
 
 
-def _counts(most: int) -> Axis:
+def _counts(most: float) -> Axis:
     return number_axis(0, max(1, most), least=1)
 
 

@@ -47,14 +47,6 @@ class Facts(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Thumbnail:
-    """The picture of a vehicle as a data URI, and the time of its frame in seconds."""
-
-    time: float
-    uri: str
-
-
-@dataclass(frozen=True, slots=True)
 class Player:
     """The video that a page shows.
 
@@ -87,7 +79,8 @@ class VideoPage:
     start, end
         When the first frame is shown, and when the last one ends, seconds as in the tracks.
     thumbnails
-        By id; a vehicle may have none.
+        By id, the time of a frame in seconds, and the picture of the vehicle as a data URI. A
+        vehicle may have none.
     still
         A frame with the heat over it, BGR uint8; None if there was no frame.
     settings
@@ -101,7 +94,7 @@ class VideoPage:
     start: float
     end: float
     records: Sequence[VehicleRecord]
-    thumbnails: Mapping[int, Thumbnail]
+    thumbnails: Mapping[int, tuple[float, str]]
     levels: Levels
     still: Image | None
     player: Player | None

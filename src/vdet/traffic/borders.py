@@ -29,26 +29,21 @@ _Size = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line; its positive side is the right of someone who looks from `start` to `end`.
+    """A line; its positive side is the left of someone who looks from `start` to `end`.
 
-    `start` and `end` are those that are drawn; `reach` goes on where they lie at the frame's edge.
-    `ways` are the directions to the negative and to the positive side.
+    `directions` are the names of the left and of the right. `start` and `end` are those that are
+    drawn; `reach` goes on where they lie at the edge of the frame.
     """
 
     name: str
-    ways: tuple[str, str]
+    directions: tuple[str, str]
     start: Point
     end: Point
     reach: Segment
 
-    @property
-    def directions(self) -> tuple[str, ...]:
-        """Left and right, by the names that the user gave."""
-        return self.ways
-
     def distance(self, point: Point) -> float:
-        """Return the distance from the line, also from beyond its ends; positive on the right."""
-        return side_of(self.start, self.end, point)
+        """Return the distance from the line, also from beyond its ends; positive on the left."""
+        return side_of(self.end, self.start, point)
 
     def meeting(self, path: Segment) -> float | None:
         """Return the share of the way along `path` at which it meets the line, if it does."""
@@ -68,7 +63,6 @@ class Zone:
     sides: tuple[Segment, ...]
     size: _Size
 
-    ways = EXIT, ENTER
     directions = ENTER, EXIT, APPEAR, VANISH
 
     def distance(self, point: Point) -> float:
@@ -92,6 +86,7 @@ class Zone:
 
 
 Border = Line | Zone
+"""The first of its directions leads to its positive side, the second to its negative side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,13 +138,13 @@ def lay_out(settings: CountSettings, width: int, height: int) -> Layout:
     return Layout(lines, zones, size, settings)
 
 
-def _line(name: str, ways: tuple[str, str], start: Point, end: Point, size: _Size) -> Line:
+def _line(name: str, directions: tuple[str, str], start: Point, end: Point, size: _Size) -> Line:
     """Make a line; an end at the frame's edge goes on beyond it, where feet may be too."""
     factor = sum(size) / math.dist(start, end)
     dx, dy = factor * (end[0] - start[0]), factor * (end[1] - start[1])
     first = (start[0] - dx, start[1] - dy) if _at_edge(start, size) else start
     last = (end[0] + dx, end[1] + dy) if _at_edge(end, size) else end
-    return Line(name, ways, start, end, (first, last))
+    return Line(name, directions, start, end, (first, last))
 
 
 def _zone(name: str, corners: Sequence[Point], size: _Size) -> Zone:

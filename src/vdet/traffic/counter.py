@@ -51,7 +51,6 @@ class _Vehicle:
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
     tallied: int = 0
-    is_taken_over: bool = False
 
     @property
     def is_leaving(self) -> bool:
@@ -110,9 +109,8 @@ class VehicleCounter:
                 self._close(vehicle)
         shown = {track.id for track in frame.tracks}
         for track in frame.tracks:
-            known = self._vehicles.get(track.id)
-            if known is not None and not known.is_taken_over:
-                known.shown = self._now
+            if track.id in self._vehicles:
+                self._vehicles[track.id].shown = self._now
             if not track.predicted:
                 self._see(track, self._sighting(track, frame.index), shown)
 
@@ -132,8 +130,7 @@ class VehicleCounter:
         return sum(
             state.border == zone and state.entered is not None
             for each in self._vehicles.values()
-            if not each.is_taken_over and self._now - each.shown <= _GAP
-            if self._is_confirmed(each)
+            if self._now - each.shown <= _GAP and self._is_confirmed(each)
             for state in each.states
         )
 
@@ -144,9 +141,7 @@ class VehicleCounter:
         return Sighting(self._now, frame, point, height, round(track.score, 4))
 
     def _see(self, track: Track, sighting: Sighting, shown: set[int]) -> None:
-        vehicle = self._vehicles.get(track.id)
-        if vehicle is None or vehicle.is_taken_over:
-            vehicle = self._begin(track.id, sighting, shown)
+        vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, shown)
         vehicle.classes.add(track.class_name, track.score)
         vehicle.outward = _touched_sides(track.box, self.layout.size)
         band = self.layout.band(sighting.height)
@@ -163,8 +158,6 @@ class VehicleCounter:
 
     def _begin(self, number: int, sighting: Sighting, shown: set[int]) -> _Vehicle:
         """Remember a new vehicle, which may go on from another that has ended."""
-        if number in self._vehicles:  # another has taken it over; this one begins anew
-            self._close(self._vehicles[number])
         before = self._before(sighting, shown)
         if before is None:
             states = [BorderState(border) for border in self.layout.borders]
@@ -179,7 +172,7 @@ class VehicleCounter:
                 events=[],
                 tallied=0,
             )
-            before.is_taken_over = True
+            self._forget(before)
         self._vehicles[number] = vehicle
         return vehicle
 
@@ -187,7 +180,7 @@ class VehicleCounter:
         """Return the vehicle that has ended where a new one begins."""
         near = []
         for vehicle in self._vehicles.values():
-            if vehicle.id in shown or vehicle.is_taken_over or vehicle.is_leaving:
+            if vehicle.id in shown or vehicle.is_leaving:
                 continue
             heights = vehicle.last.height, sighting.height
             if sighting.time - vehicle.shown > _GAP or max(heights) > _MOST_GROWTH * min(heights):
@@ -211,11 +204,14 @@ class VehicleCounter:
         vehicle.tallied = len(vehicle.events)
 
     def _close(self, vehicle: _Vehicle) -> None:
-        """Keep the events of a vehicle that is not shown any more, and forget it."""
-        del self._vehicles[vehicle.id]
-        if not vehicle.is_taken_over:
-            _end(vehicle)
+        """End a vehicle that is not shown any more."""
+        _end(vehicle)
         self._confirm(vehicle)
+        self._forget(vehicle)
+
+    def _forget(self, vehicle: _Vehicle) -> None:
+        """Keep only the events of a vehicle."""
+        del self._vehicles[vehicle.id]
         for event in vehicle.events[: vehicle.tallied]:
             self._events.append(replace(event, class_name=vehicle.classes.best))
 
@@ -229,7 +225,7 @@ def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
         entered, state.entered = state.entered, change.time if change.side > 0 else None
         if change.side < 0:
             seconds = 0.0 if entered is None else change.time - entered
-    vehicle.add(border.name, border.ways[change.side > 0], change, seconds)
+    vehicle.add(border.name, border.directions[change.side < 0], change, seconds)
 
 
 def _end(vehicle: _Vehicle) -> None:

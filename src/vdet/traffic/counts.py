@@ -105,17 +105,15 @@ class Counts:
     zones: tuple[Stay, ...]
 
     @staticmethod
-    def of(
-        events: Sequence[Event], keys: Iterable[Key] = (), zones: Iterable[str] = ()
-    ) -> "Counts":
+    def of(events: Sequence[Event], keys: Iterable[Key], zones: Iterable[str]) -> "Counts":
         """Sum up events; `keys` are counted also where nothing happened, `zones` are names."""
-        classes = (() if event.class_name is None else (event.class_name,) for event in events)
+        nothing = (Total(*key, 0, {}) for key in keys)
         ones = (
-            Total(event.name, event.direction, 1, Counter(names))
-            for event, names in zip(events, classes, strict=True)
+            Total(each.name, each.direction, 1, {each.class_name: 1} if each.class_name else {})
+            for each in events
         )
-        totals = sum_totals([*(Total(*key, 0, {}) for key in keys), *ones])
-        return Counts(tuple(events), totals, _by_minute(events), stays(events, zones))
+        totals = sum_totals([*nothing, *ones])
+        return Counts(tuple(events), totals, _by_minute(events), _stays(events, zones))
 
 
 def sum_totals(totals: Iterable[Total]) -> tuple[Total, ...]:
@@ -137,7 +135,7 @@ def _by_minute(events: Iterable[Event]) -> tuple[MinuteCount, ...]:
     return tuple(MinuteCount(*key, count) for key, count in sorted(counts.items()))
 
 
-def stays(events: Iterable[Event], zones: Iterable[str]) -> tuple[Stay, ...]:
+def _stays(events: Iterable[Event], zones: Iterable[str]) -> tuple[Stay, ...]:
     """Return the stays in each of the zones of these names."""
     ordered = sorted(events, key=lambda event: (event.time, event.direction in _IN))
     return tuple(_stay(name, [event for event in ordered if event.name == name]) for name in zones)

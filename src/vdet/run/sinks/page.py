@@ -8,7 +8,7 @@ from vdet.config.rendering import render
 from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, write_page
-from vdet.pages.video import Player, Thumbnail, VideoPage, write_index
+from vdet.pages.video import Player, VideoPage, write_index
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
@@ -31,7 +31,7 @@ class PageSink(BaseSink):
         self._crops = BestCrops()
         self._heat = HeatMap(video.width, video.height)
         self._levels = Levels()
-        self._thumbnails: dict[int, Thumbnail] = {}
+        self._thumbnails: dict[int, tuple[float, str]] = {}
         self._counter: VehicleCounter | None = None
         self._still: Image | None = None
         self._is_even = True
@@ -62,7 +62,7 @@ class PageSink(BaseSink):
 
     def _keep(self, crops: list[Crop]) -> None:
         for crop in crops:
-            self._thumbnails[crop.id] = Thumbnail(crop.time, jpeg_uri(crop.image, _THUMBNAIL))
+            self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
 
     def _page(self) -> VideoPage:
         return VideoPage(
