@@ -68,7 +68,7 @@ class Regions:
             named[each.name] = [(x * across, y * down) for x, y in each.points]
         self._numbers = np.zeros((height, width), np.uint8)
         for number, corners in reversed(list(enumerate(self.included.values(), start=1))):
-            _fill(self._numbers, corners, number)  # of two over one another, the first counts
+            _fill(self._numbers, corners, number)  # where two overlap, the first counts
         shown = self._numbers.copy() if self.included else np.ones_like(self._numbers)
         for corners in self.excluded.values():
             _fill(shown, corners, 0)

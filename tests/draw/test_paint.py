@@ -64,7 +64,7 @@ STROKES: dict[str, Draw] = {
     "line": lambda surface: draw_lines(surface, CORNERS, RED, 3),
     "thick line, closed": lambda surface: draw_lines(surface, CORNERS, RED, 6, closed=True),
     "line beyond the frame": lambda surface: draw_lines(surface, BEYOND, RED, 3, closed=True),
-    "line between pixels": lambda surface: draw_lines(surface, 16 * CORNERS + 5, RED, 4, shift=4),
+    "line between pixels": lambda surface: draw_lines(surface, CORNERS + 0.3, RED, 4),
     "arrow": lambda surface: draw_arrow(surface, (20.4, 30.2), (200, 133), RED, 3, tip=0.2),
     "text": lambda surface: write_text(
         surface, "#12 car", (41, 121), 1.2, RED, within=Box.sized(30, 60, 250, 90)

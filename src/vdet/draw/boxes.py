@@ -151,7 +151,7 @@ def _dashes(side: Box, dash: int) -> Iterator[Box]:
 
 def draw_zone(surface: Surface, corners: Sequence[Point], label: str) -> None:
     """Draw a zone with a label at its highest corner; corners are in pixels."""
-    shade(surface, np.round(np.array(corners)).astype(np.int32), ZONE, _SHADE)
+    shade(surface, corners, ZONE, _SHADE)
     draw_outline(surface, corners, ZONE, label)
 
 
@@ -185,8 +185,7 @@ def draw_regions(image: Image, regions: Regions) -> Image:
 
 def draw_outline(surface: Surface, corners: Sequence[Point], color: Color, label: str) -> None:
     """Draw the sides of a polygon, and write a label at its highest corner."""
-    points = np.round(np.array(corners)).astype(np.int32)
-    draw_lines(surface, points, color, line_width(surface), closed=True)
+    draw_lines(surface, corners, color, line_width(surface), closed=True)
     left, top = min(corners, key=lambda corner: (corner[1], corner[0]))
     height = label_tag(surface, label, (0, 0)).height
     draw_label(surface, label, (round(left), round(top) + height), color)

@@ -9,8 +9,9 @@ from itertools import pairwise
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from vdet.boxes import Box, Float64Array, Int32Array
+from vdet.boxes import Box, Float64Array
 from vdet.media.coding import Coding
 from vdet.media.images import Image
 from vdet.media.planes import Planes
@@ -45,18 +46,14 @@ def fill(surface: Surface, box: Box, color: Color) -> None:
 
 
 def draw_lines(
-    surface: Surface,
-    points: Int32Array,
-    color: Color,
-    width: int,
-    *,
-    closed: bool = False,
-    shift: int = 0,
+    surface: Surface, points: npt.ArrayLike, color: Color, width: int, *, closed: bool = False
 ) -> None:
-    """Draw a smooth line from point to point, int32 `(n, 2)` of x and y in pixels / 2**shift."""
+    """Draw a smooth line from point to point, `(n, 2)` of x and y in pixels."""
+    near = np.clip(np.asarray(points, np.float64), -_FARTHEST, _FARTHEST)
+    fixed = [np.rint(near * 2**_SHIFT).astype(np.int32)]
     for layer, value, halved in _layers(surface, color):
         thickness = max(1, round(width / 2**halved))
-        cv2.polylines(layer, [points], closed, value, thickness, cv2.LINE_AA, shift + halved)
+        cv2.polylines(layer, fixed, closed, value, thickness, cv2.LINE_AA, _SHIFT + halved)
 
 
 def draw_arrow(
@@ -81,13 +78,12 @@ def draw_trail(surface: Surface, points: Sequence[Point], color: Color, width: i
     """
     if len(points) < 2:
         return
-    line = _smoothed(np.clip(np.asarray(points, np.float64), -_FARTHEST, _FARTHEST))
-    fixed = np.rint(line * 2**_SHIFT).astype(np.int32)
-    ends = np.linspace(0, len(fixed) - 1, _TRAIL_PARTS + 1).round().astype(int).tolist()
+    line = _smoothed(np.asarray(points, np.float64))
+    ends = np.linspace(0, len(line) - 1, _TRAIL_PARTS + 1).round().astype(int).tolist()
     for part, (first, last) in enumerate(pairwise(ends), start=1):
         if last > first:
             thickness = max(1, round(width * part / _TRAIL_PARTS))
-            draw_lines(surface, fixed[first : last + 1], color, thickness, shift=_SHIFT)
+            draw_lines(surface, line[first : last + 1], color, thickness)
 
 
 def _smoothed(points: Float64Array) -> Float64Array:
@@ -130,12 +126,13 @@ def _stroke(scale: float) -> int:
     return max(1, round(1.5 * scale))
 
 
-def shade(surface: Surface, corners: Int32Array, color: Color, opacity: float) -> None:
-    """Mix a colour into a polygon, int32 `(n, 2)` of x and y in pixels."""
-    x1, y1, x2, y2 = _visible(surface, Box.sized(*cv2.boundingRect(corners)))
+def shade(surface: Surface, corners: Sequence[Point], color: Color, opacity: float) -> None:
+    """Mix a colour into a polygon; corners are in pixels."""
+    points = np.rint(np.array(corners)).astype(np.int32)
+    x1, y1, x2, y2 = _visible(surface, Box.sized(*cv2.boundingRect(points)))
     mask = np.zeros((y2 - y1, x2 - x1), np.uint8)
     if mask.size:
-        cv2.fillPoly(mask, [corners - np.array([x1, y1], np.int32)], 255)
+        cv2.fillPoly(mask, [points], 255, offset=(-x1, -y1))
         blend(surface, mask, (x1, y1), color, opacity)
 
 
@@ -163,7 +160,7 @@ def blend(
 
 
 def _halved(mask: Image, x: int, y: int) -> Image:
-    """Return the mean of the 2 × 2 pixels of a mask at `(x, y)` for which a value of chroma is."""
+    """Return a mask whose first pixel is at `(x, y)` at the resolution of chroma."""
     height, width = mask.shape
     around = y % 2, (y + height) % 2, x % 2, (x + width) % 2
     even = cv2.copyMakeBorder(mask, *around, cv2.BORDER_CONSTANT)

@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.boxes import Float64Array, Int32Array
+from vdet.boxes import Float64Array
 from vdet.draw.boxes import draw_label, line_width
 from vdet.draw.paint import Color, draw_lines
 from vdet.lanes.road import Lane, Road
@@ -42,8 +42,7 @@ def stage_pictures(road: Road) -> dict[str, Image]:
     its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
     frame = road.image.copy()
-    outline = _fixed_point(road.top_view.outline)
-    draw_lines(frame, outline, LINE, line_width(frame), closed=True, shift=_SHIFT)
+    draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
     above, fit = _enlarge(road.view.top), _enlarge(road.view.top)
     if lane := road.lane:
         lines = (road.top_view.frame_to_top(line) * _SCALE for line in (lane.left, lane.right))
@@ -60,15 +59,12 @@ def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
     x1, y1 = np.clip(area.max(axis=0) + 2, 0, (width, height)).astype(int)
     around = image[y0:y1, x0:x1]  # blend only the part that changes
     tinted = around.copy()
-    cv2.fillPoly(tinted, [_fixed_point(area - (x0, y0))], AREA, cv2.LINE_8, _SHIFT)
+    corners = np.rint((area - (x0, y0)) * 2**_SHIFT).astype(np.int32)
+    cv2.fillPoly(tinted, [corners], AREA, cv2.LINE_8, _SHIFT)
     around[:] = cv2.addWeighted(tinted, _OPACITY, around, 1 - _OPACITY, 0)
     for line in (left, right):
-        draw_lines(image, _fixed_point(line), LINE, line_width(image), shift=_SHIFT)
+        draw_lines(image, line, LINE, line_width(image))
 
 
 def _enlarge(picture: Image) -> Image:
     return picture.repeat(_SCALE, axis=0).repeat(_SCALE, axis=1)
-
-
-def _fixed_point(points: Float64Array) -> Int32Array:
-    return np.rint(points * (1 << _SHIFT)).astype(np.int32)

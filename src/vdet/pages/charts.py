@@ -16,7 +16,7 @@ from vdet.boxes import Float64Array
 from vdet.draw.boxes import color_of, text_color
 
 FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
-"""Colours of the style: of what is right, of what is wrong, and of what stands back."""
+"""Colours of the style: of what is right, of what is wrong, and of what is less important."""
 
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
 _TICKS = 5  # most parts of an axis
@@ -172,7 +172,7 @@ def level_plot(levels: Sequence[int], start: float, end: float, title: str) -> P
     """Return a number over time; `levels` are of equal steps from `start` to `end`."""
     step = (end - start) / max(1, len(levels))
     bars = [
-        Bar(start + n * step, start + (n + 1.2) * step, 0, level)  # gaps would show as hairs
+        Bar(start + n * step, start + (n + 1.2) * step, 0, level)  # gaps would show as thin lines
         for n, level in enumerate(levels)
         if level
     ]
@@ -202,7 +202,7 @@ def _counts(most: float) -> Axis:
 
 
 def pack(spans: Iterable[tuple[float, float]]) -> list[int]:
-    """Return a row for each span, in order of their begin; those at one time get different rows."""
+    """Return a row for each span, in order of their start; those at one time get different rows."""
     rows: list[int] = []
     free: list[tuple[float, int]] = []  # when the last span of a row ends, and the row
     for first, last in spans:

@@ -30,11 +30,11 @@ REMEMBERED = 10.0
 """Seconds for which a vehicle that is not shown is remembered; trackers keep ids for less."""
 
 _GAP = 1.0
-"""Most seconds from the end of a track to that of another one that goes on from it."""
+"""Longest time between the end of a track and the start of one that continues it, seconds."""
 _LEAVES = 0.1
-"""Heights of its box a second that a vehicle moves at least to leave the frame."""
+"""Lowest speed of a vehicle that leaves the frame, in heights of its box per second."""
 _MOST_GROWTH = 2.0
-"""Most times that a box is as high as the one that it goes on from."""
+"""Largest ratio of the heights of the last box of a track and the first one of the next."""
 
 
 @dataclass(slots=True)

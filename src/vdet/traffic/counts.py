@@ -41,7 +41,7 @@ class Event:
     id
         Of the track.
     class_name
-        Class of the vehicle; None where the detector does not tell classes.
+        Class of the vehicle; None if the detector has no classes.
     score
         0 to 1: that of the track in `frame`.
     stitched
@@ -106,7 +106,7 @@ class Counts:
 
     @staticmethod
     def of(events: Sequence[Event], keys: Iterable[Key], zones: Iterable[str]) -> "Counts":
-        """Sum up events; `keys` are counted also where nothing happened, `zones` are names."""
+        """Sum up events; `keys` get a total even where nothing happened, `zones` are names."""
         nothing = (Total(*key, 0, {}) for key in keys)
         ones = (
             Total(each.name, each.direction, 1, {each.class_name: 1} if each.class_name else {})

@@ -42,8 +42,8 @@ class Crop:
 class BestCrops:
     """Finds the best picture of each vehicle, frame by frame.
 
-    It keeps pictures only of vehicles that the last frame shows. Those of other vehicles are given
-    back, so the memory does not grow with the length of the video.
+    It keeps pictures only of vehicles that the last frame shows. Those of other vehicles are
+    returned, so the memory does not grow with the length of the video.
     """
 
     def __init__(self) -> None:
@@ -120,10 +120,8 @@ class HeatMap:
         """
         height, width = still.shape[:2]
         grey = cv2.cvtColor(cv2.cvtColor(still, cv2.COLOR_BGR2GRAY), cv2.COLOR_GRAY2BGR)
-        most = float(self._cells.max())
-        if not most:
-            return np.asarray(grey, np.uint8)
-        heat = cv2.GaussianBlur(np.sqrt(self._cells / most), (0, 0), _BLUR)
+        shares = self._cells / max(1.0, float(self._cells.max()))
+        heat = cv2.GaussianBlur(np.sqrt(shares), (0, 0), _BLUR)
         heat = np.clip(cv2.resize(heat, (width, height)), 0, 1)
         color = cv2.applyColorMap((80 + 175 * heat).astype(np.uint8), cv2.COLORMAP_PLASMA)
         share = _CLEAREST * np.clip(4 * heat, 0, 1)[..., np.newaxis]

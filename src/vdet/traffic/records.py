@@ -68,7 +68,7 @@ class VehicleRecord:
 
     @property
     def class_name(self) -> str | None:
-        """The class with the highest sum of scores; None where the detector tells no classes."""
+        """The class with the highest sum of scores; None if the detector has no classes."""
         return self.classes.best
 
     @property
