@@ -17,7 +17,6 @@ from vdet.plugins import STEPS, built_in_names, load_plugin
 from vdet.regions import Regions, lay_regions
 from vdet.run.result import FrameResult
 from vdet.track.track import Track
-from vdet.traffic.borders import lay_out
 from vdet.traffic.counter import VehicleCounter
 
 
@@ -168,7 +167,6 @@ def count_step(context: StepContext) -> Step | None:
     if not counts or context.video is None:
         return None
     try:
-        layout = lay_out(counts, context.width, context.height)
+        return CountStep(VehicleCounter(counts, context.width, context.height))
     except ConfigError as error:
         raise ConfigError(f"counts.{error}") from error
-    return CountStep(VehicleCounter(layout))

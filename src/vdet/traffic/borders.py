@@ -15,9 +15,9 @@ TIME_DIGITS = 4
 
 _SETTLED = 0.1
 """Seconds after which a vehicle off a border's band has changed the side."""
-_BAND = 0.05
+BAND = 0.05
 """Distance from a border within which a vehicle is on neither side, in heights of its box."""
-_LEAST_BAND = 0.003
+LEAST_BAND = 0.003
 """Smallest such distance, as a share of the frame's height."""
 _AT_EDGE = 0.002
 """A point within this share of the frame's side (or one pixel) of the frame's edge lies on it."""
@@ -89,34 +89,9 @@ Border = Line | Zone
 """The first of its directions leads to its positive side, the second to its negative side."""
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
-    """The lines and zones of a video with the rule that counts at them.
-
-    `size` is the width and height of the frames, pixels.
-    """
-
-    lines: tuple[Line, ...]
-    zones: tuple[Zone, ...]
-    size: tuple[int, int]
-    settings: CountSettings
-
-    @property
-    def borders(self) -> tuple[Border, ...]:
-        """All lines, then all zones."""
-        return (*self.lines, *self.zones)
-
-    @property
-    def keys(self) -> tuple[tuple[str, str], ...]:
-        """Every name with every direction that is counted there."""
-        return tuple((each.name, way) for each in self.borders for way in each.directions)
-
-    def band(self, height: float) -> float:
-        """Return the pixels from a border within which a box of this height is on neither side."""
-        return max(_BAND * height, _LEAST_BAND * self.size[1])
-
-
-def lay_out(settings: CountSettings, width: int, height: int) -> Layout:
+def place(
+    settings: CountSettings, width: int, height: int
+) -> tuple[tuple[Line, ...], tuple[Zone, ...]]:
     """Place lines and zones in frames of `width` × `height` pixels.
 
     Raises
@@ -135,7 +110,7 @@ def lay_out(settings: CountSettings, width: int, height: int) -> Layout:
         for each in settings.lines
     )
     zones = tuple(_zone(each.name, [*map(placed, each.points)], size) for each in settings.zones)
-    return Layout(lines, zones, size, settings)
+    return lines, zones
 
 
 def _line(name: str, directions: tuple[str, str], start: Point, end: Point, size: _Size) -> Line:

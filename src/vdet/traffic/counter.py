@@ -15,14 +15,15 @@ from vdet.polygons import Point
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.borders import (
     APPEAR,
+    BAND,
+    LEAST_BAND,
     TIME_DIGITS,
     VANISH,
     BorderState,
     Change,
-    Layout,
     Sighting,
     Zone,
-    lay_out,
+    place,
 )
 from vdet.traffic.counts import Counts, Event
 
@@ -90,12 +91,20 @@ class VehicleCounter:
 
     Attributes
     ----------
-    layout
-        The lines and zones in its frames.
+    lines, zones
+        Places in its frames.
+
+    Raises
+    ------
+    ConfigError
+        They are given for frames of another aspect ratio than `width` × `height` pixels.
     """
 
-    def __init__(self, layout: Layout) -> None:
-        self.layout = layout
+    def __init__(self, settings: CountSettings, width: int, height: int) -> None:
+        self.lines, self.zones = place(settings, width, height)
+        self._confirmed = settings.confirmed
+        self._borders = *self.lines, *self.zones
+        self._size = width, height
         self._vehicles: dict[int, _Vehicle] = {}
         self._events: list[Event] = []
         self._tally: Counter[tuple[str, str]] = Counter()
@@ -119,7 +128,8 @@ class VehicleCounter:
         for vehicle in list(self._vehicles.values()):
             self._close(vehicle)
         events = sorted(self._events, key=lambda e: (e.time, e.frame, e.id, e.name))
-        return Counts.of(events, self.layout.keys, [zone.name for zone in self.layout.zones])
+        keys = [(each.name, way) for each in self._borders for way in each.directions]
+        return Counts.of(events, keys, [zone.name for zone in self.zones])
 
     def count(self, name: str, direction: str) -> int:
         """Return how many vehicles have been counted so far in a direction of a line or zone."""
@@ -143,8 +153,8 @@ class VehicleCounter:
     def _see(self, track: Track, sighting: Sighting, shown: set[int]) -> None:
         vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, shown)
         vehicle.classes.add(track.class_name, track.score)
-        vehicle.outward = _touched_sides(track.box, self.layout.size)
-        band = self.layout.band(sighting.height)
+        vehicle.outward = _touched_sides(track.box, self._size)
+        band = max(BAND * sighting.height, LEAST_BAND * self._size[1])
         for state in vehicle.states:
             before = state.side
             change = state.see(sighting, vehicle.last, band)
@@ -160,7 +170,7 @@ class VehicleCounter:
         """Remember a new vehicle, which may go on from another that has ended."""
         before = self._before(sighting, shown)
         if before is None:
-            states = [BorderState(border) for border in self.layout.borders]
+            states = [BorderState(border) for border in self._borders]
             vehicle = _Vehicle(number, sighting, sighting, states, self._now)
         else:
             vehicle = replace(
@@ -193,7 +203,7 @@ class VehicleCounter:
 
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
         seen = round(vehicle.last.time - vehicle.first.time, TIME_DIGITS)
-        return seen >= self.layout.settings.confirmed
+        return seen >= self._confirmed
 
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""
@@ -281,7 +291,7 @@ def count_frames(
         raise ConfigError("there is nothing to count at; give lines or zones")
     if size is None:
         raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
-    counter = VehicleCounter(lay_out(settings, *size))
+    counter = VehicleCounter(settings, *size)
     for frame in frames:
         counter.update(frame)
     return counter.counts()
