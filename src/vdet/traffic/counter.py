@@ -19,6 +19,7 @@ from vdet.traffic.borders import (
     LEAST_BAND,
     TIME_DIGITS,
     VANISH,
+    Border,
     BorderState,
     Change,
     Sighting,
@@ -103,7 +104,7 @@ class VehicleCounter:
     def __init__(self, settings: CountSettings, width: int, height: int) -> None:
         self.lines, self.zones = place(settings, width, height)
         self._confirmed = settings.confirmed
-        self._borders = *self.lines, *self.zones
+        self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self._size = width, height
         self._vehicles: dict[int, _Vehicle] = {}
         self._events: list[Event] = []
