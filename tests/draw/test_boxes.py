@@ -3,8 +3,6 @@ import itertools
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vdet.boxes import Box
 from vdet.draw.boxes import (
@@ -85,21 +83,6 @@ class TestDashedBox:
             assert 0.4 < side.mean() < 0.75
             assert side[0]
             assert side[-1]
-
-    @given(
-        x=st.integers(-100, 340),
-        y=st.integers(-100, 260),
-        width=st.integers(1, 400),
-        height=st.integers(1, 300),
-        rows=st.sampled_from([180, 540, 720]),
-    )
-    def test_lies_on_the_solid_outline_of_the_same_box(
-        self, x: int, y: int, width: int, height: int, rows: int
-    ) -> None:
-        solid, dashed = blank(height=rows), blank(height=rows)
-        draw_box(solid, Box.sized(x, y, width, height), BLACK)
-        draw_box(dashed, Box.sized(x, y, width, height), BLACK, dashed=True)
-        assert not (touched(dashed) & ~touched(solid)).any()
 
 
 def contrast(one: Color, other: Color) -> float:

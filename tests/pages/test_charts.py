@@ -3,14 +3,12 @@
 from collections import Counter
 from collections.abc import Sequence
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vdet.pages.charts import (
     clock,
-    curve,
     level_plot,
     minute_plot,
     number_axis,
@@ -67,11 +65,3 @@ def test_no_two_spans_at_one_time_share_a_row_and_no_row_is_needless(
                for time in range(121)]  # fmt: skip
     assert all(len(set(each)) == len(each) for each in at_once)
     assert len(set(rows)) == max(map(len, at_once))
-
-
-def test_a_curve_keeps_its_ends_and_few_points() -> None:
-    xs = np.linspace(0, 1, 100_000)
-    line = curve(xs, 1 - xs, "#fff")
-    assert len(line.points) <= 400
-    assert (line.points[0], line.points[-1]) == ((0, 1), (1, 0))
-    assert curve(np.empty(0), np.empty(0), "#fff").points == []

@@ -66,10 +66,6 @@ class TestEnds:
     ) -> None:
         assert len(events(frames(through((0, x, 300), (4, x, 500))))) == count
 
-    def test_a_way_around_and_back_through_counts_once(self) -> None:
-        path = through((0, 600, 300), (2, 1200, 300), (4, 1200, 500), (6, 600, 500), (9, 600, 300))
-        assert ways(events(frames(path))) == ["away"]
-
     def test_a_line_that_ends_at_the_edge_goes_on_beyond_it(self) -> None:
         """The whole box of a vehicle that leaves at the side stands outside the frame."""
         to_the_edge = line((800, 400), (WIDTH - 1, 400))

@@ -75,10 +75,6 @@ class TestPath:
         ]
         assert record(*frames).length <= PATH_STEP * WIDTH
 
-    def test_the_part_of_the_box_outside_the_frame_counts_where_it_is_known(self) -> None:
-        found = record(frame(0, track(1, PLACE, whole_foot=(50.0, 260.0))))
-        assert found.path == [(50.0, 260.0)]
-
     def test_predicted_frames_add_nothing(self) -> None:
         frames = [
             frame(0, track(1, Box.sized(0, 0, 40, 30), predicted=True)),

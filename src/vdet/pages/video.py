@@ -151,8 +151,9 @@ class VideoPage:
     @property
     def timeline(self) -> Timeline:
         """When each vehicle is shown; those that are not there at once share a row."""
-        rows = charts.pack((record.first, record.last) for record in self.shown)
-        spans = [_span(record, row) for record, row in zip(self.shown, rows, strict=True)]
+        shown = self.shown
+        rows = charts.pack((record.first, record.last) for record in shown)
+        spans = list(map(_span, shown, rows))
         return Timeline("When each vehicle is shown", charts.time_axis(self.start, self.end), spans)
 
     @property
