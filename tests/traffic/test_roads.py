@@ -10,9 +10,6 @@ from track.motion.traffic import Noise, TrueVehicle, detect, random_traffic, tru
 from vdet.boxes import Box
 from vdet.config.places import CountSettings, LineSettings
 from vdet.config.schema import MotionTrackerSettings
-from vdet.synthetic.random_scenes import demo_scene
-from vdet.synthetic.scene import Scene, SceneVehicle, Waypoint
-from vdet.synthetic.truth import must_be_found, true_boxes
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.track import FrameTracks, Track
 from vdet.traffic.counter import count_frames
