@@ -204,10 +204,10 @@ def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | 
 
     In an undistorted picture they lie on the same places of the road.
     """
-    for zone in counter.layout.zones:
+    for zone in counter.zones:
         label = f"{zone.name}: {counter.present(zone)}"
         draw_zone(surface, _on_road(zone.corners, road), label)
-    for line in counter.layout.lines:
+    for line in counter.lines:
         left, right = (
             f"{line.name} {way}: {counter.count(line.name, way)}" for way in line.directions
         )
