@@ -311,18 +311,14 @@ class TestFaults:
         with pytest.raises(VideoError, match=r"cut\.mp4: is not a video, or one that was cut off"):
             VideoReader(path)
 
+    @pytest.mark.parametrize("threads", [1, 5])
     @pytest.mark.parametrize("kind", DAMAGED)
-    def test_damage_has_the_same_effect_with_any_number_of_threads(
-        self, kind: str, *, tmp_path: Path, write_clip: Writer, warnings: Warnings
+    def test_damage_is_counted_with_any_number_of_threads(
+        self, kind: str, threads: int, *, tmp_path: Path, write_clip: Writer, warnings: Warnings
     ) -> None:
         path = write_clip(tmp_path / f"damaged.{kind}", **(GOPS | DAMAGED[kind]))
         overwrite(path, 4 if kind == "mp4" else 2)
-        (frames, damaged), *others = (read_damaged(path, threads) for threads in (1, 2, 5))
-        for other, count in others:
-            assert count == damaged
-            assert [frame.time for frame in other] == [frame.time for frame in frames]
-            for one, another in zip(frames, other, strict=True):
-                np.testing.assert_array_equal(one.image, another.image)
+        frames, damaged = read_damaged(path, threads)
         assert 0 <= 60 - len(frames) <= damaged
         assert damaged > 0
         (warning,) = set(warnings())

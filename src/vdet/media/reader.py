@@ -3,9 +3,8 @@
 import itertools
 import logging
 import math
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -16,7 +15,7 @@ import numpy as np
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media.coding import Coding
-from vdet.media.decoder import Decoder
+from vdet.media.decoder import Decoder, find_entry
 from vdet.media.demux import MAX_PIXELS
 from vdet.media.frame import Frame, VideoInfo
 from vdet.media.hdr import HDR_TRANSFERS, StandardRange
@@ -38,9 +37,8 @@ class VideoReader:
 
     It gives the frames with ``start <= time - info.start < end``, and at most `frames` of them.
     Seconds count from the file's first frame, as in a player. Decoding begins at the key frame
-    before `start`, where the frames before it can be counted (see `vdet.media.seek`). Elsewhere all
-    frames are decoded, and those before `start` dropped. Indices, times and images do not depend on
-    it.
+    before `start` where the frames before it can be counted (see `find_entry`). Elsewhere all frames
+    are decoded, and those before `start` are dropped. Indices, times and images are the same.
 
     The first stream of moving pictures is read. Frames are turned upright, and mirrored where the
     file says so. HDR (PQ or HLG) is converted to BT.709. A frame of another size
@@ -60,8 +58,7 @@ class VideoReader:
     frames
         Most frames to give; None for no limit.
     threads
-        Of the decoder; None lets it choose. The frames do not depend on it; those of a damaged
-        file hardly ever do.
+        Of the decoder; None lets it choose. Only the frames near damage can depend on it.
     settings
         How much damage is tolerated, and the rate of numbered pictures.
 
@@ -87,8 +84,8 @@ class VideoReader:
         self._faults: list[str] = []
         self._length: Fraction | None = None
         self._scaled: set[tuple[int, int]] = set()
-        open_decoder = partial(Decoder, path, threads=threads, frame_rate=settings.frame_rate)
-        self._decoder = open_decoder()
+        self._frame_rate = settings.frame_rate
+        self._decoder = Decoder(path, threads=threads, frame_rate=self._frame_rate)
         try:
             self._pictures = self._decoder.pictures()
             first = next(self._pictures, None)
@@ -104,8 +101,8 @@ class VideoReader:
                 self._length = stated_duration(stream, self.info.start)
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
-            self._faults += self._assumptions(first, settings)
-            self._frames = self._deliver(*self._begin(first, open_decoder))
+            self._faults += self._assumptions(first)
+            self._frames = self._deliver(*self._begin(first, threads))
         except BaseException:
             self._decoder.close()
             raise
@@ -148,12 +145,12 @@ class VideoReader:
         self._frames.close()
         self._decoder.close()
 
-    def _assumptions(self, first: av.VideoFrame, settings: InputSettings) -> Iterator[str]:
+    def _assumptions(self, first: av.VideoFrame) -> Iterator[str]:
         """Yield what is read in another way than the file, or the user, may mean."""
         sequence = find_sequence(self.info.path)
         if sequence and sequence.step > 1:
             yield f"the numbers of its pictures rise by {sequence.step}"
-        if sequence and settings.frame_rate is None:
+        if sequence and self._frame_rate is None:
             yield f"{ASSUMED_RATE:.0f} pictures a second are assumed; --set input.frame_rate=N"
         if self._standard_range:
             name = HDR_TRANSFERS[first.color_trc]
@@ -162,15 +159,13 @@ class VideoReader:
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
 
-    def _begin(
-        self, first: av.VideoFrame, open_decoder: Callable[..., Decoder]
-    ) -> tuple[av.VideoFrame, int]:
-        """Return the picture with which decoding begins, and how many are shown before it."""
+    def _begin(self, first: av.VideoFrame, threads: int | None) -> tuple[av.VideoFrame, int]:
+        """Return the picture at which decoding begins, and how many are shown before it."""
         time = min(math.floor((self.info.start + self._start) / self.info.time_base), _MAX_TICKS)
-        entry = self._decoder.find_entry(first, time) if self._start else None
-        if entry is None:
+        entry = self._start and find_entry(self.info.path, first, time, self._frame_rate)
+        if not entry:
             return first, 0
-        decoder: Decoder = open_decoder(entry=entry)
+        decoder = Decoder(self.info.path, threads=threads, frame_rate=self._frame_rate, entry=entry)
         pictures = decoder.pictures()
         picture = next(pictures, None)
         if picture is None or picture.pts != entry.pts or decoder.damage.evident:
