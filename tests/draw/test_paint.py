@@ -23,8 +23,8 @@ from vdet.draw.paint import (
     write_text,
 )
 from vdet.media.coding import Coding
+from vdet.media.frame import Planes
 from vdet.media.images import Image
-from vdet.media.planes import Planes
 
 Mask = NDArray[np.bool_]
 WIDTH, HEIGHT = 320, 240

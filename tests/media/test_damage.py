@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vdet.media.damage import Damage
+from vdet.media.decoder import Damage
 
 
 def thing(pts: int | None) -> Any:

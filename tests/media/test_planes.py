@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vdet.media.coding import Coding
+from vdet.media.frame import Planes
 from vdet.media.images import Image
-from vdet.media.planes import Planes
 
 CODINGS = [
     Coding("bt601"),

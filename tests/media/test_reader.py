@@ -20,7 +20,7 @@ from vdet.errors import VideoError
 from vdet.media import Frame, VideoReader
 from vdet.media.coding import Coding
 from vdet.media.frame import ColorTags
-from vdet.media.orientation import Orientation
+from vdet.media.images import Orientation
 from vdet.media.reader import Clock
 
 Image = NDArray[np.uint8]

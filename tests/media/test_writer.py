@@ -21,9 +21,8 @@ from vdet.errors import OutputError, VideoError
 from vdet.files import staged
 from vdet.media import ColorTags, Frame, Picture, VideoInfo, VideoReader, VideoWriter
 from vdet.media.coding import Coding
-from vdet.media.frame import Tags
+from vdet.media.frame import Planes, Tags
 from vdet.media.images import Image
-from vdet.media.planes import Planes
 from vdet.media.writer import may_replace_video
 
 Draw = Callable[[int, int, int], Image]

@@ -19,9 +19,8 @@ from vdet.config.schema import OutputSettings, Settings
 from vdet.config.video import DrawSettings
 from vdet.media import ColorTags, Picture, VideoReader, VideoWriter
 from vdet.media.coding import Coding
-from vdet.media.frame import UNSPECIFIED
-from vdet.media.orientation import Orientation
-from vdet.media.planes import Planes
+from vdet.media.frame import UNSPECIFIED, Planes
+from vdet.media.images import Orientation
 from vdet.run.video import VideoJob
 
 TONE_RATE = 48_000

@@ -35,8 +35,8 @@ from running import write_drive
 from vdet.config.schema import Settings
 from vdet.errors import VdetError, VideoError
 from vdet.media import Frame
+from vdet.media.frame import Planes
 from vdet.media.images import Image, read_image
-from vdet.media.planes import Planes
 from vdet.run.loop import FIRST_FRAMES
 from vdet.run.threads import map_ordered
 from vdet.run.video import VideoJob, run_video

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from vdet.boxes import Box, Float64Array
 from vdet.media.coding import Coding
+from vdet.media.frame import Planes
 from vdet.media.images import Image
-from vdet.media.planes import Planes
 from vdet.polygons import Point
 
 Color = tuple[int, int, int]

@@ -1,7 +1,6 @@
 """Video and pictures: frames with exact times, sound carried over, sizes limited."""
 
-from vdet.media.frame import ColorTags, Frame, VideoInfo
-from vdet.media.planes import Picture, Planes
+from vdet.media.frame import ColorTags, Frame, Picture, Planes, VideoInfo
 from vdet.media.reader import VideoReader
 from vdet.media.writer import VideoWriter
 

@@ -1,13 +1,148 @@
-"""A frame of a video, and what is known of a video: given by the reader, taken by the writer."""
+"""A frame of a video: its picture (BGR, or the planes of a decoder), its time, and its video."""
 
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
+from typing import cast
 
-from vdet.media.coding import Coding
-from vdet.media.images import Image
-from vdet.media.orientation import Orientation
-from vdet.media.planes import Picture
+import av
+import cv2
+import numpy as np
+from av.video.reformatter import ColorRange
+
+from vdet.media.coding import Coding, Layers
+from vdet.media.images import Image, Orientation, split_channels
+
+
+class Planes:
+    """A picture of H × W pixels as planes; they share the memory of `picture`.
+
+    Attributes
+    ----------
+    luma
+        uint8 `(H, W)`.
+    blue, red
+        Chroma, uint8 `(⌈H / 2⌉, ⌈W / 2⌉)`; a value stands for 2 × 2 pixels.
+    is_own
+        Nobody else uses the picture, so it may be changed, and encoded.
+    """
+
+    def __init__(self, picture: av.VideoFrame, coding: Coding, *, is_own: bool = False) -> None:
+        self.picture = picture
+        self.coding = coding
+        self.is_own = is_own
+        self.luma, self.blue, self.red = (_plane(picture, number) for number in range(3))
+
+    @classmethod
+    def of_image(cls, image: Image, coding: Coding) -> "Planes":
+        """Convert an image, BGR uint8 `(H, W, 3)`.
+
+        4:2:0 needs even sides: the last row or column of an odd one is repeated.
+        """
+        height, width = image.shape[:2]
+        if height % 2 or width % 2:
+            edge = cv2.BORDER_REPLICATE
+            image = cv2.copyMakeBorder(image, 0, height % 2, 0, width % 2, edge).astype(np.uint8)
+            height, width = image.shape[:2]
+        luma, red, blue = split_channels(np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YCrCb)))
+        luma, *chroma = coding.from_common((luma, blue, red))
+        half = width // 2, height // 2
+        blue, red = (
+            np.asarray(cv2.resize(each, half, interpolation=cv2.INTER_AREA), np.uint8)
+            for each in chroma
+        )
+        return cls._own(width, height, coding, (luma, blue, red))
+
+    @classmethod
+    def _own(cls, width: int, height: int, coding: Coding, layers: Layers) -> "Planes":
+        picture = av.VideoFrame(width, height, "yuv420p")
+        picture.colorspace = 1 if coding.matrix == "bt709" else 6  # ITU-T H.273
+        picture.color_range = ColorRange.JPEG if coding.full_range else ColorRange.MPEG
+        planes = cls(picture, coding, is_own=True)
+        for target, source in zip(planes.layers, layers, strict=True):
+            target[:] = source
+        return planes
+
+    def copy(self) -> "Planes":
+        """Return planes of their own, which may be changed."""
+        height, width = self.shape
+        return self._own(width, height, self.coding, self.layers)
+
+    def to_image(self) -> Image:
+        """Return the picture as BGR uint8 `(H, W, 3)`; a value of chroma counts for 2 × 2 pixels.
+
+        The error is 1 to 4 levels, more for planes of colours that BGR does not have.
+        """
+        height, width = self.shape
+        if self.coding == Coding() and not (height % 2 or width % 2):  # OpenCV is faster
+            stacked = np.concatenate([layer.ravel() for layer in self.layers])
+            return np.asarray(
+                cv2.cvtColor(stacked.reshape(-1, width), cv2.COLOR_YUV2BGR_I420), np.uint8
+            )
+        return self.coding.to_bgr(self.layers)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width, pixels."""
+        return self.picture.height, self.picture.width
+
+    @property
+    def layers(self) -> Layers:
+        """Luma, blue and red."""
+        return self.luma, self.blue, self.red
+
+
+def _plane(picture: av.VideoFrame, number: int) -> Image:
+    plane = picture.planes[number]
+    values = np.frombuffer(cast(bytes, plane), np.uint8)  # it is not typed as such
+    rows = values[: plane.line_size * plane.height].reshape(plane.height, plane.line_size)
+    return rows[:, : plane.width]
+
+
+class Picture:
+    """An upright picture. What it was made from is shared, so nobody may change it.
+
+    Parameters
+    ----------
+    pixels
+        An image, BGR uint8 `(H, W, 3)`, or planes.
+    """
+
+    def __init__(self, pixels: Image | Planes) -> None:
+        self.pixels = pixels
+
+    @property
+    def height(self) -> int:
+        """Pixels."""
+        return int(self.pixels.shape[0])
+
+    @property
+    def width(self) -> int:
+        """Pixels."""
+        return int(self.pixels.shape[1])
+
+    @property
+    def planes(self) -> Planes | None:
+        """The planes, if it came so."""
+        return self.pixels if isinstance(self.pixels, Planes) else None
+
+    @cached_property
+    def image(self) -> Image:
+        """BGR uint8 `(H, W, 3)`; of planes, it is made when it is first asked for."""
+        return self.pixels.to_image() if isinstance(self.pixels, Planes) else self.pixels
+
+
+def bgr_of(picture: av.VideoFrame) -> Image:
+    """Return a decoded picture as BGR uint8 `(H, W, 3)`.
+
+    Colour matrix and range are those that the picture names; else BT.601 and limited.
+    """
+    if coding := Coding.of(picture):
+        return Planes(picture, coding).to_image()
+    image = np.asarray(picture.to_ndarray(format="bgr24", threads=1), np.uint8)
+    return image.copy() if picture.format.name == "bgr24" else np.ascontiguousarray(image)
+
 
 UNSPECIFIED = 2  # in each of the three code tables of ITU-T H.273
 

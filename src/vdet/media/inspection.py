@@ -9,9 +9,9 @@ from av.audio.stream import AudioStream
 from av.container import InputContainer
 
 from vdet.errors import VideoError
+from vdet.media.coding import HDR_TRANSFERS
 from vdet.media.demux import is_pipe, open_input
 from vdet.media.frame import VideoInfo
-from vdet.media.hdr import HDR_TRANSFERS
 from vdet.media.images import Image
 from vdet.media.probe import moving_streams, picture_stream
 from vdet.media.reader import VideoReader

@@ -10,13 +10,11 @@ from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from vdet.errors import ImageError, VideoError
-from vdet.media.coding import Coding
+from vdet.media.coding import HDR_TRANSFERS, Coding
 from vdet.media.demux import MAX_PIXELS, MAX_SIDE
 from vdet.media.frame import ColorTags, Tags, VideoInfo
-from vdet.media.hdr import HDR_TRANSFERS
-from vdet.media.images import read_header
+from vdet.media.images import Orientation, read_header
 from vdet.media.numbered import find_sequence
-from vdet.media.orientation import Orientation
 
 _DEFAULT_RATE = Fraction(25)
 _BT709 = ColorTags(1, 1, 1)

@@ -14,15 +14,12 @@ import numpy as np
 
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
-from vdet.media.coding import Coding
+from vdet.media.coding import HDR_TRANSFERS, Coding, StandardRange
 from vdet.media.decoder import Decoder, find_entry
 from vdet.media.demux import MAX_PIXELS
-from vdet.media.frame import Frame, VideoInfo
-from vdet.media.hdr import HDR_TRANSFERS, StandardRange
-from vdet.media.images import Image
+from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
+from vdet.media.images import Image, Orientation, upright
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
-from vdet.media.orientation import Orientation, upright
-from vdet.media.planes import Picture, Planes, bgr_of
 from vdet.media.probe import check_size, describe, moving_streams, stated_duration
 from vdet.media.restarts import restarts_clock
 
@@ -37,8 +34,8 @@ class VideoReader:
 
     It gives the frames with ``start <= time - info.start < end``, and at most `frames` of them.
     Seconds count from the file's first frame, as in a player. Decoding begins at the key frame
-    before `start` where the frames before it can be counted (see `find_entry`). Elsewhere all frames
-    are decoded, and those before `start` are dropped. Indices, times and images are the same.
+    before `start` where the frames before it can be counted (see `find_entry`). Elsewhere all
+    frames are decoded, and those before `start` are dropped. The frames given are the same.
 
     The first stream of moving pictures is read. Frames are turned upright, and mirrored where the
     file says so. HDR (PQ or HLG) is converted to BT.709. A frame of another size

@@ -15,8 +15,7 @@ from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.coding import Coding
 from vdet.media.demux import begins_like_mp4, is_pipe, open_input
-from vdet.media.frame import UNSPECIFIED, Frame, VideoInfo
-from vdet.media.planes import Picture, Planes
+from vdet.media.frame import UNSPECIFIED, Frame, Picture, Planes, VideoInfo
 from vdet.media.sound import SoundCopy
 from vdet.version import __version__
 

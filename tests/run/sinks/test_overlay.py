@@ -20,8 +20,8 @@ from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
 from vdet.media.coding import Coding
+from vdet.media.frame import Planes
 from vdet.media.images import Image
-from vdet.media.planes import Planes
 from vdet.run.result import FrameResult
 from vdet.run.sinks.drawn import Overlay, time_text
 from vdet.track.track import Track
