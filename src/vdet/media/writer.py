@@ -74,6 +74,11 @@ class VideoWriter:
     threads
         Of the encoder; None lets it choose.
 
+    Attributes
+    ----------
+    size
+        Bytes of pictures that were encoded until now.
+
     Raises
     ------
     OutputError
@@ -96,40 +101,65 @@ class VideoWriter:
         if path.suffix.lower() not in VIDEO_SUFFIXES:
             suffixes = ", ".join(VIDEO_SUFFIXES)
             raise OutputError(f"{self._name}: videos are written as {suffixes}; name it so")
-        self._path = path
         self._info = info
-        self._settings = settings
         self._whole_sound = whole_sound
-        self._threads = threads
-        self._encoder: _Encoder | None = None
-
-    @property
-    def size(self) -> int:
-        """Bytes of pictures that were encoded until now."""
-        return self._encoder.size if self._encoder else 0
+        self._period = 1 / info.rate
+        is_fine = info.time_base.denominator > _FINEST
+        self._time_base = Fraction(1, _FINEST) if is_fine else info.time_base
+        self._origin: Fraction | None = None  # time of the first frame
+        self._last = -1
+        self._sound: SoundCopy | None = None
+        self.size = 0
+        with self._naming_the_file():
+            self._container = av.open(
+                str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
+            )
+        self._container.metadata["comment"] = f"{_MARK} {__version__}"
+        kept = {name: value for name, value in asdict(info.tags).items() if value}
+        self._container.metadata.update(kept)
+        self._stream = self._add_picture(info, settings, threads)
 
     def write(self, frame: Frame) -> None:
-        """Encode the next frame; times must increase from one to the next."""
+        """Encode the next frame, and copy the sound up to it; times must increase."""
         with self._naming_the_file():
-            if self._encoder is None:
-                self._encoder = _Encoder(
-                    self._path, self._info, self._settings, frame.time, self._threads
-                )
-            self._encoder.write(frame)
+            if self._origin is None:
+                self._origin = frame.time
+                self._sound = self._open_sound(frame.time)
+            since = frame.time - self._origin
+            self._last = max(self._last + 1, round(since / self._time_base))
+            picture = _to_encode(frame.picture, self._info.coding)
+            picture.pts = self._last
+            picture.time_base = self._time_base
+            picture.duration = round(self._period / self._time_base)
+            packets = self._stream.encode(picture)
+            self.size += sum(packet.size for packet in packets)
+            self._container.mux(packets)
+            if self._sound:
+                self._sound.copy(since)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if self._encoder is None:
-            if kind is None:
-                raise VideoError(
-                    f"{self._name}: there was no frame to write; check the times given"
-                )
-            return
-        with contextlib.closing(self._encoder), self._naming_the_file():
-            if kind is None:
-                self._encoder.finish(whole_sound=self._whole_sound)
+        with self._naming_the_file():
+            try:
+                if kind is None:
+                    self._finish()
+            finally:
+                with contextlib.suppress(av.FFmpegError):
+                    self._container.close()
+                if self._sound:
+                    self._sound.close()
+
+    def _finish(self) -> None:
+        """Write what is left: frames that the encoder holds back, sound, the file's index."""
+        if self._origin is None:
+            raise VideoError(f"{self._name}: there was no frame to write; check the times given")
+        self._container.mux(self._stream.encode(None))
+        if self._sound:
+            end = self._last * self._time_base + self._period
+            self._sound.copy(None if self._whole_sound else end)
+        self._container.close()
 
     @contextlib.contextmanager
     def _naming_the_file(self) -> Iterator[None]:
@@ -138,70 +168,15 @@ class VideoWriter:
         except av.FFmpegError as error:
             raise OutputError(f"{self._name}: cannot be written: {error.strerror}") from error
 
-
-class _Encoder:
-    """An open output file, whose second 0 is second `origin` of the source.
-
-    Every method may raise `av.FFmpegError`.
-    """
-
-    def __init__(
-        self,
-        path: Path,
-        info: VideoInfo,
-        settings: OutputSettings,
-        origin: Fraction,
-        threads: int | None,
-    ) -> None:
-        self._origin = origin
-        self._period = 1 / info.rate
-        self._time_base = info.time_base
-        if info.time_base.denominator > _FINEST:
-            self._time_base = Fraction(1, _FINEST)
-        self._coding = info.coding
-        self._last = -1
-        self.size = 0
-        self._container = av.open(
-            str(path.absolute()), mode="w", container_options={"movflags": "+faststart"}
-        )
-        self._container.metadata["comment"] = f"{_MARK} {__version__}"
-        self._stream = self._add_picture(info, settings, threads)
-        kept = {name: value for name, value in asdict(info.tags).items() if value}
-        self._container.metadata.update(kept)
-        self._sound = None
-        if info.has_sound and is_pipe(info.path):
-            _log.warning("%s: its sound is left out: a pipe can be read only once", info.path)
-        elif info.has_sound:
-            self._sound = SoundCopy(info.path, self._container, origin)
-
-    def write(self, frame: Frame) -> None:
-        """Encode a frame, and copy the sound up to it."""
-        picture = _to_encode(frame.picture, self._coding)
-        since = frame.time - self._origin
-        self._last = max(self._last + 1, round(since / self._time_base))
-        picture.pts = self._last
-        picture.time_base = self._time_base
-        picture.duration = round(self._period / self._time_base)
-        packets = self._stream.encode(picture)
-        self.size += sum(packet.size for packet in packets)
-        self._container.mux(packets)
-        if self._sound:
-            self._sound.copy(since)
-
-    def finish(self, *, whole_sound: bool) -> None:
-        """Write what is left: frames that the encoder holds back, sound, the file's index."""
-        self._container.mux(self._stream.encode(None))
-        if self._sound:
-            end = self._last * self._time_base + self._period
-            self._sound.copy(None if whole_sound else end)
-        self._container.close()
-
-    def close(self) -> None:
-        """Close the file, complete or not."""
-        with contextlib.suppress(av.FFmpegError):
-            self._container.close()
-        if self._sound:
-            self._sound.close()
+    def _open_sound(self, origin: Fraction) -> SoundCopy | None:
+        """Return a copy of the sound of the source, if it has any that can be read again."""
+        source = self._info.path
+        if not self._info.has_sound:
+            return None
+        if is_pipe(source):
+            _log.warning("%s: its sound is left out: a pipe can be read only once", source)
+            return None
+        return SoundCopy(source, self._container, origin)
 
     def _add_picture(
         self, info: VideoInfo, settings: OutputSettings, threads: int | None
