@@ -2,6 +2,7 @@
 
 import os
 import resource
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -86,6 +87,21 @@ def test_what_cannot_be_written_is_dropped() -> None:
         assert file.write(b"unheard") == 7
     with LossyFile("/dev/full", "w") as file:
         assert file.write(b"unheard") == 7
+
+
+def test_libraries_use_one_thread_a_call() -> None:
+    code = """if True:
+        import atexit, sys
+        def show():
+            import cv2
+            print(cv2.getNumThreads())
+        atexit.register(show)
+        sys.argv = ["vdet", "--version"]
+        from vdet.process import run
+        run()
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == "1"
 
 
 def test_too_little_memory_is_reported_in_one_line(running: list[Running], tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ R = TypeVar("R")
 PARENT_CHECK_INTERVAL = 0.5  # seconds
 CLEANUP_TIMEOUT = 10.0  # seconds between SIGTERM and a forced exit
 SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OPENCV_FOR_THREADS_NUM": "1"}
-"""Variables that keep calls of libraries to one thread: frames and files are done in parallel."""
+"""Variables that limit libraries to one thread a call: frames and files are done in parallel."""
 ENVIRONMENT = {
     **SINGLE_THREADED,
     "OMP_NUM_THREADS": "1",
@@ -75,7 +75,7 @@ def core_count() -> int:
 
 
 def limit_library_threads() -> None:
-    """Do as `SINGLE_THREADED` in a process that has loaded the libraries. No library code does."""
+    """Do as `SINGLE_THREADED` says in a process that has loaded the libraries."""
     import cv2
     from threadpoolctl import threadpool_limits
 

@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import cv2
-
 from conftest import Run
 
 # Cars are shown sooner: the clip is short.
@@ -36,16 +34,3 @@ def test_the_video_is_the_same_too(run: Run, clip_path: Path, tmp_path: Path) ->
         assert result.code == 0, result.err
         videos.append(out.read_bytes())
     assert videos[0] == videos[1]
-
-
-def test_the_program_searches_with_one_thread_a_call(
-    run: Run, clip_path: Path, tmp_path: Path
-) -> None:
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(2)
-    try:
-        options = ("--no-video", "--tracks", tmp_path / "a.csv", "--frames", "1")
-        assert run("detect-video", clip_path, *options).code == 0
-        assert cv2.getNumThreads() == 1
-    finally:
-        cv2.setNumThreads(before)

@@ -24,9 +24,7 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
     are written into DIR, by default into demo.
     """
     from vdet.demo import METRICS, TRUTH, run_demo
-    from vdet.workers import limit_library_threads
 
-    limit_library_threads()
     with progress_steps("") as steps:
         result = run_demo(
             folder,

@@ -125,9 +125,7 @@ def detect_video(
     from vdet.batch.task import Work
     from vdet.regions import check_mask
     from vdet.run.video import VideoJob
-    from vdet.workers import limit_library_threads
 
-    limit_library_threads()
     check_mask(settings.regions)
     job = VideoJob(source, (), start, end, frames, at or Fraction(0), request, overwrite)
     if batch.folder is None:

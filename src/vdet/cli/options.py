@@ -192,7 +192,7 @@ class SettingsChoice:
         return load_settings(path, (*self.assignments, *more), places, detector=detector)
 
     def load_detector(self, settings: "DetectorSettings") -> "DetectorModel":
-        """Load the detector, and let this process search with one thread a call.
+        """Load the detector.
 
         Raises
         ------
@@ -200,9 +200,7 @@ class SettingsChoice:
             It cannot be loaded.
         """
         from vdet.detect.factory import load_detector
-        from vdet.workers import limit_library_threads
 
-        limit_library_threads()
         return load_detector(settings, self.model_path)
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
