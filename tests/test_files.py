@@ -4,7 +4,6 @@ import os
 import resource
 import subprocess
 import sys
-import time
 import tracemalloc
 from pathlib import Path
 
@@ -236,16 +235,6 @@ def test_files_of_others_are_never_removed(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
     remove_stale(tmp_path)
     assert (tmp_path / name).exists()
-
-
-@pytest.mark.parametrize(("days", "stays"), [(6, True), (8, False)])
-def test_age_decides_on_the_file_of_another_host(tmp_path: Path, days: int, stays: bool) -> None:
-    path = tmp_path / f".a.vdet-elsewhere-{DIGITS}.mp4"
-    path.touch()
-    changed = time.time() - days * 24 * 3600
-    os.utime(path, (changed, changed))
-    remove_stale(tmp_path)
-    assert path.exists() == stays
 
 
 def test_an_input_is_known_by_device_and_inode(tmp_path: Path) -> None:

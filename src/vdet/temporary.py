@@ -3,7 +3,7 @@
 A temporary file lies beside its output and is named `.name.vdet-`, the host, 16 digits and the
 suffix; a temporary folder lies in the folder that its files go into. The writer holds a lock on it,
 which the system releases when the process ends, in whatever way. A lock of another host may not be
-seen on a shared file system; there the age decides what a killed run left.
+seen on a shared file system, so what a killed run left is removed by the next run on its host.
 """
 
 import contextlib
@@ -12,8 +12,6 @@ import platform
 import re
 import secrets
 import shutil
-import stat
-import time
 from pathlib import Path
 
 try:
@@ -22,9 +20,8 @@ except ImportError:  # Windows: files are not locked, and none is taken for stal
     fcntl = None  # type: ignore[assignment]
 
 _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
-_NAME = re.compile(r"\..*\.vdet-([a-z0-9]*)-[0-9a-f]{16}(\.[^.]*)?", re.DOTALL)
+_NAME = re.compile(rf"\..*\.vdet-{_HOST}-[0-9a-f]{{16}}(\.[^.]*)?", re.DOTALL)
 _MAX_STEM = 180  # bytes; a whole name may have 255
-_MAX_AGE = 7 * 24 * 3600  # seconds since the last change of a file of another host
 _NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
 _FLAGS = os.O_RDWR | _NOT_A_LINK | getattr(os, "O_BINARY", 0)
 _FOLDER_FLAGS = os.O_RDONLY | _NOT_A_LINK | getattr(os, "O_DIRECTORY", 0)
@@ -76,23 +73,20 @@ def remove_stale(folder: Path) -> None:
     """Remove the temporary files and folders in `folder` whose writers have ended."""
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if fcntl and (match := _NAME.fullmatch(entry.name)):
+            if fcntl and _NAME.fullmatch(entry.name):
                 with contextlib.suppress(OSError):
-                    _remove_if_stale(entry.path, is_ours=match[1] == _HOST)
+                    _remove_if_stale(entry)
 
 
-def _remove_if_stale(path: str, *, is_ours: bool) -> None:
-    status = os.lstat(path)
-    if not is_ours and time.time() - status.st_mtime < _MAX_AGE:
-        return
-    is_folder = stat.S_ISDIR(status.st_mode)
-    descriptor = os.open(path, _FOLDER_FLAGS if is_folder else _FLAGS)
+def _remove_if_stale(entry: "os.DirEntry[str]") -> None:
+    is_folder = entry.is_dir(follow_symlinks=False)
+    descriptor = os.open(entry.path, _FOLDER_FLAGS if is_folder else _FLAGS)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if is_folder:
-            shutil.rmtree(path)
+            shutil.rmtree(entry.path)
         else:
-            os.unlink(path)  # noqa: PTH108
+            os.unlink(entry.path)  # noqa: PTH108
     finally:
         os.close(descriptor)
 
