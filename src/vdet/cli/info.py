@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,6 +10,9 @@ from vdet.cli.command import command
 from vdet.cli.options import PATH
 from vdet.cli.results import Results, facts_options
 from vdet.files import printable
+
+if TYPE_CHECKING:
+    from av.audio.stream import AudioStream
 
 Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
@@ -21,9 +24,8 @@ Facts = dict[str, Any]
 def info(path: Path, results: Results) -> None:
     """Describe a video, a picture or a model file.
 
-    FILE is a video or numbered pictures (what it holds, what a written video loses of it, where
-    the horizon is), a picture, a linear model (.npz), or a network (.onnx) of vdet or of another
-    tool. With --json, a model's file also says how it was trained.
+    FILE is a video or numbered pictures (what it holds, where the horizon is), a picture, a linear
+    model (.npz), or a network (.onnx) of vdet or of another tool.
     """
     from vdet.media.images import is_picture_name
 
@@ -95,26 +97,38 @@ def _picture(path: Path) -> Facts:
 
 def _video(path: Path) -> Facts:
     from vdet.detect.svm.horizon import seen_horizon
-    from vdet.media.inspection import inspect_video
+    from vdet.errors import VideoError
+    from vdet.media import VideoReader
+    from vdet.media.demux import is_pipe, open_input
+    from vdet.media.probe import picture_stream
     from vdet.run.loop import FIRST_FRAMES
 
-    report = inspect_video(path, FIRST_FRAMES)
-    info = report.info
-    return {
-        "kind": "video",
-        "container": report.container,
-        "bytes": report.size,
-        "codec": report.codec,
-        "pixel_format": report.pixels,
-        "width": info.width,
-        "height": info.height,
-        **asdict(info.orientation),
-        "frames": info.frames,
-        "rate": float(info.rate),
-        "start": float(info.start),
-        "seconds": None if info.duration is None else float(info.duration),
-        "sounds": list(report.sounds),
-        **asdict(info.tags),
-        "lost_in_mp4": list(report.lost),
-        "horizon": seen_horizon(report.images),
-    }
+    if is_pipe(path):
+        raise VideoError(f"{path}: can be read only once; write it into a file first")
+    with VideoReader(path, frames=FIRST_FRAMES) as reader:
+        info, images = reader.info, [frame.image for frame in reader]
+    with open_input(path) as container:
+        context = picture_stream(container, path).codec_context
+        return {
+            "kind": "video",
+            "container": container.format.long_name,
+            "bytes": max(0, container.size or 0),
+            "codec": context.name,
+            "pixel_format": context.pix_fmt,
+            "width": info.width,
+            "height": info.height,
+            **asdict(info.orientation),
+            "frames": info.frames,
+            "rate": float(info.rate),
+            "start": float(info.start),
+            "seconds": None if info.duration is None else float(info.duration),
+            "sounds": list(map(_sound, container.streams.audio)),
+            **asdict(info.tags),
+            "horizon": seen_horizon(images),
+        }
+
+
+def _sound(stream: "AudioStream") -> str:
+    context = stream.codec_context
+    form = f"{context.name}, {context.sample_rate} Hz" if context else "unknown"
+    return form if stream.language in (None, "und") else f"{form}, {stream.language}"
