@@ -9,17 +9,14 @@ from contextlib import closing
 from functools import partial
 from pathlib import Path
 
-import cv2
 import pytest
 
 from running import until
 from vdet.workers import (
-    DaskCluster,
     LocalProcesses,
     ThisProcess,
     WorkerKilledError,
     Workers,
-    make_workers,
 )
 
 MAPS = pytest.mark.parametrize("workers", [ThisProcess(), LocalProcesses(1), LocalProcesses(2)])
@@ -66,14 +63,6 @@ def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
     assert os.getpid() not in {process for _, process in results}
 
 
-def test_a_process_calls_opencv_with_one_thread() -> None:
-    assert dict(LocalProcesses(1).map(_threads_of_opencv, [0])) == {0: 1}
-
-
-def _threads_of_opencv(_: int) -> int:
-    return cv2.getNumThreads()
-
-
 def test_what_ended_processes_left_is_removed_without_a_word(tmp_path: Path) -> None:
     (tmp_path / "left").touch()
     code = f"""if True:
@@ -109,39 +98,3 @@ def test_closing_the_generator_ends_the_processes_without_a_warning(tmp_path: Pa
     with pytest.raises(ProcessLookupError):
         os.kill(process, 0)
     assert {path.name for path in tmp_path.iterdir()} <= {"0", "1", "2"}
-
-
-def test_processes_import_no_module_from_the_current_folder(tmp_path: Path) -> None:
-    (tmp_path / "queue.py").write_text("raise SystemExit('a module of the current folder')")
-    code = "from vdet.workers import *; print(*LocalProcesses(1).map(abs, [-3]))"
-    done = subprocess.run(
-        [sys.executable, "-P", "-c", code],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.stdout, done.stderr) == ("(0, 3)\n", "")
-
-
-@pytest.mark.parametrize(
-    ("jobs", "scheduler", "expected"),
-    [
-        (1, None, ThisProcess()),
-        (3, None, LocalProcesses(3)),
-        (None, "tcp://x:1", DaskCluster("tcp://x:1")),
-    ],
-)
-def test_workers_are_chosen_by_the_options(
-    jobs: int | None, scheduler: str | None, expected: Workers
-) -> None:
-    assert make_workers(jobs, scheduler) == expected
-
-
-def test_without_options_there_is_one_process_for_each_core(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("joblib.cpu_count", lambda: 7)
-    assert make_workers() == LocalProcesses(7)
-    monkeypatch.setattr("joblib.cpu_count", lambda: 1)
-    assert make_workers() == ThisProcess()

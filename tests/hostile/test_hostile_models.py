@@ -47,18 +47,7 @@ SHAPES = (
     "(" * 300 + ")" * 300,
 )
 KINDS = (
-    "<f4",
-    ">f4",
-    "<f8",
-    "|O",
-    "|S4",
-    "<U9",
-    "|V4",
-    "<M8[s]",
-    "<c8",
-    "|b1",
-    "a5",
-    "x",
+    *("<f4", ">f4", "<f8", "|O", "|S4", "<U9", "|V4", "<M8[s]", "<c8", "|b1", "a5", "x"),
     "<f4,<f4",
 )
 VALUES = (np.nan, np.inf, -np.inf, 3e38, -3e38, 1e9, -1e9, 1e-45, 0.0)
@@ -101,32 +90,32 @@ def zipped(parts: dict[str, bytes]) -> bytes:
 
 
 def bad_models() -> Iterator[bytes]:
-    """Give 500 models with a fault: in the file, in a part of it, in a number, or a part less."""
-    yield from mutated(zipped(members()), seed=1, count=100)
-    for header in mutated(HEADER.encode(), seed=2, count=80, tokens=TOKENS):
+    """Give 200 models with a fault: in the file, in a part of it, in a number, or a part less."""
+    yield from mutated(zipped(members()), seed=1, count=40)
+    for header in mutated(HEADER.encode(), seed=2, count=30, tokens=TOKENS):
         yield zipped(members(header))
-    for header in with_other_words(HEADER, WORDS, seed=3, count=80):
+    for header in with_other_words(HEADER, WORDS, seed=3, count=30):
         yield zipped(members(header))
     whole = members()
     for seed, name in enumerate(whole):
-        for part in mutated(whole[name], seed=seed, count=20):
+        for part in mutated(whole[name], seed=seed, count=8):
             yield zipped(whole | {name: part})
     rng = np.random.default_rng(4)
     names = list(whole)
     for name in names:
         yield zipped({other: part for other, part in whole.items() if other != name})
-    for _ in range(50):
+    for _ in range(20):
         name, kind = rng.choice(names), str(rng.choice(KINDS))
         data = npy_header(kind, SHAPES[rng.integers(len(SHAPES))]) + bytes(4 * LENGTH)
         yield zipped(whole | {name: data})
-    for _ in range(43):
+    for _ in range(17):
         name = rng.choice(names[1:])
         array = np.load(io.BytesIO(whole[name])).copy()
         array.flat[rng.integers(array.size)] = rng.choice(VALUES)
         yield zipped(whole | {name: npy(array)})
 
 
-def test_500_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
+def test_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
     picture, inside, out = tmp_path / "picture.png", tmp_path / "in", tmp_path / "out"
     noise = np.random.default_rng(0).integers(0, 256, (90, 160, 3), dtype=np.uint8)
     cv2.imwrite(str(picture), noise)
@@ -135,7 +124,7 @@ def test_500_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
     for number, data in enumerate(bad_models()):
         (inside / f"{number}.npz").write_bytes(data)
     before = files_in(inside)
-    assert len(before) == 500
+    assert len(before) == 200
     trials = try_all(
         [
             ["detect-image", picture, "--model", path, "-o", out / f"{path.stem}.png"]
@@ -146,7 +135,7 @@ def test_500_damaged_models_are_used_or_refused(tmp_path: Path) -> None:
     assert broken_promises(trials) == []
     assert files_in(inside) == before
     assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
-    assert 20 < sum(trial.code == 0 for trial in trials) < 250
+    assert 8 < sum(trial.code == 0 for trial in trials) < 100
 
 
 def claiming(data: bytes, size: int) -> bytes:

@@ -27,7 +27,7 @@ FORMATS: dict[str, tuple[str, list[int]]] = {
     "lossy.webp": (".webp", [cv2.IMWRITE_WEBP_QUALITY, 80]),
     "lossless.webp": (".webp", [cv2.IMWRITE_WEBP_QUALITY, 101]),
 }
-MUTATIONS = 30  # of each
+MUTATIONS = 12  # of each
 SECONDS = 20.0
 FEW_WINDOWS = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
 
@@ -66,7 +66,7 @@ BOMBS = {
 }
 
 
-def test_300_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
+def test_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
     inside, out = tmp_path / "in", tmp_path / "out"
     inside.mkdir()
     out.mkdir()
@@ -78,7 +78,7 @@ def test_300_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
     for name, data in BOMBS.items():
         (inside / name).write_bytes(data)
     before = files_in(inside)
-    assert len(before) == 300 + len(BOMBS)
+    assert len(before) == MUTATIONS * len(FORMATS) + len(BOMBS)
     trials = try_all(
         [["detect-image", path, "-o", out, *FEW_WINDOWS] for path in before], seconds=SECONDS
     )
@@ -87,7 +87,7 @@ def test_300_damaged_pictures_are_read_or_refused(tmp_path: Path) -> None:
     assert files_in(inside) == before
     assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
     written = sum(trial.code == 0 for trial in trials)
-    assert len(list(out.iterdir())) == written > 30
+    assert len(list(out.iterdir())) == written > 12
 
 
 @pytest.mark.parametrize("name", BOMBS)
@@ -101,11 +101,3 @@ def test_the_error_names_a_picture_of_too_many_pixels(tmp_path: Path, name: str)
 def test_an_endless_file_is_read_up_to_the_limit() -> None:
     with pytest.raises(ImageError, match=r"/dev/zero: is larger than 256,000,000 bytes"):
         read_image(Path("/dev/zero"))
-
-
-@pytest.mark.parametrize("suffix", [".gif", ".ppm", ".jp2", ".ras"])
-def test_other_formats_are_not_read(tmp_path: Path, suffix: str) -> None:
-    path = tmp_path / "picture.png"
-    path.write_bytes(encoded(suffix, PICTURE))
-    with pytest.raises(ImageError, match=r"is not a picture, .* \(PNG, JPEG, BMP, TIFF, WebP\)"):
-        read_image(path)

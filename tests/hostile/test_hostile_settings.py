@@ -73,21 +73,7 @@ TOKENS = (
     *("\xff", "é", "🚗"),
 )
 NUMBERS = (
-    *(
-        "0",
-        "1",
-        "2",
-        "-1",
-        "0.01",
-        "0.99",
-        "0.999999",
-        "1",
-        "8",
-        "16",
-        "99999",
-        "100000",
-        "1000000",
-    ),
+    *("0", "1", "2", "-1", "0.01", "0.99", "0.999999", "1", "8", "16", "99999", "100000"),
     *("4294967296", "-9223372036854775808", "1e-300", "1e300", "1e999", ".inf", "-.inf", ".nan"),
     *("true", "null", "[]", "{}", "[1, 2, 3]", "2001-01-01", "1:60:60", "none", "patch", "dense"),
 )
@@ -102,15 +88,15 @@ def picture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_500_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Path) -> None:
+def test_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Path) -> None:
     inside, out = tmp_path / "in", tmp_path / "out"
     inside.mkdir()
     out.mkdir()
-    settings = mutated(SETTINGS.encode(), seed=1, count=150, tokens=TOKENS)
-    settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=150)
-    settings += with_other_words(MOTION, NUMBERS, seed=5, count=50)
-    cameras = mutated(CAMERA.encode(), seed=3, count=50, tokens=TOKENS)
-    cameras += with_other_words(CAMERA, NUMBERS, seed=4, count=100)
+    settings = mutated(SETTINGS.encode(), seed=1, count=60, tokens=TOKENS)
+    settings += with_other_words(SETTINGS, NUMBERS, seed=2, count=60)
+    settings += with_other_words(MOTION, NUMBERS, seed=5, count=20)
+    cameras = mutated(CAMERA.encode(), seed=3, count=20, tokens=TOKENS)
+    cameras += with_other_words(CAMERA, NUMBERS, seed=4, count=40)
     few = only_windows("size: 160, overlap: 0.5, top: 380, bottom: 600")
     runs: list[list[str | Path]] = []
     for number, data in enumerate(settings + cameras):
@@ -119,15 +105,15 @@ def test_500_damaged_yaml_files_are_read_or_refused(tmp_path: Path, picture: Pat
         runs.append(["detect-image", picture, "-o", out / f"{number}.png"])
         of_settings = number < len(settings)
         runs[-1] += ["-c", path] if of_settings else ["--lanes", "--camera", path, *few]
-    assert len(runs) == 500
+    assert len(runs) == 200
     before = files_in(inside)
     trials = try_all(runs, seconds=SECONDS)
     assert broken_promises(trials, lines=MAX_MISTAKES + 1) == []
     assert files_in(inside) == before
     assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
     read = [trial.code == 0 for trial in trials]
-    assert sum(read[: len(settings)]) > 10
-    assert sum(read[len(settings) :]) > 10
+    assert sum(read[: len(settings)]) > 4
+    assert sum(read[len(settings) :]) > 4
 
 
 ALIAS_BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -203,11 +189,4 @@ def test_other_encodings_than_utf_8_are_refused(tmp_path: Path, data: bytes) -> 
     path = tmp_path / "my.yaml"
     path.write_bytes(data)
     with pytest.raises(ConfigError, match=r"my\.yaml: is not UTF-8 text"):
-        load_settings(path)
-
-
-def test_what_is_not_shown_of_many_mistakes_is_counted(tmp_path: Path) -> None:
-    path = tmp_path / "my.yaml"
-    path.write_text("".join(f"k{i}: 1\n" for i in range(100)))
-    with pytest.raises(ConfigError, match=f"… and {100 - MAX_MISTAKES} more mistakes$"):
         load_settings(path)

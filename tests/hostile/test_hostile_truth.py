@@ -1,10 +1,14 @@
-"""Wicked files of boxes, truth and tracks."""
+"""Damaged and wicked files of boxes, truth and tracks, through `vdet eval tracks`."""
 
+import json
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 
 import pytest
 
+from hostile.mutations import mutated, with_other_words
+from hostile.trials import broken_promises, files_in, try_all
 from vdet.errors import TruthError
 from vdet.evaluate.comparison import MAX_IDS, compare
 from vdet.labels import label
@@ -12,8 +16,89 @@ from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.xml_reader import MAX_DEPTH
 
-DEEP = 1_000_000
-CSV = "frame,time,id,x,y,width,height,predicted\n0,0.00,1,90,40,60,50,0\n"
+BOXES = [(frame, id_) for frame, id_ in product(range(6), (1, 2)) if (frame, id_) != (2, 1)]
+GT = "".join(f"{f + 1},{i},{90 * i + 3 * f},40.5,60,50,1,3,0.75\n" for f, i in BOXES)
+RESULTS = "".join(f"{f + 1},{i},{90 * i + 3 * f},41,58,51,0.9,-1,-1,-1\n" for f, i in BOXES)
+KITTI = (
+    "".join(
+        f"{f} {i} Car 0 0 -1.57 {90 * i}.5 40 {90 * i + 60} 90 1.5 1.6 3.7 1.0 1.5 9.0 0.1\n"
+        for f, i in BOXES
+    )
+    + "3 -1 DontCare -1 -1 -10 300 40 350 80 -1 -1 -1 -1000 -1000 -1000 -10\n"
+)
+CVAT = (
+    '<?xml version="1.0" encoding="utf-8"?>\n<annotations>\n<version>1.1</version>\n'
+    + "".join(
+        f'<track id="{i}" label="car">\n'
+        + "".join(
+            f'<box frame="{f}" outside="0" occluded="1" xtl="{90 * i}.5" ytl="40" '
+            f'xbr="{90 * i + 60}" ybr="90" z_order="0"><attribute name="a">b</attribute></box>\n'
+            for f in range(6)
+        )
+        + "</track>\n"
+        for i in (1, 2)
+    )
+    + "</annotations>\n"
+)
+CSV = "frame,time,id,x,y,width,height,predicted\n" + "".join(
+    f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,0\n" for f, i in BOXES
+)
+JSONL = "".join(
+    json.dumps(
+        {
+            "frame": f,
+            "time": f / 25,
+            "tracks": [
+                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "predicted": False}
+                for i in (1, 2)
+            ],
+        }
+    )
+    + "\n"
+    for f in range(6)
+)
+WORDS = (
+    *("0", "-1", "1", "1e999", "-1e999", "nan", "inf", "1e-300", "10000000", "10000001"),
+    *("9" * 400, "1_000", "0x10", "١", "", " ", "Car", "Pedestrian", "tractor", "1.5", "+3"),
+    *(".5", "5.", "None"),
+)
+TOKENS = (
+    *WORDS,
+    *(",", ";", "\t", "\n", "\r\n", '"', "'", "\0", "\ufeff", "\x85", "\u2028"),
+    *("<", ">", "&", "\xff"),
+    *('<!DOCTYPE a [<!ENTITY b "c">]>', "&b;", "<![CDATA[", "]]>", "<!--", "<?xml?>", "&#0;"),
+    *("<track>", "<box/>", "</annotations>", 'rotation="9"', "[" * 200, '{"frame": 1}', "null"),
+)
+SECONDS = 20.0
+EACH = 10  # of each format, of each of two kinds
+
+
+def test_damaged_files_of_boxes_are_read_or_refused(tmp_path: Path) -> None:
+    inside, out = tmp_path / "in", tmp_path / "out"
+    inside.mkdir()
+    out.mkdir()
+    found, true = tmp_path / "found.txt", tmp_path / "gt.txt"
+    found.write_text(RESULTS)
+    true.write_text(GT)
+    truths = {"mot.txt": GT, "kitti.txt": KITTI, "cvat.xml": CVAT}
+    tracks = {"results.txt": RESULTS, "tracks.csv": CSV, "tracks.jsonl": JSONL}
+    runs: list[list[str | Path]] = []
+    for seed, (name, text) in enumerate((truths | tracks).items()):
+        damaged = mutated(text.encode(), seed=seed, count=EACH, tokens=TOKENS)
+        damaged += with_other_words(text, WORDS, seed=seed, count=EACH)
+        for number, data in enumerate(damaged):
+            path = inside / f"{number}-{name}"
+            path.write_bytes(data)
+            files = [found, path] if name in truths else [path, true]
+            runs.append(["eval", "tracks", *files, "--json", out / f"{path.name}.json"])
+    before = files_in(inside)
+    trials = try_all(runs, seconds=SECONDS)
+    assert broken_promises(trials) == []
+    assert files_in(inside) == before
+    assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path, inside, out}
+    assert 12 < sum(trial.code == 0 for trial in trials) < 100
+
+
 ENTITY_BOMB = (
     '<!DOCTYPE annotations [<!ENTITY a "xxxxxxxxxx">'
     + "".join(
@@ -37,7 +122,7 @@ WICKED = {
     ),
     "no number": ("t.txt", "1" * 200_000 + "x,1,1,1,1,1,1,1,1", "is not a number"),
     "no number, KITTI": ("t.txt", "9" * 200_000 + "x " * 17, "is not a number"),
-    "NUL": ("t.txt", "1,1,90,40.5,60,50,1,3,0.75\n\0", "is not text"),
+    "NUL": ("t.txt", GT + "\0", "is not text"),
     "a long line": ("t.txt", "1," * 3_000_000, "has 3000001|columns between commas"),
     "a long label": ("t.txt", "1 1 " + "x" * 1_000_000 + " 0" * 14, "is unknown; give it a role"),
 }
@@ -66,6 +151,11 @@ WICKED_TRACKS = {
     "deep": ("t.jsonl", "[" * 1_000_000, ":1: .*recursion limit"),
     "a huge number": ("t.jsonl", '{"frame": ' + "9" * 100_000 + "}", ":1: "),
     "no end of tracks": ("t.jsonl", '{"frame": 0, "time": 0, "tracks": [' + "{}," * 99_999, ":1: "),
+}
+
+
+DEEP = 1_000_000
+WICKED_TRACKS |= {
     "deep COCO": ("t.coco.json", '{"images": ' + "[" * DEEP, "is not COCO .*recursion limit"),
     "no numbers in COCO": (
         "t.coco.json",
@@ -73,6 +163,7 @@ WICKED_TRACKS = {
         "is not COCO with tracks: annotations.0",
     ),
     "a huge id in COCO": ("t.coco.json", '{"images": [{"id": ' + "9" * DEEP, "is not COCO"),
+    "an entity in CVAT": ("t.xml", ENTITY_BOMB, ":1: the XML declares a document type"),
     "a long class": (
         "t.csv",
         CSV.replace("predicted\n", "class\n").replace(",0\n", "," + "x" * 1000 + "\n"),

@@ -17,7 +17,7 @@ CLIPS: dict[str, dict[str, Any]] = {
     "ts": {"sounds": ["aac"]},
     "gif": {"codec": "gif", "pix_fmt": "rgb8"},
 }
-EACH = 50
+EACH = 20
 SECONDS = 20.0
 
 
@@ -43,7 +43,7 @@ def outcomes(folder: Path, contents: dict[str, bytes]) -> list[Trial]:
     return trials
 
 
-def test_300_damaged_videos_end_well_or_with_one_line_of_error(tmp_path: Path) -> None:
+def test_damaged_videos_end_well_or_with_one_line_of_error(tmp_path: Path) -> None:
     contents = {}
     for kind, spec in CLIPS.items():
         good = write_clip(tmp_path / f"good.{kind}", count=8, size=(96, 64), **spec)
@@ -51,7 +51,7 @@ def test_300_damaged_videos_end_well_or_with_one_line_of_error(tmp_path: Path) -
             contents[f"{number:03d}.{kind}"] = data
     codes = [trial.code for trial in outcomes(tmp_path, contents)]
     assert len(codes) == EACH * len(CLIPS)
-    assert 30 < sum(code == 1 for code in codes) < 270
+    assert 10 < sum(code == 1 for code in codes) < 110
 
 
 def test_enormous_frames_are_refused_before_memory_is_set_aside(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import strategies as st
 
 from vdet.errors import VideoError
 from vdet.media import VideoReader
@@ -61,13 +60,3 @@ def test_whole_clips_pass(tmp_path: Path, write_clip: Writer) -> None:
         ("mkv", {}),
     ):
         check_mp4_index(write_clip(tmp_path / f"clip.{suffix}", **options))
-
-
-BOXES = st.lists(
-    st.tuples(
-        st.sampled_from([0, 1, 8, 12, 16, 24, 2**32 - 1]),
-        st.sampled_from([b"moov", b"trak", b"stsz", b"trun", b"moof", b"free"]),
-        st.binary(max_size=20),
-    ).map(lambda part: struct.pack(">I4s", part[0], part[1]) + part[2]),
-    max_size=8,
-).map(b"".join)

@@ -1,7 +1,5 @@
 """Pictures as planes: which decoded ones come so, and how an image becomes planes."""
 
-from fractions import Fraction
-
 import av
 import av.filter
 import numpy as np
@@ -36,25 +34,6 @@ def decoded(
     return picture
 
 
-def upside_down(picture: av.VideoFrame) -> av.VideoFrame:
-    """Return a picture whose rows are stored from the bottom up."""
-    graph = av.filter.Graph()
-    source = graph.add_buffer(
-        width=picture.width,
-        height=picture.height,
-        format=picture.format,
-        time_base=Fraction(1, 25),
-    )
-    flip, sink = graph.add("vflip"), graph.add("buffersink")
-    source.link_to(flip)
-    flip.link_to(sink)
-    graph.configure()
-    graph.push(picture)
-    flipped = graph.pull()
-    assert isinstance(flipped, av.VideoFrame)
-    return flipped
-
-
 def slopes(width: int, height: int) -> Image:
     """Return an image with all kinds of colours, but no edges."""
     y, x = np.mgrid[:height, :width] / [[[height]], [[width]]]
@@ -83,18 +62,6 @@ class TestCoding:
     @pytest.mark.parametrize("matrix", [4, 7, 9, 10])
     def test_other_matrices_have_none(self, matrix: int) -> None:
         assert Coding.of(decoded(matrix=matrix)) is None
-
-    def test_rows_from_the_bottom_up_have_none(self) -> None:
-        assert Coding.of(upside_down(decoded())) is None
-
-
-class TestViews:
-    def test_are_luma_and_the_two_chromas_at_half_the_size(self) -> None:
-        values = np.arange(48 * 64, dtype=np.uint64).astype(np.uint8).reshape(48, 64)
-        planes = Planes(av.VideoFrame.from_ndarray(values, format="yuv420p"), Coding())
-        np.testing.assert_array_equal(planes.luma, values[:32])
-        np.testing.assert_array_equal(planes.blue, values[32:40].reshape(16, 32))
-        np.testing.assert_array_equal(planes.red, values[40:].reshape(16, 32))
 
 
 class TestCopy:

@@ -14,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from clips import joined
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media import Frame, VideoReader
@@ -96,14 +95,6 @@ class TestRange:
         assert [frame.time for frame in read] == [
             reader.info.start + Fraction(index, 25) for index in expected
         ]
-
-    def test_leaving_the_block_early_closes_the_file(
-        self, plain_clip: Path, warnings: Warnings
-    ) -> None:
-        with VideoReader(plain_clip) as reader:
-            assert next(iter(reader)).index == 0
-        assert list(reader) == []
-        assert warnings() == []
 
 
 def set_matrix(path: Path, a: float, b: float, c: float, d: float) -> Path:
@@ -245,21 +236,6 @@ class TestPlanes:
             other = decoded.to_ndarray(format="bgr24").astype(int)
             assert np.abs(frame.image - other).mean() < 3
 
-    def test_of_frames_that_are_coded_unlike_the_first_there_are_none(
-        self, tmp_path: Path, write_clip: Writer
-    ) -> None:
-        one = write_clip(tmp_path / "one.h264", count=6, matrix=1)
-        other = write_clip(tmp_path / "other.h264", count=9, matrix=5, full_range=True)
-        path = joined(tmp_path / "both.h264", one, other)
-        with VideoReader(path) as reader:
-            assert reader.info.coding == Coding("bt709")
-            frames = list(reader)
-        planar = [frame.picture.planes is not None for frame in frames]
-        assert planar == [True] * 6 + [False] * 9
-        for frame in frames:
-            corner = frame.image[60:90, 10:70].mean(axis=(0, 1))
-            assert np.abs(corner - (40, 30, 210)).max() < 5, "its own coding counts"
-
 
 def test_info_is_what_the_file_declares(tmp_path: Path, write_clip: Writer) -> None:
     rate = Fraction(30_000, 1001)
@@ -324,28 +300,6 @@ class TestFaults:
         (warning,) = set(warnings())
         assert f"{path}: {damaged} of " in warning
 
-    def test_more_damage_than_is_tolerated_is_an_error_after_the_last_frame(
-        self, tmp_path: Path, write_clip: Writer, warnings: Warnings
-    ) -> None:
-        path = write_clip(tmp_path / "damaged.mp4", movflags="+faststart", **GOPS)
-        overwrite(path, 4)
-        with (
-            VideoReader(path) as reader,
-            pytest.raises(VideoError, match=r"more than input\.max_damaged \(0.05\)"),
-        ):
-            for _ in reader:
-                pass
-        assert reader.damaged > 3
-        assert warnings() == []
-
-    def test_damage_after_the_last_frame_read_is_not_reported(
-        self, tmp_path: Path, write_clip: Writer, warnings: Warnings
-    ) -> None:
-        path = cut_off(write_clip(tmp_path / "cut.mkv", **GOPS), 0.6)
-        with VideoReader(path, frames=5) as reader:
-            assert len(list(reader)) == 5
-        assert warnings() == []
-
 
 def test_pixels_that_cannot_be_converted_are_one_error(
     tmp_path: Path, write_clip: Writer, monkeypatch: pytest.MonkeyPatch
@@ -374,20 +328,9 @@ class TestRefusals:
         assert "\n" not in message
         return message
 
-    def test_a_missing_file(self, tmp_path: Path) -> None:
-        assert "no such file" in self.refusal(tmp_path / "none.mp4")
-
     @pytest.mark.parametrize("address", ["rtsp://camera/1", "https://host/a.mp4", "udp://@:1234"])
     def test_an_address(self, address: str) -> None:
         assert "streams are not read; record it into a file" in self.refusal(Path(address))
-
-    @pytest.mark.parametrize(
-        "content", ["", "plain text\n" * 40, "1\n00:00:01,000 --> 00:00:02,000\nsubtitle\n"]
-    )
-    def test_a_file_that_is_no_video(self, content: str, tmp_path: Path) -> None:
-        path = tmp_path / "text.mp4"
-        path.write_text(content)
-        assert "give a" in self.refusal(path)
 
 
 def clock_times(*stamps: int | None) -> list[Fraction]:

@@ -163,22 +163,3 @@ def joined(packets: list[Any]) -> list[tuple[int, int]]:
         demux=lambda _: iter(packets),
     )
     return [(each.stream_index, each.pts or 0) for each in continuous_packets(container, main)]
-
-
-def part_of(begin: int, *, lead: int) -> list[Any]:
-    """Return two seconds; the sound comes `lead` packets before its pictures, or after them."""
-    found = []
-    for number in range(50):
-        order = [(number + max(0, -lead), PICTURES), (number + max(0, lead), SOUND_STREAM)]
-        found += [(place, packet(stream, begin + 40 * number)) for place, stream in order]
-    return [each for _, each in sorted(found, key=lambda item: item[0])]
-
-
-@pytest.mark.parametrize("lead", [-8, 0, 8])
-@pytest.mark.parametrize("begins", [[0, 0], [0, 90_000, 0], [7_000_000, 0, 0]])
-def test_sound_may_come_before_or_after_its_pictures(begins: list[int], lead: int) -> None:
-    parts = [part_of(begin, lead=lead) for begin in begins]
-    found = joined([each for part in parts for each in part])
-    for stream in (PICTURES, SOUND_STREAM):
-        times = [time - begins[0] for index, time in found if index == stream]
-        assert times == [40 * number for number in range(50 * len(begins))]

@@ -94,19 +94,6 @@ def test_a_part_has_the_sound_of_that_part(tmp_path: Path, write_clip: Writer) -
     assert_same(sound(target), expected)
 
 
-def test_sound_that_the_container_cannot_hold_is_left_out_with_a_warning(
-    tmp_path: Path, write_clip: Writer, warnings: Warnings
-) -> None:
-    source = write_clip(tmp_path / "in.mov", sounds=["pcm_mulaw", "aac"])
-    target = copy(source, tmp_path / "out.mp4")
-    assert warnings() == [
-        f"{source}: its sound (pcm_mulaw) is empty, or cannot go into mp4; left out"
-    ]
-    with av.open(str(target)) as container:
-        assert [stream.codec_context.name for stream in container.streams.audio] == ["aac"]
-        assert container.streams.video[0].frames == 12
-
-
 def test_damaged_sound_does_not_affect_the_picture(
     tmp_path: Path, write_clip: Writer, warnings: Warnings
 ) -> None:

@@ -4,11 +4,9 @@ from fractions import Fraction
 from pathlib import Path
 
 import cv2
-import numpy as np
 import pytest
 
 from clips import draw_frame
-from conftest import Run
 from strange.conftest import Process, assert_whole
 
 
@@ -45,13 +43,6 @@ def test_numbers_that_rise_by_a_step_and_an_assumed_rate_are_told(
     assert "the numbers of its pictures rise by 3; 25 pictures a second are assumed" in warning
 
 
-def test_sixteen_bits_of_grey_are_converted(tmp_path: Path, process: Process) -> None:
-    for number in range(3):
-        grey = draw_frame(number, 160, 96)[:, :, 1].astype(np.uint16) * 257
-        cv2.imwrite(str(tmp_path / f"{number:04d}.png"), grey)
-    assert_whole(process(tmp_path / "%04d.png"), [0, 1, 2])
-
-
 def test_a_damaged_picture_is_counted_as_lost(tmp_path: Path, process: Process) -> None:
     pattern = write_pictures(tmp_path / "%d.png", range(30))
     (tmp_path / "20.png").write_text("no picture")
@@ -60,17 +51,3 @@ def test_a_damaged_picture_is_counted_as_lost(tmp_path: Path, process: Process) 
     assert shown.times[20] == Fraction(21, 25)
     (warning,) = shown.warnings
     assert "%d.png: 1 of 30 frames damaged or lost" in warning
-
-
-def test_the_error_names_a_missing_picture(run: Run, tmp_path: Path) -> None:
-    pattern = write_pictures(tmp_path / "img_%03d.png", range(5))
-    (tmp_path / "img_002.png").unlink()
-    result = run("detect-video", pattern, tmp_path / "out.mp4")
-    assert result.code == 1
-    assert "img_%03d.png: picture 2 is missing, between 1 and 3" in result.err
-    assert not (tmp_path / "out.mp4").exists()
-
-
-def test_a_folder_of_pictures_is_a_video(tmp_path: Path, process: Process) -> None:
-    pattern = write_pictures(tmp_path / "frames" / "%010d.png", range(5, 9))
-    assert_whole(process(pattern.parent), [5, 6, 7, 8])
