@@ -99,8 +99,7 @@ def _video(path: Path) -> Facts:
     from vdet.detect.svm.horizon import seen_horizon
     from vdet.errors import VideoError
     from vdet.media import VideoReader
-    from vdet.media.demux import is_pipe, open_input
-    from vdet.media.probe import picture_stream
+    from vdet.media.demux import is_pipe, open_input, picture_stream
     from vdet.run.loop import FIRST_FRAMES
 
     if is_pipe(path):

@@ -13,8 +13,7 @@ from av.packet import Packet
 from av.stream import Discard, Stream
 from av.video.stream import VideoStream
 
-from vdet.media.demux import MAX_PIXELS, is_pipe, open_input
-from vdet.media.probe import check_size, period_of, picture_stream
+from vdet.media.demux import MAX_PIXELS, check_size, is_pipe, open_input, period_of, picture_stream
 from vdet.media.restarts import continuous_packets, restarts_clock
 
 _HOLE = 256  # bytes; what lies between two packets of a whole Matroska file is far less
@@ -54,7 +53,6 @@ class Damage:
     _steps: int = 0
     _regular_steps: int = 0
     _skipped: int = 0
-    _skipped_in_damage: int = 0
     _read_to: int | None = None  # byte of the file
 
     @property
@@ -63,7 +61,8 @@ class Damage:
         if not self.evident:
             return self.lost_at_end
         errors = self.read_errors + self.decode_errors
-        skipped = self._if_regular(self._skipped_in_damage)
+        is_regular = self._regular_steps >= _REGULAR * self._steps
+        skipped = self._skipped if is_regular else 0
         return max(errors, self.without_picture, skipped) + self.lost_at_end
 
     @property
@@ -75,11 +74,6 @@ class Damage:
     def total(self) -> int:
         """Pictures that came, and those lost."""
         return self.pictures + self.lost
-
-    @property
-    def skipped(self) -> int:
-        """Pictures missing between the times of others, where most times are regular."""
-        return self._if_regular(self._skipped)
 
     def fail_to_read(self) -> None:
         """Count a place in the file that cannot be read."""
@@ -145,16 +139,9 @@ class Damage:
         step = time - self._last
         self._steps += 1
         self._regular_steps += abs(step - self.period) <= max(Fraction(1), self.period / 20)
-        if self._is_late(time):  # it was taken for missing
-            self._skipped = max(0, self._skipped - 1)
-            return
-        self._last = time
-        missing = max(0, round(step / self.period) - 1)
-        self._skipped += missing
-        self._skipped_in_damage += missing * self.evident
-
-    def _if_regular(self, pictures: int) -> int:
-        return pictures if self._regular_steps >= _REGULAR * self._steps else 0
+        if not self._is_late(time):
+            self._last = time
+            self._skipped += max(0, round(step / self.period) - 1) * self.evident
 
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture

@@ -16,11 +16,10 @@ from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media.coding import HDR_TRANSFERS, Coding, StandardRange
 from vdet.media.decoder import Decoder, find_entry
-from vdet.media.demux import MAX_PIXELS
+from vdet.media.demux import MAX_PIXELS, check_size, describe, moving_streams, stated_duration
 from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
 from vdet.media.images import Image, Orientation, upright
 from vdet.media.numbered import ASSUMED_RATE, find_sequence
-from vdet.media.probe import check_size, describe, moving_streams, stated_duration
 from vdet.media.restarts import restarts_clock
 
 _log = logging.getLogger("vdet")
@@ -42,9 +41,8 @@ class VideoReader:
     than the first is scaled to it. Where the clock of a recording restarts, its parts follow one
     another. A time that is missing, or not later than the one before, is guessed from the rate.
     Damaged packets are skipped. At the end, one warning (logger "vdet") says how many frames were
-    lost or damaged, whether the file ends before its declared end, whether otherwise regular times
-    have gaps, how often the clock restarts, which frames were scaled, and what of the file was not
-    used (other video streams, HDR, a display matrix that is no quarter turn).
+    lost or damaged, whether the file ends before its declared end, how often the clock restarts,
+    which frames were scaled, and what of the file was not used (other video streams, HDR).
 
     Parameters
     ----------
@@ -256,10 +254,6 @@ class VideoReader:
                 f"({self._tolerated:g}) allows; raise it to take what is left"
             )
         restarts = self._decoder.restarts
-        skipped = max(0, self._decoder.damage.skipped - restarts)  # sound may outlast the pictures
-        if not damaged and skipped > _TOLERANCE * total:
-            share = f"{skipped} of {total + skipped}"
-            self._faults.append(f"times jump as if {share} frames were missing")
         if restarts:
             times = "once" if restarts == 1 else f"{restarts} times"
             self._faults.append(f"its clock restarts {times}; the parts follow one another")

@@ -16,8 +16,7 @@ from av.packet import Packet
 from av.stream import Stream
 from av.video.stream import VideoStream
 
-from vdet.media.demux import packets
-from vdet.media.probe import period_of
+from vdet.media.demux import packets, period_of
 
 _TS_DISCONT = 0x0200  # FFmpeg's flag of such formats: AVFMT_TS_DISCONT
 _AHEAD = 256  # packets that are read ahead; one or two seconds

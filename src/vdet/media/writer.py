@@ -21,9 +21,8 @@ from av.video.reformatter import ColorRange
 from vdet.config.schema import OutputSettings
 from vdet.errors import OutputError, VideoError
 from vdet.media.coding import Coding
-from vdet.media.demux import begins_like_mp4, is_pipe, open_input, packets
+from vdet.media.demux import begins_like_mp4, is_pipe, open_input, packets, picture_stream
 from vdet.media.frame import UNSPECIFIED, Frame, Picture, Planes, VideoInfo
-from vdet.media.probe import picture_stream
 from vdet.media.restarts import continuous_packets, restarts_clock
 from vdet.version import __version__
 
