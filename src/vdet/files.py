@@ -6,13 +6,12 @@ import os
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from vdet.errors import OutputError, VdetError
-from vdet.temporary import create_file, create_folder, remove_stale, sync, try_to_remove
+from vdet.temporary import create_folder, remove_stale, sync, try_to_remove
 
 _CHUNK = 1_000_000  # bytes
 _MAX_SHOWN = 80  # characters of a name
@@ -93,24 +92,6 @@ def make_folder(folder: Path) -> None:
         raise OutputError(f"{folder}: cannot be made a folder: {error.strerror}") from error
 
 
-@dataclass(frozen=True, slots=True)
-class _Staged:
-    """A temporary file that becomes `path`."""
-
-    temporary: Path
-    path: Path
-    may_replace: MayReplace = any_file
-
-
-@dataclass(frozen=True, slots=True)
-class _StagedFolder:
-    """A temporary folder whose files go into `path`; earlier ones are named as `pattern` says."""
-
-    temporary: Path
-    path: Path
-    pattern: str
-
-
 class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
@@ -134,15 +115,16 @@ class OutputFiles:
 
     def __init__(self, *, overwrite: bool = False) -> None:
         self._overwrite = overwrite
-        self._files: list[_Staged] = []
-        self._folders: list[_StagedFolder] = []
+        self._folders: dict[Path, Path] = {}  # temporary ones by where their files will go
+        self._may_replace: dict[Path, MayReplace] = {}
+        self._patterns: list[tuple[Path, str]] = []
         self._cleanup = contextlib.ExitStack()
 
     def stage(self, path: Path, may_replace: MayReplace = any_file) -> Path:
-        """Return a new, empty file beside `path` that will become `path`.
+        """Return a new, empty file of the same name that will become `path`.
 
-        It has the suffix of `path`, for writers that choose a format by it. Temporary files that
-        killed runs left in the folder are removed.
+        It lies in a temporary folder beside `path`. Temporary folders that killed runs left there
+        are removed.
 
         Parameters
         ----------
@@ -150,26 +132,30 @@ class OutputFiles:
             Called at the end if `path` is there and is to be overwritten.
         """
         with output_errors(path):
-            remove_stale(path.parent)
-            temporary = create_file(path, self._cleanup)
+            temporary = self._temporary_folder(path.parent) / path.name
+            temporary.touch()
             if self._overwrite and path.is_file() and not path.is_symlink():
                 # What replaces a private file is private from the beginning.
                 temporary.chmod(stat.S_IMODE(path.stat().st_mode) | stat.S_IRUSR | stat.S_IWUSR)
-        self._files.append(_Staged(temporary, path, may_replace))
+        self._may_replace[path] = may_replace
         return temporary
 
     def stage_folder(self, path: Path, pattern: str) -> Path:
-        """Return a new, empty folder in the folder `path`; its files will then lie in `path`.
+        """Return a folder whose files will lie in the folder `path`.
 
-        It is for many files: each one of `stage` is kept open. With `overwrite`, the files in
-        `path` that the glob `pattern` names and that this run did not write are removed in the end:
-        they are of an earlier run.
+        With `overwrite`, the files in `path` that the glob `pattern` names and that this run did
+        not write are removed in the end: they are of an earlier run.
         """
         with output_errors(path):
-            remove_stale(path)
-            temporary = create_folder(path, self._cleanup)
-        self._folders.append(_StagedFolder(temporary, path, pattern))
+            temporary = self._temporary_folder(path)
+        self._patterns.append((path, pattern))
         return temporary
+
+    def _temporary_folder(self, path: Path) -> Path:
+        if path not in self._folders:
+            remove_stale(path)
+            self._folders[path] = create_folder(path, self._cleanup)
+        return self._folders[path]
 
     def __enter__(self) -> Self:
         return self
@@ -182,35 +168,35 @@ class OutputFiles:
                 self._publish()
 
     def _publish(self) -> None:
-        files = self._files + [
-            _Staged(file, folder.path / file.name)
-            for folder in self._folders
-            for file in sorted(folder.temporary.iterdir())
-        ]
-        for file in files:
-            with output_errors(file.path):
-                sync(file.temporary)
+        files = {
+            path / file.name: file
+            for path, folder in self._folders.items()
+            for file in sorted(folder.iterdir())
+        }
+        for path, file in files.items():
+            with output_errors(path):
+                sync(file)
         with contextlib.ExitStack() as undo:
-            for file in files:
-                with output_errors(file.path):
-                    if self._overwrite and os.path.lexists(file.path):
-                        _replace(file)
+            for path, file in files.items():
+                with output_errors(path):
+                    if self._overwrite and os.path.lexists(path):
+                        _replace(path, file, self._may_replace.get(path, any_file))
                     else:
-                        _add_name(file.temporary, file.path)
-                        undo.callback(try_to_remove, file.path)
+                        _add_name(file, path)
+                        undo.callback(try_to_remove, path)
             undo.pop_all()
         if self._overwrite:
-            earlier = {old for folder in self._folders for old in folder.path.glob(folder.pattern)}
-            for old in earlier - {file.path for file in files}:
+            earlier = {old for path, pattern in self._patterns for old in path.glob(pattern)}
+            for old in earlier - files.keys():
                 try_to_remove(old)
 
 
-def _replace(file: _Staged) -> None:
+def _replace(path: Path, temporary: Path, may_replace: MayReplace) -> None:
     """Replace the file that is there; keep its permissions."""
-    _check_replaceable(file.path, file.may_replace)
-    if not file.path.is_symlink():
-        file.temporary.chmod(stat.S_IMODE(file.path.stat().st_mode))
-    file.temporary.replace(file.path)
+    _check_replaceable(path, may_replace)
+    if not path.is_symlink():
+        temporary.chmod(stat.S_IMODE(path.stat().st_mode))
+    temporary.replace(path)
 
 
 def _add_name(temporary: Path, path: Path) -> None:

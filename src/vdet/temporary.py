@@ -1,9 +1,9 @@
-"""Temporary files and folders, which outputs are written into before they appear.
+"""Temporary folders, into which outputs are written before they appear.
 
-A temporary file lies beside its output and is named `.name.vdet-`, the host, 16 digits and the
-suffix; a temporary folder lies in the folder that its files go into. The writer holds a lock on it,
-which the system releases when the process ends, in whatever way. A lock of another host may not be
-seen on a shared file system, so what a killed run left is removed by the next run on its host.
+A temporary folder lies in the folder of the outputs and is named `.vdet-`, the host, and 16 digits.
+The writer holds a lock on it, which the system releases when the process ends, in whatever way. A
+lock of another host may not be seen on a shared file system, so what a killed run left is removed
+by the next run on its host.
 """
 
 import contextlib
@@ -16,51 +16,30 @@ from pathlib import Path
 
 try:
     import fcntl
-except ImportError:  # Windows: files are not locked, and none is taken for stale
+except ImportError:  # Windows: folders are not locked, and none is taken for stale
     fcntl = None  # type: ignore[assignment]
 
 _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
-_NAME = re.compile(rf"\..*\.vdet-{_HOST}-[0-9a-f]{{16}}(\.[^.]*)?", re.DOTALL)
-_MAX_STEM = 180  # bytes; a whole name may have 255
+_NAME = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
 _NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
 _FLAGS = os.O_RDWR | _NOT_A_LINK | getattr(os, "O_BINARY", 0)
 _FOLDER_FLAGS = os.O_RDONLY | _NOT_A_LINK | getattr(os, "O_DIRECTORY", 0)
 
 
-def create_file(path: Path, cleanup: contextlib.ExitStack) -> Path:
-    """Make an empty file beside `path` and return it; `cleanup` unlocks and removes it.
-
-    It would also remove another file of that name, but no two get the same one.
-    """
+def create_folder(parent: Path, cleanup: contextlib.ExitStack) -> Path:
+    """Make an empty folder in `parent` and return it; `cleanup` unlocks and removes it."""
     while True:
-        candidate = _candidate(path, path.parent)
-        cleanup.callback(try_to_remove, candidate)  # an interrupt may come as soon as it is there
-        if _hold(os.open(candidate, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666), cleanup):
-            return candidate
-
-
-def create_folder(path: Path, cleanup: contextlib.ExitStack) -> Path:
-    """Make an empty folder in the folder `path` and return it, as `create_file` does."""
-    while True:
-        candidate = _candidate(path, path)
+        candidate = parent / f".vdet-{_HOST}-{secrets.token_hex(8)}"
+        # An interrupt may come as soon as the folder is there.
         cleanup.callback(shutil.rmtree, candidate, ignore_errors=True)
         candidate.mkdir()
         if fcntl is None:
             return candidate
-        with contextlib.suppress(FileNotFoundError):  # it was removed before it was opened
-            if _hold(os.open(candidate, _FOLDER_FLAGS), cleanup):
+        with contextlib.suppress(FileNotFoundError):  # another run took it for stale
+            descriptor = os.open(candidate, _FOLDER_FLAGS)
+            cleanup.callback(os.close, descriptor)
+            if try_to_lock(descriptor) and os.fstat(descriptor).st_nlink > 0:
                 return candidate
-
-
-def _hold(descriptor: int, cleanup: contextlib.ExitStack) -> bool:
-    """Lock a new file or folder; return False if another run took it for stale before that."""
-    cleanup.callback(os.close, descriptor)
-    return try_to_lock(descriptor) and os.fstat(descriptor).st_nlink > 0
-
-
-def _candidate(path: Path, folder: Path) -> Path:
-    stem = os.fsencode(path.stem)[:_MAX_STEM].decode(errors="ignore")
-    return folder / f".{stem}.vdet-{_HOST}-{secrets.token_hex(8)}{path.suffix}"
 
 
 def try_to_remove(path: Path) -> None:
@@ -70,23 +49,19 @@ def try_to_remove(path: Path) -> None:
 
 
 def remove_stale(folder: Path) -> None:
-    """Remove the temporary files and folders in `folder` whose writers have ended."""
-    with contextlib.suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            if fcntl and _NAME.fullmatch(entry.name):
+    """Remove the temporary folders in `folder` whose writers have ended."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if fcntl and _NAME.fullmatch(path.name):
                 with contextlib.suppress(OSError):
-                    _remove_if_stale(entry)
+                    _remove_if_stale(path)
 
 
-def _remove_if_stale(entry: "os.DirEntry[str]") -> None:
-    is_folder = entry.is_dir(follow_symlinks=False)
-    descriptor = os.open(entry.path, _FOLDER_FLAGS if is_folder else _FLAGS)
+def _remove_if_stale(folder: Path) -> None:
+    descriptor = os.open(folder, _FOLDER_FLAGS)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if is_folder:
-            shutil.rmtree(entry.path)
-        else:
-            os.unlink(entry.path)  # noqa: PTH108
+        shutil.rmtree(folder)
     finally:
         os.close(descriptor)
 
