@@ -25,7 +25,8 @@ def info(path: Path, results: Results) -> None:
     """Describe a video, a picture or a model file.
 
     FILE is a video or numbered pictures (what it holds, where the horizon is), a picture, a linear
-    model (.npz), or a network (.onnx) of vdet or of another tool.
+    model (.npz), or a network (.onnx) of vdet or of another tool. With --json, a model's file also
+    says how it was trained.
     """
     from vdet.media.images import is_picture_name
 
