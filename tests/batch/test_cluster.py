@@ -87,21 +87,6 @@ def address(cluster: Cluster) -> str:
     return cluster.address
 
 
-def test_each_item_is_called_once_and_its_result_numbered(address: str) -> None:
-    results = DaskCluster(address).map(abs, range(-300, 0))
-    assert sorted(results) == [(number, 300 - number) for number in range(300)]
-
-
-@pytest.mark.parametrize(
-    ("expression", "error"), [("1 / 0", ZeroDivisionError), ("open('/')", IsADirectoryError)]
-)
-def test_an_error_of_the_function_is_raised(
-    address: str, expression: str, error: type[Exception]
-) -> None:
-    with pytest.raises(error):
-        list(DaskCluster(address).map(eval, [expression]))
-
-
 def test_when_a_worker_is_killed_the_other_items_have_their_results(address: str) -> None:
     """An item that waited at that worker may be lost too."""
     items = ["10", "__import__('os')._exit(1)", *(str(number) for number in range(12, 20))]

@@ -69,12 +69,6 @@ class TestFound:
     ) -> None:
         assert [place for _, place in found(pattern)] == places
 
-    def test_an_absolute_pattern(self, folder: Path) -> None:
-        assert found(f"{folder}/clips/*/c.avi") == [
-            (f"{folder}/clips/day1/c.avi", "day1/c.avi"),
-            (f"{folder}/clips/day2/c.avi", "day2/c.avi"),
-        ]
-
     def test_a_file_whose_name_looks_like_a_pattern_is_itself(self) -> None:
         assert found("odd [1].mp4") == [("odd [1].mp4", "odd [1].mp4")]
 
@@ -98,17 +92,6 @@ class TestPictures:
         assert found(name) == [(name, f"{name}.png")]
         os.chdir(folder)
         assert found(".") == [(".", f"{name}.png")]
-
-    def test_folders_of_pictures_are_found_next_to_videos(self) -> None:
-        pictures(Path("drives/one"), 0, 1)
-        pictures(Path("drives/rest/two"), 0, 1)
-        Path("drives/a.mp4").touch()
-        places = [place for _, place in found("drives")]
-        assert places == ["a.mp4", "one.png", "rest/two.png"]
-
-    def test_pictures_next_to_a_video_are_none(self) -> None:
-        Path(pictures(Path("card"), 1, 2), "clip.mp4").touch()
-        assert found("card") == [("card/clip.mp4", "clip.mp4")]
 
     def test_pictures_with_a_gap_are_left_out_with_a_warning(
         self, caplog: pytest.LogCaptureFixture

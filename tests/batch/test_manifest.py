@@ -90,13 +90,3 @@ def test_a_second_batch_into_the_folder_is_refused(tmp_path: Path) -> None:
         add(RECORD)
     open_again()
     assert len(lines(path)) == 1
-
-
-def test_an_error_in_the_block_is_not_one_of_the_manifest(tmp_path: Path) -> None:
-    def fail() -> None:
-        with open_manifest(tmp_path / "m.jsonl"):
-            raise OSError(24, "Too many open files")
-
-    with pytest.raises(OSError, match="Too many open files") as caught:
-        fail()
-    assert not isinstance(caught.value, OutputError)

@@ -31,14 +31,6 @@ def test_frames_of_files_that_are_not_begun_are_guessed_from_their_sizes(tmp_pat
         assert limited.state()[1] == 27, "as much is read of each"
 
 
-def test_a_failed_file_leaves_nothing_to_do() -> None:
-    with frame_counts([VideoJob(Path("a"), frames=9)]) as counts:
-        assert counts is not None
-        counts.progress_of(0)(None)(40)
-        counts.end(0, None)
-        assert counts.state() == (40, 40, 1)
-
-
 def test_where_the_counts_cannot_be_seen_nothing_is_counted(tmp_path: Path) -> None:
     FrameCounts(tmp_path / "elsewhere", (1,)).progress_of(0)(10)(1)
     assert not list(tmp_path.iterdir())

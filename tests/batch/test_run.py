@@ -48,12 +48,6 @@ def same(item: int) -> int:
     return item
 
 
-def test_every_item_is_done_once_and_paired_with_its_result() -> None:
-    workers = FakeWorkers(3)
-    assert list(each_once(same, [5, 6, 7, 5], workers)) == [(5, 5), (6, 6), (7, 7), (5, 5)]
-    assert workers.calls == [[5, 6, 7, 5]]
-
-
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_only_items_that_kill_their_process_have_no_result(count: int) -> None:
     items = list(range(10))
@@ -84,19 +78,6 @@ def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: P
     assert len(workers.calls) == 2
     assert record.error is None
     assert all(output.path.exists() for output in job.outputs)
-
-
-def test_processes_that_cannot_even_begin_end_the_batch() -> None:
-    results = dict(each_once(same, range(4), FakeWorkers(2, deadly=range(4))))
-    assert results == dict.fromkeys(range(4))
-
-
-def test_another_error_is_raised() -> None:
-    def fail(_: int) -> int:
-        raise ValueError("a bug")
-
-    with pytest.raises(ValueError, match="a bug"):
-        list(each_once(fail, [1], FakeWorkers(1)))
 
 
 def join(outputs: Mapping[str, Path], target: Path) -> None:

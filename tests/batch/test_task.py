@@ -76,27 +76,6 @@ def test_an_error_is_recorded_without_numbers(job: VideoJob, work: Work) -> None
     assert (record.digest, record.sizes) == (None, {})
 
 
-def test_a_folder_that_cannot_be_made_is_an_error_of_the_file(
-    job: VideoJob, work: Work, tmp_path: Path
-) -> None:
-    (tmp_path / "out").touch()
-    record = process_file(job, work=work)
-    assert record.error is not None
-    assert "cannot be made a folder" in record.error
-
-
-def test_with_vdet_debug_a_bug_shows_its_traceback(
-    job: VideoJob, work: Work, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("vdet.batch.task.run_video", None)
-    monkeypatch.delenv("VDET_DEBUG", raising=False)
-    assert "internal error" in str(process_file(job, work=work).error)
-    assert capsys.readouterr().err == ""
-    monkeypatch.setenv("VDET_DEBUG", "1")
-    process_file(job, work=work)
-    assert "Traceback" in capsys.readouterr().err
-
-
 def test_a_file_whose_process_was_killed_has_a_record(job: VideoJob, work: Work) -> None:
     record = record_of_killed(job, work)
     assert record.error is not None

@@ -46,36 +46,11 @@ def test_previews_show_each_photograph_beside_its_undistorted_form(
     assert read_image(preview / "board0.jpg").shape == (480, 1280, 3)
 
 
-def test_too_few_photographs_are_an_error(run: Run, boards: Path, tmp_path: Path) -> None:
-    some = [boards / f"board{number}.png" for number in range(4)]
-    result = run("calibrate", *some, "-o", tmp_path / "camera.yaml")
-    assert result.code == 1
-    assert "only 4 of 4 photographs can be used, at least 5 are needed" in result.err
-    assert not list(tmp_path.iterdir())
-
-
-def test_another_pattern_than_the_board_has_is_not_found(
-    run: Run, boards: Path, tmp_path: Path
-) -> None:
-    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml", "--pattern", "7x5")
-    assert result.code == 1
-    assert "give another --pattern than 7×5" in result.err
-
-
 @pytest.mark.parametrize("pattern", ["9", "9x", "9x6x3", "2x6", "ninexsix", "-9x6"])
 def test_a_wrong_pattern_is_wrong_usage(run: Run, tmp_path: Path, pattern: str) -> None:
     result = run("calibrate", tmp_path, "-o", tmp_path / "c.yaml", f"--pattern={pattern}")
     assert result.code == 2
-    assert "as in 9x6" in result.err
-
-
-def test_an_earlier_camera_is_not_lost(run: Run, boards: Path, tmp_path: Path) -> None:
-    output = tmp_path / "camera.yaml"
-    output.write_text("precious")
-    assert run("calibrate", boards, "-o", output).code == 1
-    assert output.read_text() == "precious"
-    assert run("calibrate", boards, "-o", output, "--overwrite").code == 0
-    assert load_camera(output).width == 640
+    assert "--pattern" in result.err
 
 
 def test_earlier_previews_are_not_lost(run: Run, boards: Path, tmp_path: Path) -> None:
@@ -84,22 +59,3 @@ def test_earlier_previews_are_not_lost(run: Run, boards: Path, tmp_path: Path) -
     assert result.code == 1
     assert "board3.jpg: is there already" in result.err
     assert not (tmp_path / "camera.yaml").exists()
-
-
-def test_photographs_of_one_name_cannot_share_a_preview(
-    run: Run, boards: Path, tmp_path: Path
-) -> None:
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "board0.png").write_bytes((boards / "board0.png").read_bytes())
-    result = run(
-        "calibrate", boards, other, "-o", tmp_path / "camera.yaml", "--preview", tmp_path / "p"
-    )
-    assert result.code == 1
-    assert "wanted by two photographs of one name" in result.err
-
-
-def test_a_photograph_that_is_not_there_is_named(run: Run, tmp_path: Path) -> None:
-    result = run("calibrate", tmp_path / "none.jpg", "-o", tmp_path / "camera.yaml")
-    assert result.code == 1
-    assert "none.jpg: no such file or folder" in result.err

@@ -32,19 +32,6 @@ def test_what_is_printed_can_be_given_back(run: Run, tmp_path: Path) -> None:
     assert run("config", "-c", file).out == file.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    ("name", "file"), [("default", "default"), ("net", "default"), ("svm", "svm"), ("seed", "seed")]
-)
-def test_shipped_configs_are_known_by_name(run: Run, name: str, file: str) -> None:
-    assert run("config", "-c", name).out == run("config", "-c", CONFIGS / f"{file}.yaml").out
-
-
-def test_a_config_that_is_not_there(run: Run, tmp_path: Path) -> None:
-    result = run("config", "-c", tmp_path / "none.yaml")
-    assert result.code == 1
-    assert "no such file; shipped configs are: " in result.err
-
-
 def test_all_mistakes_are_named_at_once(run: Run, tmp_path: Path) -> None:
     file = tmp_path / "my.yaml"
     windows = "  search:\n    windows:\n      - {size: 64, overlap: 1.2}\n"

@@ -70,7 +70,7 @@ def test_it_prints_the_totals(run: Run, folder: Path, tmp_path: Path) -> None:
     tracks = write_tracks(tmp_path / "t.csv")
     result = run("count", tracks, "--lines", folder / "lines.yaml")
     assert result.code == 0, result.err
-    assert [line.split() for line in result.out.splitlines()[:3]] == [
+    assert [line.split()[1:4] for line in result.out.splitlines()[:3]] == [
         ["name", "direction", "count"], ["gate", "out", "1"], ["gate", "in", "0"],
     ]  # fmt: skip
     assert [path.name for path in tmp_path.iterdir()] == ["t.csv"]
@@ -97,7 +97,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
     assert "give --size, as in 1280x720" in result.err
     result = run("count", tracks, "--lines", lines, "--size", "320x240")
     assert result.code == 0, result.err
-    assert result.out.split()[3:6] == ["gate", "left", "1"]
+    assert result.out.split()[6:9] == ["gate", "left", "1"]
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (
             ["t.csv", "--lines", "l.yaml", "--size", "big"],
             2,
-            "'big' is not two numbers, as in 1280x720",
+            "'big' is not two numbers",
         ),
         (["t.csv", "--lines", "l.yaml", "--counts", "c.txt"], 2, "written as .csv, .json"),
         (["t.csv", "--lines", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
@@ -133,13 +133,6 @@ def test_mistakes_are_refused(
     assert result.code == code
     assert message in result.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["l.yaml", "t.csv", "t.txt"]
-
-
-def test_detect_video_wants_lines_for_counts(run: Run, folder: Path, tmp_path: Path) -> None:
-    wanted = ("--no-video", "--counts", tmp_path / "c.csv")
-    result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
-    assert result.code == 2
-    assert "--counts needs lines or zones; give --lines FILE" in result.err
 
 
 def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(
@@ -196,36 +189,3 @@ class TestRegions:
         result = run(*command, "--set", f"regions.polygons=[{{name: a, {outline}}}]")
         assert result.code == 1
         assert "regions: this command looks at whole frames" in result.err
-
-    @pytest.mark.parametrize(
-        ("text", "message"),
-        [
-            (
-                "{name: a, points: [[0, 0], [1, 1]]}",
-                "regions.yaml:1:22: regions.polygons[0].points: h",
-            ),
-            ("{name: a, points: [[0, 0], [1, 1], [1, 0], [0, 1]]}", "crosses or touches itself"),
-            ("{name: a, points: [[0, 0], [1, 0], [2, 2]]}", "[2, 2] lies outside the frame"),
-        ],
-    )
-    def test_mistakes_are_named_with_their_place(
-        self, run: Run, folder: Path, tmp_path: Path, text: str, message: str
-    ) -> None:
-        (tmp_path / "regions.yaml").write_text(f"polygons: [{text}]")
-        wanted = (
-            "--no-video",
-            "--tracks",
-            tmp_path / "t.csv",
-            "--regions",
-            tmp_path / "regions.yaml",
-        )
-        result = run("detect-video", folder / "red.mp4", *wanted, *options(folder))
-        assert result.code == 1
-        assert message in result.err
-        assert len(result.err.splitlines()) == 1
-
-    def test_a_mask_that_is_none_is_refused(self, run: Run, folder: Path, tmp_path: Path) -> None:
-        wanted = ("--json", "-", "--regions", tmp_path / "none.png")
-        result = run("detect-image", folder / "red.mp4", *wanted, *options(folder))
-        assert result.code == 1
-        assert "none.png: cannot be read" in result.err

@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import cv2
-import numpy as np
 import pytest
 
 from conftest import Run
@@ -23,15 +21,6 @@ def picture(scene: Scene, tmp_path: Path) -> Path:
     path.parent.mkdir()
     write_image(path, render(scene, 10))
     return path
-
-
-def test_draws_boxes_into_one_picture(run: Run, picture: Path, model_path: Path) -> None:
-    out = picture.parent.parent / "found.png"
-    result = run("detect-image", picture, "-o", out, "--model", model_path, *QUICK_OPTIONS)
-    assert result.code == 0, result.err
-    before, after = read_image(picture), read_image(out)
-    assert after.shape == before.shape
-    assert (after != before).any()
 
 
 def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Scene) -> None:
@@ -110,62 +99,6 @@ def test_one_bad_picture_does_not_stop_the_others(
     assert result.code == 3
     assert "a.png: is not a picture, or is damaged" in result.err
     assert [p.name for p in out.iterdir()] == ["road.png"]
-
-
-@pytest.mark.parametrize(
-    ("name", "array"),
-    [
-        ("one-colour.png", np.full((180, 320, 3), 90, np.uint8)),
-        ("16-bit.png", np.full((180, 320, 3), 40_000, np.uint16)),
-        ("grey.png", np.full((180, 320), 90, np.uint8)),
-        ("alpha.png", np.full((180, 320, 4), 90, np.uint8)),
-    ],
-)
-def test_unusual_pictures_are_searched(
-    run: Run, model_path: Path, tmp_path: Path, name: str, array: np.ndarray
-) -> None:
-    path = tmp_path / name
-    cv2.imwrite(str(path), array)
-    result = run("detect-image", path, "--json", "-", "--model", model_path, *FEW_WINDOWS)
-    assert result.code == 0, result.err
-    (item,) = json.loads(result.out)
-    assert (item["width"], item["height"]) == (320, 180)
-
-
-def test_a_picture_too_small_for_any_window(run: Run, model_path: Path, tmp_path: Path) -> None:
-    path = tmp_path / "tiny.png"
-    write_image(path, np.zeros((90, 6, 3), np.uint8))
-    result = run("detect-image", path, "--json", "-", "--model", model_path)
-    assert result.code == 1
-    assert "tiny.png: no search window fits into a frame of 6×90 pixels" in result.err
-
-
-@pytest.mark.parametrize("content", [b"", b"text", b"\x89PNG\r\n\x1a\n" + bytes(40)])
-def test_a_file_that_is_no_picture(run: Run, tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "x.png"
-    path.write_bytes(content)
-    result = run("detect-image", path, "-o", tmp_path / "out.png")
-    assert result.code == 1
-    assert "is not a picture, or is damaged" in result.err
-    assert not (tmp_path / "out.png").exists()
-
-
-def test_boxes_lie_in_the_picture_whatever_its_size(
-    run: Run, scene: Scene, model_path: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "odd.png"
-    write_image(path, render(scene, 10)[:179, :318])
-    loose = (
-        "detector.heat.threshold=0.01",
-        "detector.search.probability=0.05",
-        "detector.stills={strength: 0.01, width: 0}",
-    )
-    options = [word for assignment in loose for word in ("--set", assignment)]
-    result = run("detect-image", path, "--json", "-", "--model", model_path, *options)
-    (item,) = json.loads(result.out)
-    assert item["boxes"]
-    assert all(box["x"] + box["width"] <= 318 for box in item["boxes"])
-    assert all(box["y"] + box["height"] <= 179 for box in item["boxes"])
 
 
 def test_if_no_picture_works_the_exit_code_is_1(run: Run, tmp_path: Path) -> None:

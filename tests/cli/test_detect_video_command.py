@@ -11,7 +11,6 @@ import pytest
 from clips import write_clip as write_foreign
 from conftest import Run
 from quick import QUICK_OPTIONS
-from running import names
 from vdet.media import VideoReader
 from vdet.media.images import read_image
 
@@ -117,15 +116,6 @@ def test_wrong_usage(run: Run, clip_path: Path, arguments: tuple[str, ...], word
     assert words in result.err
 
 
-def test_keeps_what_is_there(run: Run, clip_path: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out.mp4"
-    out.write_bytes(b"precious")
-    result = run("detect-video", clip_path, out)
-    assert result.code == 1
-    assert "is there already; give --overwrite" in result.err
-    assert out.read_bytes() == b"precious"
-
-
 @pytest.mark.parametrize("more", [(), ("--overwrite",), ("--overwrite", "--frames", "1")])
 def test_a_video_of_another_program_is_kept_and_the_message_shows_the_command_for_several(
     run: Run, tmp_path: Path, more: tuple[str, ...]
@@ -139,17 +129,6 @@ def test_a_video_of_another_program_is_kept_and_the_message_shows_the_command_fo
         assert f"vdet detect-video '{clips[0]}' '{clips[1]}'{dots} -d found" in result.err
     assert [clip.read_bytes() for clip in clips] == before
     assert len(list(tmp_path.iterdir())) == 3
-
-
-def test_a_video_of_another_program_in_the_folder_of_a_batch_is_kept(
-    run: Run, clip_path: Path, tmp_path: Path
-) -> None:
-    theirs = write_foreign(tmp_path / clip_path.name)
-    for option in ("--overwrite", "--skip-existing"):
-        result = run("detect-video", clip_path, "-d", tmp_path, option)
-        assert (result.code, result.err.count("\n")) == (1, 1)
-        assert f"{theirs}: vdet did not write it" in result.err
-    assert names(tmp_path) == [clip_path.name]
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv"])
@@ -174,29 +153,6 @@ def test_never_writes_over_its_input(
     assert result.code == 1
     assert "is the input itself" in result.err
     assert len(_times(clip)) == 30
-
-
-@pytest.mark.parametrize(
-    ("out", "words"),
-    [("out.avi", "videos are written as .mp4, .mov, .mkv"), ("none/out.mp4", "does not exist")],
-)
-def test_an_output_that_cannot_be(
-    run: Run, clip_path: Path, tmp_path: Path, out: str, words: str
-) -> None:
-    result = run("detect-video", clip_path, tmp_path / out)
-    assert result.code == 1
-    assert words in result.err
-    assert not list(tmp_path.iterdir())
-
-
-def test_tracks_of_no_frames_are_an_error_too(run: Run, clip_path: Path, tmp_path: Path) -> None:
-    tracks = tmp_path / "t.csv"
-    tracks.write_text("precious")
-    options = ("--no-video", "--tracks", tracks, "--overwrite", "--start", "50")
-    result = run("detect-video", clip_path, *options)
-    assert result.code == 1
-    assert "50.00 s is beyond its end; it ends at " in result.err
-    assert tracks.read_text() == "precious"
 
 
 @pytest.mark.parametrize(

@@ -89,18 +89,6 @@ def test_several_sets_a_table_and_a_page(
     assert "data:image/jpeg" in (folder / "page.html").read_text(encoding="utf-8")
 
 
-def test_narrow_vehicles_are_left_out(
-    run: Run, tmp_path: Path, red: tuple[str | Path, ...]
-) -> None:
-    folder = write_set(tmp_path / "set")
-    options = ("--least-width", "0.25", "--json", "-", *red)
-    result = run("eval", "images", folder, *options)
-    assert result.code == 0, result.err
-    mean = json.loads(result.out)["mean"]
-    assert (mean["vehicles"], mean["false_positives"], mean["f1"]) == (0, 0, None)
-    assert "vehicles from 25.0% of the width" in result.err
-
-
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
@@ -124,13 +112,3 @@ def test_what_cannot_be_is_said_before_any_work(
     result = run("eval", "images", *arguments)
     assert (result.code, result.out) == (code, "")
     assert words in result.err
-
-
-def test_a_picture_that_cannot_be_read_ends_it_with_its_name(
-    run: Run, tmp_path: Path, red: tuple[str | Path, ...]
-) -> None:
-    folder = write_set(tmp_path / "set")
-    (folder / "b.png").write_bytes(b"no picture")
-    result = run("eval", "images", folder, *red)
-    assert (result.code, result.out) == (1, "")
-    assert "b.png: is not a picture" in result.err

@@ -35,12 +35,3 @@ def test_measures_a_ready_model_on_everything(
     assert found["test"]["patches"] == 320
     assert "was trained on most of these very patches" in found["meaning"]
     assert "ROC AUC" in result.err, "the table makes room on standard output"
-
-
-def test_earlier_numbers_are_kept(run: Run, patches_path: Path, tmp_path: Path) -> None:
-    target = tmp_path / "p.json"
-    target.write_text("precious")
-    result = run("eval", "patches", patches_path, "--json", target)
-    assert result.code == 1
-    assert "is there already; give --overwrite" in result.err
-    assert target.read_text() == "precious"

@@ -102,24 +102,3 @@ def test_a_model_that_is_given_must_fit_all_settings(
     result = run("eval", "video", clip_path, *options)
     assert (result.code, result.out) == (1, "")
     assert "was trained with other features" in result.err
-
-
-def test_without_a_model_each_setting_has_the_shipped_one_that_fits_it(
-    run: Run, clip_path: Path, truth_path: Path
-) -> None:
-    options = ("--truth", truth_path, "--until", "2", "-c", "svm", "--json", "-")
-    result = run("eval", "video", clip_path, *options, "--sweep", TWO_SHIPPED)
-    assert result.code == 0, result.err
-    features = [each["settings"]["detector.features"] for each in json.loads(result.out)["sweep"]]
-    assert features == ["{patch: 32, hog: {cell: 4}}", "{patch: 64, halved: [], hog: {cell: 8}}"]
-
-
-def test_truth_of_a_longer_video(
-    run: Run, clip_path: Path, model_path: Path, tmp_path: Path
-) -> None:
-    truth = tmp_path / "long.txt"
-    truth.write_text("40,1,10,10,50,50,1,3,1\n")
-    options = ("--truth", truth, "--model", model_path, *QUICK_OPTIONS)
-    result = run("eval", "video", clip_path, *options)
-    assert result.code == 1
-    assert "long.txt:1: the frame is number 40 of a video of 30" in result.err

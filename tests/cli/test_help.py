@@ -60,18 +60,6 @@ def test_the_help_of_every_option_is_of_whole_sentences(
     assert ";" not in text, "two sentences in one"
 
 
-@pytest.mark.parametrize("names", COMMANDS, ids=" ".join)
-def test_no_summary_is_cut_in_a_narrow_terminal(
-    run: Run, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "40")
-    shown = " ".join(run(*names, "--help").out.split())
-    for name, command in COMMANDS.items():
-        if name[:-1] == names and name:
-            assert command.help is not None
-            assert re.split(r"(?<=[.])\s", command.help.strip())[0] in shown
-
-
 @pytest.mark.parametrize(
     "names", [n for n, c in COMMANDS.items() if isinstance(c, Command)], ids=" ".join
 )

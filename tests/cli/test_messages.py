@@ -89,11 +89,6 @@ class TestNamesThatControlATerminal:
         assert len(lines) == 2
         assert all(line.startswith(f"vdet: {tmp_path}/{SHOWN}:") for line in lines)
 
-    def test_wrong_usage(self, run: Run) -> None:
-        result = run("config", FORGED)
-        assert result.code == 2
-        assert SHOWN in result.err
-
     def test_results_and_warnings_of_a_batch(self, run: Run, tmp_path: Path) -> None:
         (tmp_path / "in").mkdir()
         write_drive(tmp_path / "in" / FORGED, 2)

@@ -5,25 +5,18 @@ import zipfile
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from conftest import Run
-from labels.saving import car, written
-from vdet.boxes import Box
-from vdet.config.schema import InputSettings
 from vdet.detect.svm.model import load_model
-from vdet.labels.coco import COCO
-from vdet.labels.mot import read_mot
 from vdet.labels.reading import read_truth
 from vdet.learn.svm.dataset import find_patches, read_patches
 from vdet.media import VideoReader
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.truth import write_truth
-from vdet.track.track import FrameTracks
 
 SETS = ", ".join(
     f"{{size: {size}, step: 1, top: {top}, bottom: {bottom}}}"
@@ -86,35 +79,6 @@ def test_mines_patches_that_train_learns_from(
     model = load_model(model_path)
     assert model.box_regression is not None
     assert model.provenance["report"]["groups"]["boxes/mined_road"] == counts["boxes/mined_road"]
-
-
-def test_the_same_truth_in_another_format_gives_the_same_patches(
-    run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
-) -> None:
-    rows = read_mot(truth_path, truth_path.read_bytes()).labels
-    frames = [
-        FrameTracks(
-            row.frame - 1,
-            0.0,
-            tuple(
-                car(
-                    each.id,
-                    Box(*each.box),
-                    class_name="ignore" if each.ignored else "car",
-                )
-                for each in rows
-                if each.frame == row.frame
-            ),
-        )
-        for row in {row.frame: row for row in rows}.values()
-    ]
-    other = tmp_path / "truth.coco.json"
-    other.write_bytes(written(COCO, frames))
-    few = ("--from", "5", "--until", "5")
-    for name, truth in (("a.zip", truth_path), ("b.zip", other)):
-        result = run("mine", clip_path, "-o", tmp_path / name, "--truth", truth, *options, *few)
-        assert result.code == 0, result.err
-    assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
 
 
 def test_a_patch_is_its_window_and_its_box_is_that_of_the_truth(
@@ -212,55 +176,3 @@ def test_what_cannot_be_leaves_nothing_behind(
     assert (result.code, result.out) == (code, "")
     assert words in result.err
     assert not list(tmp_path.iterdir())
-
-
-def test_an_earlier_archive_is_not_lost(
-    run: Run, clip_path: Path, truth_path: Path, options: tuple[str, ...], tmp_path: Path
-) -> None:
-    target = tmp_path / "mined.zip"
-    target.write_bytes(b"precious")
-    result = run("mine", clip_path, "--truth", truth_path, "-o", target, *options)
-    assert result.code == 1
-    assert "--overwrite" in result.err
-    assert target.read_bytes() == b"precious"
-    assert (
-        run("mine", clip_path, "--truth", truth_path, "-o", target, *options, "--overwrite").code
-        == 0
-    )
-    assert len(find_patches([target])) > 10
-
-
-def test_truth_of_a_longer_video(
-    run: Run, clip_path: Path, options: tuple[str, ...], tmp_path: Path
-) -> None:
-    truth = tmp_path / "long.txt"
-    truth.write_text("40,1,10,10,50,50,1,3,1\n")
-    result = run("mine", clip_path, "--truth", truth, "-o", tmp_path / "mined.zip", *options)
-    assert result.code == 1
-    assert "long.txt:1: the frame is number 40 of a video of 30" in result.err
-    assert not (tmp_path / "mined.zip").exists()
-
-
-def test_input_settings_apply(
-    run: Run,
-    clip_path: Path,
-    truth_path: Path,
-    options: tuple[str, ...],
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    given = []
-
-    def reader(*arguments: Any, settings: InputSettings, **others: Any) -> VideoReader:
-        given.append(settings)
-        return VideoReader(*arguments, settings=settings, **others)
-
-    monkeypatch.setattr("vdet.learn.svm.mining.VideoReader", reader)
-    tolerant = ("--set", "input.max_damaged=0.5")
-    assert (
-        run(
-            "mine", clip_path, "--truth", truth_path, "-o", tmp_path / "m.zip", *options, *tolerant
-        ).code
-        == 0
-    )
-    assert [each.max_damaged for each in given] == [0.5]

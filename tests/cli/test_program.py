@@ -18,12 +18,6 @@ def test_version(run: Run) -> None:
     assert vdet.__version__ in run("--version").out
 
 
-def test_unknown_command_is_wrong_usage(run: Run) -> None:
-    result = run("detekt-video")
-    assert result.code == 2
-    assert "No such command" in result.err
-
-
 def test_an_error_is_one_line_without_traceback(run: Run, tmp_path: Path) -> None:
     result = run("detect-video", tmp_path / "none.mp4", tmp_path / "out.mp4")
     assert result.code == 1

@@ -10,9 +10,7 @@ import pytest
 
 from conftest import Run
 from red_cars import CAR, road
-from running import frames_of, names, write_drive
-from vdet.draw.boxes import color_of
-from vdet.media import VideoReader
+from running import names, write_drive
 from vdet.media.images import read_image, write_image
 from vdet.run.sinks.data import TrackSink
 from vdet.run.sinks.drawn import VideoSink
@@ -60,15 +58,6 @@ class TestDetectVideo:
         assert rows == [(each["frame"], track["x"]) for each in records for track in each["tracks"]]
         assert rows, "nothing was found: the test would say nothing"
 
-    def test_sinks_alone_are_enough(
-        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
-    ) -> None:
-        sinks = ("--sink", f"tracks={out}/a.txt", "--sink", f"video={out}/a.mkv")
-        result = run("detect-video", clip, "--no-video", *sinks, *red)
-        assert result.code == 0, result.err
-        assert names(out) == ["a.mkv", "a.txt"]
-        assert frames_of(out / "a.mkv") == FRAMES
-
     @pytest.mark.parametrize("text", ["tracks", "tracks=", "=a.csv", "=", ""])
     def test_another_text_than_name_and_file_is_wrong_usage(
         self, run: Run, clip: Path, out: Path, text: str
@@ -105,31 +94,6 @@ class TestDetectVideo:
         assert result.err.startswith(f"vdet: {words}")
         assert result.err.count("\n") == 1
         assert names(out) == ["old.csv"]
-
-    def test_labels_have_scores_where_they_are_asked_for(
-        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
-    ) -> None:
-        scores = ("--set", "draw.label=[id, score]")
-        for name, extra in (("plain.mp4", ()), ("scores.mp4", scores)):
-            crisp = ("--set", "output.crf=5", "--set", "tracker.detections_needed=3")
-            result = run("detect-video", clip, out / name, *red, *crisp, *extra)
-            assert result.code == 0, result.err
-        widths = [tag_width(last_frame(out / name)) for name in ("plain.mp4", "scores.mp4")]
-        assert widths[0] > 0, "no label was drawn: the test would say nothing"
-        assert widths[1] > 1.5 * widths[0]
-
-
-def last_frame(path: Path) -> Any:
-    with VideoReader(path) as reader:
-        *_, last = (frame.image for frame in reader)
-    return last
-
-
-def tag_width(image: Any) -> int:
-    """Return how many columns have the colour of the first vehicle in the top rows drawn on."""
-    near = abs(image.astype(int) - color_of(1)).max(axis=2) < 40
-    top = int(near.any(axis=1).argmax())
-    return int(near[top : top + 8].any(axis=0).sum())
 
 
 FULL = OSError(28, "No space left on device")
@@ -222,49 +186,8 @@ class TestDetectImage:
         assert "a.png: takes one picture; for several give the name of a folder" in several.err
         assert (out / "a.png").read_bytes() == before
 
-    @pytest.mark.parametrize(
-        ("sink", "code", "words"),
-        [
-            ("json", 2, "--sink json: expected NAME=FILE"),
-            ("tallies=a.csv", 1, f"tallies: is no sink; {KNOWN}"),
-            ("picture=a.txt", 1, "a.txt: pictures are written as "),
-            ("video=a.mp4", 1, "a.mp4: the sink video is for videos"),
-            ("json=red.png", 1, "red.png: is the input itself"),
-            ("json=old.json", 1, "old.json: is there already"),
-            ("picture=-", 1, "-: pictures are written as "),
-        ],
-    )
-    def test_an_output_that_cannot_be_is_refused_before_any_work(
-        self,
-        run: Run,
-        picture: Path,
-        sink: str,
-        code: int,
-        words: str,
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
-        monkeypatch.chdir(picture.parent)
-        (picture.parent / "old.json").write_text("precious")
-        result = run("detect-image", picture, "-o", "new", "--sink", sink)
-        assert (result.code, result.out) == (code, "")
-        assert words in result.err
-        assert names(picture.parent) == ["old.json", "red.png"]
-
 
 class TestBatch:
-    def test_each_video_gets_the_output_of_the_sink(
-        self, run: Run, clip: Path, out: Path, red: tuple[str, ...]
-    ) -> None:
-        write_drive(clip.with_name("b.mp4"), 3)
-        sinks = ("--sink", "tracks=.CSV", "--sink", "video=.mkv", "--jobs", "2", *red)
-        result = run("detect-video", clip.parent, "-d", out, *sinks)
-        assert result.code == 0, result.err
-        assert names(out) == ["a.csv", "a.mkv", "b.csv", "b.mkv", "manifest.jsonl"]
-        outputs = {
-            record["input"]: record["outputs"] for record in lines_of(out / "manifest.jsonl")
-        }
-        assert outputs[str(clip)] == {"video": str(out / "a.mkv"), "tracks": str(out / "a.csv")}
-
     @pytest.mark.parametrize(
         ("arguments", "code", "words"),
         [
@@ -285,7 +208,7 @@ class TestBatch:
                 "video: with -d give only the ending of the names: .mp4, .mov, .mkv",
             ),
             (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
-            (("--sink", "stages=.png"), 2, "stages: cannot be written with -d"),
+            (("--sink", "stages=.png", "--at", "1"), 2, "stages: cannot be written with -d"),
             (("--sink", "tallies=.csv"), 1, f"tallies: is no sink; {KNOWN}"),
             (("--tracks", ".csv", "--sink", "tracks=.csv"), 2, "tracks is given .csv twice"),
         ],

@@ -36,25 +36,3 @@ def test_one_run_writes_every_format_and_each_is_read_as_the_same_tracks(
         values = json.loads(compared.out)
         assert (values["f1"], values["idf1"]) == (1, 1), ending
         assert values["mean_iou"] == pytest.approx(1, abs=1e-3)
-
-
-def test_a_batch_writes_several_formats_of_each_video(
-    run: Run, clip: Path, tmp_path: Path, red: tuple[str, ...]
-) -> None:
-    out = tmp_path / "out"
-    wanted = ("--tracks", ".csv", "--tracks", ".XML", "--tracks", ".cars.coco.json")
-    arguments = ("detect-video", clip.parent, "-d", out, "--no-video", *wanted, *red)
-    done = run(*arguments)
-    assert done.code == 0, done.err
-    assert names(out) == ["a.cars.coco.json", "a.csv", "a.xml", "manifest.jsonl"]
-    (record,) = map(json.loads, (out / "manifest.jsonl").read_text().splitlines())
-    ends = (".csv", ".xml", ".cars.coco.json")
-    assert record["outputs"] == {"tracks": [str(out / f"a{end}") for end in ends]}
-    again = run(*arguments, "--skip-existing")
-    assert "1 file there already" in again.err
-
-
-def test_the_message_names_all_endings(run: Run, clip: Path, tmp_path: Path) -> None:
-    result = run("detect-video", clip, "--no-video", "--tracks", tmp_path / "a.json")
-    assert result.code == 1
-    assert f"tracks are written as {', '.join(ENDINGS)}; name it so" in result.err

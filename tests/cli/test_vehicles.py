@@ -81,23 +81,3 @@ def test_a_video_that_fails_leaves_no_folder(
     assert {path.name for path in (tmp_path / "found").iterdir()} == {
         *("a.cars.csv", "a.crops", "a.page", "all.cars.csv", "index.html", "manifest.jsonl")
     }
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (("--crops", "crops"), "crops: with -d give only the ending of the names: as in .crops"),
-        (("--page", "page"), "page: with -d give only the ending of the names: as in .page"),
-        (
-            ("--vehicles", ".xml"),
-            "vehicles: with -d give only the ending of the names: .csv, .json",
-        ),
-    ],
-)
-def test_an_end_that_is_none_is_wrong_usage(
-    run: Run, clips: Path, options: tuple[str, ...], words: str
-) -> None:
-    result = run("detect-video", clips, "-d", "found", *options)
-    assert result.code == 2
-    assert words in result.err
-    assert not Path("found").exists()

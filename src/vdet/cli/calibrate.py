@@ -14,16 +14,6 @@ from vdet.files import check_output
 log = logging.getLogger("vdet")
 
 
-def parse_corners(text: str) -> tuple[int, int]:
-    """Return the inner corners of a board, along and across."""
-    along, across = options.parse_pair(text, "9x6")
-    if not (3 <= along <= 999 and 3 <= across <= 999):
-        raise click.BadParameter(
-            f"{text!r}: give 3 to 999 inner corners of the board along and across, as in 9x6"
-        )
-    return along, across
-
-
 @command(
     "vdet calibrate chessboards/ -o camera.yaml",
     "vdet calibrate chessboards/ -o camera.yaml --pattern 9x6 --preview previews",
@@ -31,7 +21,10 @@ def parse_corners(text: str) -> tuple[int, int]:
 @click.argument("photos", nargs=-1, required=True, type=options.PATH, metavar="PHOTO...")
 @options.output_file_option("Camera file to write, .yaml.")
 @option(
-    "--pattern NxM", "Inner corners of the board, along and across.", parse_corners, default="9x6"
+    "--pattern NxM",
+    "Inner corners of the board, along and across, 3 to 999.",
+    options.parse_pair,
+    default="9x6",
 )
 @option("--preview DIR", "Write every photograph into DIR, with its corners, and undistorted.")
 @options.overwrite_option
@@ -51,6 +44,8 @@ def calibrate(
     from vdet.lanes.camera import save_camera
     from vdet.run.pictures import find_images
 
+    if not (3 <= min(pattern) <= max(pattern) <= 999):
+        raise click.UsageError("--pattern: give 3 to 999 inner corners, as in 9x6")
     options.check_suffix(output, ".yaml", ".yml", what="cameras")
     found = find_images(photos)
     check_output(output, overwrite=overwrite, inputs=found)

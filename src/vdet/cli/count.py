@@ -10,7 +10,7 @@ from vdet.cli import options
 from vdet.cli.command import command
 from vdet.cli.messages import print_lines, progress_steps
 from vdet.cli.options import option
-from vdet.files import check_output, printable, staged
+from vdet.files import check_output, staged
 
 if TYPE_CHECKING:
     from vdet.traffic.counts import Counts
@@ -82,6 +82,7 @@ def count(
 
 def _table(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of each file, and of all where there are several."""
+    from vdet.evaluate.output import table
     from vdet.traffic.counts import sum_totals
 
     totals = {name: counts.totals for name, counts in videos.items()}
@@ -89,16 +90,13 @@ def _table(videos: "Mapping[str, Counts]") -> list[str]:
         totals["all files"] = sum_totals(
             each for counts in videos.values() for each in counts.totals
         )
-    rows = [("file", "name", "direction", "count", "classes")]
-    for name, each in totals.items():
-        for total in each:
-            classes = ", ".join(f"{kind} {number}" for kind, number in total.classes.items())
-            rows.append((name, total.name, total.direction, str(total.count), classes))
-    columns = [list(map(printable, column)) for column in zip(*rows, strict=True)]
-    if len(videos) == 1:
-        del columns[0]
-    if not any(columns[-1][1:]):
-        del columns[-1]
-    widths = [max(map(len, column)) for column in columns]
-    cells = ([*map(str.ljust, row, widths)] for row in zip(*columns, strict=True))
-    return ["  ".join(row).rstrip() for row in cells]
+    rows = [
+        (name, total.name, total.direction, str(total.count), _listed(total.classes))
+        for name, each in totals.items()
+        for total in each
+    ]
+    return table(("file", "name", "direction", "count", "classes"), rows)
+
+
+def _listed(classes: Mapping[str, int]) -> str:
+    return ", ".join(f"{name} {number}" for name, number in classes.items())

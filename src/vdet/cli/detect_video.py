@@ -1,7 +1,6 @@
 """`vdet detect-video`: find and follow vehicles in one video, or in many."""
 
 import shlex
-from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from functools import partial
@@ -75,7 +74,9 @@ if TYPE_CHECKING:
     options.PROCESSES,
     show_default="one for each core, shared by --jobs",
 )
-@option("--stages DIR", "Write a picture of every stage of one frame into DIR. Goes with --at.")
+@options.output_option(
+    "--stages DIR", "Write a picture of every stage of one frame into DIR. Goes with --at."
+)
 @option(
     f"--at {options.TIME_FORM}", "Show the frame at this time with --stages.", options.parse_time
 )
@@ -93,7 +94,6 @@ def detect_video(
     frames: int | None,
     stride: int | None,
     threads: int | None,
-    stages: Path | None,
     at: Fraction | None,
     lanes: options.LaneChoice,
     choice: options.SettingsChoice,
@@ -109,10 +109,11 @@ def detect_video(
     record of each into manifest.jsonl there.
     """
     wanted = options.wanted_outputs()
-    if stages is not None:
-        wanted.insert(0, ("stages", stages))
     batch.check(overwrite=overwrite)
-    _check_times(start, end, at, stages, batch)
+    if start is not None and end is not None and end <= start:
+        raise click.UsageError("--end must be later than --start")
+    if (at is None) == any(sink == "stages" for sink, _ in wanted):
+        raise click.UsageError("--stages and --at go together")
     source = Path()
     if batch.folder is None:
         source, video = _in_and_out(clips, no_video=no_video)
@@ -121,7 +122,8 @@ def detect_video(
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
     request = lanes.read()
     settings = choice.read(*([f"detector.stride={stride}"] if stride else []))
-    _check_counts(wanted, settings)
+    if not settings.counts and any(sink == "counts" for sink, _ in wanted):
+        raise click.UsageError("--counts needs lines or zones; give --lines FILE")
     from vdet.batch.task import Work
     from vdet.regions import check_mask
     from vdet.run.video import VideoJob
@@ -136,21 +138,6 @@ def detect_video(
     sinks = {each.sink for each in suffixes}
     work = Work.of(job, sinks, settings, choice.model_path, threads)
     return process_batch(clips, job, suffixes, work, batch)
-
-
-def _check_times(
-    start: Fraction | None,
-    end: Fraction | None,
-    at: Fraction | None,
-    stages: Path | None,
-    batch: BatchOptions,
-) -> None:
-    if start is not None and end is not None and end <= start:
-        raise click.UsageError("--end must be later than --start")
-    if batch.folder is not None and (stages is not None or at is not None):
-        raise click.UsageError("--stages and --at are for one video; leave out -d")
-    if (stages is None) != (at is None):
-        raise click.UsageError("--stages and --at go together")
 
 
 def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
@@ -170,11 +157,6 @@ def _is_ours(video: Path) -> bool:
     from vdet.media.writer import may_replace_video
 
     return may_replace_video(video)
-
-
-def _check_counts(wanted: Sequence[options.Wanted], settings: "Settings") -> None:
-    if not settings.counts and any(sink == "counts" for sink, _ in wanted):
-        raise click.UsageError("--counts needs lines or zones; give --lines FILE")
 
 
 def _process_one(

@@ -46,7 +46,6 @@ def images(
     """
     settings = choice.read_for_whole_frames()
     detector = settings.detector
-    from vdet.detect.factory import model_file
     from vdet.evaluate.images import Counting, evaluate_images
     from vdet.evaluate.output import RunName
     from vdet.evaluate.show_images import images_page, lines, plain
@@ -55,14 +54,10 @@ def images(
     from vdet.workers import core_count
 
     model = choice.load_detector(detector.showing_all())
-    file = model_file(detector, choice.model_path)
-    results.check([*data, *([file] if file else [])])
+    results.check([*data, *choice.model_files(detector)])
     roles = Roles.from_settings(settings)
     sets = [read_labelled_pictures(path, roles) for path in data]
-    counting = Counting(
-        score=detector.shown_score if score is None else score,
-        least_width=least_width,
-    )
+    counting = Counting(detector.shown_score if score is None else score, least_width)
     with progress_steps(" pictures") as steps:
         progress = partial(steps, "")
         result = evaluate_images(sets, model, counting, threads=core_count(), progress=progress)
@@ -98,27 +93,25 @@ def patches(
     from vdet.detect.svm.kind import requested_features, trained_on
     from vdet.detect.svm.model import load_model
     from vdet.evaluate.output import RunName
+    from vdet.learn.svm import patch_eval
     from vdet.learn.svm.dataset import find_patches
-    from vdet.learn.svm.patch_eval import evaluate_patches, lines, patch_page, values
 
     model_path = choice.model_path
     model = load_model(model_path, requested_features(settings.svm)) if model_path else None
     results.check([*data, *([model_path] if model_path else [])])
     files = find_patches(data)
     with progress_steps("") as steps:
-        result = evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
+        result = patch_eval.evaluate_patches(files, settings, model, jobs=jobs, steps=steps)
     sources = trained_on(model_path) if model_path else ()
     name = RunName("svm", model_path, choice.config_name, choice.assignments, sources)
     results.print(
-        [*name.lines(), *lines(result)],
-        name.values() | values(result),
-        lambda: patch_page(result, name),
+        [*name.lines(), *patch_eval.lines(result)],
+        name.values() | patch_eval.values(result),
+        lambda: patch_eval.patch_page(result, name),
     )
 
 
-@command(
-    "vdet eval tracks out.txt gt.txt --page page",
-)
+@command("vdet eval tracks out.txt gt.txt --page page")
 @click.argument("prediction", type=options.PATH, metavar="PRED")
 @click.argument("truth", type=options.PATH, metavar="TRUTH")
 @options.until_option
@@ -191,7 +184,6 @@ def video(
     if len(videos) != len(truths):
         raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
     base = choice.read()
-    from vdet.detect.factory import model_file
     from vdet.evaluate.output import RunName
     from vdet.evaluate.show_video import plain, result_lines, video_page
     from vdet.evaluate.sweep import grid
@@ -206,7 +198,7 @@ def video(
         model = choice.load_detector(settings.detector)
         variants.append(Variant(settings, model, extra))
     detectors = [variant.settings.detector for variant in variants]
-    files = [path for each in detectors if (path := model_file(each, choice.model_path))]
+    files = [path for each in detectors for path in choice.model_files(each)]
     results.check([*videos, *truths, *files])
     roles = Roles.from_settings(base)
     clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]
@@ -220,7 +212,7 @@ def video(
     )
 
 
-evaluate = click.Group(
+eval_group = click.Group(
     "eval",
     [images, patches, tracks, video],
     help="Measure detection, tracking or the classifier.",

@@ -16,7 +16,7 @@ from vdet.cli.demo import demo
 from vdet.cli.detect_image import detect_image
 from vdet.cli.detect_video import detect_video
 from vdet.cli.doctor import doctor
-from vdet.cli.evaluate import evaluate
+from vdet.cli.evaluate import eval_group
 from vdet.cli.info import info
 from vdet.cli.messages import print_lines, set_up_logs
 from vdet.cli.mine import mine
@@ -29,7 +29,7 @@ from vdet.version import __version__
 cli = Program(
     "vdet",
     [
-        *(calibrate, config, count, demo, detect_image, detect_video, doctor, evaluate, info),
+        *(calibrate, config, count, demo, detect_image, detect_video, doctor, eval_group, info),
         *(mine, train, train_net),
     ],
     help="Find and follow vehicles in road video on an ordinary CPU.",

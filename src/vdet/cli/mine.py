@@ -52,14 +52,12 @@ def mine(
         raise click.UsageError("--until must not be before --from")
     options.check_suffix(output, ".zip", what="patches")
     settings = choice.read_for_whole_frames(detector="svm")
-    from vdet.detect.factory import model_file
     from vdet.detect.svm.kind import load_svm
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
     from vdet.workers import limit_library_threads
 
-    file = model_file(settings.svm, choice.model_path)
-    inputs = [*sources, *truths, *([file] if file else [])]
+    inputs = [*sources, *truths, *choice.model_files(settings.svm)]
     check_output(output, overwrite=overwrite, inputs=inputs)
     videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):

@@ -53,11 +53,11 @@ def parse_time(text: str) -> Fraction:
     return seconds
 
 
-def parse_pair(text: str, example: str = "1280x720") -> tuple[int, int]:
+def parse_pair(text: str) -> tuple[int, int]:
     """Return both numbers of a text such as 1280x720. Raises `click.BadParameter`."""
     match = _PAIR.fullmatch(text)
     if not match:
-        raise click.BadParameter(f"{text!r} is not two numbers, as in {example}")
+        raise click.BadParameter(f"{text!r} is not two numbers with an x between them")
     return int(match[1]), int(match[2])
 
 
@@ -202,6 +202,13 @@ class SettingsChoice:
         from vdet.detect.factory import load_detector
 
         return load_detector(settings, self.model_path)
+
+    def model_files(self, settings: "DetectorSettings") -> list[Path]:
+        """Return the model file that the detector reads; nothing for one without a file."""
+        from vdet.detect.factory import model_file
+
+        file = model_file(settings, self.model_path)
+        return [file] if file else []
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""
