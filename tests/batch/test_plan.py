@@ -206,7 +206,7 @@ class TestRefused:
         Path("out").mkdir()
         make(Path("out/manifest.jsonl"))
         for skip_existing in (False, True):
-            with pytest.raises(OutputError, match=r"manifest\.jsonl: is no ordinary file"):
+            with pytest.raises(OutputError, match=r"manifest\.jsonl: is not a regular file"):
                 plan("clips", skip_existing=skip_existing)
         assert not Path("out/elsewhere").exists()
 

@@ -72,8 +72,9 @@ def test_every_option_stands_under_a_heading_and_examples_can_be_run(
     for parameter in command.params:
         row = rf"^  (-\w, )?{parameter.opts[-1]}\b"
         assert isinstance(parameter, click.Argument) or re.search(row, shown, re.MULTILINE)
-    assert command.examples
-    for example in command.examples:
+    _, *examples = (command.epilog or "").split("\n")
+    assert examples
+    for example in examples:
         words = shlex.split(example.partition(" > ")[0])
         assert words[: 1 + len(names)] == ["vdet", *names]
         command.make_context(example, words[1 + len(names) :], obj=False)

@@ -84,10 +84,10 @@ def check_manifest(path: Path) -> None:
     Raises
     ------
     OutputError
-        What is there is no ordinary file.
+        What is there is not a regular file.
     """
     if os.path.lexists(path) and not stat.S_ISREG(path.lstat().st_mode):
-        raise OutputError(f"{path}: is no ordinary file; remove it, or give another folder")
+        raise OutputError(f"{path}: is not a regular file; remove it, or give another folder")
 
 
 def read_written(path: Path) -> dict[str, Written]:

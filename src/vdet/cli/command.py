@@ -24,13 +24,11 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     "Parallel work": ("--jobs", "--threads", "--scheduler"),
     "General": ("--quiet", "--verbose", "--version", "--help"),
 }
-"""Heading of each option in the help, in order. Options that are not named come under `_OTHERS`."""
+"""The headings in the help, in order, with their options. Other options go under `_OTHERS`."""
 
 
 class Command(click.Command):
-    """A command of the program; its help ends with examples, and it takes `-q` and `-v`."""
-
-    examples: Sequence[str] = ()
+    """A command of the program, which takes `-q` and `-v`; its help groups the options."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
@@ -39,35 +37,27 @@ class Command(click.Command):
         self.short_help = re.split(r"(?<=\.)\s", (self.help or "").strip())[0]
 
     def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options under their headings, and the examples."""
-        records = {
-            parameter.opts[-1]: record
-            for parameter in self.get_params(context)
-            if isinstance(parameter, click.Option)
-            and (record := parameter.get_help_record(context))
-        }
-        named = {name for names in HEADINGS.values() for name in names}
-        others = [name for name in records if name not in named]
-        for heading, names in HEADINGS.items():
-            rows = [records[name] for name in names or others if name in records]
-            if rows:
+        """Write the options under their headings."""
+        headings = {name: heading for heading, names in HEADINGS.items() for name in names}
+        rows: dict[str, list[tuple[str, str]]] = {heading: [] for heading in HEADINGS}
+        for parameter in self.get_params(context):
+            record = parameter.get_help_record(context)
+            if record and isinstance(parameter, click.Option):
+                rows[headings.get(parameter.opts[-1], _OTHERS)].append(record)
+        for heading, group in rows.items():
+            if group:
                 with formatter.section(heading):
-                    formatter.write_dl(rows)
-        if self.examples:
-            with formatter.section("Examples"):
-                for line in self.examples:
-                    formatter.write(f"{'':{formatter.current_indent}}{line}\n")
+                    formatter.write_dl(group)
+
+    def format_epilog(self, _: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples."""
+        with formatter.section("Examples"):
+            formatter.write_text(self.epilog or "")
 
 
 def command(*examples: str) -> Callable[[Callable[..., Any]], Command]:
-    """Return a decorator that makes a command, with command lines that its help shows."""
-
-    def make(function: Callable[..., Any]) -> Command:
-        made = click.command(cls=Command)(function)
-        made.examples = examples
-        return made
-
-    return make
+    """Return a decorator that makes a command, with command lines at the end of its help."""
+    return click.command(cls=Command, epilog="\n".join(("\b", *examples)))
 
 
 class Program(click.Group):
@@ -89,7 +79,7 @@ class Program(click.Group):
             return self.commands.get(name)
         command = load_plugin(COMMANDS, name)
         if not isinstance(command, click.Command):
-            raise ConfigError(f"{name}: is no click command; repair or reinstall that package")
+            raise ConfigError(f"{name}: is not a click command; repair or reinstall that package")
         return command
 
     def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:

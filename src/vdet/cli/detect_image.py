@@ -41,7 +41,8 @@ def detect_image(
     images: tuple[Path, ...],
     output: Path | None,
     stages: Path | None,
-    lanes: options.LaneChoice,
+    lanes: bool,
+    camera: Path | None,
     choice: options.SettingsChoice,
     overwrite: bool,
 ) -> int:
@@ -50,7 +51,7 @@ def detect_image(
     Each IMAGE is a file, or a folder of files. Without an output, the vehicles are printed: class,
     score, and box in pixels, as x, y, width and height.
     """
-    request = lanes.read()
+    request = options.read_lanes(lanes, camera)
     settings = choice.read()
     from vdet.regions import check_mask
     from vdet.run.pictures import find_images, plan_pictures, run_pictures

@@ -95,7 +95,8 @@ def detect_video(
     stride: int | None,
     threads: int | None,
     at: Fraction | None,
-    lanes: options.LaneChoice,
+    lanes: bool,
+    camera: Path | None,
     choice: options.SettingsChoice,
     overwrite: bool,
     batch: BatchOptions,
@@ -120,7 +121,7 @@ def detect_video(
         wanted = [*video, *wanted]
     if no_video and not wanted:
         raise click.UsageError("nothing would be written; give an output, such as --tracks")
-    request = lanes.read()
+    request = options.read_lanes(lanes, camera)
     settings = choice.read(*([f"detector.stride={stride}"] if stride else []))
     if not settings.counts and any(sink == "counts" for sink, _ in wanted):
         raise click.UsageError("--counts needs lines or zones; give --lines FILE")

@@ -44,7 +44,7 @@ _PAIR = re.compile(r"([1-9][0-9]{0,4})[x×]([1-9][0-9]{0,4})", re.ASCII | re.IGN
 def parse_time(text: str) -> Fraction:
     """Return a time in exact seconds: the type of an option. Raises `click.BadParameter`."""
     if not _TIME.fullmatch(text):
-        raise click.BadParameter(f"{text!r} is no time; give seconds or HH:MM:SS, as in 1:23.5")
+        raise click.BadParameter(f"{text!r} is not a time; give seconds or HH:MM:SS, as in 1:23.5")
     seconds = Fraction(0)
     for part in text.split(":"):
         seconds = seconds * 60 + Fraction(part)
@@ -309,35 +309,23 @@ def as_outputs(wanted: Iterable[Wanted]) -> tuple["Output", ...]:
     return tuple(Output(sink, path) for sink, path in wanted)
 
 
-@dataclass(frozen=True, slots=True)
-class LaneChoice:
-    """The values of `lane_options`."""
-
-    lanes: bool
-    camera_path: Path | None
-
-    def read(self) -> "LaneRequest | None":
-        """Return what is asked for, None for no lanes; read the camera file."""
-        if self.camera_path is not None and not self.lanes:
-            raise click.UsageError("--camera goes with --lanes")
-        if not self.lanes:
-            return None
-        from vdet.lanes.camera import load_camera
-        from vdet.lanes.road import LaneRequest
-
-        if self.camera_path is None:
-            log.warning("--lanes without --camera: pictures are taken as undistorted")
-            return LaneRequest()
-        return LaneRequest(load_camera(self.camera_path))
+def lane_options(command: F) -> F:
+    """Add `--lanes` and `--camera FILE`, for `read_lanes`."""
+    text = "Undistort for --lanes with this file, which vdet calibrate wrote."
+    add_lanes = option("--lanes", "Find the lane too, and draw it into undistorted frames.")
+    return add_lanes(option("--camera FILE", text)(command))
 
 
-lane_options = bundle(
-    "lanes",
-    LaneChoice,
-    option("--lanes", "Find the lane too, and draw it into undistorted frames."),
-    option(
-        "--camera FILE",
-        "Undistort for --lanes with this file, which vdet calibrate wrote.",
-        name="camera_path",
-    ),
-)
+def read_lanes(lanes: bool, camera: Path | None) -> "LaneRequest | None":
+    """Return what `lane_options` ask for, None for no lanes; read the camera file."""
+    if camera is not None and not lanes:
+        raise click.UsageError("--camera goes with --lanes")
+    if not lanes:
+        return None
+    from vdet.lanes.camera import load_camera
+    from vdet.lanes.road import LaneRequest
+
+    if camera is None:
+        log.warning("--lanes without --camera: pictures are taken as undistorted")
+        return LaneRequest()
+    return LaneRequest(load_camera(camera))
