@@ -14,6 +14,7 @@ from vdet.detect.svm.model import save_model
 from vdet.evaluate.scores import Scores, score
 from vdet.files import any_file, check_output, make_folder, staged
 from vdet.labels.reading import read_predictions, read_truth
+from vdet.learn.svm.choosing import Most
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.mining import VideoSource, mine
 from vdet.learn.svm.training import train
@@ -45,7 +46,7 @@ lines:
 drawn: true
 """
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv", "counts": "counts.csv", "page": "page"}
-_MINING = ("train.mine.per_vehicle=2", "train.mine.false_alarms=6", "train.mine.parts=3")
+_MOST = Most(per_vehicle=2, false_alarms=6, parts=3)  # drawn vehicles are alike: few suffice
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
 
 
@@ -144,14 +145,14 @@ def run_demo(
     announce("2/4 finding the vehicles with the network …")
     by_network = find("network", _BY_NETWORK, settings, None)
     announce(f"3/4 drawing {ROADS} more roads, and training a linear model on patches of them …")
-    linear = load_settings(None, _MINING, detector="svm")
+    linear = load_settings(detector="svm")
     sources, rng = _roads_to_learn(folder), np.random.default_rng(seed)
     make_folder(folder / "training")
     for source in sources:
         busy = busy_road(rng)
         write_clip(source.path, busy, overwrite=overwrite)
         write_truth(source.truth, busy, overwrite=overwrite)
-    mine(sources, folder / PATCHES, linear, overwrite=overwrite, steps=steps)
+    mine(sources, folder / PATCHES, linear, most=_MOST, overwrite=overwrite, steps=steps)
     model, metrics = train(find_patches([folder / PATCHES]), linear, steps=steps)
     save_model(model, folder / MODEL, overwrite=overwrite)
     metrics.write(folder / METRICS, overwrite=overwrite)

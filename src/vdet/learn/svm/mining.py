@@ -27,6 +27,7 @@ from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
 from vdet.learn.svm.choosing import (
     MOST,
+    Most,
     PatchKind,
     choose_windows,
     cut_sides,
@@ -177,6 +178,7 @@ def mine(
     settings: Settings,
     model: SvmModel | None = None,
     *,
+    most: Most = MOST,
     overwrite: bool = False,
     steps: Steps = no_steps,
 ) -> MiningResult:
@@ -193,6 +195,8 @@ def mine(
     model
         The model whose false alarms are searched for; None: any window without a vehicle may be
         taken.
+    most
+        Most patches of each kind in a frame.
     steps
         Called for each source with its name and its number of frames.
 
@@ -226,7 +230,7 @@ def mine(
                     frame.image.shape[1],
                     rng,
                     probability=settings.train.mine.probability,
-                    most=MOST,
+                    most=most,
                 ):
                     x, y, side, _ = each.box.xywh
                     patch = to_patch(cut_window(frame.image, x, y, side, side), PATCH)
