@@ -192,18 +192,6 @@ def test_all_three_run_through_a_batch(package: Path, clip: Path, tmp_path: Path
     assert (record["model"], record["error"]) == (None, None)
 
 
-def test_mine_takes_the_detector(package: Path, clip: Path, tmp_path: Path) -> None:
-    truth = tmp_path / "gt.txt"
-    truth.write_text(f"1,1,1,1,20,20,1,3,1\n{FRAMES},1,1,1,20,20,1,3,1\n")
-    wide = ("--set", "train.mine.probability=0.5", "--set", "detector.kind=red", "--every", "10")
-    done = vdet(
-        package, "mine", clip, "--truth", truth, "-o", tmp_path / "mined.zip", "--from", "1", *wide
-    )
-    assert done.returncode == 0, done.stderr
-    assert "false alarms" in done.stdout
-    assert " 0 false alarms" not in done.stdout, "the red car is one where the truth has none"
-
-
 def test_its_settings_are_printed_and_checked(package: Path) -> None:
     printed = vdet(package, "config", "--set", "detector.kind=red", "--set", "detector.level=7")
     assert "kind: red" in printed.stdout

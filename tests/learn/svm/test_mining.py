@@ -82,12 +82,9 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
         assert red > green + 100, "the middle of a vehicle shows the car"
 
 
-def test_nothing_wanted_is_an_error(
-    video: VideoSource, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vdet.learn.svm.mining.MOST", Most(0, 0, 0))
+def test_nothing_wanted_is_an_error(video: VideoSource, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=r"road\.mp4: no window fits a vehicle or is a false alarm"):
-        mine([video], tmp_path / "mined.zip", Settings())
+        mine([video], tmp_path / "mined.zip", Settings(), most=Most(0, 0, 0))
     assert not (tmp_path / "mined.zip").exists()
 
 
