@@ -55,7 +55,6 @@ def mine(
     from vdet.detect.svm.kind import load_svm
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
-    from vdet.workers import limit_library_threads
 
     inputs = [*sources, *truths, *choice.model_files(settings.svm)]
     check_output(output, overwrite=overwrite, inputs=inputs)
@@ -69,7 +68,6 @@ def mine(
         else mining.PictureSource(path)
         for path in sources
     ]
-    limit_library_threads()
     model = load_svm(settings.svm, choice.model_path)
     with progress_steps(" frames") as steps:
         mined = mining.mine(labelled, output, settings, model, overwrite=overwrite, steps=steps)
