@@ -34,6 +34,7 @@ from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit
 from vdet.media import Frame, Picture, VideoReader
 from vdet.run.loop import Pipeline, peek
+from vdet.run.search_rate import SearchRate
 from vdet.track.factory import make_tracker
 from vdet.workers import limit_library_threads, make_workers
 
@@ -62,7 +63,7 @@ class SearchedVideo:
     height: int
     rate: Fraction
     frames: int
-    stride: int
+    searches: SearchRate
     windows: dict[int, Windows]
 
 
@@ -176,10 +177,10 @@ def _search(
             ],
             last,
         )
-        stride = settings.detector.stride_at(info.rate)
+        searches = SearchRate(settings.detector.searches, settings.detector.stride)
         tracker = make_tracker(settings, info.width, info.height)
-        count = sum(1 for _ in Pipeline(searching, tracker, stride=stride).follow(frames))
-    return SearchedVideo(info.width, info.height, info.rate, count, stride, searching.windows)
+        count = sum(1 for _ in Pipeline(searching, tracker, rate=searches).follow(frames))
+    return SearchedVideo(info.width, info.height, info.rate, count, searches, searching.windows)
 
 
 def _sweep(
@@ -222,7 +223,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
             frame=result.frame.index + 1,
             id=track.id,
         )
-        for result in Pipeline(found, tracker, stride=searched.stride).follow(frames)
+        for result in Pipeline(found, tracker, rate=searched.searches).follow(frames)
         for track in result.tracks
     ]
     rate = float(searched.rate)

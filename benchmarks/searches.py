@@ -20,8 +20,9 @@ from vdet.media.coding import Coding
 
 HEIGHTS = (720, 1080, 2160)
 DECODED = 60
-RATE = 25  # frames a second of the project video
-_OF_SVM, _OF_NETWORK = (each.stride_at(RATE) for each in (SvmSettings(), NetworkSettings()))
+_OF_SVM, _OF_NETWORK = 3, 2
+"""Every N-th frame is searched of the project video, which has 25 frames a second."""
+
 _STRIDES = {
     "svm dense": _OF_SVM,
     "svm detection": _OF_SVM,

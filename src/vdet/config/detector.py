@@ -1,7 +1,6 @@
 """The section `detector`: what all kinds of detectors have in common, and that of networks."""
 
 from collections.abc import Hashable
-from fractions import Fraction
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
@@ -43,10 +42,6 @@ class DetectorSettings(Section):
     stride: int | None = Field(None, ge=1, le=100)
     """Search every N-th frame. Overrides searches."""
     foot: Foot = 0.0
-
-    def stride_at(self, rate: float | Fraction) -> int:
-        """Return N where every N-th frame of a video of `rate` frames a second is searched."""
-        return self.stride or max(1, int(rate / (self.searches or rate)))
 
     @property
     def search_key(self) -> Hashable:

@@ -279,7 +279,7 @@ def _build(
     pipelines = []
     for each in variants:
         own = build(each.model, each.settings, video, images)
-        key = each.settings.detector.search_key, own.stride, each.settings.regions
+        key = each.settings.detector.search_key, own.rate, each.settings.regions
         search = searches.setdefault(key, _shared(own.detector.search))
         pipelines.append(replace(own, detector=_Sharing(search, own.detector.detect)))
     return pipelines

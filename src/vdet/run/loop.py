@@ -16,6 +16,7 @@ from vdet.media import Frame, VideoInfo
 from vdet.media.images import Image
 from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
+from vdet.run.search_rate import EVERY_FRAME, SearchRate
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import carrying, make_tracker
@@ -33,9 +34,8 @@ class Pipeline:
     ----------
     steps
         Each gets every result, in the order of the frames.
-    stride
-        Every `stride`-th frame is searched, beginning with the first. In the others the tracker
-        carries the vehicles on.
+    rate
+        Which frames are searched. In the others the tracker carries the vehicles on.
     is_still
         Whether the only frame is a still picture.
     """
@@ -43,7 +43,7 @@ class Pipeline:
     detector: VideoDetector
     tracker: VideoTracker
     steps: Sequence[Step] = ()
-    stride: int = 1
+    rate: SearchRate = EVERY_FRAME
     is_still: bool = False
 
     def follow(
@@ -61,21 +61,26 @@ class Pipeline:
             The video, for the results.
         threads
             Number of frames that are searched at once. The results do not depend on it.
+
+        Raises
+        ------
+        ValueError
+            The times of the frames do not increase.
         """
         tracker, detector = carrying(self.tracker), self.detector
         prepared = [step for step in self.steps if isinstance(step, ParallelStep)]
 
-        def search(numbered: tuple[int, Frame]) -> tuple[bool, Any]:
-            position, frame = numbered
+        def search(chosen: tuple[Frame, bool]) -> Any:
+            frame, is_searched = chosen
             for step in prepared:
                 step.prepare(frame)
-            if position % self.stride:
-                return False, None
-            return True, detector.search(frame.picture, None if self.is_still else frame.index)
+            if not is_searched:
+                return None
+            return detector.search(frame.picture, None if self.is_still else frame.index)
 
-        ahead = threads * self.stride  # so that each thread has a frame to search
-        with map_ordered(search, enumerate(frames), threads, ahead=ahead) as results:
-            for (_, frame), (searched, candidates) in results:
+        chosen = self.rate.choose(frames)
+        with map_ordered(search, chosen, threads, is_work=lambda each: each[1]) as results:
+            for (frame, searched), candidates in results:
                 time, picture = float(frame.time), frame.picture
                 if searched:
                     detections = detector.detect(candidates)
@@ -128,8 +133,8 @@ def build(
     made = make_steps(StepContext(settings, width, height, video, lanes), steps)
     if video is None:
         return Pipeline(detector, StillTracker(), made, is_still=True)
-    stride = settings.detector.stride_at(video.rate)
-    return Pipeline(detector, tracker or make_tracker(settings, width, height), made, stride)
+    rate = SearchRate(settings.detector.searches, settings.detector.stride)
+    return Pipeline(detector, tracker or make_tracker(settings, width, height), made, rate)
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:

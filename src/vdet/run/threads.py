@@ -19,6 +19,8 @@ R = TypeVar("R")
 
 POLL_INTERVAL = 0.1  # seconds between checks whether the other side has ended
 JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
+_AHEAD = 8
+"""Largest number of items that `map_ordered` takes ahead for each thread."""
 
 
 class _End:
@@ -181,28 +183,29 @@ def map_ordered(
     items: Iterable[T],
     threads: int,
     *,
-    ahead: int | None = None,
+    is_work: Callable[[T], bool] = lambda _: True,
 ) -> Iterator[Iterator[tuple[T, R]]]:
     """Pair items with the results of `function`, computed in parallel, in their order.
 
-    At most `ahead` items are taken before the result of the first is waited for, or as many as
-    there are threads.
+    Items are taken until there is one for each thread and one more. Those for which `is_work` is
+    false take no time and do not count, but at most `_AHEAD` items are taken for each thread.
     """
     running: deque[tuple[T, Future[R]]] = deque()
-
-    def first() -> tuple[T, R]:
-        item, future = running.popleft()
-        return item, future.result()
 
     with ThreadPoolExecutor(threads, thread_name_prefix="vdet-search") as pool:
 
         def pairs() -> Iterator[tuple[T, R]]:
+            work = 0
             for item in items:
                 running.append((item, pool.submit(function, item)))
-                if len(running) > (ahead or threads):
-                    yield first()
+                work += is_work(item)
+                while work > threads or len(running) > _AHEAD * threads:
+                    first, future = running.popleft()
+                    work -= is_work(first)
+                    yield first, future.result()
             while running:
-                yield first()
+                first, future = running.popleft()
+                yield first, future.result()
 
         try:
             yield pairs()
