@@ -1,6 +1,7 @@
 """Files: outputs that are whole or absent, temporary files that are stale, limits, names."""
 
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -247,6 +248,9 @@ def test_a_name_is_shown_on_one_line_without_control_characters(name: str) -> No
     assert shown == name or not name.isprintable() or name.startswith(shown[:-1])
 
 
+TEXTS = re.compile(r"[a-z0-9-]+\.txt")
+
+
 class TestFolder:
     """`OutputFiles.stage_folder`: very many files, which appear together too."""
 
@@ -255,7 +259,7 @@ class TestFolder:
         resource.setrlimit(resource.RLIMIT_NOFILE, (200, hard))
         try:
             with OutputFiles() as files:
-                folder = files.stage_folder(tmp_path, "*.txt")
+                folder = files.stage_folder(tmp_path, TEXTS)
                 for number in range(300):
                     (folder / f"{number}.txt").touch()
         finally:
@@ -268,7 +272,7 @@ class TestFolder:
 
         def write(overwrite: bool) -> None:
             with OutputFiles(overwrite=overwrite) as files:
-                (files.stage_folder(tmp_path, "*.txt") / "a.txt").write_text("new")
+                (files.stage_folder(tmp_path, TEXTS) / "a.txt").write_text("new")
 
         with pytest.raises(OutputError, match=r"a\.txt: has appeared during the run"):
             write(overwrite=False)
@@ -278,6 +282,19 @@ class TestFolder:
         assert names(tmp_path) == ["a.txt", "mine.png"]
         assert (tmp_path / "a.txt").read_text() == "new"
 
+    @pytest.mark.parametrize("is_old", [True, False])
+    def test_a_failed_run_leaves_no_folder_of_its_own(self, tmp_path: Path, is_old: bool) -> None:
+        path = tmp_path / "found"
+        if is_old:
+            path.mkdir()
+        files = OutputFiles()
+        (files.stage_folder(path) / "a.txt").touch()
+        files.__exit__(KeyboardInterrupt, None, None)
+        assert path.exists() == is_old
+        with OutputFiles() as files:
+            files.stage_folder(path)
+        assert path.is_dir(), "a run that ends well leaves it, also without a file"
+
     def test_that_of_a_killed_run_is_removed_and_that_of_a_running_one_is_kept(
         self, tmp_path: Path
     ) -> None:
@@ -285,8 +302,8 @@ class TestFolder:
         left.mkdir()
         (left / "a.txt").touch()
         with OutputFiles() as files:
-            mine = files.stage_folder(tmp_path, "*.txt")
+            mine = files.stage_folder(tmp_path, TEXTS)
             with OutputFiles() as others:
-                others.stage_folder(tmp_path, "*.txt")
+                others.stage_folder(tmp_path, TEXTS)
                 assert mine.is_dir()
             assert not left.exists()

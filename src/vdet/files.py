@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator
@@ -96,7 +97,7 @@ class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
     When the block ends without an error, all staged files are synced to the disk and then get their
-    names. When it ends with an error, none appears.
+    names. When it ends with an error, none appears. Folders are made where they are missing.
 
     Parameters
     ----------
@@ -117,7 +118,8 @@ class OutputFiles:
         self._overwrite = overwrite
         self._folders: dict[Path, Path] = {}  # temporary ones by where their files will go
         self._may_replace: dict[Path, MayReplace] = {}
-        self._patterns: list[tuple[Path, str]] = []
+        self._names: dict[Path, re.Pattern[str]] = {}
+        self._new_folders: list[Path] = []
         self._cleanup = contextlib.ExitStack()
 
     def stage(self, path: Path, may_replace: MayReplace = any_file) -> Path:
@@ -140,19 +142,29 @@ class OutputFiles:
         self._may_replace[path] = may_replace
         return temporary
 
-    def stage_folder(self, path: Path, pattern: str) -> Path:
+    def stage_folder(self, path: Path, names: re.Pattern[str] | None = None) -> Path:
         """Return a folder whose files will lie in the folder `path`.
 
-        With `overwrite`, the files in `path` that the glob `pattern` names and that this run did
-        not write are removed in the end: they are of an earlier run.
+        If `path` is missing and the block ends with an error, it is not there afterwards.
+
+        Parameters
+        ----------
+        names
+            With `overwrite`, files of an earlier run are removed at the end: those in `path` with
+            such names that this run did not write. None: all are kept.
         """
+        is_new = not path.exists()
         with output_errors(path):
             temporary = self._temporary_folder(path)
-        self._patterns.append((path, pattern))
+        if is_new:
+            self._new_folders.append(path)
+        if names:
+            self._names[path] = names
         return temporary
 
     def _temporary_folder(self, path: Path) -> Path:
         if path not in self._folders:
+            path.mkdir(parents=True, exist_ok=True)
             remove_stale(path)
             self._folders[path] = create_folder(path, self._cleanup)
         return self._folders[path]
@@ -163,9 +175,15 @@ class OutputFiles:
     def __exit__(
         self, kind: type[BaseException] | None, _: BaseException | None, __: TracebackType | None
     ) -> None:
-        with self._cleanup:
-            if kind is None:
-                self._publish()
+        try:
+            with self._cleanup:
+                if kind is None:
+                    self._publish()
+                    self._new_folders.clear()
+        finally:
+            for folder in self._new_folders:
+                with contextlib.suppress(OSError):  # another run may have written into it
+                    folder.rmdir()
 
     def _publish(self) -> None:
         files = {
@@ -186,9 +204,10 @@ class OutputFiles:
                         undo.callback(try_to_remove, path)
             undo.pop_all()
         if self._overwrite:
-            earlier = {old for path, pattern in self._patterns for old in path.glob(pattern)}
-            for old in earlier - files.keys():
-                try_to_remove(old)
+            for path, names in self._names.items():
+                for old in set(path.iterdir()) - files.keys():
+                    if names.fullmatch(old.name):
+                        try_to_remove(old)
 
 
 def _replace(path: Path, temporary: Path, may_replace: MayReplace) -> None:

@@ -17,7 +17,7 @@ from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector, model_file
 from vdet.errors import in_one_line
 from vdet.progress import Progress, no_progress
-from vdet.run.sinks.protocol import make_folders, output_state
+from vdet.run.sinks.protocol import output_state
 from vdet.run.video import VideoJob, run_video
 from vdet.version import __version__
 
@@ -126,7 +126,7 @@ def _digest_of(path: Path | str | None) -> str:
 
 
 def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress) -> Record:
-    """Make the folders of a job's outputs, run it, and return its record.
+    """Run a job, and return its record.
 
     Errors are recorded, and not raised. `progress` is as `run_video` takes it.
     """
@@ -137,9 +137,6 @@ def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress)
             record = replace(record, digest=digest, **_run(job, work, progress))
         except Exception as failure:
             record = replace(record, error=in_one_line(failure))
-            for output in job.outputs:
-                with suppress(OSError):
-                    output.path.rmdir()  # only a folder, and only if it is empty
             if os.environ.get("VDET_DEBUG") == "1":
                 traceback.print_exc()
     seconds = round(time.perf_counter() - began, 3)
@@ -154,8 +151,6 @@ def record_of_killed(job: VideoJob, work: Work) -> Record:
 
 def _run(job: VideoJob, work: Work, progress: Progress) -> dict[str, Any]:
     """Run a job, and return what its record says about the result."""
-    for output in job.outputs:
-        make_folders(output)
     job = replace(job, threads=work.threads, codec_threads=work.threads)
     model = load_detector(work.settings.detector, work.model)
     totals = run_video(job, model, work.settings, progress=progress)

@@ -48,7 +48,7 @@ class DrawSettings(Section):
     """
     label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
     """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
-    labels. null: id in a video, id and score in a picture.
+    labels. null: the id in a video, the score in a picture.
     """
     colors: Literal["id", "class", "region", "one"] = "id"
     """Use one colour for each id, for each class, for each polygon of the section regions, or for

@@ -11,7 +11,7 @@ from vdet.boxes import Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import ImageError
-from vdet.files import OutputFiles, make_folder
+from vdet.files import OutputFiles
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, Picture
 from vdet.media.images import PICTURE_SUFFIXES, Image, is_picture_name, read_image
@@ -84,8 +84,6 @@ def plan_pictures(
     jobs = [PictureJob(source, tuple(wanted(source))) for source in sources]
     outputs = [output for job in jobs for output in job.outputs]
     check_sinks(outputs, overwrite=overwrite, inputs=sources, makes_folder=not is_file)
-    if out is not None and not is_file:
-        make_folder(out)
     return jobs
 
 

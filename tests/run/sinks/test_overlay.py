@@ -128,9 +128,9 @@ def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], t
     np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
 
 
-def test_a_still_picture_shows_ids_and_scores() -> None:
+def test_a_still_picture_shows_scores_without_ids() -> None:
     expected = road(CAR)
-    draw_box(expected, CAR, color_of(1), "#1 0.90")
+    draw_box(expected, CAR, color_of(1), "0.90")
     np.testing.assert_array_equal(drawn_on(result_of(CAR), video=None), expected)
 
 

@@ -124,10 +124,8 @@ class TestFailure:
         self, request: pytest.FixtureRequest, red_clip: Path, tmp_path: Path
     ) -> Iterator[VideoJob]:
         threads = threading.active_count()
-        (tmp_path / "stages").mkdir()
-        wanted = outputs(
-            video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv", stages=tmp_path / "stages"
-        )
+        folders = {name: tmp_path / name for name in ("stages", "page", "crops")}
+        wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.csv", **folders)
         fragile = Output("fragile", tmp_path / "fragile.txt")
         in_order = (fragile, *wanted) if "before" in request.param else (*wanted, fragile)
         yield VideoJob(red_clip, in_order, frames=20)
@@ -148,13 +146,12 @@ class TestFailure:
         self.set_failure(register, moment, RuntimeError("broken"))
         with pytest.raises(RuntimeError, match="broken"):
             run_red(job)
-        assert [path.name for path in tmp_path.iterdir()] == ["stages"]
-        assert list((tmp_path / "stages").iterdir()) == []
+        assert list(tmp_path.iterdir()) == []
         self.set_failure(register, "never", RuntimeError())
         check_job(job)
         run_red(job)
         names = {path.name for path in tmp_path.iterdir()}
-        assert names == {"fragile.txt", "out.csv", "out.mp4", "stages"}
+        assert names == {"fragile.txt", "out.csv", "out.mp4", "stages", "page", "crops"}
         assert (tmp_path / "fragile.txt").read_text().split() == [str(n) for n in range(20)]
         assert len(read(tmp_path / "out.mp4")) == 20
         assert len(list((tmp_path / "stages").iterdir())) == 5
@@ -180,7 +177,6 @@ def test_frames_too_small_to_be_searched_get_no_boxes_but_every_output(
             image = np.full((height, width, 3), 90, np.uint8)
             writer.write(Frame(index, index / rate, Picture(image)))
     sink = collect("collects")
-    (tmp_path / "stages").mkdir()
     wanted = outputs(
         video=tmp_path / "out.mp4",
         tracks=tmp_path / "out.csv",

@@ -1,7 +1,8 @@
 """Files of tracks in each format."""
 
+import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -75,6 +76,20 @@ def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
         '"height": 6, "score": 1.0, "predicted": false, "class": null, "foot": [2.5, 3.0], '
         '"distance": null, "lane": null}]}\n'
     )
+
+
+def test_standard_output_gets_each_frame_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    pipe = io.BytesIO()
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(io.BufferedWriter(pipe)))
+    lines: list[int] = []
+
+    def results() -> Iterator[FrameResult]:
+        for result in RESULTS:
+            yield result
+            lines.append(pipe.getvalue().count(b"\n"))
+
+    write(Output("tracks", Path("-")), results())
+    assert lines == [1, 2, 3]
 
 
 def road(lane: Lane | None) -> Road:

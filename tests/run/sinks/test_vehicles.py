@@ -52,9 +52,11 @@ def test_a_better_picture_replaces_that_of_a_vehicle_that_was_gone(tmp_path: Pat
 
 def test_pictures_of_an_earlier_run_go(tmp_path: Path) -> None:
     write(Output("crops", tmp_path), [result_of(CAR, CAR)])
-    (tmp_path / "vehicle-list.txt").write_text("mine")
+    mine = ["vehicle-0001-at-0.000s.txt", "vehicle-0002-at-home-0.000s.jpg", "vehicle-list.txt"]
+    for name in mine:
+        (tmp_path / name).write_text("mine")
     write(Output("crops", tmp_path), [result_of(CAR, time=Fraction(3))])
-    assert names(tmp_path) == ["vehicle-0001-at-3.000s.jpg", "vehicle-list.txt"]
+    assert names(tmp_path) == sorted(["vehicle-0001-at-3.000s.jpg", *mine])
 
 
 def test_thousands_of_vehicles_do_not_need_thousands_of_open_files(tmp_path: Path) -> None:

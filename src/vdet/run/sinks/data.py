@@ -63,7 +63,6 @@ class TrackSink(BaseSink):
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if self._file is None:
-            sys.stdout.flush()
             return
         with self._file:
             if kind is None:
@@ -72,6 +71,8 @@ class TrackSink(BaseSink):
     def write(self, result: FrameResult) -> None:
         """Add the tracks of a frame."""
         self._writer.write(result.frame_tracks)
+        if self._file is None:
+            sys.stdout.flush()
 
 
 TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=True)

@@ -39,7 +39,7 @@ from vdet.track.track import Track
 from vdet.traffic.counter import VehicleCounter
 
 VIDEO_LABEL = ("id",)
-PICTURE_LABEL = ("id", "score")
+PICTURE_LABEL = ("score",)
 _OTHER_CLASSES = 10
 """Colours for classes that are not among `OUR_NAMES`."""
 

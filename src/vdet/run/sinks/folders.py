@@ -1,19 +1,19 @@
 """The sinks that fill a folder with pictures: `stages` of one frame, and `crops` of vehicles."""
 
+import re
 from pathlib import Path
 
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
-from vdet.files import make_folder
 from vdet.lanes.drawing import stage_pictures
 from vdet.media.images import Image, encode_image
 from vdet.regions import Regions
 from vdet.run.result import FrameResult
-from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
+from vdet.run.sinks.drawn import PICTURE_LABEL, VIDEO_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.traffic.overview import BestCrops, Crop
 
 _BOXES = "boxes"
-CROP_NAMES = "vehicle-*-at-*s.*"
+_CROP_NAME = re.compile(r"vehicle-\d{4,}-at-\d+\.\d{3}s\.(jpg|png)")
 
 
 class StagesSink(BaseSink):
@@ -30,21 +30,21 @@ class StagesSink(BaseSink):
         if self._is_done or not result.searched or result.frame.time < self._time:
             return
         self._is_done = True
-        make_folder(self.path)
         pictures = self.context.stage_pictures(result.frame.image, result.detections)
         if settings := self.context.settings.regions:
             height, width = result.frame.image.shape[:2]
             regions = Regions(settings, width, height)
             pictures["regions"] = draw_regions(result.frame.image, regions)
-        pictures[_BOXES] = _with_boxes(result)
+        pictures[_BOXES] = _with_boxes(result, is_still=self.context.video is None)
         if result.road:
             pictures |= stage_pictures(result.road)
+        folder = self.context.files.stage_folder(self.path)
         for number, (name, picture) in enumerate(pictures.items(), start=1):
-            path = self.path / f"{number}-{name}.png"
-            self.context.files.stage(path).write_bytes(encode_image(picture, path))
+            path = folder / f"{number}-{name}.png"
+            path.write_bytes(encode_image(picture, path))
 
 
-def _with_boxes(result: FrameResult) -> Image:
+def _with_boxes(result: FrameResult, *, is_still: bool) -> Image:
     """Draw the detections in white with their scores, and the shown vehicles over them."""
     picture = result.frame.image.copy()
     detections = result.detections
@@ -52,7 +52,7 @@ def _with_boxes(result: FrameResult) -> Image:
         draw_box(picture, each.box, WHITE)
         draw_label(picture, f"{each.score:.2f}", (each.box.x1, each.box.y2), WHITE)
     for track in result.tracks:
-        text = label_text(track, PICTURE_LABEL)
+        text = label_text(track, PICTURE_LABEL if is_still else (*VIDEO_LABEL, *PICTURE_LABEL))
         draw_box(picture, track.box, color_of(track.id), text, dashed=track.predicted)
     return picture
 
@@ -65,8 +65,7 @@ class CropSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        make_folder(path)
-        self._folder = context.files.stage_folder(path, CROP_NAMES)
+        self._folder = context.files.stage_folder(path, _CROP_NAME)
         self._suffix = f".{context.settings.crops.format}"
         self._best = BestCrops()
         self._written: dict[int, Path] = {}
@@ -88,4 +87,4 @@ class CropSink(BaseSink):
             path.write_bytes(encode_image(crop.image, path))
 
 
-CROPS = SinkKind(CropSink, what="pictures of vehicles", marker=CROP_NAMES, takes="videos")
+CROPS = SinkKind(CropSink, what="pictures of vehicles", marker="vehicle-*-at-*s.*", takes="videos")

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vdet.config.rendering import render
-from vdet.files import make_folder
 from vdet.media.images import Image, is_picture_name
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, write_page
 from vdet.pages.video import Player, VideoPage, write_index
@@ -25,7 +24,7 @@ class PageSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        make_folder(path)
+        self._file = context.files.stage_folder(path) / PAGE_NAME
         video = self.video
         self._records = VehicleRecords(video.width)
         self._crops = BestCrops()
@@ -41,8 +40,7 @@ class PageSink(BaseSink):
     def finish(self) -> None:
         """Write the page."""
         self._keep(self._crops.end())
-        target = self.context.files.stage(self.path / PAGE_NAME)
-        write_page(self._page().html(), target)
+        write_page(self._page().html(), self._file)
 
     def write(self, result: FrameResult) -> None:
         """Add a frame."""

@@ -15,7 +15,6 @@ from vdet.files import (
     OutputFiles,
     any_file,
     check_output,
-    make_folder,
     output_errors,
 )
 from vdet.media import VideoInfo
@@ -210,21 +209,14 @@ def check_sinks(
         if path == STANDARD_OUTPUT and kind.writes_standard_output:
             continue
         if kind.marker:
-            if not makes_folder:
-                make_folder(path)
             path = min(path.glob(kind.marker), default=path / kind.marker)
         check_output(
             path,
             overwrite=overwrite,
             inputs=inputs,
-            makes_folder=makes_folder,
+            makes_folder=makes_folder or bool(kind.marker),
             may_replace=kind.may_replace,
         )
-
-
-def make_folders(output: Output) -> None:
-    """Make the folder of an output, or the folder that it is. Raises `OutputError`."""
-    make_folder(output.path if sink_kind(output.sink).marker else output.path.parent)
 
 
 def output_state(output: Output) -> tuple[int, int] | None:
