@@ -23,9 +23,9 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.config.loading import load_settings
 from vdet.config.schema import NetworkSettings, Settings
 from vdet.detect.factory import load_detector
+from vdet.evaluate.average_precision import rank_predictions
 from vdet.evaluate.comparison import pool
-from vdet.evaluate.detection_metrics import rank_predictions
-from vdet.evaluate.images import Counting, ImagesResult, Source, evaluate_images
+from vdet.evaluate.images import Counting, ImagesResult, MeasuredSet, evaluate_images
 from vdet.evaluate.show_video import result_lines
 from vdet.evaluate.video import Variant, evaluate_clips, open_clip
 from vdet.labels.reading import read_labelled_pictures
@@ -120,9 +120,9 @@ def measure(sets: Sequence[Path], network: Path) -> ImagesResult:
     return evaluate_images(labelled, model, counting, threads=core_count())
 
 
-def ranked_logits(sources: Sequence[Source]) -> tuple[Float64Array, BoolArray]:
+def ranked_logits(sources: Sequence[MeasuredSet]) -> tuple[Float64Array, BoolArray]:
     """Return the output of the network for each detection, and whether it finds a vehicle."""
-    ranked = [rank_predictions(pool([i.compare(0) for i in each.images])) for each in sources]
+    ranked = [rank_predictions(pool([i.every for i in each.images])) for each in sources]
     scores = np.clip(np.concatenate([each.scores for each in ranked]), 1e-6, 1 - 1e-6)
     return np.log(scores / (1 - scores)), np.concatenate([each.right[0] for each in ranked])
 

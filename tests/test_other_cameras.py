@@ -21,7 +21,7 @@ from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import horizon_of
-from vdet.evaluate.comparison import Comparison, compare, match
+from vdet.evaluate.comparison import Comparison, compare
 from vdet.evaluate.scores import score, score_comparison
 from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo
@@ -121,11 +121,9 @@ def mirror_images(clip: Iterable[Frame]) -> Iterator[Frame]:
 def on_vehicles(comparison: Comparison) -> dict[tuple[int, int], Float64Array]:
     """Give the left, top, right and bottom shown of each vehicle found, by frame and vehicle."""
     return {
-        (pairs.frame.number, vehicle): np.concatenate([box[:2], box[:2] + box[2:]])
-        for pairs in match(comparison)
-        for vehicle, box in zip(
-            pairs.vehicles.tolist(), pairs.frame.track_boxes[pairs.track_rows], strict=True
-        )
+        (frame.number, vehicle): np.concatenate([box[:2], box[:2] + box[2:]])
+        for frame in comparison.frames
+        for vehicle, box in zip(frame.found.tolist(), frame.track_boxes[frame.columns], strict=True)
     }
 
 

@@ -13,7 +13,7 @@ from vdet.evaluate.images import (
     Counting,
     ImageScores,
     MeasuredImage,
-    Source,
+    MeasuredSet,
     mean_scores,
     score_source,
 )
@@ -49,10 +49,10 @@ class Searched:
         return MeasuredImage.of(picture, WIDTH, Boxes(boxes, scores), counting)
 
 
-def source(*pictures: Searched, counting: Counting = PLAIN) -> Source:
+def source(*pictures: Searched, counting: Counting = PLAIN) -> MeasuredSet:
     measured = [each.measured(counting) for each in pictures]
     labelled = LabelledPictures("set", tuple(each.picture for each in measured))
-    return score_source(labelled, measured, counting)
+    return score_source(labelled, measured)
 
 
 def scores(*pictures: Searched, counting: Counting = PLAIN) -> ImageScores:
@@ -151,7 +151,7 @@ class TestMean:
         empty = source(Searched([], [(0.9, at(0))]))
         assert empty.scores.f1 is None
         assert empty.scores.false_positives == 1
-        mean = mean_scores([good, bad, empty], PLAIN)
+        mean = mean_scores([good, bad, empty])
         assert (mean.images, mean.vehicles, mean.matches, mean.false_positives) == (3, 4, 1, 1)
         assert (mean.recall, mean.f1) == (0.5, 0.5)
         assert mean.sizes[2].recall == 0.5
@@ -160,6 +160,6 @@ class TestMean:
         low = source(Searched([at(0)], [(0.3, at(0)), (0.1, at(500))]))
         high = source(Searched([at(0)], [(0.8, at(0)), (0.6, at(500)), (0.5, at(700))]))
         assert (low.scores.best_score, high.scores.best_score) == (0.3, 0.8)
-        mean = mean_scores([low, high], PLAIN)
+        mean = mean_scores([low, high])
         assert mean.best_score == 0.3
         assert mean.best_f1 == pytest.approx((1 + 0.5) / 2)

@@ -55,8 +55,9 @@ def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmM
     for one, other, image in zip(*images, red_set.pictures, strict=True):
         assert one.picture is image is other.picture
         assert one.width == WIDTH
-        assert np.array_equal(one.found.boxes, other.found.boxes)
-        assert np.array_equal(one.found.scores, other.found.scores)
+        for frame, same in zip(one.every.frames, other.every.frames, strict=True):
+            assert np.array_equal(frame.track_boxes, same.track_boxes)
+            assert np.array_equal(frame.scores, same.scores)
 
 
 def test_each_set_is_scored_and_progress_counts_all_pictures(

@@ -7,8 +7,9 @@ import numpy as np
 from labels.writers import Boxed, Labelled, write_coco
 from vdet.boxes import Boxes
 from vdet.evaluate.images import Counting, ImagesResult, MeasuredImage, mean_scores, score_source
-from vdet.evaluate.output import FOUND, TRUE, RunName
+from vdet.evaluate.output import RunName
 from vdet.evaluate.show_images import images_page, worst_tiles
+from vdet.evaluate.tiles import FOUND, TRUE
 from vdet.labels.label import from_size
 from vdet.labels.reading import read_labelled_pictures
 
@@ -26,8 +27,8 @@ def result_of(folder: Path, *found: tuple[float, float, float, float]) -> Images
     boxes = np.array([from_size(*box) for box in found], np.float64).reshape(-1, 4)
     shown = Boxes(boxes, np.full(len(found), 0.9))
     measured = [MeasuredImage.of(each, 100, shown, COUNTING) for each in labelled.pictures]
-    source = score_source(labelled, measured, COUNTING)
-    return ImagesResult(COUNTING, (source,), mean_scores([source], COUNTING))
+    source = score_source(labelled, measured)
+    return ImagesResult(COUNTING, (source,), mean_scores([source]))
 
 
 def test_the_page_names_detector_source_and_labels_left_out(tmp_path: Path) -> None:
@@ -44,7 +45,7 @@ def test_a_page_where_nothing_is_found_can_be_made(tmp_path: Path) -> None:
 
 def test_pictures_with_mistakes_are_shown_with_their_boxes(tmp_path: Path) -> None:
     result = result_of(tmp_path, (70, 10, 20, 30))
-    first, second = worst_tiles(result.sources[0], 0.5)
+    first, second = worst_tiles(result.sources[0])
     assert (first.title, first.caption) == ("a.png", "1 missed, 1 false alarm")
     assert (second.title, second.caption) == ("b.png", "0 missed, 1 false alarm")
     for color in (TRUE, FOUND):

@@ -28,7 +28,7 @@ def write(path: Path, frames: range, ending: str) -> Path:
 def test_several_clips_have_a_row_each_and_a_total() -> None:
     lines = list(result_lines([run((), TEN, range(1, 6))]))
     assert [line.split("  ")[0] for line in lines[1:4]] == ["clip 0", "clip 1", "total"]
-    assert any(line.startswith("largest of 1 mistakes in clip 1") for line in lines)
+    assert any(line.startswith("largest of 1 mistake in clip 1") for line in lines)
 
 
 def test_a_sweep_has_a_row_for_each_setting_and_names_the_best() -> None:

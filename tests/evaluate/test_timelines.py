@@ -2,40 +2,24 @@ import pytest
 
 from evaluate.scenes import TEN, drive, video
 from labels.saving import row
-from vdet.evaluate.comparison import compare, match
+from vdet.evaluate.comparison import compare
 from vdet.evaluate.scores import score
-from vdet.evaluate.timelines import (
-    FirstDetection,
-    Mistake,
-    Timeline,
-    mistakes,
-    track_timelines,
-    vehicle_timelines,
-)
+from vdet.evaluate.timelines import FirstDetection, Stretch, mistakes, stretches
 from vdet.labels.video import LabelledVideo
 
-Stretch = tuple[int, int, int | None]
 
-
-def found_timelines(found: LabelledVideo, truth: LabelledVideo) -> tuple[Timeline, ...]:
-    comparison = compare(found, truth)
-    return vehicle_timelines(comparison, match(comparison))
-
-
-def stretches(timeline: Timeline) -> list[Stretch]:
-    return [(each.first, each.last, each.partner) for each in timeline.stretches]
-
-
-def found_mistakes(found: LabelledVideo, truth: LabelledVideo) -> tuple[Mistake, ...]:
-    comparison = compare(found, truth)
-    matched = match(comparison)
-    return mistakes(vehicle_timelines(comparison, matched), track_timelines(comparison, matched))
+def found_mistakes(found: LabelledVideo, truth: LabelledVideo) -> tuple[Stretch, ...]:
+    return mistakes(stretches(compare(found, truth)))
 
 
 def test_each_track_has_its_own_stretch() -> None:
     found = video(drive(4, range(1, 4)), drive(9, range(6, 11)))
-    (timeline,) = found_timelines(found, video(drive(7, range(1, 11))))
-    assert stretches(timeline) == [(1, 3, 4), (4, 5, None), (6, 10, 9)]
+    seen = stretches(compare(found, video(drive(7, range(1, 11)))))
+    assert [(each.kind, each.first, each.last, each.partner) for each in seen] == [
+        ("found", 1, 3, 4),
+        ("missed", 4, 5, None),
+        ("found", 6, 10, 9),
+    ]
 
 
 def test_the_delay_is_from_the_first_true_frame_to_the_first_match() -> None:
@@ -72,8 +56,8 @@ def test_false_tracks_per_minute_use_the_length_of_the_video() -> None:
 def test_frames_in_a_row_are_one_mistake_and_the_longest_comes_first() -> None:
     found = video(drive(1, range(3, 6)), drive(1, range(7, 11)))
     late, gap = found_mistakes(found, video(drive(7, TEN)))
-    assert late == Mistake("missed", 7, 1, 2, 0)
-    assert gap == Mistake("missed", 7, 6, 6, 0)
+    assert late == Stretch("missed", 7, 1, 2, None, 0)
+    assert gap == Stretch("missed", 7, 6, 6, None, 0)
     assert (late.boxes, late.middle, gap.boxes, gap.middle) == (2, 1, 1, 6)
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 import pytest
 
 from quick import QUICK
 from vdet.config.loading import load_settings
-from vdet.config.schema import MotionTrackerSettings, Settings
+from vdet.config.schema import DetectorSettings, MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
@@ -116,6 +116,21 @@ def test_settings_that_search_alike_share_the_search(
         results = list(follow_together(variants, reader, reader.info))
     assert [len(each) for each in results] == [4, 4, 4]
     assert sorted(searched) == [0, 0, 1, 1, 2, 2], "two searches a frame for four settings"
+
+
+class ListingSettings(DetectorSettings):
+    """Settings of another package's detector, which have no hash."""
+
+    kind: Literal["listing"] = "listing"
+    weights: dict[str, list[float]]
+
+
+def test_settings_of_a_plug_in_may_hold_lists(clip_path: Path, variant: OfModel) -> None:
+    detector = ListingSettings(weights={"car": [1.0]})
+    listing = replace(variant(), settings=settings().model_copy(update={"detector": detector}))
+    with VideoReader(clip_path, frames=3) as reader:
+        results = list(follow_together([listing, listing], reader, reader.info))
+    assert [len(each) for each in results] == [2, 2, 2]
 
 
 def test_only_the_frames_that_the_truth_covers_are_read(

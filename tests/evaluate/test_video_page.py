@@ -6,8 +6,8 @@ import numpy as np
 
 from labels.saving import checked_video, row
 from pages.html import Elements
-from vdet.evaluate.output import FOUND, TRUE
 from vdet.evaluate.show_video import mistake_tiles, video_page
+from vdet.evaluate.tiles import FOUND, TRUE
 from vdet.evaluate.video import RunResult, score_video
 from vdet.labels.label import Label
 from vdet.labels.video import LabelledVideo

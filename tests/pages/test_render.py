@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from vdet.evaluate.output import Tile
+from vdet.evaluate.tiles import Tile
 from vdet.pages.charts import Bar, Line, Plot, number_axis
 from vdet.pages.render import counted, link_to, render, write_page
 
@@ -23,12 +23,10 @@ def html() -> str:
         "eval_images.html",
         subtitle=NASTY,
         figures=[(NASTY, NASTY)],
-        headings=[NASTY],
-        rows=[[NASTY]],
+        sources=([NASTY], [[NASTY]]),
         others=[NASTY],
         plot=Plot(NASTY, axis, axis, bars, lines, [(NASTY, "#fff")]),
-        size_headings=[NASTY],
-        size_rows=[[NASTY]],
+        sizes=([NASTY], [[NASTY]]),
         sheets=[(NASTY, [tile])],
     )
 

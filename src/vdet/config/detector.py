@@ -1,6 +1,5 @@
 """The section `detector`: what all kinds of detectors have in common, and that of networks."""
 
-from collections.abc import Hashable
 from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field
@@ -44,10 +43,10 @@ class DetectorSettings(Section):
     foot: Foot = 0.0
 
     @property
-    def search_key(self) -> Hashable:
+    def search_key(self) -> object:
         """What the search of a frame depends on, apart from which frames are searched.
 
-        Detectors whose settings have the same key and the same stride, and that read the same model
+        Detectors whose settings have equal keys and the same stride, and that read the same model
         file, find the same candidates in a frame.
         """
         return self
@@ -91,7 +90,7 @@ class NetworkSettings(DetectorSettings):
     """Names of the classes in the network's order. null: those in its file."""
 
     @property
-    def search_key(self) -> Hashable:
+    def search_key(self) -> object:
         """What the search of a frame depends on."""
         return self.kind, self.least, self.classes, self.names
 

@@ -1,7 +1,6 @@
 """The section `detector` of the linear SVM: its features, windows, heatmap and scores."""
 
 import math
-from collections.abc import Hashable
 from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -219,7 +218,7 @@ class SvmSettings(DetectorSettings):
     stills: StillSettings = StillSettings()
 
     @property
-    def search_key(self) -> Hashable:
+    def search_key(self) -> object:
         """What the search of a frame depends on: all but heat, score and still pictures."""
         return self.kind, self.features, self.search
 

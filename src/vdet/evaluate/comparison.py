@@ -37,7 +37,7 @@ _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ComparedFrame:
-    """The vehicles and the predictions that count in a frame.
+    """The vehicles and the predictions that count in a frame, and how they are paired.
 
     Attributes
     ----------
@@ -52,6 +52,8 @@ class ComparedFrame:
         float64 `(m,)`: confidence of the predictions.
     iou
         float64 `(n, m)`.
+    rows, columns
+        int64 `(k,)` each: box `rows[i]` of the vehicles is found by box `columns[i]` of the tracks.
     """
 
     number: int
@@ -61,6 +63,18 @@ class ComparedFrame:
     track_boxes: Float64Array
     scores: Float64Array
     iou: Float64Array
+    rows: Int64Array
+    columns: Int64Array
+
+    @property
+    def found(self) -> Int64Array:
+        """The vehicles that are found, int64 `(k,)`: indices as in `vehicles`."""
+        return self.vehicles[self.rows]
+
+    @property
+    def found_by(self) -> Int64Array:
+        """The track that finds each of `found`, int64 `(k,)`."""
+        return self.tracks[self.columns]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,7 +108,13 @@ class Comparison:
 def compare(
     prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None = None
 ) -> Comparison:
-    """Put predictions beside the truth of the same video and apply the ignore regions.
+    """Put predictions beside the truth of the same video, apply the ignore regions, pair boxes.
+
+    Boxes are paired at IoU 0.5 and above. A pair of the previous frame stays together if it still
+    overlaps enough; the others are paired so that the sum of IoU is largest. As in TrackEval, a
+    frame without vehicles or without predictions does not count as the previous frame.
+    Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
+    MOT Metrics", 2008.
 
     The video is taken to end with the last frame that either of them knows. If the truth covers
     only a part of the video, cut the predictions with `until` first; otherwise all later ones are
@@ -115,19 +135,21 @@ def compare(
     kept = [_apply_regions(prediction.frame(number), truth.frame(number)) for number in numbers]
     vehicle_ids = np.unique(joined(vehicles.ids for vehicles, _ in kept))
     track_ids = np.unique(joined(tracks.ids for _, tracks in kept))
-    frames = [
-        ComparedFrame(
-            number,
-            np.searchsorted(vehicle_ids, vehicles.ids),
-            np.searchsorted(track_ids, tracks.ids),
-            vehicles.boxes,
-            tracks.boxes,
-            tracks.scores,
-            iou_matrix(vehicles.boxes, tracks.boxes),
-        )
-        for number, (vehicles, tracks) in zip(numbers, kept, strict=True)
-        if len(vehicles) or len(tracks)
-    ]
+    partners = np.full(len(vehicle_ids), UNMATCHED)
+    frames = []
+    for number, (vehicles, tracks) in zip(numbers, kept, strict=True):
+        if len(vehicles) or len(tracks):
+            of_vehicles = np.searchsorted(vehicle_ids, vehicles.ids)
+            of_tracks = np.searchsorted(track_ids, tracks.ids)
+            iou = iou_matrix(vehicles.boxes, tracks.boxes)
+            together = partners[of_vehicles][:, np.newaxis] == of_tracks
+            weights = np.where(at_least(iou, MATCH_IOU), iou + _KEEP_BONUS * together, 0)
+            boxes = vehicles.boxes, tracks.boxes, tracks.scores
+            frame = ComparedFrame(number, of_vehicles, of_tracks, *boxes, iou, *assign(weights))
+            frames.append(frame)
+            if iou.size:
+                partners[:] = UNMATCHED
+                partners[frame.found] = frame.found_by
     rate = rate or prediction.rate or truth.rate
     seconds = max(prediction.last_frame, truth.last_frame) / rate if rate else None
     return Comparison(tuple(frames), vehicle_ids, track_ids, seconds)
@@ -218,56 +240,3 @@ def _apply_regions(
     dropped = np.asarray(covered.any(axis=1) | tracks.ignored)
     dropped[paired] = False
     return vehicles, tracks.where(~dropped)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MatchedFrame:
-    """A frame's pairs: row `vehicle_rows[i]` of its vehicles, row `track_rows[i]` of its tracks."""
-
-    frame: ComparedFrame
-    vehicle_rows: Int64Array
-    track_rows: Int64Array
-
-    def __len__(self) -> int:
-        return len(self.vehicle_rows)
-
-    @property
-    def vehicles(self) -> Int64Array:
-        """The vehicles that were found, int64: indices as in `ComparedFrame.vehicles`."""
-        return self.frame.vehicles[self.vehicle_rows]
-
-    @property
-    def tracks(self) -> Int64Array:
-        """The track that found each of `vehicles`, int64."""
-        return self.frame.tracks[self.track_rows]
-
-    @property
-    def iou(self) -> Float64Array:
-        """The overlap of each pair, float64."""
-        return self.frame.iou[self.vehicle_rows, self.track_rows]
-
-
-def match(comparison: Comparison) -> list[MatchedFrame]:
-    """Pair vehicles with predictions in every frame, at IoU 0.5 and above.
-
-    A pair of the previous frame stays together if it still overlaps enough; the others are paired
-    so that the sum of IoU is largest. As in TrackEval, a frame without vehicles or without
-    predictions does not count as the previous frame.
-    Source: Bernardin and Stiefelhagen, "Evaluating Multiple Object Tracking Performance: The CLEAR
-    MOT Metrics", 2008.
-    """
-    partners = np.full(len(comparison.vehicle_ids), UNMATCHED)
-    matched = []
-    for frame in comparison.frames:
-        pairs = _match_frame(frame, partners)
-        matched.append(pairs)
-        if frame.iou.size:
-            partners[:] = UNMATCHED
-            partners[pairs.vehicles] = pairs.tracks
-    return matched
-
-
-def _match_frame(frame: ComparedFrame, partners: Int64Array) -> MatchedFrame:
-    together = partners[frame.vehicles][:, np.newaxis] == frame.tracks[np.newaxis, :]
-    weights = np.where(at_least(frame.iou, MATCH_IOU), frame.iou + _KEEP_BONUS * together, 0)
-    return MatchedFrame(frame, *assign(weights))

@@ -6,16 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Boxes, Float64Array, Int64Array
+from vdet.boxes import BoolArray, Boxes, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
-from vdet.evaluate.comparison import Comparison, MatchedFrame, compare, match, pool
-from vdet.evaluate.detection_metrics import (
-    RankedPredictions,
-    detection_metrics,
-    rank_predictions,
-    ratio,
-)
+from vdet.evaluate.average_precision import RankedPredictions, rank_predictions
+from vdet.evaluate.comparison import Comparison, compare, pool
+from vdet.evaluate.scores import ratio, score_detections
 from vdet.labels.label import MAX_IN_FRAME
 from vdet.labels.pictures import LabelledPicture, LabelledPictures
 from vdet.labels.video import LabelledVideo
@@ -47,38 +43,47 @@ class Counting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredImage:
-    """A searched picture as a video of one frame: its vehicles, and detections of every score."""
+    """A searched picture, compared with its labels as a video of one frame.
+
+    Attributes
+    ----------
+    width
+        Width of the picture, pixels.
+    regions
+        float64 `(n, 4)`: x1, y1, x2, y2 of the ignore regions.
+    every, shown
+        The vehicles beside the detections of every score, and beside those that count.
+    """
 
     picture: LabelledPicture
     width: int
-    truth: LabelledVideo
-    found: LabelledVideo
+    regions: Float64Array
+    every: Comparison
+    shown: Comparison
 
     @staticmethod
     def of(
         picture: LabelledPicture, width: int, found: Boxes, counting: Counting
     ) -> "MeasuredImage":
-        """Mark what is an ignore region, and which detections need not find anything.
-
-        Parameters
-        ----------
-        width
-            Width of the picture, pixels.
-        """
+        """Compare the detections with the labels of a picture that is `width` pixels wide."""
         least = counting.least_width * width
         regions = picture.ignored | (_widths(picture.boxes) < least)
+        truth = _one_frame(picture.boxes, np.ones(len(regions)), regions)
         best = np.argsort(-found.scores, kind="stable")[:MAX_IN_FRAME]
-        boxes = found.sides[best]
-        return MeasuredImage(
-            picture,
-            width,
-            _one_frame(picture.boxes, np.ones(len(regions)), regions),
-            _one_frame(boxes, found.scores[best], _widths(boxes) < least),
-        )
+        boxes, scores = found.sides[best], found.scores[best]
+        detected = _one_frame(boxes, scores, _widths(boxes) < least)
+        shown = detected.where(scores >= counting.score)
+        comparisons = compare(detected, truth), compare(shown, truth)
+        return MeasuredImage(picture, width, picture.boxes[regions], *comparisons)
 
-    def compare(self, score: float) -> Comparison:
-        """Compare the detections of at least this score with the vehicles."""
-        return compare(self.found.where(self.found.scores >= score), self.truth)
+
+def _one_frame(boxes: Float64Array, scores: Float64Array, ignored: BoolArray) -> LabelledVideo:
+    count = len(boxes)
+    return LabelledVideo(np.ones(count, np.int64), np.arange(count), boxes, scores, ignored, 1)
+
+
+def _widths(boxes: Float64Array) -> Float64Array:
+    return np.asarray(boxes[:, 2] - boxes[:, 0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +166,7 @@ class F1Curve:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
+class MeasuredSet:
     """The pictures of one source, as labelled and as measured, their curve and their scores."""
 
     labelled: LabelledPictures
@@ -175,7 +180,7 @@ class ImagesResult:
     """What counted, the sources of pictures with their scores, and the mean of these."""
 
     counting: Counting
-    sources: tuple[Source, ...]
+    sources: tuple[MeasuredSet, ...]
     mean: ImageScores
 
 
@@ -202,7 +207,6 @@ def evaluate_images(
         A picture cannot be read or searched; the message names it.
     """
     advance = progress(sum(len(each.pictures) for each in sets))
-
     settings = Settings()  # the whole picture, and no step
 
     def search(labelled: LabelledPicture) -> MeasuredImage:
@@ -217,42 +221,35 @@ def evaluate_images(
             for _, result in results:
                 measured.append(result)
                 advance(1)
-        sources.append(score_source(each, measured, counting))
-    return ImagesResult(counting, tuple(sources), mean_scores(sources, counting))
+        sources.append(score_source(each, measured))
+    return ImagesResult(counting, tuple(sources), mean_scores(sources))
 
 
-def score_source(
-    labelled: LabelledPictures, images: Sequence[MeasuredImage], counting: Counting
-) -> Source:
+def score_source(labelled: LabelledPictures, images: Sequence[MeasuredImage]) -> MeasuredSet:
     """Return the scores of one source."""
-    shown = [image.compare(counting.score) for image in images]
-    matched = [match(comparison) for comparison in shown]
-    metrics = detection_metrics(pool(shown), [frame for frames in matched for frame in frames])
-    ranked = rank_predictions(pool([image.compare(0) for image in images]))
-    precisions = ranked.average_precisions()
-    values = asdict(metrics) | {"ap50": float(precisions[0]), "ap50_95": float(precisions.mean())}
+    found = score_detections(pool([image.shown for image in images]))
+    ranked = rank_predictions(pool([image.every for image in images]))
     curve = F1Curve.of(ranked)
-    best_f1, best_score = _best([images], [curve], counting.score)
+    best_f1, best_score = _best([curve])
+    ap50, ap50_95 = ranked.average_precisions()
+    ratios = asdict(found) | {"ap50": ap50, "ap50_95": ap50_95}
     scores = ImageScores(
         images=len(images),
         vehicles=ranked.vehicles,
-        matches=metrics.matches,
-        false_positives=metrics.false_positives,
+        matches=found.matches,
+        false_positives=found.false_positives,
         best_f1=best_f1,
         best_score=best_score,
-        sizes=_by_size(images, matched),
-        **{name: values[name] if ranked.vehicles else None for name in _RATIOS},
+        sizes=_by_size(images),
+        **{name: ratios[name] if ranked.vehicles else None for name in _RATIOS},
     )
-    return Source(labelled, tuple(images), curve, scores)
+    return MeasuredSet(labelled, tuple(images), curve, scores)
 
 
-def mean_scores(sources: Sequence[Source], counting: Counting) -> ImageScores:
+def mean_scores(sources: Sequence[MeasuredSet]) -> ImageScores:
     """Return the mean over sources."""
     scores = [source.scores for source in sources]
-    counted = [source for source in sources if source.scores.vehicles]
-    best_f1, best_score = _best(
-        [source.images for source in counted], [source.curve for source in counted], counting.score
-    )
+    best_f1, best_score = _best([each.curve for each in sources if each.scores.vehicles])
     sizes = zip(*(each.sizes for each in scores), strict=True)
     return ImageScores(
         best_f1=best_f1,
@@ -262,75 +259,41 @@ def mean_scores(sources: Sequence[Source], counting: Counting) -> ImageScores:
     )
 
 
-def _best(
-    sources: Sequence[Sequence[MeasuredImage]], curves: Sequence[F1Curve], shown: float
-) -> tuple[float | None, float | None]:
-    """Return the highest mean F1 at any one score, and that score; None without vehicles.
+def _mean(scores: Sequence[Any], names: Iterable[str]) -> dict[str, Any]:
+    """Return the sum of each count and the mean of each ratio that is known."""
+    means: dict[str, float | None] = {}
+    for name in names:
+        known = [value for each in scores if (value := getattr(each, name)) is not None]
+        total = sum(known)
+        means[name] = (total if isinstance(total, int) else total / len(known)) if known else None
+    return means
 
-    The curves choose the score. F1 there is measured as at the score `shown`, which is taken if it
-    is better: a curve can differ a little where vehicles overlap.
-    """
+
+def _best(curves: Sequence[F1Curve]) -> tuple[float | None, float | None]:
+    """Return the highest mean F1 at any one score, and that score; None without vehicles."""
     scores = np.unique(np.concatenate([np.empty(0), *(curve.scores for curve in curves)]))[::-1]
     if not len(scores):
         return None, None
     means = np.mean([curve.at(scores) for curve in curves], axis=0)
-    chosen = float(scores[np.argmax(means)])
-    exact = {
-        score: np.mean([_f1(images, score) for images in sources]) for score in (chosen, shown)
-    }
-    best = max(exact, key=lambda score: exact[score])
-    return float(exact[best]), best
+    return float(means.max()), float(scores[np.argmax(means)])
 
 
-def _f1(images: Sequence[MeasuredImage], score: float) -> float:
-    comparisons = [image.compare(score) for image in images]
-    matches = sum(len(pairs) for each in comparisons for pairs in match(each))
-    boxes = sum(each.vehicle_lengths().sum() + each.track_lengths().sum() for each in comparisons)
-    return ratio(2 * matches, boxes)
-
-
-def _one_frame(boxes: Float64Array, scores: Float64Array, ignored: BoolArray) -> LabelledVideo:
-    count = len(boxes)
-    return LabelledVideo(np.ones(count, np.int64), np.arange(count), boxes, scores, ignored, 1)
-
-
-def _widths(boxes: Float64Array) -> Float64Array:
-    return np.asarray(boxes[:, 2] - boxes[:, 0])
-
-
-def _by_size(
-    images: Sequence[MeasuredImage], matched: Sequence[Sequence[MatchedFrame]]
-) -> tuple[SizeScores, ...]:
-    counts = np.zeros((3, len(SIZE_NAMES)), np.int64)  # vehicles, matches, false positives
-    for image, frames in zip(images, matched, strict=True):
-        width = image.width
-        for pairs in frames:
-            vehicles = _sizes(pairs.frame.vehicle_boxes, width)
-            wrong = np.delete(pairs.frame.track_boxes, pairs.track_rows, axis=0)
-            groups = (vehicles, vehicles[pairs.vehicle_rows], _sizes(wrong, width))
-            counts += [np.bincount(sizes, minlength=len(SIZE_NAMES)) for sizes in groups]
-    return tuple(_size_scores(*column) for column in counts.T.tolist())
-
-
-def _sizes(boxes: Float64Array, width: int) -> Int64Array:
-    """Return the index into `SIZE_NAMES` of each box."""
-    return np.searchsorted(SIZES, _widths(boxes) / width, side="right").astype(np.int64)
-
-
-def _size_scores(vehicles: int, matches: int, wrong: int) -> SizeScores:
-    if not vehicles:
-        return SizeScores(0, 0, wrong, None, None)
-    f1 = ratio(2 * matches, matches + wrong + vehicles)
-    return SizeScores(vehicles, matches, wrong, ratio(matches, vehicles), f1)
-
-
-def _mean(scores: Sequence[Any], names: Iterable[str]) -> dict[str, Any]:
-    """Return the sum of each count and the mean of each ratio that is known."""
-    return {name: _total([getattr(each, name) for each in scores]) for name in names}
-
-
-def _total(values: Sequence[int | float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    if not known:
-        return None
-    return sum(known) if isinstance(known[0], int) else sum(known) / len(known)
+def _by_size(images: Sequence[MeasuredImage]) -> tuple[SizeScores, ...]:
+    counts = np.zeros((3, len(SIZE_NAMES)), np.int64)  # of vehicles, matches, false positives
+    for image in images:
+        for frame in image.shown.frames:
+            vehicles = _widths(frame.vehicle_boxes) / image.width
+            wrong = _widths(np.delete(frame.track_boxes, frame.columns, axis=0)) / image.width
+            for kind, widths in enumerate((vehicles, vehicles[frame.rows], wrong)):
+                sizes = np.searchsorted(SIZES, widths, side="right")
+                counts[kind] += np.bincount(sizes, minlength=len(SIZE_NAMES))
+    return tuple(
+        SizeScores(
+            vehicles,
+            matches,
+            wrong,
+            ratio(matches, vehicles) if vehicles else None,
+            ratio(2 * matches, matches + wrong + vehicles) if vehicles else None,
+        )
+        for vehicles, matches, wrong in counts.T.tolist()
+    )

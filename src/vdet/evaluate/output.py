@@ -1,25 +1,15 @@
-"""What evaluations show: tables, ratios, the detector that was measured, and pictures."""
+"""What evaluations show as text: tables, ratios, and the detector that was measured."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
-
-from vdet.boxes import Box, Float64Array
 from vdet.config.schema import DetectorSettings
 from vdet.detect.factory import model_file, trained_on
-from vdet.draw.paint import Color
-from vdet.media.images import Image
 from vdet.version import __version__
 
 ABSENT = "–"
-
-TRUE: Color = (90, 220, 60)
-FOUND: Color = (40, 120, 255)
-IGNORED: Color = (160, 160, 160)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +56,34 @@ class RunName:
         }
 
 
+Table = tuple[Sequence[str], Sequence[Sequence[str]]]
+"""Headings and rows of text, for the terminal and for pages."""
+
+Columns = Sequence[tuple[str, str]]
+"""Headings, and the attribute of the scores below each."""
+
+
+def score_table(first: str, columns: Columns, scores: Iterable[tuple[str, object]]) -> Table:
+    """Return a table of scores.
+
+    Parameters
+    ----------
+    first
+        Heading of the names.
+    columns
+        The other headings, and the attribute of the scores below each.
+    scores
+        The name and the scores of each row.
+    """
+    rows = [[name, *(figure(getattr(each, key)) for _, key in columns)] for name, each in scores]
+    return (first, *(heading for heading, _ in columns)), rows
+
+
+def figure(value: float | None) -> str:
+    """Write a count or a ratio; a dash for None."""
+    return str(value) if isinstance(value, int) else share(value)
+
+
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """Return aligned lines, headings first: the first column to the left, the others to the right.
 
@@ -77,42 +95,10 @@ def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
         One text per column each.
     """
     widths = [max(map(len, column)) for column in zip(headings, *rows, strict=True)]
-    return [_line(row, widths) for row in (headings, *rows)]
-
-
-def _line(row: Sequence[str], widths: Sequence[int]) -> str:
-    first, *others = zip(row, widths, strict=True)
-    cells = [first[0].ljust(first[1]), *(text.rjust(width) for text, width in others)]
-    return "  ".join(cells).rstrip()
+    form = "  ".join(f"{{:{'>' if number else '<'}{width}}}" for number, width in enumerate(widths))
+    return [form.format(*row).rstrip() for row in (headings, *rows)]
 
 
 def share(value: float | None, digits: int = 3) -> str:
     """Write a ratio; a dash for None."""
     return ABSENT if value is None else f"{value:.{digits}f}"
-
-
-@dataclass(frozen=True, slots=True)
-class Tile:
-    """A BGR uint8 image with the title and the caption below it."""
-
-    image: Image
-    title: str
-    caption: str
-
-
-Outlines = tuple[Float64Array, Color, int]
-"""Boxes to draw, float64 `(n, 4)`: x1, y1, x2, y2; the colour and width of the outlines."""
-
-
-def draw_tile(image: Image, part: Box, width: int, *outlines: Outlines) -> Image:
-    """Cut a part out of a BGR uint8 frame, scale it to a width, and draw boxes."""
-    cut = part.cut(image)
-    scale = width / cut.shape[1]
-    target = width, max(1, round(cut.shape[0] * scale))
-    kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    tile = np.asarray(cv2.resize(cut, target, interpolation=kind), np.uint8)
-    for boxes, color, line in outlines:
-        corners = ((boxes - (part.x1, part.y1, part.x1, part.y1)) * scale).round().astype(int)
-        for x1, y1, x2, y2 in corners.tolist():
-            cv2.rectangle(tile, (x1, y1), (x2, y2), color, line)
-    return tile

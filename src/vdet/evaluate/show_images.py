@@ -5,37 +5,33 @@ from dataclasses import asdict
 from typing import Any
 
 from vdet.boxes import Box
-from vdet.evaluate.comparison import Comparison, match
 from vdet.evaluate.images import (
     SIZE_NAMES,
     ImageScores,
     ImagesResult,
     MeasuredImage,
+    MeasuredSet,
     SizeScores,
-    Source,
 )
-from vdet.evaluate.output import (
-    ABSENT,
-    FOUND,
-    IGNORED,
-    TRUE,
-    RunName,
-    Tile,
-    draw_tile,
-    share,
-    table,
-)
+from vdet.evaluate.output import ABSENT, RunName, Table, score_table, share, table
+from vdet.evaluate.scores import score_detections
+from vdet.evaluate.tiles import FOUND, IGNORED, TRUE, Tile, draw_tile
 from vdet.files import printable
-from vdet.labels.pictures import LabelledPictures
 from vdet.media.images import Image
 from vdet.pages.charts import SOFT, Line, Plot, color, curve, number_axis
 from vdet.pages.render import counted, render
 
-HEADINGS = (
-    *("source", "pictures", "vehicles", "precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
-    *("false alarms", "best F1", "at score"),
+COLUMNS = (
+    *(
+        ("pictures", "images"),
+        ("vehicles", "vehicles"),
+        ("precision", "precision"),
+        ("recall", "recall"),
+    ),
+    *(("F1", "f1"), ("AP50", "ap50"), ("AP50:95", "ap50_95"), ("IoU", "mean_iou")),
+    *(("false alarms", "false_positives"), ("best F1", "best_f1"), ("at score", "best_score")),
 )
-SIZE_HEADINGS = ("recall / F1 by width", *SIZE_NAMES)
+"""The headings of the scores, and the attribute of `ImageScores` below each."""
 
 _MOST_OTHERS = 8  # labels that are named
 _TILE_WIDTH = 480  # pixels
@@ -46,10 +42,9 @@ def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
     """Yield the detector, what counted, and the scores of each source."""
     yield from run.lines()
     yield counting_line(result)
-    yield ""
-    yield from table(HEADINGS, rows(result))
-    yield ""
-    yield from table(SIZE_HEADINGS, size_rows(result))
+    for headings, rows in (source_table(result), size_table(result)):
+        yield ""
+        yield from table(headings, rows)
     if others := others_lines(result):
         yield ""
         yield from others
@@ -64,6 +59,17 @@ def counting_line(result: ImagesResult) -> str:
     return text
 
 
+def source_table(result: ImagesResult) -> Table:
+    """Return a row for each source, and one for the mean of several."""
+    return score_table("source", COLUMNS, _named(result))
+
+
+def size_table(result: ImagesResult) -> Table:
+    """Return recall and F1 by the width of the vehicles, in the same rows."""
+    rows = [[name, *map(_size_cell, scores.sizes)] for name, scores in _named(result)]
+    return ("recall / F1 by width", *SIZE_NAMES), rows
+
+
 def _named(result: ImagesResult) -> list[tuple[str, ImageScores]]:
     """Return the name and the scores of each set, and of the mean of several."""
     named = [(source.labelled.name, source.scores) for source in result.sources]
@@ -71,27 +77,20 @@ def _named(result: ImagesResult) -> list[tuple[str, ImageScores]]:
     return [*named, (f"mean of {sets}", result.mean)] if len(named) > 1 else named
 
 
-def rows(result: ImagesResult) -> list[list[str]]:
-    """Return the texts under `HEADINGS`: a row for each source, and one for the mean of several."""
-    return [[name, *_cells(scores)] for name, scores in _named(result)]
-
-
-def size_rows(result: ImagesResult) -> list[list[str]]:
-    """Return the texts under `SIZE_HEADINGS`, in the same rows."""
-    return [[name, *map(_size_cell, scores.sizes)] for name, scores in _named(result)]
+def _size_cell(size: SizeScores) -> str:
+    return f"{share(size.recall, 2)} / {share(size.f1, 2)}" if size.vehicles else ABSENT
 
 
 def others_lines(result: ImagesResult) -> list[str]:
     """Return the labels that are not vehicles, a line for each set that has such labels."""
-    sets = [source.labelled for source in result.sources]
-    return [_others_line(each) for each in sets if each.others]
-
-
-def _others_line(labelled: LabelledPictures) -> str:
-    shown = labelled.others[:_MOST_OTHERS]
-    named = ", ".join(f"{printable(name)} ({count})" for name, count in shown)
-    more = ", …" if len(labelled.others) > _MOST_OTHERS else ""
-    return f"not vehicles in {labelled.name}: {named}{more}"
+    found = []
+    for labelled in (source.labelled for source in result.sources):
+        shown = labelled.others[:_MOST_OTHERS]
+        named = ", ".join(f"{printable(name)} ({count})" for name, count in shown)
+        more = ", …" if len(labelled.others) > _MOST_OTHERS else ""
+        if named:
+            found.append(f"not vehicles in {labelled.name}: {named}{more}")
+    return found
 
 
 def plain(result: ImagesResult, run: RunName) -> dict[str, Any]:
@@ -116,34 +115,18 @@ def _plain_scores(scores: ImageScores) -> dict[str, Any]:
     return {**asdict(scores), "sizes": [{"width": name, **size} for name, size in sizes]}
 
 
-def _size_cell(size: SizeScores) -> str:
-    return f"{share(size.recall, 2)} / {share(size.f1, 2)}" if size.vehicles else ABSENT
-
-
-def _cells(scores: ImageScores) -> list[str]:
-    found = (scores.precision, scores.recall, scores.f1, scores.ap50, scores.ap50_95)
-    return [
-        *(str(scores.images), str(scores.vehicles)),
-        *map(share, (*found, scores.mean_iou)),
-        str(scores.false_positives),
-        *(share(scores.best_f1), share(scores.best_score, 2)),
-    ]
-
-
 def images_page(result: ImagesResult, run: RunName) -> str:
     """Return the page as HTML. Raises `ImageError` if a picture can no longer be read."""
-    score = result.counting.score
-    sheets = [(each.labelled.name, worst_tiles(each, score)) for each in result.sources]
+    headings, rows = source_table(result)
+    sheets = [(each.labelled.name, worst_tiles(each)) for each in result.sources]
     return render(
         "eval_images.html",
         subtitle="; ".join([*run.lines(), counting_line(result)]),
-        figures=list(zip(HEADINGS, rows(result)[-1], strict=True))[1:],
-        headings=HEADINGS,
-        rows=rows(result),
+        figures=list(zip(headings, rows[-1], strict=True))[1:],
+        sources=(headings, rows),
         others=others_lines(result),
         plot=_f1_plot(result),
-        size_headings=SIZE_HEADINGS,
-        size_rows=size_rows(result),
+        sizes=size_table(result),
         sheets=[(name, tiles) for name, tiles in sheets if tiles],
     )
 
@@ -158,36 +141,28 @@ def _f1_plot(result: ImagesResult) -> Plot:
     return Plot(title, number_axis(0, 1, "score"), number_axis(0, 1), (), lines, legend)
 
 
-def worst_tiles(source: Source, score: float) -> list[Tile]:
-    """Return the pictures with the most mistakes at a score, with all boxes.
+def worst_tiles(source: MeasuredSet) -> list[Tile]:
+    """Return the pictures with the most mistakes among what counts, with all boxes.
 
     Raises `ImageError` if a picture can no longer be read.
     """
-    ranked = [(image, *_count(image.compare(score))) for image in source.images]
-    ranked.sort(key=lambda each: -each[1] - each[2])
+    scored = [(image, score_detections(image.shown)) for image in source.images]
+    scored.sort(key=lambda each: -each[1].misses - each[1].false_positives)
     return [
         Tile(
-            _drawn(image, score),
+            _drawn(image),
             image.picture.path.name,
-            f"{missed} missed, {counted(wrong, 'false alarm')}",
+            f"{scores.misses} missed, {counted(scores.false_positives, 'false alarm')}",
         )
-        for image, missed, wrong in ranked[:_MOST_TILES]
-        if missed or wrong
+        for image, scores in scored[:_MOST_TILES]
+        if scores.misses or scores.false_positives
     ]
 
 
-def _count(comparison: Comparison) -> tuple[int, int]:
-    """Return the number of missed vehicles and of false alarms."""
-    found = sum(map(len, match(comparison)))
-    lengths = comparison.vehicle_lengths(), comparison.track_lengths()
-    missed, wrong = (int(each.sum()) - found for each in lengths)
-    return missed, wrong
-
-
-def _drawn(image: MeasuredImage, score: float) -> Image:
+def _drawn(image: MeasuredImage) -> Image:
     picture = image.picture.read()
-    outlines = [(image.truth.boxes[image.truth.ignored], IGNORED, 1)]
-    for frame in image.compare(score).frames:
+    outlines = [(image.regions, IGNORED, 1)]
+    for frame in image.shown.frames:
         outlines += [(frame.vehicle_boxes, TRUE, 2), (frame.track_boxes, FOUND, 1)]
     height, width = picture.shape[:2]
     return draw_tile(picture, Box(0, 0, width, height), _TILE_WIDTH, *outlines)

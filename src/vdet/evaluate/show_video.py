@@ -8,27 +8,27 @@ from typing import Any
 from vdet.boxes import Box
 from vdet.config.schema import InputSettings
 from vdet.evaluate.comparison import Comparison
-from vdet.evaluate.output import ABSENT, FOUND, TRUE, RunName, Tile, draw_tile, share, table
-from vdet.evaluate.scores import Scores
-from vdet.evaluate.timelines import Mistake
+from vdet.evaluate.output import ABSENT, RunName, Table, score_table, share, table
+from vdet.evaluate.tiles import FOUND, TRUE, Tile, draw_tile
+from vdet.evaluate.timelines import Stretch
 from vdet.evaluate.video import ClipResult, RunResult, best
 from vdet.media import VideoReader
 from vdet.media.images import Image
 from vdet.pages.charts import BAD, FILL, Span, Timeline, number_axis
-from vdet.pages.render import render
+from vdet.pages.render import counted, render
 
-HEADINGS = (
-    *("precision", "recall", "F1", "AP50", "AP50:95", "IoU"),
-    *("MOTA", "IDF1", "HOTA", "switches", "false tracks"),
+COLUMNS = (
+    *(("precision", "precision"), ("recall", "recall"), ("F1", "f1"), ("AP50", "ap50")),
+    *(("AP50:95", "ap50_95"), ("IoU", "mean_iou"), ("MOTA", "mota"), ("IDF1", "idf1")),
+    *(("HOTA", "hota"), ("switches", "id_switches"), ("false tracks", "false_tracks")),
 )
-MISTAKE_HEADINGS = ("what", "frames", "boxes", "best IoU")
+"""The headings of the scores, and the attribute of `Scores` below each."""
 _LARGEST = 10  # mistakes that are listed for a video
 
 _DETAILS = """\
 boxes: {vehicle_boxes} true ones (vehicles: {vehicles}); {matches} found, {misses} missed, \
-{false_positives} false alarms
-tracks: {tracks}, {false_tracks} of them false{per_minute}; {id_switches} id switches, \
-{fragmentations} fragmentations
+{alarms}
+tracks: {tracks}, {false_tracks} of them false{per_minute}; {switches}, {breaks}
 vehicles: {mostly_tracked} mostly tracked, {partly_tracked} partly, {mostly_lost} mostly lost, \
 {never_found} never found; mean time to the first detection {delay}
 also: MOTP {motp:.3f}, IDP {idp:.3f}, IDR {idr:.3f}, DetA {deta:.3f}, AssA {assa:.3f}"""
@@ -42,36 +42,30 @@ def result_lines(runs: Sequence[RunResult]) -> Iterator[str]:
     """Yield runs as lines: one run in full, several (a sweep) with a row each."""
     top = best(runs)
     if len(runs) > 1:
-        yield from table(("setting", *HEADINGS), sweep_rows(runs))
+        yield from table(*sweep_table(runs))
         yield ""
         yield f"best F1: {_setting(top)} ({share(top.total.f1)})"
         return
-    yield from table(("video", *HEADINGS), clip_rows(top))
+    yield from table(*clip_table(top))
     yield ""
     yield from detail_lines(top)
     for clip in top.clips:
         if clip.mistakes:
             yield ""
-            yield f"largest of {len(clip.mistakes)} mistakes in {clip.name}"
-            yield from table(MISTAKE_HEADINGS, mistake_rows(clip))
+            yield f"largest of {counted(len(clip.mistakes), 'mistake')} in {clip.name}"
+            yield from table(*mistake_table(clip))
 
 
-def key_figures(scores: Scores) -> list[str]:
-    """Return the texts under `HEADINGS`."""
-    found = (scores.precision, scores.recall, scores.f1, scores.ap50, scores.ap50_95)
-    followed = (scores.mean_iou, scores.mota, scores.idf1, scores.hota)
-    return [*map(share, (*found, *followed)), str(scores.id_switches), str(scores.false_tracks)]
+def clip_table(run: RunResult) -> Table:
+    """Return a row for each video, and one for the total of several."""
+    named = [(clip.name, clip.scores) for clip in run.clips]
+    total = [("total", run.total)] if len(named) > 1 else []
+    return score_table("video", COLUMNS, [*named, *total])
 
 
-def clip_rows(run: RunResult) -> list[list[str]]:
-    """Return a row of text for each video, and one for the total of several."""
-    rows = [[clip.name, *key_figures(clip.scores)] for clip in run.clips]
-    return [*rows, ["total", *key_figures(run.total)]] if len(rows) > 1 else rows
-
-
-def sweep_rows(runs: Sequence[RunResult]) -> list[list[str]]:
-    """Return a row of text for the total of each run."""
-    return [[_setting(run), *key_figures(run.total)] for run in runs]
+def sweep_table(runs: Sequence[RunResult]) -> Table:
+    """Return a row for the total of each run."""
+    return score_table("setting", COLUMNS, [(_setting(run), run.total) for run in runs])
 
 
 def _setting(run: RunResult) -> str:
@@ -79,10 +73,14 @@ def _setting(run: RunResult) -> str:
 
 
 def detail_lines(run: RunResult) -> list[str]:
-    """Return which frames were compared, and the numbers that are not key figures."""
-    delay, rate = run.total.mean_delay, run.total.false_tracks_per_minute
+    """Return which frames were compared, and the numbers that are in no table."""
+    total = run.total
+    delay, rate = total.mean_delay, total.false_tracks_per_minute
     details = _DETAILS.format(
-        **asdict(run.total),
+        **asdict(total),
+        alarms=counted(total.false_positives, "false alarm"),
+        switches=counted(total.id_switches, "id switch"),
+        breaks=counted(total.fragmentations, "fragmentation"),
         delay=ABSENT if delay is None else f"{delay:.1f} frames",
         per_minute="" if rate is None else f" ({rate:.1f} a minute)",
     )
@@ -90,24 +88,25 @@ def detail_lines(run: RunResult) -> list[str]:
 
 
 def _frames_line(clip: ClipResult) -> str:
-    left_out = f"; left out: {clip.left_out} boxes found in later ones" if clip.left_out else ""
+    boxes = counted(clip.left_out, "box")
+    left_out = f"; left out: {boxes} found in later ones" if clip.left_out else ""
     return f"{clip.name}: frames 1–{clip.until} compared{left_out}"
 
 
-def mistake_rows(clip: ClipResult) -> list[list[str]]:
-    """Return the texts of the largest mistakes under `MISTAKE_HEADINGS`."""
-    return [
+def mistake_table(clip: ClipResult) -> Table:
+    """Return the largest mistakes."""
+    return ("what", "frames", "boxes", "best IoU"), [
         [_name(each), _frame_span(each), str(each.boxes), share(each.overlap, 2)]
         for each in clip.mistakes[:_LARGEST]
     ]
 
 
-def _name(mistake: Mistake) -> str:
+def _name(mistake: Stretch) -> str:
     missed = mistake.kind == "missed"
     return f"vehicle {mistake.id} missed" if missed else f"false alarm, track {mistake.id}"
 
 
-def _frame_span(mistake: Mistake) -> str:
+def _frame_span(mistake: Stretch) -> str:
     return f"{mistake.first}–{mistake.last}" if mistake.boxes > 1 else str(mistake.first)
 
 
@@ -134,6 +133,8 @@ def plain(runs: Sequence[RunResult], name: RunName) -> dict[str, Any]:
 def plain_clip(clip: ClipResult) -> dict[str, Any]:
     """Return the scores of a video and its mistakes as values for JSON."""
     lost = [{**asdict(mistake), "boxes": mistake.boxes} for mistake in clip.mistakes]
+    for each in lost:
+        del each["partner"]
     frames = {"until": clip.until, "left_out": clip.left_out}
     return {**asdict(clip.scores), **frames, "mistakes": lost}
 
@@ -146,18 +147,17 @@ def video_page(runs: Sequence[RunResult], what: str) -> str:
     """
     top = best(runs)
     best_of = f"; best of {len(runs)} settings: {_setting(top)}" if len(runs) > 1 else ""
+    headings, rows = clip_table(top)
     return render(
         "eval_video.html",
         subtitle=f"{', '.join(clip.name for clip in top.clips)}; {what}{best_of}",
-        figures=list(zip(HEADINGS, key_figures(top.total), strict=True)),
-        headings=HEADINGS,
-        rows=clip_rows(top) if len(top.clips) > 1 else [],
+        figures=list(zip(headings, rows[-1], strict=True))[1:],
+        videos=(headings, rows) if len(top.clips) > 1 else None,
         details=detail_lines(top),
-        sweep_rows=sweep_rows(runs) if len(runs) > 1 else [],
+        sweep=sweep_table(runs) if len(runs) > 1 else None,
         best=runs.index(top),
-        mistake_headings=MISTAKE_HEADINGS,
         clips=[
-            (clip.name, _timeline(clip), mistake_rows(clip), mistake_tiles(clip))
+            (clip.name, _timeline(clip), mistake_table(clip), mistake_tiles(clip))
             for clip in top.clips
         ],
     )
@@ -165,26 +165,18 @@ def video_page(runs: Sequence[RunResult], what: str) -> str:
 
 def _timeline(clip: ClipResult) -> Timeline:
     """Return when each vehicle was found and by which track, when missed, and the false alarms."""
-    spans = [
-        _span(
-            row, each.first, each.last, each.partner, "missed" if each.partner is None else "found"
-        )
-        for row, timeline in enumerate(clip.timelines)
-        for each in timeline.stretches
-    ]
-    spans += [
-        _span(len(clip.timelines), each.first, each.last, None, _name(each))
-        for each in clip.mistakes
-        if each.kind == "false alarm"
-    ]
-    names = [*(f"vehicle {timeline.id}" for timeline in clip.timelines), "false alarms"]
+    ids = clip.comparison.vehicle_ids.tolist()
+    rows = {id_: row for row, id_ in enumerate(ids)}
+    spans = []
+    for each in clip.stretches:
+        alarm = each.kind == "false alarm"
+        color, label = (BAD, "") if each.partner is None else (FILL, f"#{each.partner}")
+        title = f"{_name(each) if alarm else each.kind}: {each.first}–{each.last}"
+        row = len(ids) if alarm else rows[each.id]
+        spans.append(Span(row, each.first - 0.5, each.last + 0.5, title, color, label=label))
+    names = [*(f"vehicle {id_}" for id_ in ids), "false alarms"]
     axis = number_axis(0, max(1, clip.until) + 0.5, "frame", fixed=True)
     return Timeline("When each vehicle was found", axis, spans, names)
-
-
-def _span(row: int, first: int, last: int, track: int | None, what: str) -> Span:
-    color, label = (BAD, "") if track is None else (FILL, f"#{track}")
-    return Span(row, first - 0.5, last + 0.5, f"{what}: {first}–{last}", color, label=label)
 
 
 def mistake_tiles(clip: ClipResult) -> list[Tile]:
@@ -213,7 +205,7 @@ def _frames(video: Path, numbers: set[int]) -> dict[int, Image]:
         return {frame.index + 1: frame.image for frame in reader if frame.index + 1 in numbers}
 
 
-def _cropped(image: Image, mistake: Mistake, comparison: Comparison) -> Image:
+def _cropped(image: Image, mistake: Stretch, comparison: Comparison) -> Image:
     """Return the part of a frame around the box of a mistake."""
     (frame,) = (each for each in comparison.frames if each.number == mistake.middle)
     if mistake.kind == "missed":

@@ -1,38 +1,47 @@
-"""When each vehicle was found and by which track, and when vehicle and track have no partner."""
+"""When each vehicle was found and by which track, and when it was missed or was a false alarm."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
-from vdet.boxes import Float64Array, Int64Array
-from vdet.evaluate.comparison import Comparison, MatchedFrame
-
-MistakeKind = Literal["missed", "false alarm"]
+from vdet.boxes import Int64Array
+from vdet.evaluate.comparison import ComparedFrame, Comparison
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Consecutive frames, `first` to `last` from 1, with the same partner.
+    """Consecutive frames in which a vehicle or a track has the same partner, or none.
 
-    `partner` is the id of the matched track or vehicle; None: there is no match. `overlap` is the
-    mean over the frames of the best IoU with any box of the other side.
+    Attributes
+    ----------
+    kind
+        `found` or `missed`: the vehicle `id` of the truth; `false alarm`: the track `id`.
+    first, last
+        Numbers of the frames, from 1.
+    partner
+        Id of the track that finds the vehicle; None of a mistake.
+    overlap
+        Mean over the frames of the best IoU with any box of the other side. Of a mistake, near 0:
+        there is no such box. Below 0.5: the box fits badly. Above: the box is matched with another
+        one.
     """
 
+    kind: Literal["found", "missed", "false alarm"]
+    id: int
     first: int
     last: int
     partner: int | None
     overlap: float
 
+    @property
+    def boxes(self) -> int:
+        """Number of boxes."""
+        return self.last - self.first + 1
 
-@dataclass(frozen=True, slots=True)
-class Timeline:
-    """The stretches of the vehicle or track `id`, in order.
-
-    Frames in which it does not count are in no stretch.
-    """
-
-    id: int
-    stretches: tuple[Stretch, ...]
+    @property
+    def middle(self) -> int:
+        """Number of the middle frame."""
+        return (self.first + self.last) // 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,118 +62,63 @@ class FirstDetection:
         return None if self.found is None else self.found - self.appears
 
 
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """Consecutive frames with the same mistake.
+def first_detections(comparison: Comparison) -> tuple[FirstDetection, ...]:
+    """Return when each vehicle was first found, in the order of `vehicle_ids`."""
+    appears: dict[int, int] = {}
+    found: dict[int, int] = {}
+    for frame in comparison.frames:
+        for vehicles, first in ((frame.vehicles, appears), (frame.found, found)):
+            for vehicle in vehicles.tolist():
+                first.setdefault(vehicle, frame.number)
+    ids = enumerate(comparison.vehicle_ids.tolist())
+    return tuple(FirstDetection(id_, appears[row], found.get(row)) for row, id_ in ids)
 
-    Attributes
-    ----------
-    kind
-        `missed`: the vehicle `id` of the truth; `false alarm`: the track `id`.
-    first, last
-        Numbers of the frames, from 1.
-    overlap
-        Mean over the frames of the best IoU with any box of the other side. Near 0: there is no
-        such box. Below 0.5: the box fits badly. Above: the box is matched with another one.
+
+def stretches(comparison: Comparison) -> tuple[Stretch, ...]:
+    """Return when each vehicle was found or missed, and the false alarms, by vehicle and track.
+
+    Frames in which a vehicle or a track does not count are in no stretch.
     """
-
-    kind: MistakeKind
-    id: int
-    first: int
-    last: int
-    overlap: float
-
-    @property
-    def boxes(self) -> int:
-        """Number of boxes lost."""
-        return self.last - self.first + 1
-
-    @property
-    def middle(self) -> int:
-        """Number of the middle frame."""
-        return (self.first + self.last) // 2
+    ids = comparison.vehicle_ids, comparison.track_ids
+    of_vehicles = _stretches(comparison.frames, *ids)
+    of_tracks = _stretches([_swapped(frame) for frame in comparison.frames], *ids[::-1])
+    alarms = [replace(each, kind="false alarm") for each in of_tracks if each.partner is None]
+    return *of_vehicles, *alarms
 
 
-def vehicle_timelines(
-    comparison: Comparison, matched: Sequence[MatchedFrame]
-) -> tuple[Timeline, ...]:
-    """Return the timeline of each vehicle, in order of index; `matched` is `match(comparison)`."""
-    sides = (
-        (each.frame.number, each.frame.vehicles, each.frame.iou, each.vehicles, each.tracks)
-        for each in matched
-    )
-    return _timelines(comparison.vehicle_ids, comparison.track_ids, sides)
+def _swapped(frame: ComparedFrame) -> ComparedFrame:
+    """Return a frame with its tracks as vehicles."""
+    swapped = replace(frame, vehicles=frame.tracks, tracks=frame.vehicles, iou=frame.iou.T)
+    return replace(swapped, rows=frame.columns, columns=frame.rows)
 
 
-def track_timelines(
-    comparison: Comparison, matched: Sequence[MatchedFrame]
-) -> tuple[Timeline, ...]:
-    """Return the timeline of each track, in order of index; `matched` is `match(comparison)`."""
-    sides = (
-        (each.frame.number, each.frame.tracks, each.frame.iou.T, each.tracks, each.vehicles)
-        for each in matched
-    )
-    return _timelines(comparison.track_ids, comparison.vehicle_ids, sides)
-
-
-def first_detections(vehicles: Sequence[Timeline]) -> tuple[FirstDetection, ...]:
-    """Return when the vehicle of each timeline was first found."""
-    return tuple(
-        FirstDetection(
-            vehicle.id,
-            vehicle.stretches[0].first,
-            next((each.first for each in vehicle.stretches if each.partner is not None), None),
+def _stretches(
+    frames: Sequence[ComparedFrame], ids: Int64Array, partner_ids: Int64Array
+) -> list[Stretch]:
+    seen: list[list[tuple[int, int | None, float]]] = [[] for _ in ids]
+    for frame in frames:
+        partners = dict(
+            zip(frame.found.tolist(), partner_ids[frame.found_by].tolist(), strict=True)
         )
-        for vehicle in vehicles
-    )
+        overlaps = frame.iou.max(axis=1, initial=0).tolist()
+        for vehicle, overlap in zip(frame.vehicles.tolist(), overlaps, strict=True):
+            seen[vehicle].append((frame.number, partners.get(vehicle), overlap))
+    found: list[Stretch] = []
+    for id_, each in zip(ids.tolist(), seen, strict=True):
+        runs: list[list[tuple[int, int | None, float]]] = []
+        for number, partner, overlap in each:
+            if not runs or runs[-1][-1][:2] != (number - 1, partner):
+                runs.append([])
+            runs[-1].append((number, partner, overlap))
+        for run in runs:
+            (first, partner, _), (last, *_) = run[0], run[-1]
+            mean = sum(overlap for *_, overlap in run) / len(run)
+            kind: Literal["found", "missed"] = "missed" if partner is None else "found"
+            found.append(Stretch(kind, id_, first, last, partner, mean))
+    return found
 
 
-def mistakes(vehicles: Sequence[Timeline], tracks: Sequence[Timeline]) -> tuple[Mistake, ...]:
+def mistakes(found: Sequence[Stretch]) -> tuple[Stretch, ...]:
     """Return the stretches without a partner, the longest first."""
-    sides: tuple[tuple[MistakeKind, Sequence[Timeline]], ...]
-    sides = ("missed", vehicles), ("false alarm", tracks)
-    found = [
-        Mistake(kind, timeline.id, each.first, each.last, each.overlap)
-        for kind, timelines in sides
-        for timeline in timelines
-        for each in timeline.stretches
-        if each.partner is None
-    ]
-    return tuple(sorted(found, key=lambda each: (-each.boxes, each.first, each.kind, each.id)))
-
-
-_Seen = tuple[int, int | None, float]
-"""Number of a frame, the id of the partner in it, and the best IoU."""
-
-
-def _timelines(
-    ids: Int64Array,
-    other_ids: Int64Array,
-    sides: Iterable[tuple[int, Int64Array, Float64Array, Int64Array, Int64Array]],
-) -> tuple[Timeline, ...]:
-    """Return the timelines of one side.
-
-    For each frame, `sides` has its number, the indices in it, a row of IoU for each of these, the
-    indices that are matched, and the indices of their partners.
-    """
-    seen: list[list[_Seen]] = [[] for _ in ids]
-    for number, indices, iou, paired, partners in sides:
-        partner_of = dict(zip(paired.tolist(), other_ids[partners].tolist(), strict=True))
-        overlaps = iou.max(axis=1, initial=0).tolist()
-        for index, overlap in zip(indices.tolist(), overlaps, strict=True):
-            seen[index].append((number, partner_of.get(index), overlap))
-    return tuple(
-        Timeline(id_, _stretches(each)) for id_, each in zip(ids.tolist(), seen, strict=True)
-    )
-
-
-def _stretches(seen: Sequence[_Seen]) -> tuple[Stretch, ...]:
-    runs: list[list[_Seen]] = []
-    for number, partner, overlap in seen:
-        if not runs or runs[-1][-1][:2] != (number - 1, partner):
-            runs.append([])
-        runs[-1].append((number, partner, overlap))
-    return tuple(
-        Stretch(run[0][0], run[-1][0], run[0][1], sum(each[2] for each in run) / len(run))
-        for run in runs
-    )
+    wrong = (each for each in found if each.partner is None)
+    return tuple(sorted(wrong, key=lambda each: (-each.boxes, each.first, each.kind, each.id)))

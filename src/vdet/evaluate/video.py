@@ -6,7 +6,7 @@ searched once for them, and only what follows the search runs for each.
 
 import itertools
 import threading
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -18,20 +18,18 @@ from vdet.boxes import Box, Boxes
 from vdet.config.schema import Settings
 from vdet.detect.protocol import DetectorModel
 from vdet.errors import VideoError
-from vdet.evaluate.comparison import Comparison, compare, match, pool
+from vdet.evaluate.comparison import Comparison, compare, pool
 from vdet.evaluate.scores import Scores, score_comparison
-from vdet.evaluate.timelines import Mistake, Timeline, mistakes, track_timelines, vehicle_timelines
+from vdet.evaluate.timelines import Stretch, mistakes, stretches
 from vdet.labels.label import Label
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.labels.video import LabelledVideo
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
-from vdet.media.images import Image
 from vdet.progress import Progress, no_progress
 from vdet.regions import Regions, lay_regions
-from vdet.run.loop import Pipeline, build, named_errors, peek
+from vdet.run.loop import build, named_errors, peek
 from vdet.run.result import FrameResult
-from vdet.track.track import Track
 
 _KEPT = 4
 """Searches that are kept for the other settings; each runs at most two ahead of the results."""
@@ -72,10 +70,14 @@ class ClipResult:
     video: Path | None
     comparison: Comparison
     scores: Scores
-    mistakes: tuple[Mistake, ...]
-    timelines: tuple[Timeline, ...]
+    stretches: tuple[Stretch, ...]
     until: int
     left_out: int = 0
+
+    @property
+    def mistakes(self) -> tuple[Stretch, ...]:
+        """The missed vehicles and the false alarms, the longest first."""
+        return mistakes(self.stretches)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +94,8 @@ class RunResult:
     @staticmethod
     def of(assignments: tuple[str, ...], clips: Sequence[ClipResult]) -> "RunResult":
         """Add the scores of all clips, taken as one."""
+        if len(clips) == 1:
+            return RunResult(assignments, tuple(clips), clips[0].scores)
         total = score_comparison(pool([clip.comparison for clip in clips]))
         return RunResult(assignments, tuple(clips), total)
 
@@ -149,17 +153,9 @@ def score_video(
 ) -> ClipResult:
     """Score the predictions for a video and list their mistakes; arguments as in `compare`."""
     comparison = compare(prediction, truth, rate=rate)
-    matched = match(comparison)
-    vehicles = vehicle_timelines(comparison, matched)
-    return ClipResult(
-        name,
-        video,
-        comparison,
-        score_comparison(comparison),
-        mistakes(vehicles, track_timelines(comparison, matched)),
-        vehicles,
-        max(prediction.last_frame, truth.last_frame),
-    )
+    until = max(prediction.last_frame, truth.last_frame)
+    scores = score_comparison(comparison)
+    return ClipResult(name, video, comparison, scores, stretches(comparison), until)
 
 
 def score_files(
@@ -191,7 +187,7 @@ def score_files(
     compared = found.until(last)
     result = score_video(str(prediction), compared, true.until(last), rate=rate)
     result = replace(result, until=last, left_out=len(found) - len(compared))
-    return RunResult((), (result,), result.scores)
+    return RunResult.of((), [result])
 
 
 def best(runs: Sequence[RunResult]) -> RunResult:
@@ -228,7 +224,11 @@ def find_tracks(
         with named_errors(clip.video, VideoError):
             for results in follow_together(variants, reader, reader.info):
                 for row, result in zip(rows, results, strict=True):
-                    row += [_label(result.frame.index + 1, track) for track in result.tracks]
+                    number = result.frame.index + 1
+                    row += [
+                        Label(0, track.box.pixels, frame=number, id=track.id, score=track.score)
+                        for track in result.tracks
+                    ]
                 frames = results[0].frame.index + 1
                 advance(1)
         info = reader.info
@@ -253,7 +253,16 @@ def follow_together(
     Errors as of `vdet.run.loop.build`.
     """
     images, read = peek(frames)
-    pipelines = _build(variants, video, images)
+    searches: list[tuple[object, _Search]] = []  # and what each depends on
+    pipelines = []
+    for each in variants:
+        own = build(each.model, each.settings, video, images)
+        key = each.settings.detector.search_key, own.rate, each.settings.regions
+        search = next((search for other, search in searches if other == key), None)
+        if search is None:
+            search = _shared(own.detector.search)
+            searches.append((key, search))
+        pipelines.append(replace(own, detector=_Sharing(search, own.detector.detect)))
     del images  # else they stay in memory for the whole run
     copies = itertools.tee(read, len(pipelines))
     runs = [each.follow(copy, video.path) for each, copy in zip(pipelines, copies, strict=True)]
@@ -271,20 +280,6 @@ class _Sharing:
     detect: Callable[[Any], Boxes]
 
 
-def _build(
-    variants: Sequence[Variant], video: VideoInfo, images: Sequence[Image]
-) -> list[Pipeline]:
-    """Build what the frames go through under each of the settings; `images` are from `peek`."""
-    searches: dict[Hashable, _Search] = {}
-    pipelines = []
-    for each in variants:
-        own = build(each.model, each.settings, video, images)
-        key = each.settings.detector.search_key, own.rate, each.settings.regions
-        search = searches.setdefault(key, _shared(own.detector.search))
-        pipelines.append(replace(own, detector=_Sharing(search, own.detector.detect)))
-    return pipelines
-
-
 def _shared(search: _Search) -> _Search:
     """Return a search that runs once for each frame, whichever thread asks for it first."""
     cached, lock = lru_cache(_KEPT)(search), threading.Lock()
@@ -294,10 +289,6 @@ def _shared(search: _Search) -> _Search:
             return cached(picture, index)
 
     return locked
-
-
-def _label(number: int, track: Track) -> Label:
-    return Label(0, track.box.pixels, frame=number, id=track.id, score=track.score)
 
 
 def _in_regions(truth: LabelledVideo, regions: Regions | None) -> LabelledVideo:

@@ -61,7 +61,7 @@ def counted(count: int, noun: str) -> str:
 
 def named(count: int, noun: str) -> str:
     """Return the noun for a number of things: `car`, `cars`, `buses`."""
-    return noun if count == 1 else noun + ("es" if noun.endswith("s") else "s")
+    return noun if count == 1 else noun + ("es" if noun.endswith(("s", "x", "ch")) else "s")
 
 
 def link_to(path: Path, folder: Path) -> str:

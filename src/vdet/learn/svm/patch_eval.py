@@ -15,7 +15,8 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.evaluate.output import RunName, Tile, share, table
+from vdet.evaluate.output import RunName, share, table
+from vdet.evaluate.tiles import Tile
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
 from vdet.learn.svm.extraction import TEST_SHARE, extract, hold_out

@@ -1,59 +1,15 @@
-"""How well vehicles are found, without regard to their ids."""
+"""How well vehicles are found at every score, without regard to their ids."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from vdet.boxes import BoolArray, Float64Array
-from vdet.evaluate.comparison import ComparedFrame, Comparison, MatchedFrame
+from vdet.evaluate.comparison import ComparedFrame, Comparison
 
 IOU_THRESHOLDS = np.linspace(0.5, 0.95, 10)
 
 _RECALLS = np.linspace(0, 1, 101)
-
-
-@dataclass(frozen=True)
-class DetectionMetrics:
-    """Counts of boxes over all frames and their ratios, 0 to 1.
-
-    `matches` are true boxes found at IoU 0.5, `false_positives` predictions that found nothing,
-    `misses` true boxes that were not found. `mean_iou` is the mean over the matches.
-    """
-
-    matches: int
-    false_positives: int
-    misses: int
-    precision: float
-    recall: float
-    f1: float
-    ap50: float
-    ap50_95: float
-    mean_iou: float
-
-
-def detection_metrics(comparison: Comparison, matched: Sequence[MatchedFrame]) -> DetectionMetrics:
-    """Return the detection metrics; `matched` is `match(comparison)`."""
-    matches = sum(len(frame) for frame in matched)
-    vehicles = int(comparison.vehicle_lengths().sum())
-    predictions = int(comparison.track_lengths().sum())
-    precisions = rank_predictions(comparison).average_precisions()
-    return DetectionMetrics(
-        matches=matches,
-        false_positives=predictions - matches,
-        misses=vehicles - matches,
-        precision=ratio(matches, predictions),
-        recall=ratio(matches, vehicles),
-        f1=ratio(2 * matches, predictions + vehicles),
-        ap50=float(precisions[0]),
-        ap50_95=float(precisions.mean()),
-        mean_iou=ratio(sum(float(frame.iou.sum()) for frame in matched), matches),
-    )
-
-
-def ratio(part: float, whole: float) -> float:
-    """Return `part / whole`; 0 if `whole` is 0, as in TrackEval."""
-    return float(part / whole) if whole else 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,14 +35,15 @@ class RankedPredictions:
     right: BoolArray
     vehicles: int
 
-    def average_precisions(self) -> Float64Array:
-        """Return the average precision at each of `IOU_THRESHOLDS`, float64 `(10,)`, 0 to 1.
+    def average_precisions(self) -> tuple[float, float]:
+        """Return the average precision at IoU 0.5, and its mean over `IOU_THRESHOLDS`, 0 to 1.
 
         It is the mean of the precision at the 101 recalls 0, 0.01 … 1; 0 if there are no vehicles.
         """
         if not self.vehicles or not len(self.scores):
-            return np.zeros(len(IOU_THRESHOLDS))
-        return np.array([_average_precision(row, self.vehicles) for row in self.right])
+            return 0.0, 0.0
+        precisions = [_average_precision(row, self.vehicles) for row in self.right]
+        return precisions[0], float(np.mean(precisions))
 
 
 def rank_predictions(comparison: Comparison) -> RankedPredictions:
@@ -96,7 +53,7 @@ def rank_predictions(comparison: Comparison) -> RankedPredictions:
     scores = np.concatenate([np.empty(0), *(np.sort(-frame.scores) for frame in frames)])
     right = np.concatenate([none, *map(_right_predictions, frames)], axis=1)
     order = np.argsort(scores, kind="stable")
-    vehicles = int(comparison.vehicle_lengths().sum())
+    vehicles = sum(len(frame.vehicles) for frame in frames)
     return RankedPredictions(-scores[order], right[:, order], vehicles)
 
 
