@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from typing import Any, NoReturn
 
 from vdet.errors import INTERRUPTED, VdetError, in_one_line
@@ -23,6 +24,7 @@ def run() -> NoReturn:
         os.environ.setdefault(name, value)
     for number in _signals():
         signal.signal(number, _interrupt)
+    _watch_for_signals()
     try:
         from vdet.cli import main
 
@@ -78,10 +80,23 @@ def _signals() -> list[signal.Signals]:
 def _interrupt(*_: object) -> NoReturn:
     for number in _signals():
         signal.signal(number, signal.SIG_IGN)  # a second signal must not interrupt the clean-up
-    forced_exit = threading.Timer(CLEANUP_TIMEOUT, os._exit, (INTERRUPTED,))
-    forced_exit.daemon = True
-    forced_exit.start()
     raise KeyboardInterrupt
+
+
+def _watch_for_signals() -> None:
+    """Exit `CLEANUP_TIMEOUT` after a signal, even if the main thread hangs in a library."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    signal.set_wakeup_fd(writer)  # gets the number of a signal at once
+    numbers = _signals()
+
+    def exit_late() -> None:
+        while os.read(reader, 1)[0] not in numbers:
+            pass
+        time.sleep(CLEANUP_TIMEOUT)
+        os._exit(INTERRUPTED)
+
+    threading.Thread(target=exit_late, daemon=True).start()
 
 
 def _exit_if_a_thread_hangs(code: object) -> None:

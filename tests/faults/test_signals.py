@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from detect.onnx.graphs import write_endless
 from faults.conftest import Start
 from running import Gate, names, until
 
@@ -20,6 +21,32 @@ class Slow:
 
 sys.meta_path.insert(0, Slow)
 """
+
+
+SHOWS_THAT_A_NETWORK_RUNS = """
+from vdet.detect.onnx.session import Session
+
+run = Session.run
+
+def shown(session, inputs):
+    print("running", flush=True)
+    return run(session, inputs)
+
+Session.run = shown
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_while_a_network_does_not_end(
+    launch: Start, tmp_path: Path, number: signal.Signals
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(SHOWS_THAT_A_NETWORK_RUNS)
+    network = write_endless(tmp_path / "net.onnx")
+    running = launch("info", network, modules=tmp_path)
+    assert running.process.stdout is not None
+    assert running.process.stdout.readline() == "running\n"
+    running.send(number)
+    assert running.finish(seconds=45).code == 130  # the network itself would get 60
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

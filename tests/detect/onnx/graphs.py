@@ -120,7 +120,7 @@ def write_network(
     ]
     inputs = [helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, *sides])]
     outputs = [helper.make_tensor_value_info("output0", TensorProto.FLOAT, None)]
-    return _write(path, nodes, inputs, outputs, constants, metadata)
+    return write_graph(path, nodes, inputs, outputs, constants, metadata)
 
 
 def write_rt_detr(path: Path, box: RedBox, size: tuple[int, int], pixel: tuple[int, int]) -> Path:
@@ -149,7 +149,7 @@ def write_rt_detr(path: Path, box: RedBox, size: tuple[int, int], pixel: tuple[i
         helper.make_tensor_value_info("boxes", TensorProto.FLOAT, None),
         helper.make_tensor_value_info("scores", TensorProto.FLOAT, None),
     ]
-    return _write(path, nodes, inputs, outputs, constants, None)
+    return write_graph(path, nodes, inputs, outputs, constants)
 
 
 def _redness(
@@ -176,14 +176,38 @@ def _constant(values: npt.NDArray[np.generic], name: str) -> onnx.TensorProto:
     return numpy_helper.from_array(values, name)
 
 
-def _write(
+def write_endless(path: Path) -> Path:
+    """Write a network whose loop has 2^62 rounds."""
+    value = helper.make_tensor_value_info
+    nodes = [
+        helper.make_node("Identity", ["go"], ["still"]),
+        helper.make_node("Identity", ["sum"], ["next"]),
+    ]
+    state = [value("go", TensorProto.BOOL, []), value("sum", TensorProto.FLOAT, [1])]
+    after = [value("still", TensorProto.BOOL, []), value("next", TensorProto.FLOAT, [1])]
+    body = helper.make_graph(nodes, "body", [value("n", TensorProto.INT64, []), *state], after)
+    constants = [
+        numpy_helper.from_array(np.array(2**62), "rounds"),
+        numpy_helper.from_array(np.array(True), "true"),
+        numpy_helper.from_array(np.zeros(1, np.float32), "zero"),
+    ]
+    loop = helper.make_node("Loop", ["rounds", "true", "zero"], ["end"], body=body)
+    add = helper.make_node("Add", ["images", "end"], ["output0"])
+    inputs = [value("images", TensorProto.FLOAT, [1, 3, 64, 64])]
+    return write_graph(
+        path, [loop, add], inputs, [value("output0", TensorProto.FLOAT, None)], constants
+    )
+
+
+def write_graph(
     path: Path,
     nodes: Sequence[onnx.NodeProto],
     inputs: Sequence[onnx.ValueInfoProto],
     outputs: Sequence[onnx.ValueInfoProto],
     constants: Sequence[onnx.TensorProto],
-    metadata: Mapping[str, str] | None,
+    metadata: Mapping[str, str] | None = None,
 ) -> Path:
+    """Write a network of any graph."""
     graph = helper.make_graph(nodes, "detector", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[OPSET], ir_version=IR_VERSION)
     if metadata:

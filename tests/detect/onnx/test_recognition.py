@@ -86,7 +86,7 @@ def test_a_centred_letterbox_in_rgb(
     assert recognize(Session(path)).name == name
 
 
-def test_the_metadata_tell_the_size_of_an_input_of_any_size(tmp_path: Path) -> None:
+def test_the_metadata_give_the_size_of_an_input_of_any_size(tmp_path: Path) -> None:
     form = ultralytics(SIZE, BOX, 80)
     path = write_network(
         tmp_path / "net.onnx", form, SIZE, (64, 32), metadata=ULTRALYTICS, dynamic=True
@@ -104,6 +104,18 @@ def test_yolox_has_its_letterbox_at_the_top_left_in_bgr(raw: bool, tmp_path: Pat
     assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
     assert found.scores == pytest.approx([1.0], abs=0.01)
     assert recognize(Session(path)).name == "YOLOX"
+
+
+@pytest.mark.parametrize("raw", [True, False], ids=["raw", "decoded"])
+def test_yolox_of_one_class_is_not_taken_for_boxes_after_suppression(
+    raw: bool, tmp_path: Path
+) -> None:
+    form = yolox(SIZE, RedBox(x=64, y=32, width=16, height=8), 1, raw=raw)
+    assert form.table.shape == (168, 6)
+    path = write_network(tmp_path / "net.onnx", form, SIZE, (40, 32))
+    found = detect(path, frame_with_red(160, 128))
+    assert found.sides == pytest.approx(np.array([[224, 112, 256, 144]]), abs=0.01)
+    assert class_names(found) == ["vehicle"]
 
 
 def test_rt_detr_stretches_the_frame(tmp_path: Path) -> None:

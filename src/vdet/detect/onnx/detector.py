@@ -19,6 +19,8 @@ from vdet.errors import ModelError
 from vdet.media import Picture
 from vdet.media.images import Image
 
+_MOST_BOXES = 10_000  # before suppression, those of the highest scores
+
 SHIPPED = Path(__file__).parents[2] / "models" / "net.onnx"
 
 
@@ -35,7 +37,7 @@ class NetworkModel:
         self._settings = settings
         self._recognized = recognize(Session(path), settings.names or ())
         names, wanted = self._recognized.names, settings.classes
-        self._numbers = np.array(our_classes(names, wanted), np.int32)
+        self._numbers = np.array([*our_classes(names, wanted), -1], np.int32)
         if (self._numbers < 0).all():
             raise ModelError(
                 f"{path}: knows none of detector.classes ({', '.join(wanted)}); it knows "
@@ -52,7 +54,8 @@ class NetworkModel:
 class NetworkDetector:
     """Finds vehicles in frames of one size: a `VideoDetector`; it remembers nothing.
 
-    `numbers` has for each class of the network its number in `detector.classes`, -1 for others.
+    `numbers` has for each class of the network its number in `detector.classes`, -1 for others,
+    and ends with another -1.
     """
 
     network: Recognized
@@ -61,12 +64,11 @@ class NetworkDetector:
 
     def search(self, picture: Picture, index: int | None) -> tuple[RawBoxes, float]:
         """Return the vehicles in pixels of the frame before suppression, and the least score."""
-        raw, place = self.network.find(picture, self.settings.least)
-        boxes = visible(place.to_frame(raw.boxes), (picture.width, picture.height))
+        raw = self.network.find(picture, self.settings.least)
+        boxes = visible(raw.boxes.astype(np.float64), (picture.width, picture.height))
         is_known = (raw.classes >= 0) & (raw.classes < len(self.numbers))
-        numbers = np.where(is_known, self.numbers[np.where(is_known, raw.classes, 0)], -1)
-        is_large = (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)
-        keep = is_large & (numbers >= 0) & np.isfinite(boxes).all(axis=1)
+        numbers = self.numbers[np.where(is_known, raw.classes, -1)]
+        keep = (numbers >= 0) & (boxes[:, 2:] - boxes[:, :2] >= 1).all(axis=1)  # not with a NaN
         found = RawBoxes(boxes[keep].astype(np.float32), raw.scores[keep], numbers[keep])
         return found, self.settings.still_score if index is None else 0.0
 
@@ -112,7 +114,7 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
     """
     near, far = boxes[:, :2], boxes[:, 2:]
     places = np.concatenate([near, far - near], axis=1, dtype=np.float64)
-    kept = cv2.dnn.NMSBoxes(places.tolist(), scores.tolist(), 0.0, overlap)
+    kept = cv2.dnn.NMSBoxes(places.tolist(), scores.tolist(), 0.0, overlap, top_k=_MOST_BOXES)
     return np.asarray(kept, np.int64).reshape(-1)
 
 

@@ -109,8 +109,10 @@ def _around(middle: Array, size: Array) -> Array:
 
 
 def _raw(boxes: Array, scores: Array, classes: Array) -> RawBoxes:
+    """Return the boxes. Raises `ValueError` where the shapes do not fit each other."""
+    count = len(scores)
     return RawBoxes(
-        boxes.astype(np.float32).reshape(-1, 4),
-        np.clip(scores.astype(np.float32), 0, 1),
-        classes.astype(np.int32),
+        boxes.astype(np.float32).reshape(count, 4),
+        np.clip(scores.astype(np.float32).reshape(count), 0, 1),
+        classes.astype(np.int32).reshape(count),
     )

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array, Float64Array
+from vdet.boxes import Float32Array
 from vdet.media import Picture
 from vdet.media.images import Image
 
@@ -86,10 +86,10 @@ class Placement(NamedTuple):
     top: int
     scales: tuple[float, float]
 
-    def to_frame(self, boxes: Float32Array) -> Float64Array:
+    def to_frame(self, boxes: Float32Array) -> Float32Array:
         """Return boxes of the input, `(n, 4)` x1, y1, x2, y2, in pixels of the frame."""
         offset = np.array([self.left, self.top] * 2, np.float32)
-        return np.asarray((boxes - offset) / np.array(self.scales * 2, np.float32), np.float64)
+        return np.asarray((boxes - offset) / np.array(self.scales * 2, np.float32))
 
 
 def scaled_to(image: Image, width: int, height: int) -> Image:

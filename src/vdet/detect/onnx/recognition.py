@@ -1,6 +1,7 @@
 """Finds the form of a network in an ONNX file, by its metadata, then its names, then its shapes."""
 
 import ast
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,12 +23,14 @@ from vdet.detect.onnx.layouts import (
     named_columns,
     our_cells,
 )
-from vdet.detect.onnx.preparation import GREY, InputForm, Placement, size_of_area
-from vdet.detect.onnx.session import TYPES, Array, Session, first_line
+from vdet.detect.onnx.preparation import GREY, InputForm, size_of_area
+from vdet.detect.onnx.session import TYPES, Array, Session
 from vdet.errors import ModelError
 from vdet.media import Picture
 
 _MULTIPLE = 32
+_MAX_SIDE = 16_384
+_MAX_PIXELS = 16_000_000
 _MOST_FINAL_ROWS = 1000
 _DEFAULT_SIDE = 640  # of the usual exports with an input of any size
 _SIZES = "orig_target_sizes"
@@ -44,10 +47,10 @@ class Header(Section):
 
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
-    pixels: int = Field(147_456, ge=1024, le=16_000_000, description="of the scaled frame")
+    pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS, description="of the scaled frame")
     calibration: NetworkScoreSettings = NetworkScoreSettings()
     provenance: dict[str, Any] = Field(
-        default={}, description="what it was trained on and how, and what it reached"
+        default={}, description="what it was trained on and how, and its metrics"
     )
 
 
@@ -64,7 +67,7 @@ class Recognized:
     reasons
         Why it has this form, in words.
     names
-        Names of the classes, as the network counts them.
+        Names of the classes, in the network's order.
     form
         The form of its input.
     layout
@@ -85,22 +88,33 @@ class Recognized:
         """Return the network for frames of one size; the input of our own is fitted to it."""
         return _ours(self.session, self.header, width, height) if self.header else self
 
-    def find(self, picture: Picture, least: float) -> tuple[RawBoxes, Placement]:
-        """Return the boxes with scores of at least `least`, and where the frame lies in the input.
+    def find(self, picture: Picture, least: float) -> RawBoxes:
+        """Return the boxes in pixels of the picture, with scores of at least `least`.
 
         Several threads may call this at once.
+
+        Raises
+        ------
+        ModelError
+            The network does not run, or its outputs are not what its form says.
         """
         values, place = self.form.prepare(picture)
-        return self.layout(self._outputs(values), least), place
+        outputs = self._outputs(values)
+        try:
+            with np.errstate(all="ignore"):  # numbers of any size
+                raw = self.layout(outputs, least)
+                return replace(raw, boxes=place.to_frame(raw.boxes))
+        except (ValueError, TypeError, IndexError) as error:
+            raise _unknown(self.session, f"it gives {_shapes(outputs)}") from error
 
     def outputs_for_grey(self) -> list[Array]:
         """Return the outputs for a grey picture. Raises `ModelError` where it does not run."""
-        grey = np.full((self.form.height, self.form.width, 3), GREY, np.uint8)
-        try:
-            return self._outputs(self.form.prepare(Picture(grey))[0])
-        except Exception as error:  # onnxruntime raises kinds of its own
-            seen = f"it does not run on a picture ({first_line(error):.120})"
-            raise _unknown(self.session, seen) from error
+        return self._outputs(self.form.prepare(self.grey)[0])
+
+    @property
+    def grey(self) -> Picture:
+        """A grey picture of the size of the input."""
+        return Picture(np.full((self.form.height, self.form.width, 3), GREY, np.uint8))
 
     def _outputs(self, values: Array) -> list[Array]:
         size = [[self.form.width, self.form.height]]
@@ -128,16 +142,15 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
     header = read_header(session)
     if header is not None:
         found = _ours(session, header, 1, 1)
-        shapes = [output.shape for output in found.outputs_for_grey()]
+        outputs = found.outputs_for_grey()
         cells = len(cell_centers(found.form.width, found.form.height)[1])
-        if shapes != [(1, cells, 5 + len(header.classes))]:
-            raise _unknown(session, f"it has a header of vdet, but gives {_listed(shapes)}")
+        if [each.shape for each in outputs] != [(1, cells, 5 + len(header.classes))]:
+            raise _unknown(session, f"it has a header of vdet, but gives {_shapes(outputs)}")
         return found
-    if any(slot.name == _SIZES for slot in session.inputs):
-        return _rt_detr(session, names)
-    if len(session.inputs) != 1:
+    has_sizes = any(slot.name == _SIZES for slot in session.inputs)
+    if len(session.inputs) != 1 + has_sizes:
         raise _unknown(session, f"it has {len(session.inputs)} inputs")
-    return _by_shape(session, names)
+    return _rt_detr(session, names) if has_sizes else _by_shape(session, names)
 
 
 def read_header(session: Session) -> Header | None:
@@ -166,26 +179,25 @@ def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
     layout = partial(named_columns, order=(places["labels"], places["boxes"], places["scores"]))
     reasons = (f"it has an input {_SIZES}", "its outputs are labels, boxes and scores")
     form = replace(_form(session, None), fit="stretch")
-    return Recognized(session, "RT-DETR", reasons, tuple(names) or COCO, form, layout)
+    found = Recognized(session, "RT-DETR", reasons, tuple(names) or COCO, form, layout)
+    found.find(found.grey, 0)  # raises where the shapes are others
+    return found
 
 
 def _by_shape(session: Session, names: Sequence[str]) -> Recognized:
     metadata = _ultralytics_metadata(session)
     form = _form(session, metadata.size)
-    shape = _shape(session)
-    if len(shape) != 4 or shape[1] not in (3, None):
-        raise _unknown(session, f"its input is {_listed([shape])}, not (1, 3, height, width)")
     names = tuple(names) or metadata.names
     found = Recognized(session, "", (), names, form, final_rows)
-    shapes = [output.shape for output in found.outputs_for_grey()]
-    if len(shapes[0]) != 3 or shapes[0][0] != 1:
-        raise _unknown(session, f"its output is {_listed(shapes)}")
-    rule = _rule(shapes[0][1:], len(cell_centers(form.width, form.height)[1]), metadata)
+    outputs = found.outputs_for_grey()
+    shape = outputs[0].shape
+    size = f"{form.width}×{form.height}"
+    cells = len(cell_centers(form.width, form.height)[1])
+    rule = _rule(shape[1:], cells, metadata) if len(shape) == 3 and shape[0] == 1 else None
     if rule is None:
-        size = f"{form.width}×{form.height}"
-        raise _unknown(session, f"for an input of {size} it gives {_listed(shapes)}")
+        raise _unknown(session, f"for an input of {size} it gives {_shapes(outputs)}")
     seen = ("its metadata has the keys of Ultralytics",) if metadata.names else ()
-    reasons = (*seen, f"its output is {shapes[0]}: {rule.reason}")
+    reasons = (*seen, f"its output is {shape}: {rule.reason}")
     names = _names(session, names, rule.classes)
     found = replace(found, name=rule.name, reasons=reasons, names=names, layout=rule.layout)
     return _as_yolox(found) if rule.name == "YOLOX" else found
@@ -204,9 +216,9 @@ def _rule(shape: Sequence[int], cells: int, metadata: "_Metadata") -> _Rule | No
     """Return the form of an output of this many rows and columns, if it is known."""
     rows, columns = shape
     known = len(metadata.names)
-    if columns == 6 and (metadata.is_final or rows <= _MOST_FINAL_ROWS):
-        reason = "rows of box, score and class"
-        return _Rule("boxes after suppression", reason, None, final_rows)
+    final = _Rule("boxes after suppression", "rows of box, score and class", None, final_rows)
+    if columns == 6 and metadata.is_final:
+        return final
     if columns == cells and known in (0, rows - 4):
         reason = "columns of box and class scores"
         return _Rule("Ultralytics v8 or later", reason, rows - 4, center_columns)
@@ -214,17 +226,17 @@ def _rule(shape: Sequence[int], cells: int, metadata: "_Metadata") -> _Rule | No
         return _Rule("Ultralytics v5", "three boxes a cell", columns - 5, center_rows)
     if rows == cells and columns >= 6 and not known:
         return _Rule("YOLOX", "one box a cell, and no metadata", columns - 5, center_rows)
-    return None
+    return final if columns == 6 and rows <= _MOST_FINAL_ROWS else None
 
 
 def _as_yolox(found: Recognized) -> Recognized:
     """Return YOLOX with its own form of input, and decoded where the export left that out."""
     found = replace(found, form=replace(found.form, fit="corner", is_rgb=False, factor=1.0))
-    middles = found.outputs_for_grey()[0][0][:, 0]
-    if np.ptp(middles) >= found.form.width / 2:  # they spread over the input
+    boxes = found.find(found.grey, -math.inf).boxes
+    if boxes.max(initial=0) >= found.form.width / 2:  # they spread over the input
         return found
     grid = cell_centers(found.form.width, found.form.height)
-    reasons = (*found.reasons, "its middles are offsets from cells")
+    reasons = (*found.reasons, "its boxes are relative to cells")
     return replace(found, layout=partial(center_rows, grid=grid), reasons=reasons)
 
 
@@ -254,39 +266,36 @@ def _ultralytics_metadata(session: Session) -> _Metadata:
         names, side, args = (
             ast.literal_eval(metadata.get(key, "None")) for key in ("names", "imgsz", "args")
         )
-        listed = tuple(names.values()) if isinstance(names, dict) else tuple(names or ())
+        listed = names.values() if isinstance(names, dict) else names or ()
+        known = tuple(str(each) for each in listed)
         size = (int(side[1]), int(side[0])) if side else None
         has_nms = bool((args or {}).get("nms"))
-    except (ValueError, SyntaxError, TypeError, AttributeError, LookupError) as error:
+    except Exception as error:  # of many kinds: the text is any
         raise _unknown(session, "its metadata cannot be read") from error
     task = metadata.get("task", "detect")
     if task != "detect":
-        raise _unknown(session, f"its task is {task}, not detect")
+        raise _unknown(session, f"its task is {task:.40}, not detect")
     is_final = has_nms or metadata.get("end2end") == "True"
-    return _Metadata(tuple(str(each) for each in listed), size, is_final)
+    return _Metadata(known, size, is_final)
 
 
 def _form(session: Session, size: tuple[int, int] | None) -> InputForm:
     """Return the usual input, of fixed size, or of the `size` in the metadata, or of 640×640."""
-    height, width = shape[2:4] if len(shape := _shape(session)) == 4 else (None, None)
+    slot = next(each for each in session.inputs if each.name != _SIZES)
+    shape = [side if isinstance(side, int) and side > 0 else None for side in slot.shape]
+    if len(shape) != 4 or shape[1] not in (3, None):
+        seen = str(slot.shape).replace("None", "any")
+        raise _unknown(session, f"its input is {seen:.100}, not [1, 3, height, width]")
     usual = size or (_DEFAULT_SIDE, _DEFAULT_SIDE)
-    size = width or usual[0], height or usual[1]
-    dtype = TYPES[_picture_input(session).type]
-    return InputForm(*size, "center", is_rgb=True, factor=1 / 255, dtype=dtype)
+    width, height = shape[3] or usual[0], shape[2] or usual[1]
+    if not (0 < width <= _MAX_SIDE and 0 < height <= _MAX_SIDE and width * height <= _MAX_PIXELS):
+        limits = f"{_MAX_PIXELS:,} pixels, or a side of more than {_MAX_SIDE:,}"
+        raise _unknown(session, f"its input has no pixels, more than {limits}")
+    return InputForm(width, height, "center", is_rgb=True, factor=1 / 255, dtype=TYPES[slot.type])
 
 
-def _picture_input(session: Session) -> Any:
-    return next(each for each in session.inputs if each.name != _SIZES)
-
-
-def _shape(session: Session) -> tuple[int | None, ...]:
-    """Return the shape of the input for the picture; None stands for any length."""
-    sides = _picture_input(session).shape
-    return tuple(side if isinstance(side, int) and side > 0 else None for side in sides)
-
-
-def _listed(shapes: Sequence[tuple[int | None, ...]]) -> str:
-    return " and ".join(str(shape).replace("None", "any") for shape in shapes)
+def _shapes(outputs: Sequence[Array]) -> str:
+    return " and ".join(str(each.shape) for each in outputs)
 
 
 def _unknown(session: Session, seen: str) -> ModelError:

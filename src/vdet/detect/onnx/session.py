@@ -1,7 +1,10 @@
-"""An ONNX file that onnxruntime has loaded, with its inputs and metadata."""
+"""An ONNX file that onnxruntime has loaded, with limits for its time and its memory."""
 
 import os
+import threading
+import weakref
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +13,16 @@ import numpy.typing as npt
 
 from vdet.errors import ModelError
 from vdet.files import read_whole
+from vdet.workers import core_count
 
 Array = npt.NDArray[Any]
 
-MAX_BYTES = 1_000_000_000
+MAX_BYTES = 500_000_000
 """Largest ONNX file that is read."""
+MAX_SECONDS = 60
+"""Longest time for one picture."""
+_MAX_MEMORY = 1_000_000_000  # bytes while it runs, for each core: so many pictures run at once
+_MAX_METADATA = 200_000  # characters of one value
 
 TYPES: dict[str, type[np.generic]] = {
     "tensor(float)": np.float32,
@@ -25,7 +33,7 @@ TYPES: dict[str, type[np.generic]] = {
 }
 """What onnxruntime calls the types of inputs."""
 
-_ERRORS_ONLY = 3
+_SILENT = 4  # level of onnxruntime's own messages: every error is raised too
 
 
 class Session:
@@ -39,7 +47,7 @@ class Session:
     Raises
     ------
     ModelError
-        The file cannot be read, or is no ONNX file that onnxruntime can run.
+        The file cannot be read, or is not an ONNX file that onnxruntime can run.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,29 +56,77 @@ class Session:
         os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
         import onnxruntime
 
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = options.inter_op_num_threads = 1  # frames run in parallel
-        options.log_severity_level = _ERRORS_ONLY
-        providers = ["CPUExecutionProvider"]
-        try:
-            self._session = onnxruntime.InferenceSession(data, options, providers=providers)
-        except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
-            reason = first_line(error)
-            raise ModelError(f"{path}: cannot be loaded by onnxruntime: {reason:.200}") from error
         self.path = path
-        self.inputs = self._session.get_inputs()
+        self._new_options = onnxruntime.RunOptions
+        try:
+            self._session = onnxruntime.InferenceSession(
+                data,
+                _limited_options(),
+                providers=["CPUExecutionProvider"],
+                disabled_optimizers=["ConstantFolding"],  # it computes without these limits
+            )
+            self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
+            self.inputs = self._session.get_inputs()
+            self.output_names = [each.name for each in self._session.get_outputs()]
+        except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
+            message = f"cannot be loaded by onnxruntime: {_in_words(error)}"
+            raise ModelError(f"{path}: {message}") from error
         for each in self.inputs:
             if each.type not in TYPES:
                 message = f"its input {each.name} is a {each.type}; give a detector"
                 raise ModelError(f"{path}: {message}")
-        self.output_names = [each.name for each in self._session.get_outputs()]
-        self.metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
+        if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
+            raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
+        self._running: set[Any] = set()
+        closed = threading.Event()
+        weakref.finalize(self, closed.set)
+        threading.Thread(target=_watch, args=(self._running, closed), daemon=True).start()
 
     def run(self, inputs: Mapping[str, Array]) -> list[Array]:
-        """Return all outputs."""
-        return [np.asarray(each) for each in self._session.run(None, dict(inputs))]
+        """Return all outputs. Raises `ModelError` if it fails, or takes too much time or memory."""
+        options = self._new_options()
+        options.log_severity_level = _SILENT
+        self._running.add(options)
+        try:
+            return [np.asarray(each) for each in self._session.run(None, dict(inputs), options)]
+        except Exception as error:  # onnxruntime raises kinds of its own
+            reason = f"it took more than {MAX_SECONDS} s" if options.terminate else _in_words(error)
+            raise ModelError(f"{self.path}: does not run on a picture: {reason}") from error
+        finally:
+            self._running.discard(options)
 
 
-def first_line(error: Exception) -> str:
-    """Return the first line of an error's message."""
-    return str(error).partition("\n")[0]
+def _limited_options() -> Any:
+    """Return options for one thread, since frames run in parallel, and with a limit of memory."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = _SILENT
+    options.add_session_config_entry("session.use_env_allocators", "1")
+    cpu = onnxruntime.OrtMemoryInfo(
+        "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
+    )
+    limit = onnxruntime.OrtArenaCfg({"max_mem": core_count() * _MAX_MEMORY})
+    with suppress(Exception):  # older versions keep the first one, and say so
+        onnxruntime.create_and_register_allocator(cpu, limit)
+    return options
+
+
+def _watch(running: set[Any], closed: threading.Event) -> None:
+    """Stop what runs for too long.
+
+    Seconds are counted here, so that a process that was itself stopped for a while ends nothing.
+    """
+    seconds: dict[Any, int] = {}
+    while not closed.wait(1):
+        seconds = {each: seconds.get(each, -1) + 1 for each in list(running)}
+        for options, count in seconds.items():
+            options.terminate = count >= MAX_SECONDS
+
+
+def _in_words(error: Exception) -> str:
+    message = str(error)
+    if "memory" in message:
+        return "it takes too much memory"
+    return message.partition("\n")[0][:200]

@@ -1,0 +1,146 @@
+"""Damaged and wicked networks through `vdet detect-image --model`."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from detect.onnx.graphs import write_graph
+from hostile.mutations import mutated
+from hostile.trials import broken_promises, try_all
+from vdet.detect.onnx.detector import SHIPPED
+
+SECONDS = 20.0
+CELLS = 84  # of an input of 64×64
+Write = Callable[[Path], Path]
+
+
+def constant(
+    values: object, *, shape: Sequence[str | int | None] = (1, 3, 64, 64), **metadata: str
+) -> Write:
+    """Return what writes a network that gives the same table for every picture."""
+
+    def write(path: Path) -> Path:
+        nodes = [
+            helper.make_node("ReduceMax", ["images"], ["most"], keepdims=0),
+            helper.make_node("Mul", ["most", "none"], ["zero"]),
+            helper.make_node("Add", ["table", "zero"], ["output0"]),
+        ]
+        constants = [
+            numpy_helper.from_array(np.array(values, np.float32), "table"),
+            numpy_helper.from_array(np.zeros(1, np.float32), "none"),
+        ]
+        return write_graph(path, nodes, [picture(shape)], [table("output0")], constants, metadata)
+
+    return write
+
+
+def picture(shape: Sequence[str | int | None]) -> onnx.ValueInfoProto:
+    return helper.make_tensor_value_info("images", TensorProto.FLOAT, shape)
+
+
+def table(name: str) -> onnx.ValueInfoProto:
+    return helper.make_tensor_value_info(name, TensorProto.FLOAT, None)
+
+
+def zeros_of(count: int) -> Write:
+    """Return what writes a network that makes `count` numbers while it runs."""
+
+    def write(path: Path) -> Path:
+        nodes = [
+            helper.make_node("ConstantOfShape", ["count"], ["zeros"]),
+            helper.make_node("ReduceMax", ["zeros"], ["most"], keepdims=0),
+            helper.make_node("Add", ["images", "most"], ["output0"]),
+        ]
+        constants = [numpy_helper.from_array(np.array([count]), "count")]
+        return write_graph(path, nodes, [picture((1, 3, 64, 64))], [table("output0")], constants)
+
+    return write
+
+
+def rt_detr(*shapes: Sequence[int]) -> Write:
+    """Return what writes a network with outputs labels, boxes and scores of these shapes."""
+
+    def write(path: Path) -> Path:
+        names = ("labels", "boxes", "scores")
+        constants = [
+            numpy_helper.from_array(np.ones(shape, np.float32), f"_{name}")
+            for name, shape in zip(names, shapes, strict=True)
+        ]
+        nodes = [helper.make_node("Identity", [f"_{name}"], [name]) for name in names]
+        sizes = helper.make_tensor_value_info("orig_target_sizes", TensorProto.INT64, [1, 2])
+        return write_graph(
+            path, nodes, [picture((1, 3, 64, 64)), sizes], list(map(table, names)), constants
+        )
+
+    return write
+
+
+ULTRALYTICS = np.zeros((1, 84, CELLS))
+NETWORKS: Mapping[str, tuple[Write, str]] = {
+    "an input of 50,000×50,000": (constant(ULTRALYTICS, shape=(1, 3, 50_000, 50_000)), "pixels"),
+    "imgsz of 50,000×50,000": (
+        constant(ULTRALYTICS, shape=(1, 3, "H", "W"), imgsz="[50000, 50000]"),
+        "pixels",
+    ),
+    "an infinite imgsz": (constant(ULTRALYTICS, imgsz="[1e999, 64]"), "metadata cannot be read"),
+    "an imgsz of 10,000 digits": (
+        constant(ULTRALYTICS, shape=(1, 3, "H", "W"), imgsz=f"[0x{'f' * 10_000}, 64]"),
+        "pixels",
+    ),
+    "args that are a number": (constant(ULTRALYTICS, args="5"), "metadata cannot be read"),
+    "args like a well": (constant(ULTRALYTICS, args="[" * 5000), "metadata cannot be read"),
+    "args of many signs": (constant(ULTRALYTICS, args="-" * 100_000 + "1"), "cannot be read"),
+    "8 million names": (
+        constant(ULTRALYTICS, names=f"[{'1,' * 8_000_000}]"),
+        "metadata of more than 200,000 characters",
+    ),
+    "4 GB while it runs": (zeros_of(10**9), "takes too much memory"),
+    "scores without boxes": (rt_detr((1, 5), (1, 0, 4), (1, 5)), r"is of no form .* \(1, 0, 4\)"),
+    "boxes of eight sides": (rt_detr((1, 5), (1, 5, 8), (1, 5)), r"is of no form .* \(1, 5, 8\)"),
+    "scores for each class": (rt_detr((1, 5), (1, 5, 4), (1, 5, 80)), "is of no form"),
+    "numbers alone": (rt_detr((), (), ()), "is of no form"),
+    "no rows": (constant(np.zeros((1, 0, 0))), "is of no form"),
+    "a single number": (constant(0.0), "is of no form"),
+    "no numbers": (constant(np.full((1, 84, CELLS), np.nan)), ""),
+    "endless numbers": (constant(np.full((1, CELLS, 85), np.inf)), ""),
+    "large numbers": (constant(np.full((1, 300, 6), 3e38)), ""),
+}
+
+
+@pytest.fixture(scope="module")
+def noise(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("picture") / "noise.png"
+    cv2.imwrite(str(path), np.random.default_rng(0).integers(0, 256, (90, 160, 3), np.uint8))
+    return path
+
+
+def test_wicked_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
+    paths = [
+        write(tmp_path / f"{number}.onnx") for number, (write, _) in enumerate(NETWORKS.values())
+    ]
+    trials = try_all(
+        [["detect-image", noise, "--model", path, "--json", "-"] for path in paths],
+        seconds=SECONDS,
+    )
+    assert broken_promises(trials) == []
+    for trial, (name, (_, words)) in zip(trials, NETWORKS.items(), strict=True):
+        assert trial.code == (1 if words else 0), (name, trial.err)
+        assert re.search(words, trial.err), (name, trial.err)
+
+
+def test_damaged_networks_are_used_or_refused(tmp_path: Path, noise: Path) -> None:
+    paths = []
+    for number, data in enumerate(mutated(SHIPPED.read_bytes(), seed=1, count=60)):
+        paths.append(tmp_path / f"{number}.onnx")
+        paths[-1].write_bytes(data)
+    trials = try_all(
+        [["detect-image", noise, "--model", path, "--json", "-"] for path in paths],
+        seconds=SECONDS,
+    )
+    assert broken_promises(trials) == []
