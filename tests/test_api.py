@@ -104,6 +104,23 @@ def test_follow_gives_the_same_for_any_number_of_threads(clip_path: Path) -> Non
     assert len(one) == 9
 
 
+@pytest.mark.parametrize("number", [{"frames": -1}, {"threads": 0}])
+def test_numbers_below_one_are_refused_by_name(clip_path: Path, number: dict[str, Any]) -> None:
+    (name,) = number
+    with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; give 1 or more"):
+        next(vdet.follow(clip_path, **number))
+    with pytest.raises(vdet.VdetError, match=f"^{name}: is -?[01]; give 1 or more"):
+        vdet.detect_video(clip_path, **number)
+
+
+def test_no_file_that_is_read_is_overwritten(clip_path: Path, tmp_path: Path) -> None:
+    mask = tmp_path / "mask.csv"
+    mask.touch()
+    settings = vdet.load_settings(assignments=[f"regions.mask={mask}"])
+    with pytest.raises(vdet.VdetError, match=r"mask\.csv: is the input itself"):
+        vdet.detect_video(clip_path, tracks=mask, settings=settings, overwrite=True)
+
+
 def test_follow_searches_the_frames_that_the_settings_ask_for(clip_path: Path) -> None:
     settings = vdet.load_settings(assignments=["detector.stride=4"])
     results = list(vdet.follow(clip_path, settings=settings, frames=9))

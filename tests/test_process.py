@@ -104,6 +104,18 @@ def test_libraries_use_one_thread_a_call() -> None:
     assert done.stdout.split()[-1] == "1"
 
 
+def test_a_signal_after_the_work_does_not_change_the_exit_code() -> None:
+    code = """if True:
+        import os, signal, sys
+        from vdet import process
+        process._exit_if_a_thread_hangs = lambda _: os.kill(os.getpid(), signal.SIGTERM)
+        sys.argv = ["vdet", "--version"]
+        process.run()
+    """
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_too_little_memory_is_reported_in_one_line(running: list[Running], tmp_path: Path) -> None:
     limit = 300_000 * KB
 

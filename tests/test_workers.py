@@ -12,11 +12,13 @@ from pathlib import Path
 import pytest
 
 from running import until
+from vdet.errors import ConfigError
 from vdet.workers import (
     LocalProcesses,
     ThisProcess,
     WorkerKilledError,
     Workers,
+    make_workers,
 )
 
 MAPS = pytest.mark.parametrize("workers", [ThisProcess(), LocalProcesses(1), LocalProcesses(2)])
@@ -57,6 +59,11 @@ def test_an_error_of_the_function_is_raised(workers: Workers) -> None:
         list(workers.map(partial(divmod, 1), [1, 0]))
 
 
+def test_fewer_than_one_process_are_refused() -> None:
+    with pytest.raises(ConfigError, match="jobs: is -1; give 1 or more"):
+        make_workers(-1)
+
+
 def test_one_local_process_is_another_one_and_does_one_item_at_a_time() -> None:
     results = list(LocalProcesses(1).map(process_of, range(4)))
     assert [number for number, _ in results] == [0, 1, 2, 3]
@@ -93,6 +100,7 @@ def test_closing_the_generator_ends_the_processes_without_a_warning(tmp_path: Pa
         LocalProcesses(2).map(partial(end_after_item_1_began, tmp_path), range(10))
     ) as results:
         assert next(results) == (0, None)
+        until(lambda: bool((tmp_path / "1").read_text()))
         process = int((tmp_path / "1").read_text())
         os.kill(process, 0)  # it is there
     with pytest.raises(ProcessLookupError):

@@ -28,7 +28,7 @@ from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector
 from vdet.detect.protocol import DetectorModel, VideoDetector
-from vdet.errors import VdetError
+from vdet.errors import VdetError, check_positive
 from vdet.evaluate.scores import Scores
 from vdet.evaluate.video import score_files
 from vdet.lanes.camera import load_camera
@@ -191,7 +191,10 @@ def follow(
     ------
     VideoError
         The video cannot be read or searched.
+    ConfigError
+        A number is less than 1.
     """
+    check_positive(frames=frames, threads=threads)
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
     part = _exact(start), _exact(end), frames
     job = VideoJob(Path(source), (), *part, lanes=_lanes(lanes, camera), threads=threads)
@@ -244,11 +247,12 @@ def detect_video(
 
     The others are those of `follow`, and the errors those of the command `vdet detect-video`.
     """
+    check_positive(frames=frames, threads=threads)
     settings, loaded, tracker = _resolved(settings, model, detector, tracker)
     wanted = _outputs({"video": video, "tracks": tracks, **(outputs or {})})
     part = _exact(start), _exact(end), frames, Fraction(str(at))
-    request = _lanes(lanes, camera)
-    job = VideoJob(Path(source), wanted, *part, request, overwrite=overwrite, threads=threads)
+    request, inputs = _lanes(lanes, camera), _inputs(model, camera, settings.regions.mask)
+    job = VideoJob(Path(source), wanted, *part, request, inputs, overwrite, threads)
     check_job(job)
     reported = reporting(progress) if progress else no_progress
     return run_video(job, loaded, settings, tracker=tracker, steps=steps, progress=reported)
@@ -275,7 +279,8 @@ def detect_image(
     """
     settings, loaded, _ = _resolved(settings, model, detector, None)
     job = PictureJob(Path(source), _outputs({"picture": picture, **(outputs or {})}))
-    check_sinks(job.outputs, overwrite=overwrite, inputs=[job.source])
+    inputs = [job.source, *_inputs(model, settings.regions.mask)]
+    check_sinks(job.outputs, overwrite=overwrite, inputs=inputs)
     return run_picture(job, loaded, settings, overwrite=overwrite).detections
 
 
@@ -362,6 +367,10 @@ def _outputs(named: Mapping[str, Paths | None]) -> tuple[Output, ...]:
         if paths is not None
         for path in ([paths] if isinstance(paths, str | PathLike) else paths)
     )
+
+
+def _inputs(*files: PathName | None) -> tuple[Path, ...]:
+    return tuple(Path(file) for file in files if file is not None)
 
 
 def _lanes(lanes: bool, camera: PathName | None) -> LaneRequest | None:

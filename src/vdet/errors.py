@@ -30,6 +30,13 @@ class ConfigError(VdetError, ValueError):
         return "\n".join(self.args)
 
 
+def check_positive(**numbers: int | None) -> None:
+    """Raise a `ConfigError` that names the first number below 1; None counts as not given."""
+    for name, number in numbers.items():
+        if number is not None and number < 1:
+            raise ConfigError(f"{name}: is {number}; give 1 or more, or leave it out")
+
+
 class DataError(VdetError, ValueError):
     """The training patches cannot be used."""
 

@@ -36,6 +36,7 @@ def run() -> NoReturn:
         sys.stderr.write(f"vdet: {in_one_line(error)}\n")
         sys.exit(VdetError.exit_code)
     except SystemExit as end:
+        _ignore_signals()  # the work is done: one that comes now must not change the exit code
         _exit_if_a_thread_hangs(end.code)
         raise
 
@@ -77,9 +78,13 @@ def _signals() -> list[signal.Signals]:
     return [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
 
 
-def _interrupt(*_: object) -> NoReturn:
+def _ignore_signals() -> None:
     for number in _signals():
-        signal.signal(number, signal.SIG_IGN)  # a second signal must not interrupt the clean-up
+        signal.signal(number, signal.SIG_IGN)
+
+
+def _interrupt(*_: object) -> NoReturn:
+    _ignore_signals()  # a second signal must not interrupt the clean-up
     raise KeyboardInterrupt
 
 

@@ -17,9 +17,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from vdet.errors import INTERRUPTED, ClusterError
+from vdet.errors import INTERRUPTED, ClusterError, check_positive
 from vdet.version import __version__
 
 if TYPE_CHECKING:
@@ -86,10 +86,11 @@ def limit_library_threads() -> None:
 def make_workers(jobs: int | None = None, scheduler: str | None = None) -> Workers:
     """Return the cluster of `scheduler` if given, else `jobs` processes; None: one for each core.
 
-    For a single job no further process is started.
+    For a single job no further process is started. Raises `ConfigError` for less than one job.
     """
     if scheduler:
         return DaskCluster(scheduler)
+    check_positive(jobs=jobs)
     count = jobs or core_count()
     return ThisProcess() if count == 1 else LocalProcesses(count)
 
@@ -203,12 +204,13 @@ class DaskCluster:
     """All workers of the Dask scheduler at `address`; they find inputs and outputs by their paths.
 
     The scheduler has `connect_timeout` seconds to answer, and then `worker_timeout` seconds to have
-    a worker.
+    a worker. While there is work, it may be without workers for `lost_timeout` seconds.
     """
 
     address: str
     connect_timeout: float = 10.0
     worker_timeout: float = 10.0
+    lost_timeout: float = 60.0
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> Generator[tuple[int, R]]:
         """Yield each item's number and result; see `Workers`.
@@ -221,8 +223,8 @@ class DaskCluster:
             After all other items have ended: Dask gave up some, because it lost the workers that
             had them (`distributed.scheduler.allowed-failures`).
         ClusterError
-            Dask is not installed, the scheduler does not answer, it has no worker, a worker has not
-            this version of vdet, or the scheduler ends while there is work.
+            Dask is not installed, the scheduler does not answer, it has no worker, a worker has
+            another version of vdet, or the scheduler or all workers end while there is work.
         """
         with _connection(self.address, self.connect_timeout) as client:
             _check_workers(client, self.address, self.worker_timeout)
@@ -234,7 +236,9 @@ class DaskCluster:
             lost = []
             ended = as_completed(futures, loop=client.loop)  # type: ignore[no-untyped-call]
             del futures  # so that the workers drop each result once it was read
-            for future in ended:
+            while not ended.is_empty():  # type: ignore[no-untyped-call]
+                self._wait_for_next(ended, client)
+                future = next(ended)
                 number = numbers[future.key]
                 try:
                     result = self._result(future)
@@ -244,6 +248,24 @@ class DaskCluster:
                     yield number, result
             if lost:
                 raise WorkerKilledError(lost)
+
+    def _wait_for_next(
+        self, ended: "distributed.as_completed", client: "distributed.Client"
+    ) -> None:
+        """Wait until an item has ended; raise `ClusterError` if there is no worker for long."""
+        seen = asked = time.monotonic()
+        while not ended.has_ready():  # type: ignore[no-untyped-call]
+            time.sleep(0.02)
+            if (now := time.monotonic()) < asked + 1:
+                continue
+            asked = now
+            with contextlib.suppress(OSError):  # the scheduler has ended, and so have all items
+                seen = now if client.nthreads() else seen  # type: ignore[no-untyped-call]
+            if now > seen + self.lost_timeout:
+                raise ClusterError(
+                    f"{self.address}: all workers have ended; start some with `dask worker "
+                    f"{self.address}`, and run this again"
+                )
 
     def _result(self, future: "distributed.Future[R]") -> R:
         try:
@@ -259,6 +281,24 @@ class DaskCluster:
 def _call_limited(function: Callable[[T], R], item: T) -> R:
     limit_library_threads()
     return function(item)
+
+
+def is_repeated() -> bool:
+    """Tell whether Dask has begun this task before, with a worker that has ended since.
+
+    The scheduler keeps a note of each task that asks. Outside a Dask worker the answer is False.
+    """
+    if "distributed" not in sys.modules:
+        return False
+    from distributed import Event, get_worker
+
+    try:
+        begun: Any = partial(Event, f"vdet-{get_worker().get_current_task()}")()
+    except ValueError:  # this is no worker
+        return False
+    was_begun = bool(begun.is_set())
+    begun.set()
+    return was_begun
 
 
 @contextlib.contextmanager

@@ -7,14 +7,14 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
 
 from conftest import Run
 from drawn_patches import write_patches
-from running import Gate, frames_of, names, start, until, with_modules, write_drive
+from running import SOON, Gate, frames_of, names, start, until, with_modules, write_drive
 from vdet.detect.svm.model import load_model
 from vdet.errors import ClusterError
 from vdet.workers import DaskCluster, WorkerKilledError
@@ -30,7 +30,13 @@ class Cluster:
     gate: Gate
 
 
-def dask(kind: str, *options: str, folder: Path) -> "subprocess.Popen[bytes]":
+def dask(
+    kind: str, *options: str, folder: Path, allowed_failures: int = 0
+) -> "subprocess.Popen[bytes]":
+    """Start a scheduler or workers.
+
+    By default, Dask itself does not repeat an item whose worker was killed: so vdet has to.
+    """
     program = (sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard")
     with (folder / f"{kind}.log").open("wb") as log:
         return subprocess.Popen(
@@ -41,17 +47,19 @@ def dask(kind: str, *options: str, folder: Path) -> "subprocess.Popen[bytes]":
             env=with_modules(folder)
             | {
                 "DASK_TEMPORARY_DIRECTORY": str(folder),
-                # Dask itself does not repeat an item whose worker was killed: so vdet has to.
-                "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0",
+                "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(allowed_failures),
             },
         )
 
 
 @contextmanager
-def scheduler(folder: Path) -> "Iterator[tuple[Cluster, subprocess.Popen[bytes]]]":
+def scheduler(
+    folder: Path, allowed_failures: int = 0
+) -> "Iterator[tuple[Cluster, subprocess.Popen[bytes]]]":
     """Start a scheduler; give its cluster, and its process."""
     gate = Gate(folder)
-    process = dask("scheduler", "--host", "127.0.0.1", "--port", "0", folder=folder)
+    options = ("--host", "127.0.0.1", "--port", "0")
+    process = dask("scheduler", *options, folder=folder, allowed_failures=allowed_failures)
     try:
         until((folder / "scheduler.json").exists)
         until(lambda: (folder / "scheduler.json").read_text().endswith("}"))
@@ -97,6 +105,24 @@ def test_when_a_worker_is_killed_the_other_items_have_their_results(address: str
     assert 1 in lost
     assert len(lost) <= 2
     assert results == {number: 10 + number for number in range(10) if number not in lost}
+
+
+def test_a_cluster_without_workers_is_given_up_and_a_repeated_item_knows_it(tmp_path: Path) -> None:
+    """A worker may end when its files have appeared, before its result has arrived."""
+    first = "__import__('vdet.workers').workers.is_repeated() or __import__('os')._exit(1)"
+    with scheduler(tmp_path, allowed_failures=1) as (cluster, _):
+        worker = dask("worker", "--nworkers", "1", folder=tmp_path)
+        try:
+            dask_cluster = DaskCluster(cluster.address, worker_timeout=SOON, lost_timeout=0.1)
+            slow = replace(dask_cluster, lost_timeout=SOON)
+            assert list(slow.map(eval, [first])) == [(0, True)]
+            results = dask_cluster.map(eval, ["1", "__import__('time').sleep(300)"])
+            assert next(results) == (0, 1)
+        finally:
+            worker.terminate()
+            worker.wait()
+        with pytest.raises(ClusterError, match="all workers have ended; start some with `dask"):
+            next(results)
 
 
 def test_when_the_generator_is_closed_the_scheduler_forgets_the_items(

@@ -166,6 +166,11 @@ class TestJobs:
     def tracks_alone(self) -> Plan:
         return plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, skip_existing=True)
 
+    def test_names_that_are_no_utf_8_are_up_to_date_too(self) -> None:
+        Path("clips/a.mp4").rename("clips/\udcff.mp4")
+        record("clips/\udcff.mp4", "out/\udcff.mp4")
+        assert plan("clips/\udcff.mp4", skip_existing=True).skipped
+
     def test_an_output_folder_that_was_named_otherwise_is_the_same(self) -> None:
         record("clips/a.mp4", "out/a.mp4")
         Path("link").symlink_to("out")
@@ -192,8 +197,15 @@ class TestRefused:
 
     @pytest.mark.parametrize("folder", ["clips", "clips/out", "clips/day", "."])
     def test_inputs_and_outputs_in_one_another(self, folder: str) -> None:
-        with pytest.raises(BatchError, match=r"lies in the (input|output) folder"):
+        with pytest.raises(BatchError, match=r"lies in the (input|output folder)"):
             plan("clips", folder=folder)
+
+    @pytest.mark.parametrize("clip", ["clips/*", "clips/*/*.mp4", "clips/**/*.mp4", "*/*/*.mp4"])
+    def test_an_output_folder_that_a_pattern_will_match(self, clip: str) -> None:
+        with pytest.raises(BatchError, match=r"^clips/found: lies in the input "):
+            plan(clip, folder="clips/found")
+        assert plan("clips/*.mp4", folder="clips/found").jobs
+        assert plan("clips/day*/*.mp4", folder="clips/found").jobs
 
     def test_an_output_that_is_an_input(self) -> None:
         Path("out").mkdir()

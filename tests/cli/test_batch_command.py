@@ -70,6 +70,19 @@ def test_a_folder_with_a_bad_file_from_the_first_run_to_the_last(
     assert len(records_of(out)) == 4
 
 
+def test_a_name_that_becomes_too_long_fails_alone(run: Run, clips: Path, tmp_path: Path) -> None:
+    (clips / "day2" / "b.mp4").rename(clips / f"{'b' * 251}.mp4")
+    arguments = ("detect-video", clips, "-d", tmp_path / "out", "--no-video", "--jobs", "1")
+    outputs = ("--vehicles", ".cars.csv", "--page", ".page")
+    for more in ((), ("--skip-existing",)):
+        result = run(*arguments, *outputs, *more)
+        assert result.code == 3
+        assert "1 failed" in result.err
+        assert "bbb.page" in result.err
+        assert "File name too long" in result.err
+        assert (tmp_path / "out" / "all.cars.csv").exists()
+
+
 def test_a_dry_run_lists_and_does_nothing(run: Run, clips: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     result = run("detect-video", clips, "-d", out, "--tracks", ".txt", "--dry-run")

@@ -23,6 +23,15 @@ def picture(scene: Scene, tmp_path: Path) -> Path:
     return path
 
 
+def test_never_writes_over_a_mask_that_it_reads(run: Run, picture: Path, tmp_path: Path) -> None:
+    mask = tmp_path / "mask.png"
+    write_image(mask, read_image(picture))
+    before = mask.read_bytes()
+    result = run("detect-image", picture, "--regions", mask, "-o", mask, "--overwrite")
+    assert (result.code, "is the input itself" in result.err) == (1, True)
+    assert mask.read_bytes() == before
+
+
 def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Scene) -> None:
     result = run("detect-image", picture, "--json", "-", "--model", model_path, *QUICK_OPTIONS)
     assert result.code == 0, result.err

@@ -1,6 +1,7 @@
 """The program as a whole: help, versions, errors as text, exit codes."""
 
 import logging
+import re
 import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -14,8 +15,10 @@ from conftest import Run
 from vdet.cli.messages import print_lines
 
 
-def test_version(run: Run) -> None:
-    assert vdet.__version__ in run("--version").out
+def test_the_version_is_that_at_the_top_of_the_changelog(run: Run) -> None:
+    assert run("--version").out == f"vdet, version {vdet.__version__}\n"
+    changelog = Path(__file__).parents[2] / "CHANGELOG.md"
+    assert re.findall("^## (.*)", changelog.read_text("utf-8"), re.MULTILINE)[0] == vdet.__version__
 
 
 def test_an_error_is_one_line_without_traceback(run: Run, tmp_path: Path) -> None:

@@ -5,12 +5,10 @@ import json
 import os
 import stat
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import BinaryIO
-
-from pydantic import BaseModel, ValidationError
 
 from vdet.errors import OutputError
 from vdet.files import output_errors
@@ -72,12 +70,6 @@ Written = tuple[str, int, int]
 """What the manifest says about an output: digest, size and time, as in `Record`."""
 
 
-class _Line(BaseModel):
-    digest: str
-    sizes: dict[str, int]
-    times: dict[str, int] = {}
-
-
 def check_manifest(path: Path) -> None:
     """Refuse a link, which may lead out of the folder, and a FIFO, which may block for ever.
 
@@ -105,12 +97,10 @@ def read_written(path: Path) -> dict[str, Written]:
         return found
     with output_errors(path), os.fdopen(os.open(path, os.O_RDONLY | _FLAGS), "rb") as file:
         for text in file:
-            try:
-                line = _Line.model_validate_json(text)
-            except ValidationError:
-                continue
-            for name, size in line.sizes.items():
-                found[os.path.realpath(name)] = line.digest, size, line.times.get(name, 0)
+            with suppress(ValueError, TypeError, KeyError, AttributeError):
+                line = json.loads(text)
+                for name, size in line["sizes"].items():
+                    found[os.path.realpath(name)] = line["digest"], size, line["times"][name]
     return found
 
 

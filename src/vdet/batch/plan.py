@@ -1,11 +1,13 @@
 """The plan of a batch: a job for each video. A wrong plan is refused before any work."""
 
+import errno
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vdet.batch.inputs import Source, find_sources
+from vdet.batch.inputs import Source, find_sources, matches_in
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
@@ -107,7 +109,11 @@ def make_plan(
         skipped = [job for job in jobs if _is_done(job, digest, written)]
         jobs = [_replacing_ours(job, written, manifest) for job in jobs if job not in skipped]
     for job in jobs:
-        check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
+        try:
+            check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
+        except OSError as error:
+            if error.errno != errno.ENAMETOOLONG:  # such a file fails alone
+                raise
     for total in totals:
         check_output(total.path, overwrite=replaces, makes_folder=True)
     return Plan(folder, tuple(jobs), tuple(skipped), totals)
@@ -190,10 +196,10 @@ def _replacing_ours(job: VideoJob, written: Mapping[str, Written], manifest: Pat
 def _refuse_nested(clips: Iterable[Path], sources: Iterable[Source], folder: Path) -> None:
     resolved = folder.resolve()
     for clip in clips:
-        if clip.is_dir() and resolved.is_relative_to(clip.resolve()):
+        if matches_in(clip, folder):
             raise BatchError(
-                f"{folder}: lies in the input folder {clip}, and its videos would be inputs of the "
-                "next run; give a folder outside"
+                f"{folder}: lies in the input {clip}, and its videos would be inputs of the next "
+                "run; give a folder outside"
             )
     for source in sources:
         if source.path.resolve().is_relative_to(resolved):
@@ -202,14 +208,22 @@ def _refuse_nested(clips: Iterable[Path], sources: Iterable[Source], folder: Pat
             )
 
 
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Return the device and the inode of a file; None if it is not there."""
+    with suppress(OSError):
+        state = path.stat()
+        return state.st_dev, state.st_ino
+    return None
+
+
 def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[Total], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
-    inputs = {job.source.resolve() for job in jobs}
+    inputs = {_identity(path) for job in jobs for path in (job.source, *job.inputs)} - {None}
     owners = {folder / MANIFEST: "the manifest"}
     makers = [(total.path, "the outputs of all videos") for total in totals]
     makers += [(output.path, str(job.source)) for job in jobs for output in job.outputs]
     for path, maker in makers:
-        if path.resolve() in inputs:
+        if _identity(path) in inputs:
             raise OutputError(f"{path}: is an input itself; give another folder")
         if path in owners:
             raise BatchError(

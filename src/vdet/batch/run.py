@@ -1,5 +1,6 @@
 """Run a planned batch: process every file, and write its record when it has ended."""
 
+import os
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
@@ -14,7 +15,7 @@ from vdet.files import OutputFiles, make_folder, output_errors
 from vdet.progress import no_progress
 from vdet.run.video import VideoJob
 from vdet.temporary import remove_stale
-from vdet.workers import WorkerKilledError, Workers
+from vdet.workers import WorkerKilledError, Workers, is_repeated
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -57,14 +58,14 @@ def run_batch(
         write_totals(plan)
     finally:
         paths = [output.path for job in plan.jobs for output in job.outputs]
-        for folder in {path.parent for path in paths} | {path for path in paths if path.is_dir()}:
+        for folder in {path.parent for path in paths} | set(filter(os.path.isdir, paths)):
             remove_stale(folder)
 
 
 def write_totals(plan: Plan) -> None:
     """Write the files over all videos, from the outputs that are there. Raises `OutputError`."""
-    for total in plan.totals:
-        there = {name: path for name, path in total.outputs.items() if path.exists()}
+    for total in plan.totals:  # a name may be too long for `Path.exists`
+        there = {name: path for name, path in total.outputs.items() if os.path.isfile(path)}  # noqa: PTH113
         with OutputFiles(overwrite=True) as files, output_errors(total.path):
             total.made_by.write(there, files.stage(total.path))
 
@@ -72,7 +73,7 @@ def write_totals(plan: Plan) -> None:
 def _process_numbered(
     numbered: tuple[int, VideoJob], *, work: Work, counts: FrameCounts | None
 ) -> Record:
-    number, job = numbered
+    number, job = _replacing(numbered) if is_repeated() else numbered
     progress = counts.progress_of(number) if counts else no_progress
     return process_file(job, work=work, progress=progress)
 

@@ -54,8 +54,8 @@ def count(
     TRACKS are files of vdet detect-video --tracks. Nothing is detected again, and the counts are
     the same as those of detect-video --counts.
     """
-    settings = choice.read().counts
-    if not settings:
+    settings = choice.read()
+    if not settings.counts:
         raise click.UsageError("there is nothing to count at; give --lines FILE")
     from vdet.traffic.counter import count_file
     from vdet.traffic.counts import write_counts, write_counts_of_all
@@ -64,12 +64,12 @@ def count(
     if target is not None:
         if target.suffix.lower() not in SUFFIXES:
             raise click.UsageError(f"--counts: counts are written as {', '.join(SUFFIXES)}")
-        check_output(target, overwrite=overwrite, inputs=tracks)
+        check_output(target, overwrite=overwrite, inputs=[*tracks, *choice.inputs(settings)])
     videos = {}
     with progress_steps(" files") as steps:
         advance = steps("", len(tracks) if len(tracks) > 1 else None)
         for path in tracks:
-            videos[str(path)] = count_file(path, settings, size, rate)
+            videos[str(path)] = count_file(path, settings.counts, size, rate)
             advance(1)
     if target is not None:
         with staged(target, overwrite=overwrite) as temporary:

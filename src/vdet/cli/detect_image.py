@@ -61,8 +61,9 @@ def detect_image(
     model = choice.load_detector(settings.detector)
     sources = find_images(images)
     shared = options.as_outputs(options.wanted_outputs())
-    check_sinks(shared, overwrite=overwrite, inputs=sources)
-    jobs = plan_pictures(sources, output, stages, overwrite=overwrite)
+    inputs = [*sources, *choice.inputs(settings, settings.detector), *([camera] if camera else [])]
+    check_sinks(shared, overwrite=overwrite, inputs=inputs)
+    jobs = plan_pictures(sources, output, stages, overwrite=overwrite, inputs=inputs)
     is_printed = not (output or stages or shared)
     with progress_steps(" pictures") as steps:
         failures = run_pictures(

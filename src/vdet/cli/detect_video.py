@@ -130,7 +130,9 @@ def detect_video(
     from vdet.run.video import VideoJob
 
     check_mask(settings.regions)
-    job = VideoJob(source, (), start, end, frames, at or Fraction(0), request, overwrite)
+    inputs = (*choice.inputs(settings, settings.detector), *([camera] if camera else []))
+    part = start, end, frames, at or Fraction(0)
+    job = VideoJob(source, (), *part, request, inputs, overwrite)
     if batch.folder is None:
         job = replace(job, outputs=options.as_outputs(wanted), threads=threads)
         _process_one(job, settings, choice)

@@ -54,7 +54,7 @@ def images(
     from vdet.workers import core_count
 
     model = choice.load_detector(detector.showing_all())
-    results.check([*data, *choice.model_files(detector)])
+    results.check([*data, *choice.inputs(settings, detector)])
     roles = Roles.from_settings(settings)
     sets = [read_labelled_pictures(path, roles) for path in data]
     counting = Counting(detector.shown_score if score is None else score, least_width)
@@ -198,7 +198,7 @@ def video(
         model = choice.load_detector(settings.detector)
         variants.append(Variant(settings, model, extra))
     detectors = [variant.settings.detector for variant in variants]
-    files = [path for each in detectors for path in choice.model_files(each)]
+    files = [path for each in detectors for path in choice.inputs(base, each)]
     results.check([*videos, *truths, *files])
     roles = Roles.from_settings(base)
     clips = [open_clip(*pair, until, roles) for pair in zip(videos, truths, strict=True)]

@@ -56,7 +56,7 @@ def mine(
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm import mining
 
-    inputs = [*sources, *truths, *choice.model_files(settings.svm)]
+    inputs = [*sources, *truths, *choice.inputs(settings, settings.svm)]
     check_output(output, overwrite=overwrite, inputs=inputs)
     videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):

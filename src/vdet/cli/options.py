@@ -203,12 +203,17 @@ class SettingsChoice:
 
         return load_detector(settings, self.model_path)
 
-    def model_files(self, settings: "DetectorSettings") -> list[Path]:
-        """Return the model file that the detector reads; nothing for one without a file."""
+    def inputs(
+        self, settings: "Settings", detector: "DetectorSettings | None" = None
+    ) -> list[Path]:
+        """Return the files of these settings, and the model file of a detector."""
+        from vdet.config.loading import find_config
         from vdet.detect.factory import model_file
 
-        file = model_file(settings, self.model_path)
-        return [file] if file else []
+        config = self.config_name and find_config(self.config_name)
+        model = detector and model_file(detector, self.model_path)
+        named = (config, self.regions, self.lines, settings.regions.mask, model)
+        return [Path(each) for each in named if each]
 
     def read_for_whole_frames(self, *more: str, detector: str | None = None) -> "Settings":
         """Read them for a command that looks at whole frames; refuse regions as a `ConfigError`."""

@@ -43,7 +43,7 @@ def train(
     options.check_suffix(output, ".npz", what="models")
     metrics_path = output.with_suffix(".json")
     for path in (output, metrics_path):
-        check_output(path, overwrite=overwrite, inputs=data)
+        check_output(path, overwrite=overwrite, inputs=[*data, *choice.inputs(settings)])
     from vdet.detect.svm.model import save_model
     from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm.dataset import find_patches

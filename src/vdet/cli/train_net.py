@@ -65,6 +65,7 @@ def train_net(
     limit_library_threads()
     job = NetworkJob(data, clips, output, base, overwrite, Roles.from_settings(base_settings))
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
+    inputs += choice.inputs(base_settings)
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
     with live_bar(total=settings.steps, unit=" steps") as bar:

@@ -55,7 +55,12 @@ def find_images(paths: Sequence[Path]) -> list[Path]:
 
 
 def plan_pictures(
-    sources: Sequence[Path], out: Path | None, stages: Path | None, *, overwrite: bool
+    sources: Sequence[Path],
+    out: Path | None,
+    stages: Path | None,
+    *,
+    overwrite: bool,
+    inputs: Sequence[Path] = (),
 ) -> list[PictureJob]:
     """Choose the outputs of each picture, and check them before any work.
 
@@ -66,11 +71,13 @@ def plan_pictures(
         which is made, and in which the pictures keep their names. None: no pictures.
     stages
         Folder of the stage pictures; several sources get a folder in it each. None: no such.
+    inputs
+        Other files that are read; outputs never replace them.
 
     Raises
     ------
     OutputError
-        An output exists already (and not `overwrite`), is a source, or is that of two sources.
+        An output exists already (and not `overwrite`), is an input, or is that of two sources.
     """
     several = len(sources) > 1
     is_file = out is not None and not several and out.suffix.lower() in PICTURE_SUFFIXES
@@ -83,7 +90,8 @@ def plan_pictures(
 
     jobs = [PictureJob(source, tuple(wanted(source))) for source in sources]
     outputs = [output for job in jobs for output in job.outputs]
-    check_sinks(outputs, overwrite=overwrite, inputs=sources, makes_folder=not is_file)
+    inputs = [*sources, *inputs]
+    check_sinks(outputs, overwrite=overwrite, inputs=inputs, makes_folder=not is_file)
     return jobs
 
 

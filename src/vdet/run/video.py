@@ -49,6 +49,8 @@ class VideoJob:
         frames from 2 s before it are searched.
     lanes
         If it is given, the lane is found too, and everything is drawn on undistorted frames.
+    inputs
+        Other files that are read, such as settings; outputs never replace them.
     overwrite
         Outputs that are there already are replaced.
     threads
@@ -68,6 +70,7 @@ class VideoJob:
     frames: int | None = None
     at: Fraction = Fraction(0)
     lanes: LaneRequest | None = None
+    inputs: tuple[Path, ...] = ()
     overwrite: bool = False
     threads: int | None = None
     codec_threads: int | None = None
@@ -121,7 +124,7 @@ class OpenVideo:
 
 def check_job(job: VideoJob) -> None:
     """Refuse a job whose outputs cannot be written, before any work. Raises `OutputError`."""
-    check_sinks(job.outputs, overwrite=job.overwrite, inputs=[job.source])
+    check_sinks(job.outputs, overwrite=job.overwrite, inputs=[job.source, *job.inputs])
 
 
 @contextmanager

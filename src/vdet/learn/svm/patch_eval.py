@@ -85,7 +85,7 @@ def evaluate_patches(
     Parameters
     ----------
     jobs
-        Processes that describe patches, as joblib counts them: -1 for one per core.
+        Number of processes that describe patches; None for one per core.
     steps
         Called at the start of each step, with the number of patches to describe or None.
 

@@ -1,5 +1,6 @@
 """The protocol of an output (a sink), its kinds, and how outputs are checked and opened."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
@@ -226,7 +227,7 @@ def output_state(output: Output) -> tuple[int, int] | None:
     in it that the sink writes.
     """
     marker, path = sink_kind(output.sink).marker, output.path
-    if not (path.is_dir() if marker else path.is_file()):
+    if not (os.path.isdir if marker else os.path.isfile)(path):  # its name may be too long
         return None
     states = [file.stat() for file in (path.glob(marker) if marker else [path])]
     return sum(s.st_size for s in states), max((s.st_mtime_ns for s in states), default=0)
