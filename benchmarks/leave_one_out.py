@@ -107,7 +107,7 @@ def _split(path: Path, part_of: Callable[[str], str], folder: Path) -> list[Path
 def train(job: NetworkJob, settings: Settings) -> Path:
     """Train a network, if there is none yet, and return its file."""
     if not job.output.exists():
-        train_to_file(job, settings.train.net, progress=lambda state: _print_step(job, state.step))
+        train_to_file(job, settings, progress=lambda step, _: _print_step(job, step))
     return job.output
 
 

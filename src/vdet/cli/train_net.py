@@ -1,7 +1,6 @@
 """`vdet train-net`: from labelled pictures to a network."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -11,9 +10,6 @@ from vdet.cli.messages import live_bar, print_lines
 from vdet.cli.options import option
 from vdet.errors import DataError
 from vdet.files import check_output
-
-if TYPE_CHECKING:
-    from vdet.learn.net.training import TrainingState
 
 
 @command(
@@ -51,30 +47,28 @@ def train_net(
     if not data and not clips:
         raise click.UsageError("nothing to learn from; give DATA or --video")
     options.check_suffix(output, ".onnx", what="networks")
-    base_settings = choice.read()
-    settings = base_settings.train.net
+    settings = choice.read()
     try:
         import onnx  # noqa: F401
         import torch  # noqa: F401
     except ImportError as error:
         raise DataError("torch or onnx is not installed; pip install torch onnx") from error
-    from vdet.labels.roles import Roles
     from vdet.learn.net.run import NetworkJob, train_to_file
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
-    job = NetworkJob(data, clips, output, base, overwrite, Roles.from_settings(base_settings))
+    job = NetworkJob(data, clips, output, base, overwrite)
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
     inputs += choice.inputs(base_settings)
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
-    with live_bar(total=settings.steps, unit=" steps") as bar:
+    with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 
-        def advance(state: "TrainingState") -> None:
+        def advance(step: int, loss: float) -> None:
             if bar.n == 0:  # a training that continues is not as fast as its first step seems
-                bar.initial = state.step - 1
-            bar.set_postfix_str(f"loss {state.loss:.3f}, rate {state.rate:.1e}", refresh=False)
-            bar.update(state.step - bar.n)
+                bar.initial = step - 1
+            bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
+            bar.update(step - bar.n)
 
         metrics = train_to_file(job, settings, progress=advance)
     print_lines(*metrics.lines(), "", f"{output}: the network; {job.metrics}: the metrics")

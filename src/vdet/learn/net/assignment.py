@@ -101,8 +101,6 @@ def assign(
 
 def _cheapest(costs: Tensor, overlaps: Tensor) -> Tensor:
     """Return which cells each vehicle gets, bool `(n, cells)`."""
-    if not len(costs):
-        return torch.zeros_like(costs, dtype=torch.bool)
     count = overlaps.topk(CANDIDATES, dim=1).values.sum(1).int().clamp(min=1)
     cheapest = costs.topk(CANDIDATES, dim=1, largest=False)
     wanted = torch.arange(CANDIDATES)[None] < count[:, None]

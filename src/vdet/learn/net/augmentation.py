@@ -59,15 +59,13 @@ class SampleDrawer:
         if rng.random() < drawing.mosaics:
             sample = self._mosaic(rng, drawing)
         else:
-            low, high = np.log(_SCALES)
-            scale = drawing.magnified * np.exp(rng.uniform(low, high))
+            scale = drawing.magnified * _scale(rng, _SCALES)
             sample = _place(rng, self._pick(rng), (drawing.width, drawing.height), scale)
         if rng.random() < 0.5:
             sample = _mirrored(sample)
         visible = sample.boxes[~sample.ignored]
         image = with_weather(rng, _recolored(rng, sample.image), visible)
-        image = _with_noise(rng, image)
-        return _cleaned(replace(sample, image=image), LEAST_SIDE)
+        return _without_small(replace(sample, image=_with_noise(rng, image)))
 
     def _pick(self, rng: np.random.Generator) -> Sample:
         source = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
@@ -86,14 +84,17 @@ class SampleDrawer:
             (0, y, x, height),
             (x, y, width, height),
         ):
-            low, high = np.log(_MOSAIC_SCALES)
-            scale = drawing.magnified * np.exp(rng.uniform(low, high))
+            scale = drawing.magnified * _scale(rng, _MOSAIC_SCALES)
             fit = width / (right - left)  # the scale refers to the width of the whole picture
             part = _place(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)
             image[top:bottom, left:right] = part.image
             moved = part.boxes + np.array([left, top, left, top], np.float32)
             parts.append(replace(part, boxes=moved))
         return join(parts, image)
+
+
+def _scale(rng: np.random.Generator, limits: tuple[float, float]) -> float:
+    return float(np.exp(rng.uniform(*np.log(limits))))
 
 
 def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scale: float) -> Sample:
@@ -149,10 +150,10 @@ def _cropped(sample: Sample) -> Sample:
     return Sample(sample.image, cut[keep], sample.classes[keep], ignored[keep])
 
 
-def _cleaned(sample: Sample, least_side: float) -> Sample:
+def _without_small(sample: Sample) -> Sample:
     """Ignore vehicles that are too small to be found."""
     sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
-    small = (sides.max(1, initial=0) < least_side) | (sides.min(1, initial=1e9) < least_side / 2)
+    small = (sides.max(1, initial=0) < LEAST_SIDE) | (sides.min(1, initial=1e9) < LEAST_SIDE / 2)
     return replace(sample, ignored=sample.ignored | small)
 
 

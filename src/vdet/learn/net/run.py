@@ -1,18 +1,18 @@
 """A training from files to files: labelled pictures and videos → network and metrics."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from vdet.config.train import NetworkTrainingSettings
+from vdet.config.schema import Settings
 from vdet.detect.onnx.recognition import Header, read_header
 from vdet.detect.onnx.session import Session
 from vdet.files import write_json
-from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.learn.net.export import export_network
 from vdet.learn.net.sources import CLASSES, SourceReport, clip_source, image_source
-from vdet.learn.net.training import TrainingState, train_network
+from vdet.learn.net.training import Progress, train_network
 from vdet.version import __version__
 
 _AVERAGED = 100  # last steps whose mean loss is reported
@@ -34,8 +34,6 @@ class NetworkJob:
         An exported network from whose weights the training starts.
     overwrite
         Replace an earlier network and its metrics.
-    roles
-        What the labels mean.
     """
 
     pictures: tuple[Path, ...]
@@ -43,7 +41,6 @@ class NetworkJob:
     output: Path
     base: Path | None = None
     overwrite: bool = False
-    roles: Roles = DEFAULT_ROLES
 
     @property
     def metrics(self) -> Path:
@@ -80,12 +77,7 @@ class NetworkMetrics:
         )
 
 
-def train_to_file(
-    job: NetworkJob,
-    settings: NetworkTrainingSettings,
-    *,
-    progress: Callable[[TrainingState], object] = lambda _: None,
-) -> NetworkMetrics:
+def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) -> NetworkMetrics:
     """Train a network, write it with its metrics, and remove the checkpoint.
 
     Raises
@@ -105,32 +97,30 @@ def train_to_file(
     if job.base:
         header = read_header(Session(job.base))
         base["base"] = header.provenance if header else {}
-    sources = [image_source(path, job.roles) for path in job.pictures]
-    sources += [clip_source(video, truth, job.roles) for video, truth in job.clips]
-    recent: list[float] = []
+    sources = [image_source(path, settings) for path in job.pictures]
+    sources += [clip_source(video, truth, settings) for video, truth in job.clips]
+    learning = settings.train.net
+    losses: deque[float] = deque(maxlen=_AVERAGED)
 
-    def note(state: TrainingState) -> None:
-        recent.append(state.loss)
-        del recent[:-_AVERAGED]
-        progress(state)
+    def advance(step: int, loss: float) -> None:
+        losses.append(loss)
+        progress(step, loss)
 
-    network = train_network(
-        sources, len(CLASSES), settings, job.checkpoint, base=job.base, progress=note
-    )
+    network = train_network(sources, learning, job.checkpoint, base=job.base, progress=advance)
     report = NetworkMetrics(
         sources=tuple(source.report() for source in sources),
-        steps=settings.steps,
+        steps=learning.steps,
         parameters=sum(each.numel() for each in network.parameters()),
         seconds=round(time.monotonic() - began, 1),
-        loss=round(sum(recent) / len(recent), 4) if recent else None,
+        loss=round(sum(losses) / len(losses), 4) if losses else None,
     )
     header = Header(
         classes=CLASSES,
-        pixels=settings.width * settings.height,
-        calibration=settings.score,
+        pixels=learning.width * learning.height,
+        calibration=learning.score,
         provenance={
             "program": f"vdet {__version__}",
-            "training": settings.model_dump(mode="json"),
+            "training": learning.model_dump(mode="json"),
             "report": asdict(report),
             **base,
         },

@@ -1,7 +1,7 @@
-"""Labelled pictures and videos in memory, as the training draws its pictures from them."""
+"""Labelled pictures and videos in memory, from which the training draws."""
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array, Int64Array
+from vdet.config.schema import Settings
 from vdet.labels.reading import read_labelled_pictures, read_truth
-from vdet.labels.roles import DEFAULT_ROLES, Roles
+from vdet.labels.roles import Roles
 from vdet.media import VideoReader
 from vdet.media.images import Image
 
@@ -24,7 +25,7 @@ UNKNOWN = -1
 """The class of a vehicle whose kind is not known."""
 
 EVERY = 4
-"""Every N-th frame of a labelled video is learnt: neighbours are nearly equal."""
+"""Every N-th frame of a labelled video is used: neighbours are nearly equal."""
 
 _VEHICLE = "vehicle"
 
@@ -42,7 +43,7 @@ class Sample:
     classes
         int64 `(n,)`, `UNKNOWN` for a vehicle whose kind is not known.
     ignored
-        bool `(n,)`: the box is an ignore region: neither vehicle nor background.
+        bool `(n,)`: the box is an ignore region, neither vehicle nor background.
     """
 
     image: Image
@@ -64,7 +65,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class SourceReport:
-    """What a source has: its name, pictures, vehicles, and a SHA-256 of pictures and labels."""
+    """The name of a source, its pictures and vehicles, and a SHA-256 of pictures and labels."""
 
     name: str
     pictures: int
@@ -74,7 +75,7 @@ class SourceReport:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """The samples of one camera or collection; `name` stands in metrics and settings."""
+    """The samples of one camera or collection; metrics and settings use its `name`."""
 
     name: str
     samples: Sequence[Sample]
@@ -89,8 +90,8 @@ class Source:
         return SourceReport(self.name, len(self.samples), vehicles, digest.hexdigest())
 
 
-def image_source(path: Path, roles: Roles = DEFAULT_ROLES) -> Source:
-    """Read a set of labelled pictures into memory.
+def image_source(path: Path, settings: Settings) -> Source:
+    """Read a set of labelled pictures into memory; `settings` has the roles of labels.
 
     Raises
     ------
@@ -99,26 +100,28 @@ def image_source(path: Path, roles: Roles = DEFAULT_ROLES) -> Source:
     ImageError
         A picture cannot be read.
     """
-    labelled = read_labelled_pictures(path, roles)
+    labelled = read_labelled_pictures(path, Roles.from_settings(settings))
     samples = [
         _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.pictures
     ]
     return Source(Path(labelled.name).resolve().name, samples)
 
 
-def clip_source(video: Path, truth_file: Path, roles: Roles = DEFAULT_ROLES) -> Source:
+def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
     """Read every `EVERY`-th frame of a labelled video into memory; all its vehicles are cars.
+
+    `settings` has the roles of labels, and how much damage is tolerated.
 
     Raises
     ------
     TruthError
         The truth cannot be read.
     VideoError
-        The video cannot be read.
+        The video cannot be read, or is too damaged.
     """
-    truth = read_truth(truth_file, roles)
+    truth = read_truth(truth_file, Roles.from_settings(settings))
     samples = []
-    with VideoReader(video, frames=truth.last_frame) as reader:
+    with VideoReader(video, frames=truth.last_frame, settings=settings.input) as reader:
         for number, frame in enumerate(reader, start=1):
             if number % EVERY == 0:
                 rows = truth.frame(number)
@@ -134,12 +137,11 @@ def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: Bo
     ).shrunk()
 
 
-def join(samples: Iterable[Sample], image: Image) -> Sample:
+def join(samples: Sequence[Sample], image: Image) -> Sample:
     """Return a sample that shows `image` with the boxes of all `samples`."""
-    parts = list(samples)
     return Sample(
         image,
-        np.concatenate([part.boxes for part in parts]),
-        np.concatenate([part.classes for part in parts]),
-        np.concatenate([part.ignored for part in parts]),
+        np.concatenate([sample.boxes for sample in samples]),
+        np.concatenate([sample.classes for sample in samples]),
+        np.concatenate([sample.ignored for sample in samples]),
     )

@@ -21,7 +21,7 @@ from vdet.learn.net.assignment import Vehicles, assign
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import start_from
 from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_loss
-from vdet.learn.net.sources import UNKNOWN, Sample, Source, join
+from vdet.learn.net.sources import CLASSES, UNKNOWN, Sample, Source, join
 from vdet.run.threads import prefetch
 
 CHECKPOINT = 500
@@ -45,13 +45,8 @@ _AVERAGE = 0.998
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
 
 
-@dataclass(frozen=True, slots=True)
-class TrainingState:
-    """How far a training is: the steps done, the last loss and the learning rate."""
-
-    step: int
-    loss: float
-    rate: float
+Progress = Callable[[int, float], object]
+"""Called after each step, with the number of steps so far and the loss."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,12 +85,11 @@ def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
 
 def train_network(
     sources: Sequence[Source],
-    class_count: int,
     settings: NetworkTrainingSettings,
     checkpoint: Path,
     *,
     base: Path | None = None,
-    progress: Callable[[TrainingState], object] = lambda _: None,
+    progress: Progress = lambda *_: None,
 ) -> Network:
     """Train a network and return it with the moving average of its weights.
 
@@ -124,7 +118,7 @@ def train_network(
         **settings.model_dump(exclude={"score"}),  # it changes no weight
     }
     with _fast_torch():
-        run = _Run(class_count, settings, learnt_with)
+        run = _Run(settings, learnt_with)
         if checkpoint.exists():
             run.restore(checkpoint)
         elif base is not None:
@@ -132,7 +126,7 @@ def train_network(
         with prefetch(_batches(sources, settings, run.step)) as batches:
             for batch in batches:
                 loss = run.learn(batch)
-                progress(TrainingState(run.step, loss, run.rate))
+                progress(run.step, loss)
                 if run.step % CHECKPOINT == 0 or run.step == settings.steps:
                     run.save(checkpoint)
     return run.averaged.eval()
@@ -165,13 +159,11 @@ def _fast_torch() -> Iterator[None]:
 class _Run:
     """The state of a training between two steps."""
 
-    def __init__(
-        self, class_count: int, settings: NetworkTrainingSettings, learnt_with: dict[str, Any]
-    ) -> None:
+    def __init__(self, settings: NetworkTrainingSettings, learnt_with: dict[str, Any]) -> None:
         torch.manual_seed(_SEED)
         self._settings = settings
         self._learnt_with = learnt_with
-        self._network = Network(class_count).to(memory_format=torch.channels_last).train()
+        self._network = Network(len(CLASSES)).to(memory_format=torch.channels_last).train()
         self.averaged = copy.deepcopy(self._network)
         weights = [each for each in self._network.parameters() if each.ndim > 1]
         others = [each for each in self._network.parameters() if each.ndim <= 1]
