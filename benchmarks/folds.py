@@ -20,7 +20,7 @@ import numpy.typing as npt
 from vdet.boxes import NO_BOXES, BoolArray, Boxes
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.detect.svm.detector import Candidates, SvmDetector, horizon_of
+from vdet.detect.svm.detector import Candidates, SvmDetector, SvmModel
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
 from vdet.evaluate.scores import score
@@ -101,9 +101,9 @@ class Searched:
     detector: SvmDetector
     windows: dict[int, Windows]
 
-    def search(self, picture: Picture, index: int | None) -> Candidates:  # noqa: ARG002
+    def search(self, picture: Picture, index: int | None) -> Candidates:
         assert index is not None
-        return Candidates(self.windows[index], is_still=False)
+        return Candidates(self.windows[index], picture, is_still=False)
 
     def detect(self, candidates: Candidates) -> Boxes:
         return self.detector.detect(candidates)
@@ -169,14 +169,11 @@ def _search(
     with VideoReader(video, frames=last) as reader:
         info = reader.info
         images, frames = peek(reader)
-        horizon = horizon_of(settings.svm, images)
-        searching = Searching(
-            [
-                SvmDetector(model, settings.svm, info.width, info.height, horizon=horizon)
-                for model in models
-            ],
-            last,
-        )
+        detectors = [
+            SvmModel(model, settings.svm).for_video(info.width, info.height, images)
+            for model in models
+        ]
+        searching = Searching(detectors, last)
         searches = SearchRate(settings.detector.searches, settings.detector.stride)
         tracker = make_tracker(settings, info.width, info.height)
         count = sum(1 for _ in Pipeline(searching, tracker, rate=searches).follow(frames))
@@ -217,12 +214,7 @@ def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> 
     frames = (Frame(n, n / searched.rate, unseen) for n in range(searched.frames))
     found = Searched(detector, searched.windows)
     rows = [
-        Label(
-            0,
-            astuple(track.box),
-            frame=result.frame.index + 1,
-            id=track.id,
-        )
+        Label(0, astuple(track.box), frame=result.frame.index + 1, id=track.id)
         for result in Pipeline(found, tracker, rate=searched.searches).follow(frames)
         for track in result.tracks
     ]

@@ -41,4 +41,4 @@ class PatchSearch:
         for x, y, width, height in self._boxes[indices].tolist():
             patch = frame.cut(slice(y, y + height), slice(x, x + width), side, side)
             vectors.append(self._extractor.describe_channels(patch))
-        return self._extractor.stack(vectors)
+        return np.stack(vectors)

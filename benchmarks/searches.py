@@ -13,7 +13,7 @@ from benchmarks.patch_search import PatchSearch
 from benchmarks.rounds import Task, measure
 from vdet.config.schema import DetectorSettings, NetworkSettings, SvmSettings
 from vdet.detect.factory import load_detector
-from vdet.detect.svm.dense_search import dense_search
+from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.search import Engine, FrameSearch
 from vdet.media import Picture, Planes
 from vdet.media.coding import Coding
@@ -57,7 +57,7 @@ def search_times(
 
 
 def _search(
-    config: ShippedConfig, pictures: Sequence[Picture], engine: Engine = dense_search
+    config: ShippedConfig, pictures: Sequence[Picture], engine: Engine = DenseSearch
 ) -> Task:
     """Search the pictures."""
     width, height = pictures[0].width, pictures[0].height

@@ -20,7 +20,7 @@ from vdet.boxes import Box, Float64Array
 from vdet.config.schema import Settings, SvmSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
-from vdet.detect.svm.detector import horizon_of
+from vdet.detect.svm.horizon import find_horizon
 from vdet.evaluate.comparison import Comparison, compare
 from vdet.evaluate.scores import score, score_comparison
 from vdet.labels.label import Label
@@ -130,7 +130,7 @@ def on_vehicles(comparison: Comparison) -> dict[tuple[int, int], Float64Array]:
 @each_camera
 def test_the_horizon_is_found(case: Case) -> None:
     images, _ = peek(frames(case.scene))
-    horizon = horizon_of(LINEAR.svm, images)
+    horizon = find_horizon(images)
     assert horizon == pytest.approx(case.camera.horizon / case.camera.height, abs=0.03)
 
 

@@ -1,17 +1,15 @@
-"""Regions laid over frames: what lies in them, and what has to be searched."""
+"""Regions laid over frames, and what lies in them."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError, ImageError
 from vdet.media.images import write_image
-from vdet.regions import Regions, SearchArea, check_mask, lay_regions
+from vdet.regions import Regions, check_mask, lay_regions
 
 ROAD = {"name": "road", "points": [[0.5, 0.5], [1, 0.5], [1, 1], [0.25, 1]]}
 BUSH = {"name": "bush", "points": [[0.8, 0.6], [0.9, 0.6], [0.9, 0.8], [0.8, 0.8]]}
@@ -68,29 +66,3 @@ def test_pixels_for_another_shape_are_refused() -> None:
     )
     with pytest.raises(ConfigError, match=r"^regions\.size: places are given for frames of 1"):
         lay_regions(settings, 320, 180)
-
-
-corners = st.tuples(st.integers(0, 40), st.integers(0, 30))
-
-
-@given(st.lists(corners, min_size=3, max_size=3, unique=True), st.booleans(), st.data())
-def test_every_place_of_a_region_is_searched(
-    points: list[tuple[int, int]], excluded: bool, data: st.DataObject
-) -> None:
-    try:
-        settings = RegionsSettings.model_validate(
-            {
-                "size": (40, 30),
-                "polygons": [
-                    {"name": "a", "points": points, "kind": "exclude" if excluded else "include"}
-                ],
-            }
-        )
-    except ValueError:
-        return
-    regions = Regions(settings, 40, 30)
-    x = data.draw(st.floats(0, 39.9))
-    y = data.draw(st.floats(0, 29.9))
-    if regions.contains((x, y)):
-        near = np.floor([[x - 1, y - 1, x + 2, y + 2]])
-        assert SearchArea(regions.pixels).touches(near)[0]

@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import BoolArray, Float64Array, visible
+from vdet.boxes import BoolArray
 from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError
 from vdet.media.images import Image, read_header, read_image
@@ -14,27 +14,6 @@ from vdet.polygons import Point
 
 _WHITE = 128
 """Least value of a pixel of a mask that is included."""
-
-
-class SearchArea:
-    """The pixels of a frame that may show the foot of a vehicle.
-
-    Parameters
-    ----------
-    pixels
-        bool `(H, W)`.
-    """
-
-    def __init__(self, pixels: BoolArray) -> None:
-        self._size = pixels.shape[1], pixels.shape[0]
-        self._sums = np.asarray(cv2.integral(pixels.astype(np.uint8)), np.int32)
-
-    def touches(self, boxes: Float64Array) -> BoolArray:
-        """Tell of each box `(n, 4)`, x1, y1, x2, y2 in whole pixels, whether a pixel lies in it."""
-        left, top, right, bottom = visible(boxes, self._size).astype(np.int64).T
-        sums = self._sums
-        inside = sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left]
-        return np.asarray(inside > 0)
 
 
 class Regions:

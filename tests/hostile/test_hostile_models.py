@@ -154,18 +154,18 @@ def bombs() -> dict[str, tuple[bytes, str]]:
         "halved": [],
         "hog": {"orientations": 32, "cell": 2, "block": 8, "channels": [0, 1, 2]},
     }
-    asking = json.dumps({"format": "vdet model", "version": FORMAT_VERSION, "features": many})
+    asking = json.dumps(json.loads(HEADER) | {"features": many})
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("header.npy", bytes(300_000_000))
     return {
         "a billion features, claimed": (
             zipped(whole | {"weights": billion + bytes(100)}),
-            r"weights is damaged: the file does not hold the shape \(1, 1000000000\)",
+            "is not a vdet model, or is damaged",
         ),
         "a billion features, packed": (
             zipped(whole | {"weights": billion + bytes(65_000_000)}),
-            r"is far too large for a model: 65,\d+,\d+ bytes when unpacked",
+            "is not a vdet model, or is damaged",
         ),
         "ninety million features, asked for": (
             zipped(members(asking)),

@@ -88,16 +88,16 @@ def _network(path: Path) -> Facts:
 
 
 def _picture(path: Path) -> Facts:
-    from vdet.detect.svm.horizon import seen_horizon
+    from vdet.detect.svm.horizon import find_horizon
     from vdet.media.images import read_image
 
     image = read_image(path)
     height, width = image.shape[:2]
-    return {"kind": "picture", "width": width, "height": height, "horizon": seen_horizon([image])}
+    return {"kind": "picture", "width": width, "height": height, "horizon": find_horizon([image])}
 
 
 def _video(path: Path) -> Facts:
-    from vdet.detect.svm.horizon import seen_horizon
+    from vdet.detect.svm.horizon import find_horizon
     from vdet.errors import VideoError
     from vdet.media import VideoReader
     from vdet.media.demux import is_pipe, open_input, picture_stream
@@ -124,7 +124,7 @@ def _video(path: Path) -> Facts:
             "seconds": None if info.duration is None else float(info.duration),
             "sounds": list(map(_sound, container.streams.audio)),
             **asdict(info.tags),
-            "horizon": seen_horizon(images),
+            "horizon": find_horizon(images),
         }
 
 

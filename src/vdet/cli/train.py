@@ -1,6 +1,5 @@
-"""`vdet train`: from labelled patches or pictures to a linear model."""
+"""`vdet train`: from labelled patches to a linear model."""
 
-import tempfile
 from pathlib import Path
 
 import click
@@ -29,13 +28,12 @@ def train(
     scheduler: str | None,
     overwrite: bool,
 ) -> None:
-    """Train a linear model on labelled patches or pictures.
+    """Train a linear model on labelled patches.
 
-    Each DATA is a folder or a zip file of patches, or labelled pictures (COCO, KITTI, YOLO or
-    Pascal VOC), out of which patches of vehicles and of other things are cut. Patches lie in
-    vehicles/<group>/ and non-vehicles/<group>/. A file boxes.csv beside these folders says where in
-    a patch the vehicle is; vdet mine writes it. With it the model learns where the sides of
-    vehicles are. The metrics are printed, and written beside the model as JSON.
+    Each DATA is a folder or a zip file with pictures in vehicles/<group>/ and
+    non-vehicles/<group>/. A file boxes.csv beside these folders says where in a patch the vehicle
+    is; vdet mine writes it. With it the model learns where the sides of vehicles are. The metrics
+    are printed, and written beside the model as JSON.
     """
     if jobs and scheduler:
         raise click.UsageError("--jobs is for this machine; leave it out, or --scheduler")
@@ -45,24 +43,13 @@ def train(
     for path in (output, metrics_path):
         check_output(path, overwrite=overwrite, inputs=[*data, *choice.inputs(settings)])
     from vdet.detect.svm.model import save_model
-    from vdet.labels.reading import holds_labelled_pictures
     from vdet.learn.svm.dataset import find_patches
-    from vdet.learn.svm.mining import PictureSource, mine
     from vdet.learn.svm.training import train as fit_model
 
     if scheduler:  # the workers were started in other folders
         data = tuple(path.absolute() for path in data)
-    pictures = [path for path in data if holds_labelled_pictures(path)]
-    patches = [path for path in data if path not in pictures]
-    with (
-        tempfile.TemporaryDirectory(prefix="vdet-") as folder,
-        progress_steps("") as steps,
-    ):
-        if pictures:
-            archive = Path(folder) / "pictures.zip"
-            mine([PictureSource(path) for path in pictures], archive, settings, steps=steps)
-            patches.append(archive)
-        files = find_patches(patches)
+    files = find_patches(data)
+    with progress_steps("") as steps:
         model, metrics = fit_model(files, settings, jobs=jobs, scheduler=scheduler, steps=steps)
     save_model(model, output, overwrite=overwrite)
     metrics.write(metrics_path, overwrite=overwrite)

@@ -6,7 +6,6 @@ from typing import Any, Protocol, runtime_checkable
 from vdet.boxes import Boxes
 from vdet.media import Picture
 from vdet.media.images import Image
-from vdet.regions import Regions, SearchArea
 
 
 @runtime_checkable
@@ -53,24 +52,6 @@ StagePictures = Callable[[Image, Boxes], dict[str, Image]]
 def stage_pictures_of(detector: VideoDetector) -> StagePictures:
     """Return the function that makes the stage pictures of a detector, if it makes any."""
     return detector.stage_pictures if isinstance(detector, StagedDetector) else lambda *_: {}
-
-
-@runtime_checkable
-class LimitableDetector(VideoDetector, Protocol):
-    """A detector that can leave out the parts of the frame that need no search."""
-
-    def limited_to(self, area: SearchArea) -> VideoDetector:
-        """Return a detector for the same video that need not search outside `area`.
-
-        It finds the same in the area.
-        """
-
-
-def limited(detector: VideoDetector, regions: Regions | None) -> VideoDetector:
-    """Return a detector that searches only the regions, if it can; else the detector itself."""
-    if regions is not None and isinstance(detector, LimitableDetector):
-        return detector.limited_to(SearchArea(regions.pixels))
-    return detector
 
 
 @runtime_checkable

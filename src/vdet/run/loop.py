@@ -9,12 +9,11 @@ from typing import Any
 
 from vdet.boxes import NO_BOXES, Boxes
 from vdet.config.schema import Settings
-from vdet.detect.protocol import DetectorModel, VideoDetector, limited
+from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError, ImageError, VdetError
 from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import Image
-from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
 from vdet.run.search_rate import EVERY_FRAME, SearchRate
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
@@ -128,8 +127,7 @@ def build(
         The regions, the lines or the camera do not fit the frames.
     """
     height, width = (video.height, video.width) if video else images[0].shape[:2]
-    regions = lay_regions(settings.regions, width, height)
-    detector = limited(model.for_video(width, height, images), regions)
+    detector = model.for_video(width, height, images)
     made = make_steps(StepContext(settings, width, height, video, lanes), steps)
     if video is None:
         return Pipeline(detector, StillTracker(), made, is_still=True)

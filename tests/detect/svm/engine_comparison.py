@@ -11,7 +11,7 @@ from drawn_patches import draw_patches
 from seed import SEED
 from vdet.boxes import Float32Array
 from vdet.config.schema import FeatureSettings, WindowSettings
-from vdet.detect.svm.dense_search import dense_search
+from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.detect.svm.model import BoxRegression, LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
@@ -47,7 +47,7 @@ class EngineResults:
 def compare(model: LinearModel, grids: list[WindowGrid], pixels: Image | Planes) -> EngineResults:
     """Search a frame with both engines."""
     frame = _pyramid(pixels, model.features, grids)
-    dense = [dense_search(model, grid).search(frame).probabilities for grid in grids]
+    dense = [DenseSearch(model, grid).search(frame).probabilities for grid in grids]
     patch = [PatchSearch(model, grid).search(frame).probabilities for grid in grids]
     return EngineResults(log_odds(np.concatenate(dense)), log_odds(np.concatenate(patch)))
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from boxing import moved_to, rounded
-from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder, road
+from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.boxes import Box, Boxes
 from vdet.config.schema import StillSettings, SvmSettings
-from vdet.detect.svm.detector import SvmModel, horizon_of
+from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.search import FrameSearch
 from vdet.detect.svm.stages import Trace
@@ -144,15 +144,6 @@ class TestDefaultSettings:
         assert len(detect_still(road(), DEFAULT)) == 0
 
 
-@pytest.mark.parametrize(("settings", "told"), [(ROWS, False), (DEFAULT, True)])
-def test_the_horizon_is_told_where_windows_depend_on_it(
-    settings: SvmSettings, told: bool, caplog: pytest.LogCaptureFixture
-) -> None:
-    with caplog.at_level("INFO", "vdet"):
-        SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, [road()])
-    assert ("horizon" in caplog.text) == told
-
-
 class TestStillPictures:
     """A still picture equals the last of `heat.frames` equal frames of a video."""
 
@@ -216,17 +207,35 @@ class TestStillPictures:
 
 
 class TestHorizon:
-    def test_a_horizon_in_the_settings_is_not_searched_for(
-        self, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
-        assert horizon_of(DEFAULT, [road()]) == 0.35
+    UNSET = by_perspective(None, 0.15, 0.2).svm
 
-    def test_the_horizon_is_not_searched_for_where_no_set_depends_on_it(
-        self, monkeypatch: pytest.MonkeyPatch
+    @staticmethod
+    def reported(settings: SvmSettings, count: int, caplog: pytest.LogCaptureFixture) -> str:
+        """Return the line of the log that is about the horizon, with its level."""
+        with caplog.at_level("INFO", "vdet"):
+            SvmModel(MODEL, settings).for_video(WIDTH, HEIGHT, [road()] * count)
+        return "".join(f"{each.levelname} {each.message}" for each in caplog.records)
+
+    def test_one_in_the_settings_is_not_searched_for(
+        self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
     ) -> None:
         monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
-        horizon_of(ROWS, [road()])
+        assert self.reported(DEFAULT, 5, caplog) == "INFO the horizon lies at 0.35 of the height"
+
+    def test_none_is_searched_for_where_no_window_set_depends_on_it(
+        self, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        monkeypatch.setattr("vdet.detect.svm.detector.find_horizon", pytest.fail)
+        assert self.reported(ROWS, 5, caplog) == ""
+
+    @pytest.mark.parametrize(("count", "level"), [(1, "INFO"), (5, "WARNING")])
+    def test_a_video_without_one_warns_that_it_is_assumed(
+        self, count: int, level: str, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        line = self.reported(self.UNSET, count, caplog)
+        assert line.startswith(f"{level} no horizon is found in the first frames: 0.58 of the hei")
+        assert "set detector.search.perspective.horizon" in line
+        assert "lies" not in line
 
 
 @pytest.mark.parametrize("shape", [(240, 20, 3), (1, 1, 3), (2, 2, 3)])
@@ -257,6 +266,3 @@ def test_one_loaded_model_serves_frames_of_any_size() -> None:
             height // 4,
             width // 4,
         )
-
-
-# What `detection_scores` makes of the strength of the evidence.

@@ -7,7 +7,7 @@ import pytest
 
 from vdet.boxes import Box, Float32Array
 from vdet.config.schema import HeatSettings, WindowSettings
-from vdet.detect.svm.heat import Heat, HeatMap, find_regions
+from vdet.detect.svm.heat import Heat, HeatHistory, find_regions
 from vdet.detect.svm.windows import Windows, lay_grid
 
 
@@ -23,13 +23,13 @@ def heat_map(
     blur: int = 1,
     weight: Literal["none", "coverage"] = "none",
     shrink: Literal[1, 2, 4, 8] = 1,
-) -> HeatMap:
+) -> HeatHistory:
     """Make the map of a frame of 100 × 60 pixels."""
     settings = HeatSettings(frames=frames, blur=blur, weight=weight, shrink=shrink)
-    return HeatMap(100, 60, settings)
+    return HeatHistory(100, 60, settings)
 
 
-def values_of(heat: HeatMap, windows: Windows) -> Float32Array:
+def values_of(heat: HeatHistory, windows: Windows) -> Float32Array:
     return heat.update(windows).values
 
 

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
+from vdet.detect.svm.horizon import find_horizon
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import demo_scene, empty_road
@@ -68,8 +68,8 @@ def test_the_horizon_is_found_behind_traffic() -> None:
     ],
     ids=["black", "white", "noise", "upright lines", "a pixel", "a row"],
 )
-def test_without_lines_the_horizon_is_the_default_one(image: Image) -> None:
-    assert find_horizon([image]) == DEFAULT_HORIZON
+def test_without_lines_there_is_no_horizon(image: Image) -> None:
+    assert find_horizon([image]) is None
 
 
 def fan(*slopes: float, meeting: float = 0.45, upward: bool = False) -> Image:
@@ -91,7 +91,7 @@ LEFT = tuple(-slope for slope in RIGHT)
 
 def test_lines_from_both_sides_are_needed() -> None:
     assert find_horizon([fan(*LEFT, *RIGHT)]) == pytest.approx(0.45, abs=STEP)
-    assert find_horizon([fan(*RIGHT)]) == find_horizon([fan(*LEFT)]) == DEFAULT_HORIZON
+    assert find_horizon([fan(*RIGHT)]) is find_horizon([fan(*LEFT)]) is None
 
 
 def test_lines_that_meet_below_themselves_do_not_count() -> None:
@@ -102,7 +102,7 @@ def test_lines_that_meet_below_themselves_do_not_count() -> None:
 
 def test_a_very_tall_picture_is_not_enlarged() -> None:
     tracemalloc.start()
-    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) == DEFAULT_HORIZON
+    assert find_horizon([np.zeros((3000, 40, 3), np.uint8)]) is None
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 10_000_000

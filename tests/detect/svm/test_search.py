@@ -15,11 +15,11 @@ from vdet.config.schema import (
     WindowSettings,
 )
 from vdet.config.section import scale_lengths
-from vdet.detect.svm.dense_search import dense_search
+from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel
-from vdet.detect.svm.search import Engine, FrameSearch, lay_grids
-from vdet.detect.svm.windows import Windows
+from vdet.detect.svm.search import Engine, FrameSearch
+from vdet.detect.svm.windows import Windows, lay_grids
 from vdet.errors import FrameSizeError, ImageError
 from vdet.media import Picture
 from vdet.media.images import Image
@@ -49,7 +49,7 @@ def laid(
     return np.concatenate([grid.boxes for grid in grids])
 
 
-def search_of(features: FeatureSettings, engine: Engine = dense_search) -> FrameSearch:
+def search_of(features: FeatureSettings, engine: Engine = DenseSearch) -> FrameSearch:
     settings = SvmSettings(features=features, search=scale_lengths(fixed(*SETS), 720 / 120))
     return FrameSearch(model_of(features), settings, 160, 120, engine=engine)
 

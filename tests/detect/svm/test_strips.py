@@ -21,9 +21,9 @@ from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.strips import (
     Strip,
-    StripWeights,
     block_sums,
     describe_blocks,
+    histogram_tables,
     table_sums,
     window_blocks,
 )
@@ -151,20 +151,20 @@ def features_of(bins: int | None) -> FeatureSettings:
     return FeatureSettings(halved=(), hog=HogSettings(channels=(0,)), histogram=histogram)
 
 
-def weights_of(features: FeatureSettings, members: int) -> tuple[StripWeights, np.ndarray]:
-    """Return a model's sorted weights, and those of its histogram, `(members, 3, bins)`."""
+def tables_of(features: FeatureSettings, members: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the tables of a model, and the weights of its histogram, `(members, 3, bins)`."""
     layout, bins = Layout.of(features), features.histogram.bins or 0
     weights = np.random.default_rng(bins).normal(size=(members, layout.length)).astype(np.float32)
     model = LinearModel(features, weights, *np.zeros((3, members), np.float32))
-    return StripWeights.of(model), weights[:, layout.histogram].reshape(members, 3, bins)
+    return histogram_tables(model), weights[:, layout.histogram].reshape(members, 3, bins)
 
 
 @pytest.mark.parametrize("bins", [8, 32, 256])
 @pytest.mark.parametrize("members", [1, 3])
 def test_a_window_sums_the_weights_of_its_histogram(bins: int, members: int) -> None:
     features = features_of(bins)
-    sorted_weights, weights = weights_of(features, members)
-    sums = table_sums(SMALL_STRIP, sorted_weights.tables, features, X, Y)
+    tables, weights = tables_of(features, members)
+    sums = table_sums(SMALL_STRIP, tables, features, X, Y)
     assert sums.shape == (members, 3, 4)
     assert sums.dtype == np.float32
     for m, i, j in np.ndindex(*sums.shape):
@@ -197,7 +197,7 @@ class TestHalvedChannels:
         )
 
     def test_a_window_counts_half_its_pixels_across_and_down(self) -> None:
-        tables = weights_of(self.FEATURES, 2)[0].tables
+        tables = tables_of(self.FEATURES, 2)[0]
         strip, x, y = self.strip(), np.array([0, 16, 96]), np.array([0, 8, 32])
         none = np.zeros_like(tables)
         for number, channel in enumerate(strip):

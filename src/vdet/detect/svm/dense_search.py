@@ -1,13 +1,12 @@
 """The dense engine: a strip of the frame is described once for all the windows in it.
 
-Windows that are whole cells apart share their HOG blocks (`AlignedSearch`). A grid of which every
-second window is whole cells apart is searched as four such grids (`PhasedSearch`). The windows of
-any other grid share only resizing and gradients (`LocatedSearch`).
+Windows that are whole cells apart share their HOG blocks. A grid of which every second window is
+whole cells apart is searched as four such grids. The windows of any other grid share only resizing
+and gradients.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -17,39 +16,79 @@ from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.detect.svm.strips import (
     Strip,
-    StripWeights,
     block_sums,
+    block_weights,
     describe_blocks,
+    histogram_tables,
     table_sums,
     window_blocks,
 )
 from vdet.detect.svm.windows import GridResult, IndexArray, WindowGrid
 
 MAX_PHASES = 2
-"""Of `PhasedSearch`, across and down. With more, `LocatedSearch` is faster."""
+"""Most grids of shared blocks, across and down, that a grid is split into; with more of them,
+sharing only the gradients is faster."""
 BATCH = 8192
 """Number of windows that are described before they are classified; it bounds the memory."""
 
 
-def dense_search(
-    model: LinearModel, grid: WindowGrid
-) -> "AlignedSearch | PhasedSearch | LocatedSearch":
-    """Return the fastest search of a grid that has windows."""
-    features = model.features
-    cells = grid.step * features.patch / grid.size / features.hog.cell
-    if cells.denominator == 1:
-        return AlignedSearch(model, grid)
-    if cells.denominator <= MAX_PHASES:
-        return PhasedSearch(model, grid, cells.denominator)
-    return LocatedSearch(model, grid)
-
-
-class AlignedSearch:
-    """Searches a grid whose windows are whole cells apart, across and down."""
+class DenseSearch:
+    """Searches the windows of one grid, split into parts whose windows lie on the same strip."""
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._weights = StripWeights.of(model)
+        features = model.features
+        pixels = grid.step * features.patch / grid.size  # from window to window, of the patch
+        n = (pixels / features.hog.cell).denominator
+        part: type[_AlignedPart | _LocatedPart] = _AlignedPart
+        if n > MAX_PHASES:
+            part = _LocatedPart
+            n = (pixels / max(map(features.shrink, range(3)))).denominator
+        self._numbers = np.arange(len(grid)).reshape(grid.rows, grid.columns)
+        self._parts: list[tuple[IndexArray, _Part]] = [
+            (
+                self._numbers[row::n, column::n].ravel(),
+                part(model, grid.every_nth(n, column, row)),
+            )
+            for row in range(min(n, grid.rows))
+            for column in range(min(n, grid.columns))
+        ]
+
+    def search(self, frame: FramePyramid) -> GridResult:
+        """Return the probability of each window."""
+        probabilities = np.zeros(self._numbers.size, np.float32)
+        seen = []
+        for numbers, part in self._parts:
+            values, described = part.search(frame)
+            probabilities[numbers] = self._model.to_probabilities(values)
+            seen.append(described)
+        return GridResult(probabilities, lambda indices: self._hogs(seen, indices))
+
+    def _hogs(self, seen: list[Any], indices: IndexArray) -> Float32Array:
+        hogs = np.zeros((len(indices), Layout.of(self._model.features).hog_length), np.float32)
+        for (numbers, part), described in zip(self._parts, seen, strict=True):
+            rows, places = np.nonzero(indices[:, np.newaxis] == numbers)
+            if len(rows):
+                hogs[rows] = part.hogs(described, places)
+        return hogs
+
+
+class _Part(Protocol):
+    """The search of `n` windows on one strip, by a model with `m` members."""
+
+    def search(self, frame: FramePyramid) -> tuple[Float32Array, Any]:
+        """Return the decision values, `(n, m)`, and what `hogs` needs of the frame."""
+
+    def hogs(self, described: Any, places: IndexArray) -> Float32Array:
+        """Return the HOG features of some of the windows, by their indices."""
+
+
+class _AlignedPart:
+    """Windows that are whole cells apart, across and down."""
+
+    def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
+        self._model = model
+        self._weights, self._tables = block_weights(model), histogram_tables(model)
         self._strip = Strip(grid, model.features)
         self._columns = grid.columns
         cell = model.features.hog.cell
@@ -57,131 +96,52 @@ class AlignedSearch:
         self._x = np.arange(grid.columns)[:, np.newaxis] * self._cells * cell
         self._y = np.arange(grid.rows)[np.newaxis] * self._cells * cell
 
-    def search(self, frame: FramePyramid) -> GridResult:
-        """Return the probability of each window."""
+    def search(self, frame: FramePyramid) -> tuple[Float32Array, Float32Array]:
         features = self._model.features
         strip = self._strip.cut(frame)
         blocks = describe_blocks(strip, features)
-        at_every_block = block_sums(blocks, self._weights.hog)
-        values = at_every_block[:, :: self._cells, :: self._cells]
-        values = values + table_sums(strip, self._weights.tables, features, self._x, self._y)
+        values = block_sums(blocks, self._weights)[:, :: self._cells, :: self._cells]
+        values = values + table_sums(strip, self._tables, features, self._x, self._y)
         by_row = values.transpose(2, 1, 0).reshape(-1, len(values))
-        probabilities = self._model.to_probabilities(by_row + self._model.biases)
-        return GridResult(probabilities, lambda indices: self._hogs(blocks, indices))
+        return by_row + self._model.biases, blocks
 
-    def _hogs(self, blocks: Float32Array, indices: IndexArray) -> Float32Array:
-        rows, columns = np.divmod(indices, self._columns)
-        return window_blocks(
-            blocks, columns * self._cells, rows * self._cells, self._model.features
-        )
+    def hogs(self, described: Float32Array, places: IndexArray) -> Float32Array:
+        rows, columns = np.divmod(places, self._columns)
+        across, down = columns * self._cells, rows * self._cells
+        return window_blocks(described, across, down, self._model.features)
 
 
-class PhasedSearch:
-    """Searches a grid of which every n-th window is whole cells apart, as n² aligned grids."""
+class _LocatedPart:
+    """Windows that are whole pixels apart, in each channel of a patch.
 
-    def __init__(self, model: LinearModel, grid: WindowGrid, n: int) -> None:
-        self._shape = (grid.rows, grid.columns)
-        self._n = n
-        self._parts = {
-            (row, column): AlignedSearch(model, grid.every_nth(n, column, row))
-            for row in range(min(n, grid.rows))
-            for column in range(min(n, grid.columns))
-        }
-
-    def search(self, frame: FramePyramid) -> GridResult:
-        """Return the probability of each window."""
-        probabilities = np.zeros(self._shape, np.float32)
-        results = {}
-        for (row, column), part in self._parts.items():
-            results[row, column] = result = part.search(frame)
-            place = probabilities[row :: self._n, column :: self._n]
-            place[:] = result.probabilities.reshape(place.shape)
-        return GridResult(probabilities.ravel(), lambda indices: self._hogs(results, indices))
-
-    def _hogs(
-        self, results: dict[tuple[int, int], GridResult], indices: IndexArray
-    ) -> Float32Array:
-        """Return the HOG features of some windows, each from its part."""
-        rows, columns = np.divmod(indices, self._shape[1])
-        hogs: list[Float32Array] = []
-        for row, column in zip(rows.tolist(), columns.tolist(), strict=True):
-            (j, first_row), (i, first_column) = divmod(row, self._n), divmod(column, self._n)
-            width = len(range(first_column, self._shape[1], self._n))
-            hogs.append(results[first_row, first_column].hogs(np.array([j * width + i])))
-        return np.concatenate(hogs)
-
-
-@dataclass(frozen=True, slots=True)
-class _Phase:
-    """The windows of a grid that lie on one strip: their indices, and their pixels in the strip."""
-
-    strip: Strip
-    indices: IndexArray
-    x: IndexArray
-    y: IndexArray
-
-
-class LocatedSearch:
-    """Searches a grid of any step.
-
-    A strip is resized and its gradients are computed once (`HOGDescriptor.compute` with locations).
-    Windows lie on the same strip if they are whole pixels of each of its channels apart.
+    The gradients of the strip are computed once (`HOGDescriptor.compute` with locations).
     """
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
-        self._tables = StripWeights.of(model).tables
-        self._windows = len(grid)
-        self._phases = list(_phases(grid, model))
+        self._tables = histogram_tables(model)
+        self._strip = Strip(grid, model.features)
+        row, column = np.divmod(np.arange(len(grid)), grid.columns)
+        pixels = int(grid.step * Fraction(model.features.patch, grid.size))
+        self._x, self._y = column * pixels, row * pixels
         self._descriptors = patch_descriptors(model.features)
 
-    def search(self, frame: FramePyramid) -> GridResult:
-        """Return the probability of each window."""
-        probabilities = np.zeros(self._windows, np.float32)
-        strips: list[Channels] = []
-        for phase in self._phases:
-            strip = phase.strip.cut(frame)
-            strips.append(strip)
-            for i in range(0, len(phase.indices), BATCH):
-                batch = slice(i, i + BATCH)
-                values = self._decision_values(strip, phase.x[batch], phase.y[batch])
-                probabilities[phase.indices[batch]] = self._model.to_probabilities(values)
-        return GridResult(probabilities, lambda indices: self._hogs(strips, indices))
+    def search(self, frame: FramePyramid) -> tuple[Float32Array, Channels]:
+        strip = self._strip.cut(frame)
+        sums = table_sums(strip, self._tables, self._model.features, self._x, self._y)
+        values = sums.T + self._model.biases
+        for first in range(0, len(values), BATCH):
+            hogs = self.hogs(strip, np.arange(first, min(first + BATCH, len(values))))
+            weights = self._model.weights[:, : hogs.shape[1]]
+            values[first : first + BATCH] += hogs @ weights.T
+        return values, strip
 
-    def _hogs(self, strips: list[Channels], indices: IndexArray) -> Float32Array:
-        """Describe some windows, each on its own strip."""
-        hogs = np.zeros((len(indices), Layout.of(self._model.features).hog_length), np.float32)
-        for phase, strip in zip(self._phases, strips, strict=True):
-            rows, places = np.nonzero(indices[:, np.newaxis] == phase.indices)
-            if len(rows):
-                hogs[rows] = self._describe(strip, phase.x[places], phase.y[places])
-        return hogs
-
-    def _decision_values(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
-        hogs = self._describe(strip, x, y)
-        values = hogs @ self._model.weights[:, : hogs.shape[1]].T + self._model.biases
-        sums = table_sums(strip, self._tables, self._model.features, x, y)
-        return np.asarray(values + sums.T, np.float32)
-
-    def _describe(self, strip: Channels, x: IndexArray, y: IndexArray) -> Float32Array:
-        """Return the HOG features of each window, float32 `(n, h)`, channel by channel."""
-        described = [np.zeros((len(x), 0), np.float32)]  # all there is without HOG
+    def hogs(self, described: Channels, places: IndexArray) -> Float32Array:
+        parts = [np.zeros((len(places), 0), np.float32)]  # all there is without HOG
         for number, hog in self._descriptors.items():
             shrink = self._model.features.shrink(number)
-            places = zip((x // shrink).tolist(), (y // shrink).tolist(), strict=True)
-            vectors = hog.compute(strip[number], locations=list(places))
-            described.append(np.reshape(vectors, (len(x), -1)))
-        return np.concatenate(described, axis=1, dtype=np.float32)
-
-
-def _phases(grid: WindowGrid, model: LinearModel) -> Iterator[_Phase]:
-    """Split a grid into parts whose windows are whole pixels apart, in each channel of a patch."""
-    scale = Fraction(model.features.patch, grid.size)
-    n = (grid.step * scale / max(map(model.features.shrink, range(3)))).denominator
-    for first_row in range(min(n, grid.rows)):
-        for first_column in range(min(n, grid.columns)):
-            part = grid.every_nth(n, first_column, first_row)
-            pixels = int(part.step * scale)
-            row, column = np.divmod(np.arange(len(part)), part.columns)
-            indices = (row * n + first_row) * grid.columns + column * n + first_column
-            yield _Phase(Strip(part, model.features), indices, column * pixels, row * pixels)
+            x, y = self._x[places] // shrink, self._y[places] // shrink
+            locations = list(zip(x.tolist(), y.tolist(), strict=True))
+            vectors = hog.compute(described[number], locations=locations)
+            parts.append(np.reshape(vectors, (len(places), -1)))
+        return np.concatenate(parts, axis=1, dtype=np.float32)

@@ -10,7 +10,7 @@ import numpy as np
 from vdet.boxes import Boxes, are_nested
 from vdet.config.schema import SvmSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
-from vdet.detect.svm.heat import Heat, HeatMap, HotRegion, find_regions
+from vdet.detect.svm.heat import Heat, HeatHistory, HotRegion, find_regions
 from vdet.detect.svm.horizon import DEFAULT_HORIZON, find_horizon
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.road_check import RoadCheck
@@ -20,7 +20,6 @@ from vdet.detect.svm.votes import Votes, split_regions
 from vdet.detect.svm.windows import Windows
 from vdet.media import Picture
 from vdet.media.images import Image
-from vdet.regions import SearchArea
 
 log = logging.getLogger("vdet")
 
@@ -29,13 +28,12 @@ log = logging.getLogger("vdet")
 class Candidates:
     """What the search of one frame gives.
 
-    `windows` are all that were searched. A still picture is no frame of a video. `picture` is the
-    frame, where `RoadCheck` may need it.
+    `windows` are all that were searched. `is_still` tells a still picture from a frame of a video.
     """
 
     windows: Windows
+    picture: Picture
     is_still: bool
-    picture: Picture | None = None
 
 
 class SvmModel:
@@ -56,12 +54,28 @@ class SvmModel:
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
         """Return a detector for frames of one size; `images` show where the horizon is."""
-        horizon = horizon_of(self._settings, images)
-        if self._settings.search.perspective.sizes:
-            log.info("the horizon lies at %.2f of the height", horizon)
+        horizon = self._horizon(images)
         return SvmDetector(
             self._model, self._settings, width, height, horizon=horizon, check=self._check
         )
+
+    def _horizon(self, images: Sequence[Image]) -> float:
+        """Return the row of the horizon, share of the height, and report it."""
+        perspective = self._settings.search.perspective
+        if not perspective.sizes:
+            return DEFAULT_HORIZON  # no window set depends on it
+        horizon = perspective.horizon
+        if horizon is None and (horizon := find_horizon(images)) is None:
+            # A folder may hold many pictures without a horizon: only videos warn.
+            log.log(
+                logging.WARNING if len(images) > 1 else logging.INFO,
+                "no horizon is found in the first frames: %.2f of the height is assumed; set "
+                "detector.search.perspective.horizon, which may also be above the frame",
+                DEFAULT_HORIZON,
+            )
+            return DEFAULT_HORIZON
+        log.info("the horizon lies at %.2f of the height", horizon)
+        return horizon
 
 
 class SvmDetector:
@@ -72,9 +86,7 @@ class SvmDetector:
     width, height
         Size of the frames, pixels.
     horizon
-        Row of the horizon, share of the frames' height (`horizon_of`).
-    area
-        Where vehicles are looked for; None for the whole frame.
+        Row of the horizon, share of the frames' height.
     check
         As of `SvmModel`.
 
@@ -94,29 +106,20 @@ class SvmDetector:
         height: int,
         *,
         horizon: float = DEFAULT_HORIZON,
-        area: SearchArea | None = None,
         check: RoadCheck | None = None,
     ) -> None:
         self._check = check
-        self._search = FrameSearch(model, settings, width, height, horizon=horizon, area=area)
-        self._model = model
-        self._horizon = horizon
-        self._area = area
+        self._search = FrameSearch(model, settings, width, height, horizon=horizon)
         self._features = model.features
         self._size = width, height
         self._settings = settings
         self._heat = scale_lengths(settings.heat, height / REFERENCE_HEIGHT)
-        self._map = HeatMap(width, height, self._heat)
+        self._history = HeatHistory(width, height, self._heat)
         self._recent: deque[Windows] = deque(maxlen=self._heat.frames)
-
-    def limited_to(self, area: SearchArea) -> "SvmDetector":
-        """Return a detector that leaves out windows far from an area. Raises `ImageError`."""
-        return self._twin(area, self._check)
 
     def search(self, picture: Picture, index: int | None) -> Candidates:
         """Search the windows of a frame; several threads may call this at once."""
-        windows = self._search.search(picture)
-        return Candidates(windows, index is None, picture if self._check else None)
+        return Candidates(self._search.search(picture), picture, is_still=index is None)
 
     def detect(self, candidates: Candidates) -> Boxes:
         """Add the hits of the next frame to the heat, and return what is hot.
@@ -126,35 +129,19 @@ class SvmDetector:
         """
         hits = candidates.windows.hits(self._settings.search.probability)
         for _ in range(self._heat.frames if candidates.is_still else 1):
-            heat = self._map.update(hits)
+            heat = self._history.update(hits)
             self._recent.append(hits)
         trace = Trace(candidates.windows, hits, heat, self._search.grids)
         detections = self._detections(self._regions(heat), trace)
         if candidates.is_still:
             detections = self._shown_in_still(detections)
-        if self._check and candidates.picture and self._check.is_due():
-            self._check.compare(candidates.picture, self._as_still(candidates, detections))
+        if self._check and len(self._recent) == self._heat.frames:
+            self._check.compare(candidates.picture, detections)
         return detections
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
         """Return pictures of patches and their features, the windows, the hits and the heat."""
         return stage_pictures(image, detections.trace, self._features)
-
-    def _as_still(self, candidates: Candidates, detections: Boxes) -> Boxes:
-        """Return what is found where the frame is taken as a still picture."""
-        if candidates.is_still:
-            return detections
-        return self._twin(self._area).detect(replace(candidates, is_still=True))
-
-    def _twin(self, area: SearchArea | None, check: RoadCheck | None = None) -> "SvmDetector":
-        return SvmDetector(
-            self._model,
-            self._settings,
-            *self._size,
-            horizon=self._horizon,
-            area=area,
-            check=check,
-        )
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)
@@ -183,11 +170,3 @@ class SvmDetector:
         sizes = found.sides[:, 2:] - found.sides[:, :2]
         shown = found[(strengths >= stills.strength) & (sizes >= least).all(axis=1)]
         return shown[~are_nested(shown.sides, shown.data["strength"])]
-
-
-def horizon_of(settings: SvmSettings, images: Sequence[Image]) -> float:
-    """Return the row of the horizon, share of the height: from the settings, or from `images`."""
-    perspective = settings.search.perspective
-    if not perspective.sizes:
-        return DEFAULT_HORIZON  # no window set depends on it
-    return find_horizon(images) if perspective.horizon is None else perspective.horizon

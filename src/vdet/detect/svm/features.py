@@ -4,7 +4,7 @@ Source: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 
 """
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
@@ -60,9 +60,9 @@ class Layout:
 class FeatureExtractor:
     """Computes the feature vectors of patches; it has no state, so threads may share it.
 
-    The parts of a vector, in order: HOG channel by channel (each as `cv2.HOGDescriptor.compute`
-    gives it: blocks column by column from the top, then cells, then orientations), colour histogram
-    channel by channel.
+    A vector begins with HOG, channel by channel, each as `cv2.HOGDescriptor.compute` gives it
+    (blocks column by column from the top, then cells, then orientations). The colour histogram
+    follows, channel by channel.
     """
 
     def __init__(self, settings: FeatureSettings) -> None:
@@ -86,18 +86,14 @@ class FeatureExtractor:
 
     def describe_channels(self, channels: Channels) -> Float32Array:
         """Compute the features of one patch from its channels."""
-        parts: list[npt.ArrayLike] = []
-        parts += [hog.compute(channels[i]) for i, hog in self._descriptors.items()]
-        if self.settings.histogram.bins:
-            parts += [histogram(channel, self.settings.histogram.bins) for channel in channels]
-        return np.concatenate([np.ravel(part) for part in parts], dtype=np.float32)
+        parts = [np.ravel(hog.compute(channels[i])) for i, hog in self._descriptors.items()]
+        if bins := self.settings.histogram.bins:
+            parts += [histogram(channel, bins) for channel in channels]
+        return np.concatenate(parts, dtype=np.float32)
 
     def describe_all(self, patches: Iterable[Image]) -> Float32Array:
         """Compute the features of patches one by one; float32 `(n, layout.length)`."""
-        return self.stack([self.describe(patch) for patch in patches])
-
-    def stack(self, vectors: Sequence[Float32Array]) -> Float32Array:
-        """Return vectors as one array, float32 `(n, layout.length)`."""
+        vectors = [self.describe(patch) for patch in patches]
         return np.stack(vectors) if vectors else np.empty((0, self.layout.length), np.float32)
 
 
@@ -114,9 +110,9 @@ def split(image: Image, settings: FeatureSettings) -> Channels:
 def hog_descriptor(
     settings: FeatureSettings, window: tuple[int, int], channel: int
 ) -> cv2.HOGDescriptor:
-    """Return OpenCV's descriptor of a channel, blocks a cell apart.
+    """Return OpenCV's descriptor of a channel, with blocks a cell apart.
 
-    `window` is its width and height, pixels of the patch; those of the channel may be fewer.
+    `window` is its width and height, in pixels of the patch; a halved channel has half of them.
     """
     shrink = settings.shrink(channel)
     width, height = (side // shrink for side in window)
@@ -137,7 +133,7 @@ def histogram(channel: Image, bins: int) -> npt.NDArray[np.intp]:
 
 
 def cut_window(image: Image, x: int, y: int, width: int, height: int) -> Image:
-    """Return a window of an image; beyond the sides of it, the outermost pixels are repeated."""
+    """Return a window of an image; beyond its sides, the outermost pixels are repeated."""
     rows = np.arange(y, y + height).clip(0, image.shape[0] - 1)
     columns = np.arange(x, x + width).clip(0, image.shape[1] - 1)
     return np.asarray(image[rows[:, np.newaxis], columns])
@@ -149,12 +145,16 @@ def to_patch(image: Image, side: int) -> Image:
 
 
 def resize(image: Image, width: int, height: int) -> Image:
-    """Resize an image so that every pixel of it counts.
+    """Resize an image so that each of its pixels counts.
 
     It is halved (each pixel the mean of four) while it is at least twice as large and both sides
-    are even. The rest is done bilinearly, or by area where it is still at least twice as large.
+    are even. It is then resized bilinearly, or by area where it is still at least twice as large.
     """
-    while image.shape[0] >= 2 * height and image.shape[1] >= 2 * width and _is_even(image):
+    while (
+        image.shape[0] >= 2 * height
+        and image.shape[1] >= 2 * width
+        and image.shape[0] % 2 == image.shape[1] % 2 == 0
+    ):
         image = halve(image)
     if image.shape[:2] == (height, width):
         return image
@@ -167,7 +167,3 @@ def halve(image: Image) -> Image:
     """Return an image of even sides at half its size, each pixel the mean of four."""
     half = (image.shape[1] // 2, image.shape[0] // 2)
     return np.asarray(cv2.resize(image, half, interpolation=cv2.INTER_AREA), np.uint8)
-
-
-def _is_even(image: Image) -> bool:
-    return not any(side % 2 for side in image.shape[:2])

@@ -1,9 +1,7 @@
-"""Hits of the last frames summed into a heatmap, and the regions where it is hot.
+"""The heatmap, the sum of the hits of the last frames, and the regions where it is hot.
 
-A hit adds to the pixels of its vehicle (`Windows.vehicles`): with box regression, that is tighter
-than the window.
-
-Source: seed section 3, "Combine frames to create a heatmap and find contours".
+A hit adds to the pixels of its vehicle (`Windows.vehicles`), which with box regression is smaller
+than the window. The original system summed heat in the same way.
 """
 
 from collections import deque
@@ -50,7 +48,7 @@ class HotRegion:
     strength: float
 
 
-class HeatMap:
+class HeatHistory:
     """Sums the probabilities of hits over the last frames.
 
     Parameters

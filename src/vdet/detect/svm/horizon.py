@@ -4,7 +4,7 @@ Lane lines, barriers, kerbs and roofs run along the road, so in the picture they
 vanishing point. Line segments vote for it (von Gioi et al., "LSD: a Line Segment Detector", 2012).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -14,7 +14,7 @@ from vdet.boxes import Float64Array
 from vdet.media.images import Image
 
 DEFAULT_HORIZON = 0.58
-"""Share of the height at which dashboard cameras usually have it; for frames without lines."""
+"""Where dashboard cameras usually have it, share of the height; used where none is found."""
 
 _MAX_ASPECT = 4  # height over width of a picture that can show a road
 _WIDTH = 640  # pixels, of the picture in which segments are detected
@@ -35,7 +35,7 @@ class _Segments:
     lengths: Float64Array
 
 
-def find_horizon(images: Iterable[Image]) -> float:
+def find_horizon(images: Sequence[Image]) -> float | None:
     """Return the row of the horizon, share of the frame's height.
 
     Parameters
@@ -45,14 +45,8 @@ def find_horizon(images: Iterable[Image]) -> float:
 
     Returns
     -------
-    0.30 to 0.74 in steps of 0.01; `DEFAULT_HORIZON` where too few lines run along the road.
+    0.30 to 0.74 in steps of 0.01; None where too few lines run along the road.
     """
-    seen = seen_horizon(list(images))
-    return DEFAULT_HORIZON if seen is None else seen
-
-
-def seen_horizon(images: Sequence[Image]) -> float | None:
-    """Return as `find_horizon` the row where lines meet; None where too few run along the road."""
     if not images:
         return None
     height, width = images[0].shape[:2]

@@ -12,11 +12,11 @@ _STREAM_SPACE = "YCrCb"  # the colour space whose channels planes have
 
 
 class FramePyramid:
-    """The searched rows of one frame at full size and, made when needed, halved again and again.
+    """The searched rows of one frame at full size and, made when needed, at half, quarter … size.
 
-    It gives the channels of the features' colour space. Where these are luma and chroma, it works
-    on the planes of a picture; a value of chroma stands for 2 × 2 pixels. Elsewhere it works on
-    BGR, which is converted last, as in training.
+    It gives the channels of the features' colour space. For YCrCb, it takes them from the planes of
+    a picture that has them; a value of chroma stands for 2 × 2 pixels. Otherwise it resizes BGR,
+    which is converted last, as in training.
 
     Parameters
     ----------
@@ -25,10 +25,10 @@ class FramePyramid:
     features
         Their colour space.
     top, bottom
-        First row that is searched, and first row below; None for the frame's end.
+        First row that is searched, even; first row below, None for the frame's end.
     margin
-        Columns beyond the left and right of the frame that are searched too; they repeat its
-        outermost columns.
+        Number of columns, even, that are searched beyond the left and right of the frame; they
+        repeat its outermost columns.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class FramePyramid:
         self._origin = margin, -top
         rows = slice(top, picture.height if bottom is None else bottom)
         planes = picture.planes
-        if planes and features.color_space == _STREAM_SPACE and not (top % 2 or margin % 2):
+        if planes and features.color_space == _STREAM_SPACE:
             self._levels = _of_planes(planes, rows, margin)
         else:
             self._levels = (_Levels(_widened(picture.image[rows], margin)),)
@@ -82,13 +82,17 @@ class _Levels:
         self._levels = {level: each for level, each in enumerate((full, half)) if each is not None}
 
     def cut(self, sides: tuple[int, int, int, int], width: int, height: int) -> Image:
-        """Return a part, from first row to first row below, resized to `width` × `height`."""
+        """Return the part between top, bottom, left and right, resized to `width` × `height`."""
         level = 0
-        while _halves_exactly(sides) and _is_twice(sides, width, height):
-            sides = (sides[0] // 2, sides[1] // 2, sides[2] // 2, sides[3] // 2)
+        top, bottom, left, right = sides
+        while (
+            not any(side % 2 for side in (top, bottom, left, right))
+            and bottom - top >= 2 * height
+            and right - left >= 2 * width
+        ):
+            top, bottom, left, right = top // 2, bottom // 2, left // 2, right // 2
             level += 1
-        part = self._at(level)[sides[0] : sides[1], sides[2] : sides[3]]
-        return resize(part, width, height)
+        return resize(self._at(level)[top:bottom, left:right], width, height)
 
     def _at(self, level: int) -> Image:
         """Return the image, halved `level` times."""
@@ -125,11 +129,3 @@ def _doubled(values: Image) -> Image:
     return np.asarray(
         cv2.resize(values, (2 * width, 2 * height), interpolation=cv2.INTER_NEAREST), np.uint8
     )
-
-
-def _halves_exactly(sides: tuple[int, int, int, int]) -> bool:
-    return all(side % 2 == 0 for side in sides)
-
-
-def _is_twice(sides: tuple[int, int, int, int], width: int, height: int) -> bool:
-    return sides[1] - sides[0] >= 2 * height and sides[3] - sides[2] >= 2 * width

@@ -1,4 +1,4 @@
-"""Whether the shipped linear model knows a road: what it finds, compared with the network."""
+"""A warning where the shipped linear model does not know a road: the network finds other boxes."""
 
 import logging
 from collections.abc import Callable
@@ -11,11 +11,11 @@ log = logging.getLogger("vdet")
 
 LEAST_SCORE = 0.5
 LEAST_WIDTH = 0.06
-"""Narrower vehicles are not compared, share of the frame's width: the linear model does not search
+"""Share of the frame's width. Narrower vehicles are not compared: the linear model does not search
 for them."""
 
 LEAST_BOXES = 5
-"""Number of boxes of both detectors from which on the model is judged."""
+"""Least number of boxes, of both detectors together, by which the model is judged."""
 
 LEAST_AGREEMENT = 0.5
 """Least share of boxes that both have on a road that the model knows. It is 1.0 on the project
@@ -39,16 +39,14 @@ class RoadCheck:
         self._seen = self._both = self._all = 0
         self._has_warned = False
 
-    def is_due(self) -> bool:
-        """Return whether the next frame is compared, and count it.
+    def compare(self, picture: Picture, found: Boxes) -> None:
+        """Compare what is found in the next picture or frame with what the other detector finds.
 
-        These are the frames 0, 1, 2, 4, 8, …, so that a clip of any length is compared in a few.
+        Only 0, 1, 2, 4, 8, … are compared, so that a clip of any length is compared in a few.
         """
         number, self._seen = self._seen, self._seen + 1
-        return not self._has_warned and not number & (number - 1)
-
-    def compare(self, picture: Picture, found: Boxes) -> None:
-        """Compare what is found in a still picture with what the other detector finds."""
+        if self._has_warned or number & (number - 1):
+            return
         if self._other is None:
             self._other = self._load_other()
         other = self._other.for_video(picture.width, picture.height, [picture.image])

@@ -5,7 +5,6 @@ computes their HOG blocks, and sums the model's weights over the windows in them
 product, of colour histograms by look-up tables and integral images.
 """
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 import cv2
@@ -46,31 +45,27 @@ def _extent(
     return slice(start, start + round(span)), round(span * features.patch / grid.size)
 
 
-@dataclass(frozen=True, slots=True)
-class StripWeights:
-    """The weights of a model with `m` members, in the order in which strips need them.
+def block_weights(model: LinearModel) -> Float32Array:
+    """Return the weights of HOG in the order of `describe_blocks`, float32 `(m, b, b, d)`.
 
-    `hog` is float32 `(m, blocks, blocks, d)`: blocks of a window by column and row, `d` features of
-    a block, channel by channel. `tables` is float32 `(m, 3, 256)`: what a pixel adds to the colour
-    histogram's part of the decision value, by the pixel's channel and value.
+    A window has b × b blocks, by column and row, of d features, channel by channel; `m` is the
+    number of members of the model.
     """
-
-    hog: Float32Array
-    tables: Float32Array
-
-    @staticmethod
-    def of(model: LinearModel) -> "StripWeights":
-        """Sort the weights of a model."""
-        layout, features = Layout.of(model.features), model.features
-        blocks = features.patch // features.hog.cell - features.hog.block + 1
-        shape = len(model.weights), blocks, blocks
-        hog = [np.zeros((*shape, 0), np.float32)]  # all there is without HOG
-        hog += [model.weights[:, part].reshape(*shape, -1) for part in layout.hog]
-        tables = _tables(model.weights[:, layout.histogram], features.histogram.bins)
-        return StripWeights(np.concatenate(hog, axis=-1), tables)
+    features, members = model.features, len(model.weights)
+    blocks = features.patch // features.hog.cell - features.hog.block + 1
+    shape = members, blocks, blocks
+    parts = [np.zeros((*shape, 0), np.float32)]  # all there is without HOG
+    parts += [model.weights[:, part].reshape(*shape, -1) for part in Layout.of(features).hog]
+    return np.concatenate(parts, axis=-1)
 
 
-def _tables(weights: Float32Array, bins: int | None) -> Float32Array:
+def histogram_tables(model: LinearModel) -> Float32Array:
+    """Return what a pixel adds to the decision value, by member, channel and value.
+
+    float32 `(m, 3, 256)`; it is the share of the colour histogram.
+    """
+    weights = model.weights[:, Layout.of(model.features).histogram]
+    bins = model.features.histogram.bins
     if not bins:
         return np.zeros((len(weights), 3, 256), np.float32)
     return np.repeat(weights.reshape(len(weights), 3, bins), 256 // bins, axis=2)
@@ -82,7 +77,7 @@ def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
     Parameters
     ----------
     strip
-        Channels in the features' colour space; both sides whole numbers of cells.
+        Channels in the features' colour space; both sides are whole numbers of cells.
 
     Returns
     -------
@@ -106,7 +101,7 @@ def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
 def window_blocks(
     blocks: Float32Array, columns: IndexArray, rows: IndexArray, features: FeatureSettings
 ) -> Float32Array:
-    """Return the HOG features of some windows, as `FeatureExtractor` gives them.
+    """Return the HOG features of some windows in the order of `FeatureExtractor`.
 
     Parameters
     ----------

@@ -8,29 +8,27 @@ sets of all sizes.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Float32Array, Int32Array, Int64Array, from_sizes
-from vdet.config.schema import FeatureSettings, PerspectiveSettings, WindowSettings
-from vdet.regions import SearchArea
+from vdet.boxes import Float32Array, Int32Array
+from vdet.config.schema import (
+    FeatureSettings,
+    PerspectiveSettings,
+    SvmSettings,
+    WindowSettings,
+)
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
+from vdet.detect.svm.horizon import DEFAULT_HORIZON
 
 IndexArray = npt.NDArray[np.intp]
 
-_MARGIN = Fraction(1, 2)
-"""Windows this near the area are searched too, sides of a window: they show parts of the vehicles
-in the area, and add to their heat."""
-
-ALIGNMENT = 16
-"""The part begins so many pixels, or a multiple, after the set: then its strips are scaled as those
-of the whole set are, and its windows look the same."""
-
 _MAX_ASPECT = 16 / 9
-"""A frame that is wider shows more to the sides; its height times this counts as its width."""
+"""Of a wider frame, which shows more to the sides, the height times this counts as the width."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +64,6 @@ class Windows:
         return Windows(
             self.boxes[keep], self.probabilities[keep], self.shares[keep], self.vehicles[keep]
         )
-
-
-def join_windows(parts: Sequence[Windows]) -> Windows:
-    """Return the windows of one or more sets as one; parts in the order given."""
-    return Windows(
-        np.concatenate([part.boxes for part in parts]),
-        np.concatenate([part.probabilities for part in parts]),
-        np.concatenate([part.shares for part in parts]),
-        np.concatenate([part.vehicles for part in parts]),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +123,26 @@ class WindowGrid:
             len(range(column, self.columns, n)),
             len(range(row, self.rows, n)),
         )
+
+
+def lay_grids(
+    settings: SvmSettings,
+    features: FeatureSettings,
+    width: int,
+    height: int,
+    *,
+    horizon: float = DEFAULT_HORIZON,
+) -> list[WindowGrid]:
+    """Lay the window sets over a frame of `width` × `height` pixels.
+
+    `horizon` is its row, as a share of the frame's height. Sets of which no window fits are left
+    out.
+    """
+    search = scale_lengths(settings.search, height / REFERENCE_HEIGHT)
+    cells = features.patch // features.hog.cell
+    grids = [lay_grid(each, width, height, cells=cells) for each in search.windows]
+    grids += lay_perspective(search.perspective, features, width, height, horizon=horizon)
+    return [grid for grid in grids if len(grid)]
 
 
 def lay_grid(
@@ -222,29 +230,3 @@ def lay_perspective(
             left = -beyond * step
             grids.append(WindowGrid(size, step, left, Fraction(top), int(columns), int(rows)))
     return grids
-
-
-def limited_grid(
-    grid: WindowGrid, area: SearchArea, features: FeatureSettings
-) -> WindowGrid | None:
-    """Return the smallest grid with all windows in or near an area; None where there are none.
-
-    The windows of the area have the same pixels, and so the same features, as those of `grid`.
-    """
-    margin = math.ceil(max(_MARGIN * grid.size, grid.step))
-    grown = from_sizes(grid.boxes) + np.array([-margin, -margin, margin, margin])
-    touched = area.touches(grown).reshape(grid.rows, grid.columns)
-    if not touched.any():
-        return None
-    cells = grid.step * features.patch / grid.size / features.hog.cell
-    period = math.lcm((grid.step / ALIGNMENT).denominator, cells.denominator)
-    row, rows = _span(np.flatnonzero(touched.any(axis=1)), period)
-    column, columns = _span(np.flatnonzero(touched.any(axis=0)), period)
-    left, top = grid.left + column * grid.step, grid.top + row * grid.step
-    return WindowGrid(grid.size, grid.step, left, top, columns, rows)
-
-
-def _span(numbers: Int64Array, period: int) -> tuple[int, int]:
-    """Return the first of some numbers, down to a multiple of `period`, and the count from it."""
-    first = int(numbers[0]) // period * period
-    return first, int(numbers[-1]) + 1 - first

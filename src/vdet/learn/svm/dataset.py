@@ -104,7 +104,7 @@ def _find_in(source: Path) -> list[PatchFile]:
     if not files:
         raise DataError(
             f"{source}: no pictures in vehicles/<group>/ or non-vehicles/<group>/; "
-            "see data/README.md for the layout"
+            "vdet mine cuts such patches out of labelled videos and pictures"
         )
     return files
 

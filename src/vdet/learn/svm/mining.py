@@ -1,7 +1,7 @@
-"""Labelled videos and pictures → a zip file of patches for the training.
+"""Mining: labelled videos and pictures → a zip file of patches for the training.
 
-Vehicles are cut out of the frames, and false alarms. `choosing` compares the windows of a frame
-with its vehicles and takes some of each kind. `vdet.learn.svm.dataset` reads the patches.
+Vehicles and false alarms are cut out of the frames. `choosing` compares the windows of a frame with
+its vehicles and takes some of each kind.
 
 Source of mining false alarms: Sung & Poggio, "Example-based Learning for View-based Human Face
 Detection", 1998; for HOG and linear SVM, Dalal & Triggs, 2005, section 4.
@@ -16,22 +16,16 @@ from pathlib import Path
 import numpy as np
 
 from vdet.config.schema import Settings, SvmSettings
-from vdet.detect.svm.detector import SvmModel, horizon_of
-from vdet.detect.svm.features import cut_window, to_patch
-from vdet.detect.svm.search import lay_grids
+from vdet.detect.svm.detector import SvmModel
+from vdet.detect.svm.features import Layout, cut_window, to_patch
+from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.windows import Windows
-from vdet.errors import DataError, FrameSizeError, ImageError, TruthError, VideoError
+from vdet.errors import DataError, ImageError, TruthError, VideoError
 from vdet.labels.pictures import LabelledPicture
 from vdet.labels.reading import read_labelled_pictures, read_truth
 from vdet.labels.roles import Roles
 from vdet.labels.video import LabelledVideo
-from vdet.learn.svm.choosing import (
-    MOST,
-    Most,
-    PatchKind,
-    choose_windows,
-    cut_sides,
-)
+from vdet.learn.svm.choosing import MOST, Most, PatchKind, choose_windows, cut_sides
 from vdet.learn.svm.dataset import patch_archive
 from vdet.media import Picture, VideoReader
 from vdet.media.images import Image
@@ -53,12 +47,8 @@ _FOLDERS: dict[PatchKind, str] = {
 class LabelledFrame:
     """A frame or a picture with its windows.
 
-    Attributes
-    ----------
-    name
-        Beginning of the names of its patches.
-    number
-        It decides, with the seed of the settings, which windows are chosen.
+    The names of its patches begin with `name`. Which windows are chosen depends on `number` and on
+    the seed of the settings.
     """
 
     name: str
@@ -72,8 +62,9 @@ class LabelledFrame:
 class VideoSource:
     """A labelled video.
 
-    The frames `first` to `last` are used, counted from 1: every `every`-th, and all that cut a
-    vehicle off. If `last` is None, the last frame is that of the truth.
+    Of the frames `first` to `last`, counted from 1, every `every`-th is used. Those in which a side
+    of the frame cuts a vehicle off are rare and hard to learn, so all of them are used. If `last`
+    is None, it is the last frame of the truth.
     """
 
     path: Path
@@ -124,7 +115,7 @@ class VideoSource:
         return last
 
     def _uses(self, number: int, labels: LabelledVideo, width: int) -> bool:
-        """Return whether a frame is used. One that cuts a vehicle off is rare and hard to learn."""
+        """Return whether a frame is used: every n-th, and those that cut a vehicle off."""
         is_regular = (number - self.first) % self.every == 0
         cuts_off = any(cut_sides(box, width).any() for box in labels.boxes[~labels.ignored])
         return number >= self.first and (is_regular or cuts_off)
@@ -184,17 +175,17 @@ def mine(
 ) -> MiningResult:
     """Search the labelled frames and write patches for the training.
 
-    Patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
-    `non-vehicles/`, those of parts in `non-vehicles/mined_video_parts/`; frame and window are in
-    their names.
+    The patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
+    `non-vehicles/`. Those of parts lie in `non-vehicles/mined_video_parts/`. The name of a patch
+    has its frame and window.
 
     Parameters
     ----------
     output
         The zip file to write; `overwrite` replaces one that is there.
     model
-        The model whose false alarms are searched for; None: any window without a vehicle may be
-        taken.
+        The model whose false alarms are searched for. None: any window without a vehicle counts as
+        one.
     most
         Most patches of each kind in a frame.
     steps
@@ -256,16 +247,13 @@ def search_windows(
     ImageError
         Such frames cannot be searched.
     """
-    if model:
-        detector = model.for_video(width, height, images)
-        return lambda image: detector.search(Picture(image), None).windows
-    svm = SvmSettings()
-    grids = lay_grids(svm, svm.features, width, height, horizon=horizon_of(svm, images))
-    if not grids:
-        raise FrameSizeError(
-            f"no window fits into a frame of {width}×{height} pixels; give a larger one"
-        )
-    boxes = np.concatenate([grid.boxes for grid in grids])
-    ones = np.ones(len(boxes), np.float32)
-    windows = Windows(boxes, ones, ones, boxes.astype(np.float32))
-    return lambda _: windows
+    detector = (model or _sure_model()).for_video(width, height, images)
+    return lambda image: detector.search(Picture(image), None).windows
+
+
+def _sure_model() -> SvmModel:
+    """Return a model that takes every window for a vehicle."""
+    settings = SvmSettings()
+    weights = np.zeros((1, Layout.of(settings.features).length), np.float32)
+    zero, low = np.zeros(1, np.float32), np.full(1, -80, np.float32)
+    return SvmModel(LinearModel(settings.features, weights, zero, zero, low), settings)
