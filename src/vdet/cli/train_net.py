@@ -59,7 +59,7 @@ def train_net(
     limit_library_threads()
     job = NetworkJob(data, clips, output, base, overwrite)
     inputs = [*data, *([base] if base else []), *(path for clip in clips for path in clip)]
-    inputs += choice.inputs(base_settings)
+    inputs += choice.inputs(settings)
     for path in (job.output, job.metrics):
         check_output(path, overwrite=overwrite, inputs=inputs)
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
