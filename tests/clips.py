@@ -41,6 +41,7 @@ ODD: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "first time not 0": ("ts", {}),
     "first time an hour late": ("mkv", {"begin": Fraction(3600)}),
+    "b-frames in avi": ("avi", {"options": B_FRAMES, "count": 30, "sounds": ["libmp3lame"]}),
     "times missing": ("h264", {"options": {"bf": "2"}}),
     "sound": ("mp4", {"sounds": ["aac"]}),
     "sound in mkv": ("mkv", {"sounds": ["libopus"]}),
@@ -163,7 +164,7 @@ def write_clip(
         assert isinstance(stream, av.VideoStream)
         stream.height, stream.width = coded[0].shape[:2]
         stream.pix_fmt = pix_fmt
-        if codec.startswith(("libx", "libsvt")):
+        if codec.startswith(("libx", "libsvt")) and path.suffix != ".avi":
             stream.time_base = stream.codec_context.time_base = Fraction(1, 90_000)
         if rotation:
             stream.set_display_rotation(rotation)

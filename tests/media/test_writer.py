@@ -69,11 +69,11 @@ class TestMark:
         assert may_replace_video(path), "it is damaged, and vdet wrote it all the same"
 
     @pytest.mark.parametrize("suffix", [".mp4", ".mov", ".mkv", ".avi", ".ts"])
-    @pytest.mark.parametrize("share", [1, 0.5])
+    @pytest.mark.parametrize("share", [1, 0.7])
     def test_other_videos_do_not_even_if_they_are_cut_off(
         self, suffix: str, share: float, tmp_path: Path
     ) -> None:
-        path = write_clip(tmp_path / f"in{suffix}")
+        path = write_clip(tmp_path / f"in{suffix}", count=60)
         path.write_bytes(path.read_bytes()[: int(path.stat().st_size * share)])
         assert not may_replace_video(path)
 
@@ -235,6 +235,12 @@ class TestAllOrNothing:
 
 
 class TestRefusals:
+    def test_a_gap_that_mp4_cannot_hold(self, frames: list[Frame], tmp_path: Path) -> None:
+        late = replace(frames[1], time=frames[1].time + 300 * 86_400)
+        with pytest.raises(OutputError, match="mp4 cannot hold the 7200 hours between two frames"):
+            write(tmp_path / "out.mp4", [frames[0], late])
+        assert len(read(write(tmp_path / "out.mkv", [frames[0], late]))) == 2
+
     @pytest.mark.parametrize("name", ["out.avi", "out", "out.mp4.txt"])
     def test_a_suffix_of_no_known_container(self, name: str, tmp_path: Path) -> None:
         with pytest.raises(OutputError, match=r"\.mp4, \.mov, \.mkv"):

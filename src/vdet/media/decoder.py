@@ -1,5 +1,6 @@
 """Decode a picture stream from its first picture, or from a key frame, in spite of damage."""
 
+from collections import deque
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
@@ -45,8 +46,7 @@ class Damage:
     corrupt_packets: int = 0
     pictures: int = 0
     corrupt_pictures: int = 0
-    read_errors: int = 0
-    decode_errors: int = 0
+    errors: int = 0
     without_picture: int = 0  # packets
     lost_at_end: int = 0
     _last: int | None = None  # time of a picture
@@ -54,16 +54,15 @@ class Damage:
     _regular_steps: int = 0
     _skipped: int = 0
     _read_to: int | None = None  # byte of the file
+    _largest: int = _HOLE  # packet, bytes
 
     @property
     def lost(self) -> int:
         """Pictures that should be there and are not."""
-        if not self.evident:
-            return self.lost_at_end
-        errors = self.read_errors + self.decode_errors
         is_regular = self._regular_steps >= _REGULAR * self._steps
         skipped = self._skipped if is_regular else 0
-        return max(errors, self.without_picture, skipped) + self.lost_at_end
+        missing = max(self.errors, self.without_picture, skipped) if self.evident else 0
+        return missing + self.lost_at_end
 
     @property
     def damaged(self) -> int:
@@ -75,27 +74,27 @@ class Damage:
         """Pictures that came, and those lost."""
         return self.pictures + self.lost
 
-    def fail_to_read(self) -> None:
-        """Count a place in the file that cannot be read."""
-        self.read_errors += 1
+    def fail(self) -> None:
+        """Count a place in the file that cannot be read, or a packet that cannot be decoded."""
+        self.errors += 1
         self.evident = True
 
     def pass_bytes(self, position: int, size: int) -> None:
-        """Note where in the file a packet of any stream lies; a hole between two is damage."""
+        """Note where in the file a packet of any stream lies.
+
+        A hole between two packets may be damage, or data of another kind, such as transparency.
+        Whether pictures were lost in it shows in their times.
+        """
         if self._read_to is not None and position - self._read_to > _HOLE:
-            self.fail_to_read()
+            self.evident = True
         self._read_to = max(self._read_to or 0, position + size)
+        self._largest = max(self._largest, size)
 
     def send(self, packet: "Packet[Stream]") -> None:
         """Count a packet of the stream."""
         self.packets += not packet.is_discard  # else the file says that it is not shown
         self.corrupt_packets += packet.is_corrupt
         self.evident |= packet.is_corrupt
-
-    def fail_to_decode(self) -> None:
-        """Count a packet that cannot be decoded."""
-        self.decode_errors += 1
-        self.evident = True
 
     def receive(self, picture: av.VideoFrame) -> bool:
         """Count a picture; return whether it is usable.
@@ -120,9 +119,9 @@ class Damage:
     def end(self, missing: int, file_size: int) -> bool:
         """Count `missing` pictures as lost if the file goes on, unreadable, after the last packet.
 
-        Return whether it does.
+        Return whether it does. A file that was cut off ends within a packet.
         """
-        if self._read_to is None or file_size - self._read_to <= _HOLE:
+        if self._read_to is None or file_size - self._read_to <= 2 * self._largest:
             return False
         self.lost_at_end = max(self.lost_at_end, missing)
         return True
@@ -145,7 +144,9 @@ class Damage:
 
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
+_THREADS = 4  # always as many: frames near damage depend on their number
 _WITHOUT_FRAME_THREADS = ("vp8", "vp9", "mpeg4")  # they would hide some errors
+_REORDERED = ("h264", "hevc")
 _ONE_PICTURE_PER_PACKET = frozenset((
     "av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png", "vp9",
 ))  # fmt: skip
@@ -161,13 +162,10 @@ class Entry:
         Its time, in units of the time base.
     index
         Number of frames shown before it.
-    packets
-        Number of packets of the stream before it in the file.
     """
 
     pts: int
     index: int
-    packets: int
 
 
 class Decoder:
@@ -175,8 +173,6 @@ class Decoder:
 
     Parameters
     ----------
-    threads
-        Of the decoder; None lets it choose.
     frame_rate
         Of numbered pictures, per second; None: `ASSUMED_RATE`.
     entry
@@ -191,25 +187,29 @@ class Decoder:
     def __init__(
         self,
         path: Path,
-        *,
-        threads: int | None,
         frame_rate: float | None,
         entry: Entry | None = None,
     ) -> None:
         self._entry = entry
-        self.container, self.stream = _open(path, frame_rate, threads or 0)
+        self.container, self.stream = _open(path, frame_rate)
         # In Matroska, damage shows only as a hole between the packets of all streams.
         self._all_streams = "matroska" in self.container.format.name
         self.restarts = 0  # of the clock
         if not self._all_streams:
             _discard_others(self.container, self.stream)
-        paired = self.stream.codec_context.name not in _WITH_HIDDEN_PACKETS
+        codec = self.stream.codec_context.name
+        # AVI has no times of presentation: pictures take those of decoding, in their order.
+        self._in_order = self.container.format.name == "avi" and codec in _REORDERED
+        self._times: deque[int] = deque()
+        paired = codec not in _WITH_HIDDEN_PACKETS
         self.damage = Damage(period_of(self.stream), paired=paired)
 
     def pictures(self) -> Iterator[av.VideoFrame]:
         """Yield the pictures that can be decoded."""
         for packet in chain(self._packets(), [None]):
             for picture in self._decode(packet):
+                if self._times:
+                    picture.pts = self._times.popleft()
                 if self.damage.receive(picture):
                     yield picture
         self.damage.finish()
@@ -224,28 +224,33 @@ class Decoder:
                 return
             if following is None and packet.is_corrupt:  # the file was cut off within it
                 self.damage.lost_at_end = 1
-            else:
-                self.damage.send(packet)
-                yield packet
+                return
+            self.damage.send(packet)
+            if self._in_order and packet.dts is not None:
+                self._times.append(packet.dts)
+            yield packet
 
     def _read(self) -> "Iterator[Packet[Stream]]":
-        skipped = self._entry.packets if self._entry else 0
+        waits = self._entry is not None
         others = tuple(self.container.streams) if self._all_streams else ()
         for packet in continuous_packets(
             self.container,
             self.stream,
             *others,
-            on_error=self.damage.fail_to_read,
+            on_error=self.damage.fail,
             on_restart=self._count_restart,
         ):
             is_picture = packet.stream_index == self.stream.index
-            if skipped:
-                skipped -= is_picture
+            if waits and not (is_picture and self._is_entry(packet)):
                 continue
+            waits = False
             if self._all_streams and packet.pos is not None:
                 self.damage.pass_bytes(packet.pos, packet.size)
             if is_picture and not self._needs_older_ones(packet):
                 yield packet
+
+    def _is_entry(self, packet: "Packet[Stream]") -> bool:
+        return packet.is_keyframe and self._entry is not None and packet.pts == self._entry.pts
 
     def _needs_older_ones(self, packet: "Packet[Stream]") -> bool:
         """Return whether a picture is shown before the key frame at which decoding began."""
@@ -259,7 +264,7 @@ class Decoder:
         try:
             return self.stream.codec_context.decode(packet)
         except av.FFmpegError:
-            self.damage.fail_to_decode()
+            self.damage.fail()
             return []
 
 
@@ -278,13 +283,15 @@ def find_entry(
     Returns
     -------
     None where the frames before it cannot be counted for sure: in interlaced video, for other
-    codecs than those of `_ONE_PICTURE_PER_PACKET`, without times, after damage, and in pipes.
+    codecs than those of `_ONE_PICTURE_PER_PACKET`, in AVI, without times, after damage, and in
+    pipes.
     """
     if first.pts is None or time <= first.pts or first.interlaced_frame or is_pipe(path):
         return None
-    container, stream = _open(path, frame_rate, 1)
+    container, stream = _open(path, frame_rate)
     with closing(container):
-        if stream.codec_context.name not in _ONE_PICTURE_PER_PACKET:
+        codec, form = stream.codec_context.name, container.format.name
+        if codec not in _ONE_PICTURE_PER_PACKET or form == "avi":
             return None
         _discard_others(container, stream)
         return _last_key_frame(container, stream, first.pts, time)
@@ -295,21 +302,18 @@ def _last_key_frame(
 ) -> Entry | None:
     errors: list[None] = []
     times: list[int] = []
-    key: tuple[int, int] | None = None
+    key: int | None = None
     found = continuous_packets(container, stream, on_error=lambda: errors.append(None))
-    for number, packet in enumerate(each for each in found if each.stream_index == stream.index):
+    for packet in (each for each in found if each.stream_index == stream.index):
         if packet.pts is None or packet.is_corrupt or errors:
             return None
         if packet.dts is not None and packet.dts > time:
             break
         if packet.is_keyframe and packet.pts <= time:
-            key = number, packet.pts
+            key = packet.pts
         if not packet.is_discard:
             times.append(packet.pts)
-    if key is None:
-        return None
-    number, pts = key
-    return Entry(pts, sum(first <= each < pts for each in times), number)
+    return None if key is None else Entry(key, sum(first <= each < key for each in times))
 
 
 def _discard_others(container: InputContainer, stream: VideoStream) -> None:
@@ -320,7 +324,7 @@ def _discard_others(container: InputContainer, stream: VideoStream) -> None:
                 other.discard = Discard.all
 
 
-def _open(path: Path, frame_rate: float | None, threads: int) -> tuple[InputContainer, VideoStream]:
+def _open(path: Path, frame_rate: float | None) -> tuple[InputContainer, VideoStream]:
     container = open_input(path, frame_rate)
     try:
         stream = picture_stream(container, path)
@@ -331,5 +335,5 @@ def _open(path: Path, frame_rate: float | None, threads: int) -> tuple[InputCont
         raise
     context.options = {"max_pixels": str(MAX_PIXELS)}
     context.thread_type = "SLICE" if context.name in _WITHOUT_FRAME_THREADS else "AUTO"
-    context.thread_count = threads
+    context.thread_count = _THREADS
     return container, stream

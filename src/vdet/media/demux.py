@@ -295,10 +295,12 @@ def _tags(container: InputContainer, stream: VideoStream) -> Tags:
 def stated_duration(stream: VideoStream, start: Fraction) -> Fraction | None:
     """Return the duration of the picture stream that the file declares, seconds, or None.
 
-    Matroska declares, in a tag, the end of the stream; `start` is the time of its first frame.
+    Matroska, in a tag, and ASF declare the end of the stream; `start` is the time of its first
+    frame.
     """
     if stream.duration and stream.time_base:
-        return stream.duration * stream.time_base
+        before = start if stream.container.format.name == "asf" else 0
+        return stream.duration * stream.time_base - before
     try:
         hours, minutes, seconds = stream.metadata["DURATION"].split(":")
         end = Fraction(hours) * 3600 + Fraction(minutes) * 60 + Fraction(seconds)

@@ -52,8 +52,6 @@ class VideoReader:
         Seconds after the file's first frame; None for no limit.
     frames
         Most frames to give; None for no limit.
-    threads
-        Of the decoder; None lets it choose. Only the frames near damage can depend on it.
     settings
         How much damage is tolerated, and the rate of numbered pictures.
 
@@ -71,7 +69,6 @@ class VideoReader:
         start: Fraction | None = None,
         end: Fraction | None = None,
         frames: int | None = None,
-        threads: int | None = None,
         settings: InputSettings = _DEFAULTS,
     ) -> None:
         self._start, self._end, self._limit = start or Fraction(0), end, frames
@@ -80,7 +77,7 @@ class VideoReader:
         self._length: Fraction | None = None
         self._scaled: set[tuple[int, int]] = set()
         self._frame_rate = settings.frame_rate
-        self._decoder = Decoder(path, threads=threads, frame_rate=self._frame_rate)
+        self._decoder = Decoder(path, self._frame_rate)
         try:
             self._pictures = self._decoder.pictures()
             first = next(self._pictures, None)
@@ -97,7 +94,7 @@ class VideoReader:
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
             self._faults += self._assumptions(first)
-            self._frames = self._deliver(*self._begin(first, threads))
+            self._frames = self._deliver(*self._begin(first))
         except BaseException:
             self._decoder.close()
             raise
@@ -154,13 +151,13 @@ class VideoReader:
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
 
-    def _begin(self, first: av.VideoFrame, threads: int | None) -> tuple[av.VideoFrame, int]:
+    def _begin(self, first: av.VideoFrame) -> tuple[av.VideoFrame, int]:
         """Return the picture at which decoding begins, and how many are shown before it."""
         time = min(math.floor((self.info.start + self._start) / self.info.time_base), _MAX_TICKS)
         entry = self._start and find_entry(self.info.path, first, time, self._frame_rate)
         if not entry:
             return first, 0
-        decoder = Decoder(self.info.path, threads=threads, frame_rate=self._frame_rate, entry=entry)
+        decoder = Decoder(self.info.path, self._frame_rate, entry)
         pictures = decoder.pictures()
         picture = next(pictures, None)
         if picture is None or picture.pts != entry.pts or decoder.damage.evident:
@@ -248,7 +245,7 @@ class VideoReader:
         damaged, total = self.damaged, self._decoder.damage.total
         if damaged:
             self._faults.insert(0, f"{damaged} of {total} frames damaged or lost")
-        if damaged > self._tolerated * total:
+        if damaged > math.ceil(self._tolerated * total):
             raise VideoError(
                 f"{self.info.path}: {self._faults[0]}, more than input.max_damaged "
                 f"({self._tolerated:g}) allows; raise it to take what is left"

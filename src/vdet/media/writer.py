@@ -171,6 +171,8 @@ VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 _CODEC: Final = "libx264"
 _MARK = "made by vdet"
 _FINEST = 10_000_000  # ticks a second; more is not safe in mp4 players
+_COARSEST = 20_000  # ticks a second; FFmpeg writes no coarser ones into mp4
+_MAX_STEP = 2**31  # ticks from one frame to the next in mp4
 _MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
 
@@ -271,7 +273,8 @@ class VideoWriter:
                 self._origin = frame.time
                 self._sound = self._open_sound(frame.time)
             since = frame.time - self._origin
-            self._last = max(self._last + 1, round(since / self._time_base))
+            last, self._last = self._last, max(self._last + 1, round(since / self._time_base))
+            self._check_gap((self._last - last) * self._time_base)
             picture = _to_encode(frame.picture, self._info.coding)
             picture.pts = self._last
             picture.time_base = self._time_base
@@ -281,6 +284,15 @@ class VideoWriter:
             self._container.mux(packets)
             if self._sound:
                 self._sound.copy(since)
+
+    def _check_gap(self, seconds: Fraction) -> None:
+        kind = self._container.format.name
+        scale = max(self._time_base.denominator, _COARSEST)
+        if kind != "matroska" and seconds * scale >= _MAX_STEP:
+            raise OutputError(
+                f"{self._name}: {kind} cannot hold the {float(seconds) / 3600:.0f} hours between "
+                "two frames; write .mkv"
+            )
 
     def __enter__(self) -> Self:
         return self

@@ -56,7 +56,7 @@ class VideoJob:
     threads
         Number of threads that search; None for one per core.
     codec_threads
-        Number of threads of the decoder, and of the encoder; None for one per core.
+        Number of threads of the encoder; None for one per core.
     timeout
         Seconds in which the next frame must be read or written; after that the job fails, so that
         a disk or a network that hangs does not stop a batch. The duration of the part before
@@ -148,7 +148,6 @@ def open_video(
         start=job.start,
         end=job.end,
         frames=job.frames,
-        threads=job.codec_threads or core_count(),
         settings=settings.input,
     )
     with ExitStack() as stack:
