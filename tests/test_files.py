@@ -1,12 +1,17 @@
 """Files: outputs that are whole or absent, temporary files that are stale, limits, names."""
 
+import itertools
 import os
 import re
 import resource
 import subprocess
 import sys
 import tracemalloc
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -50,7 +55,7 @@ def test_a_complete_file_replaces_the_older_one_if_asked_and_keeps_its_permissio
     assert path.stat().st_mode & 0o777 == 0o440
 
 
-def without_links(*_: object) -> None:
+def without_links(*_: object, **__: object) -> None:
     raise PermissionError(1, "Operation not permitted")
 
 
@@ -147,7 +152,46 @@ class TestOutputFiles:
         ):
             self.write(tmp_path, files, 1, 2, 3, 4)
         assert names(tmp_path) == ["2.txt", "3.txt"]
-        assert (tmp_path / "2.txt").read_text() == "new"  # what it replaced cannot come back
+        assert (tmp_path / "2.txt").read_text() == "old"
+
+    @pytest.mark.parametrize("has_links", [True, False])
+    def test_an_interrupt_at_any_moment_leaves_all_files_new_or_all_as_they_were(
+        self, has_links: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        if not has_links:
+            monkeypatch.setattr("os.link", without_links)
+        before = dict.fromkeys(["1.txt", "2.txt", "of-an-earlier-run.txt"], "old")
+        after = dict.fromkeys(["0.txt", "1.txt", "2.txt", "3.txt"], "new")
+        for moment in itertools.count():
+            folder = tmp_path / str(moment)
+            folder.mkdir()
+            for name in before:
+                (folder / name).write_text("old")
+            files = OutputFiles(overwrite=True)
+            into = files.stage_folder(folder, TEXTS)
+            for name in after:
+                (into / name).write_text("new")
+            with monkeypatch.context() as patch, suppress(KeyboardInterrupt), files:
+                interrupt_after(moment, folder, patch)
+            found = {path.name: path.read_text() for path in folder.iterdir()}
+            assert found in (before, after)
+            if found == after:
+                break
+        assert moment > 5
+
+
+def interrupt_after(steps: int, folder: Path, patch: pytest.MonkeyPatch) -> None:
+    """Raise a `KeyboardInterrupt` after so many steps and one that change what `folder` holds."""
+    stop = iter([False] * steps + [True])
+
+    def interrupted(step: Callable[..., object], *values: Any, **options: Any) -> object:
+        result = step(*values, **options)
+        if folder in {Path(value).parent for value in values} and next(stop, False):
+            raise KeyboardInterrupt
+        return result
+
+    for name in ("link", "replace", "unlink"):
+        patch.setattr(os, name, partial(interrupted, getattr(os, name)))
 
 
 def test_a_file_in_use_is_kept(tmp_path: Path) -> None:
@@ -209,7 +253,9 @@ def test_the_message_does_not_invite_to_replace_what_may_not_be(
     (tmp_path / "out.txt").touch()
     with pytest.raises(OutputError) as caught:
         check_output(tmp_path / "out.txt", overwrite=overwrite, may_replace=lambda _: False)
-    assert "vdet did not write it, so it is kept; give another output" in str(caught.value)
+    assert "vdet did not write it, so it is kept; remove it, or give another output" in str(
+        caught.value
+    )
 
 
 def test_a_folder_that_the_work_makes_may_be_missing(tmp_path: Path) -> None:
@@ -249,6 +295,13 @@ def test_a_name_is_shown_on_one_line_without_control_characters(name: str) -> No
 
 
 TEXTS = re.compile(r"[a-z0-9-]+\.txt")
+
+
+def test_a_system_without_file_locks_is_refused_in_one_line() -> None:
+    code = "import sys; sys.modules['fcntl'] = None; from vdet.__main__ import main; main()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "vdet: this system cannot lock files; on Windows, run vdet in WSL\n"
 
 
 class TestFolder:

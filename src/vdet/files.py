@@ -16,6 +16,7 @@ from vdet.temporary import create_folder, remove_stale, sync, try_to_remove
 
 _CHUNK = 1_000_000  # bytes
 _MAX_SHOWN = 80  # characters of a name
+_ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
 
 MayReplace = Callable[[Path], bool]
@@ -82,7 +83,9 @@ def _check_replaceable(path: Path, may_replace: MayReplace) -> None:
     if not (path.is_file() or path.is_symlink()):
         raise OutputError(f"{path}: is no ordinary file, and is kept; give another output")
     if not may_replace(path):
-        raise OutputError(f"{path}: vdet did not write it, so it is kept; give another output")
+        raise OutputError(
+            f"{path}: vdet did not write it, so it is kept; remove it, or give another output"
+        )
 
 
 def make_folder(folder: Path) -> None:
@@ -97,7 +100,8 @@ class OutputFiles:
     """The output files of one run, which appear together; a context manager.
 
     When the block ends without an error, all staged files are synced to the disk and then get their
-    names. When it ends with an error, none appears. Folders are made where they are missing.
+    names. When it ends with an error, or is interrupted, none appears, and every older file is as
+    it was. Folders are made where they are missing.
 
     Parameters
     ----------
@@ -110,8 +114,6 @@ class OutputFiles:
     ------
     OutputError
         A file cannot be made or synced, or cannot get its name, because there is one that is kept.
-        The files of this run that have appeared before are removed, except where they replaced
-        older files.
     """
 
     def __init__(self, *, overwrite: bool = False) -> None:
@@ -194,31 +196,47 @@ class OutputFiles:
         for path, file in files.items():
             with output_errors(path):
                 sync(file)
+        earlier = [
+            old
+            for path, names in (self._names.items() if self._overwrite else ())
+            for old in path.iterdir()
+            if names.fullmatch(old.name) and old not in files
+        ]
+        # An interrupt may come at any time, so how to undo a step is noted before the step.
         with contextlib.ExitStack() as undo:
             for path, file in files.items():
                 with output_errors(path):
                     if self._overwrite and os.path.lexists(path):
-                        _replace(path, file, self._may_replace.get(path, any_file))
+                        _check_replaceable(path, self._may_replace.get(path, any_file))
+                        if not path.is_symlink():
+                            file.chmod(stat.S_IMODE(path.stat().st_mode))
+                        self._set_aside(path, undo)
+                        file.replace(path)
                     else:
-                        _add_name(file, path)
-                        undo.callback(try_to_remove, path)
+                        _add_name(file, path, undo)
+            for old in earlier:
+                with contextlib.suppress(OSError):
+                    self._set_aside(old, undo)
+                    old.unlink(missing_ok=True)
             undo.pop_all()
-        if self._overwrite:
-            for path, names in self._names.items():
-                for old in set(path.iterdir()) - files.keys():
-                    if names.fullmatch(old.name):
-                        try_to_remove(old)
+
+    def _set_aside(self, path: Path, undo: contextlib.ExitStack) -> None:
+        """Keep the file that is there in the temporary folder, under a second name if possible."""
+        aside = self._folders[path.parent] / _ASIDE / path.name
+        aside.parent.mkdir(exist_ok=True)
+        undo.callback(_put_back, aside, path)
+        try:
+            os.link(path, aside, follow_symlinks=False)
+        except OSError:  # a file system without hard links
+            path.replace(aside)
 
 
-def _replace(path: Path, temporary: Path, may_replace: MayReplace) -> None:
-    """Replace the file that is there; keep its permissions."""
-    _check_replaceable(path, may_replace)
-    if not path.is_symlink():
-        temporary.chmod(stat.S_IMODE(path.stat().st_mode))
-    temporary.replace(path)
+def _put_back(aside: Path, path: Path) -> None:
+    if os.path.lexists(aside):
+        aside.replace(path)
 
 
-def _add_name(temporary: Path, path: Path) -> None:
+def _add_name(temporary: Path, path: Path, undo: contextlib.ExitStack) -> None:
     """Give a file its final name, unless there is a file of this name; in one step of the system.
 
     Raises
@@ -226,6 +244,7 @@ def _add_name(temporary: Path, path: Path) -> None:
     OutputError
         There is one.
     """
+    undo.callback(_remove_if_same, path, temporary.stat())
     try:
         try:
             os.link(temporary, path)
@@ -233,14 +252,18 @@ def _add_name(temporary: Path, path: Path) -> None:
             raise
         except OSError:  # a file system without hard links: an empty file takes the name
             path.touch(exist_ok=False)
-            with contextlib.ExitStack() as undo:
-                undo.callback(try_to_remove, path)
-                temporary.replace(path)
-                undo.pop_all()
+            undo.callback(try_to_remove, path)
+            temporary.replace(path)
     except FileExistsError:
         raise OutputError(
             f"{path}: has appeared during the run, so it is kept; give another output"
         ) from None
+
+
+def _remove_if_same(path: Path, status: os.stat_result) -> None:
+    with contextlib.suppress(OSError):
+        if os.path.samestat(path.lstat(), status):
+            path.unlink()
 
 
 @contextlib.contextmanager

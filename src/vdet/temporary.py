@@ -14,16 +14,18 @@ import secrets
 import shutil
 from pathlib import Path
 
+from vdet.errors import UnsupportedSystemError
+
 try:
     import fcntl
-except ImportError:  # Windows: folders are not locked, and none is taken for stale
-    fcntl = None  # type: ignore[assignment]
+except ImportError as error:
+    raise UnsupportedSystemError(
+        "this system cannot lock files; on Windows, run vdet in WSL"
+    ) from error
 
 _HOST = re.sub(r"[^a-z0-9]", "", platform.node().lower())[:16]
 _NAME = re.compile(rf"\.vdet-{_HOST}-[0-9a-f]{{16}}")
-_NOT_A_LINK = getattr(os, "O_NOFOLLOW", 0)
-_FLAGS = os.O_RDWR | _NOT_A_LINK | getattr(os, "O_BINARY", 0)
-_FOLDER_FLAGS = os.O_RDONLY | _NOT_A_LINK | getattr(os, "O_DIRECTORY", 0)
+_FOLDER_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY
 
 
 def create_folder(parent: Path, cleanup: contextlib.ExitStack) -> Path:
@@ -33,8 +35,6 @@ def create_folder(parent: Path, cleanup: contextlib.ExitStack) -> Path:
         # An interrupt may come as soon as the folder is there.
         cleanup.callback(shutil.rmtree, candidate, ignore_errors=True)
         candidate.mkdir()
-        if fcntl is None:
-            return candidate
         with contextlib.suppress(FileNotFoundError):  # another run took it for stale
             descriptor = os.open(candidate, _FOLDER_FLAGS)
             cleanup.callback(os.close, descriptor)
@@ -52,7 +52,7 @@ def remove_stale(folder: Path) -> None:
     """Remove the temporary folders in `folder` whose writers have ended."""
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
-            if fcntl and _NAME.fullmatch(path.name):
+            if _NAME.fullmatch(path.name):
                 with contextlib.suppress(OSError):
                     _remove_if_stale(path)
 
@@ -71,8 +71,6 @@ def try_to_lock(descriptor: int) -> bool:
 
     Without locks, as on some network disks, the answer is True.
     """
-    if fcntl is None:
-        return True
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -84,7 +82,7 @@ def try_to_lock(descriptor: int) -> bool:
 
 def sync(path: Path) -> None:
     """Wait until the content of a file, however it was written, is on the disk."""
-    descriptor = os.open(path, _FLAGS)
+    descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
     try:
         os.fsync(descriptor)
     finally:

@@ -148,8 +148,8 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
     if len(outputs) > 1 or (outputs and outputs[0].is_file() and not _is_ours(outputs[0])):
         shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
         raise click.UsageError(
-            f"{outputs[0]} would be the output, and a video that vdet did not write is kept; for "
-            f"several videos name a folder: vdet detect-video {shown} -d found"
+            f"{outputs[0]} would be the output, and a video that vdet did not write is kept; "
+            f"remove it, or for several videos name a folder: vdet detect-video {shown} -d found"
         )
     if no_video == bool(outputs):
         raise click.UsageError("give OUT, or --no-video without OUT; or -d DIR for several videos")
