@@ -112,15 +112,6 @@ class TestRefused:
         (line,) = refusal(path, text)
         assert line.startswith(message)
 
-    def test_all_mistakes_are_given_beside_an_unknown_kind(self, path: Path) -> None:
-        text = "tracker: {kind: best, level: 3}\ndetector: {kind: none}\noutput: {crf: 99}"
-        assert [line.split(": ")[1] for line in refusal(path, text, "input.x=1")] == [
-            "detector.kind",
-            "tracker.kind",
-            "input.x",
-            "output.crf",
-        ]
-
 
 FAKE = '''
 from typing import Literal

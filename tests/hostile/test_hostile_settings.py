@@ -125,7 +125,7 @@ HOSTILE = {
     "python object": ("detector: !!python/object/apply:os.system [id]", r"1:11: .*tags \(!name\)"),
     "deep list": ("[" * 90_000, "is nested too deeply"),
     "deep block": ("- " * 45_000, "is nested too deeply"),
-    "huge number": ("input: {x: " + "9" * 90_000 + "}", "1:12: .*the number is too large"),
+    "huge number": ("input: {x: " + "9" * 90_000 + "}", "1:12: cannot be understood: "),
     "base 60 fraction": ("input: {x: " + "1:" * 40_000 + "1.5}", "cannot be understood"),
     "huge version": ("%YAML " + "1" * 5000 + ".1\n---\nheat: {}", "is not YAML"),
     "no such character": (r'heat: "\UFFFFFFFF"', "is not YAML"),

@@ -19,8 +19,6 @@ MAX_INTEGER_BITS = 64
 MAX_MISTAKES = 20
 """Most mistakes of one file that are shown; the others are counted."""
 
-_INTEGER = "tag:yaml.org,2002:int"
-
 Key = tuple[str | int, ...]
 """Path to a value from the root: `("search", "windows", 0, "size")`."""
 
@@ -91,7 +89,7 @@ def read_document(path: Path) -> Document:
     Raises
     ------
     ConfigError
-        The file cannot be read, is not YAML, or gives a key twice (all such places are named).
+        The file cannot be read, is not YAML, or gives a key twice.
     """
     data = read_whole(path, most=MAX_BYTES, what="settings file", error=ConfigError)
     try:
@@ -103,16 +101,12 @@ def read_document(path: Path) -> Document:
 
 def parse_document(text: str, name: str) -> Document:
     """Read YAML text; `name` is its name in messages. Raises `ConfigError`."""
-    reader = _Reader(name)
-    values = reader.value(_compose(text, name), ())
-    if values is None:
-        values = {}
-    elif not isinstance(values, dict):
+    places: dict[Key, str] = {}
+    values = _Reader(name, places).value(_compose(text, name), ())
+    if not isinstance(values, dict | None):
         got = reprlib.repr(values)
-        reader.errors.append(f"{name}:1:1: expected settings (key: value), got {got}")
-    if reader.errors:
-        raise config_error(reader.errors, len(reader.errors))
-    return Document(name, values, reader.places)
+        raise ConfigError(f"{name}:1:1: expected settings (key: value), got {got}")
+    return Document(name, values or {}, places)
 
 
 def parse_assignment(text: str) -> Document:
@@ -127,16 +121,12 @@ def parse_assignment(text: str) -> Document:
     parts = key.strip().split(".")
     if not equals or not all(parts):
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
-    name = "--set"
-    reader = _Reader(name)
+    name, places = "--set", dict[Key, str]()
     path: Key = tuple(int(part) if _is_number(part) else part for part in parts)
-    nested = reader.value(_compose(value, name), path)
-    if reader.errors:
-        raise config_error(reader.errors, len(reader.errors))
+    nested = _Reader(name, places).value(_compose(value, name), path)
     for part in reversed(path):
         nested = {part: nested}
-    places = dict.fromkeys(reader.places, name) | {path: name}
-    return Document(name, nested, places)
+    return Document(name, nested, dict.fromkeys([*places, path], name))
 
 
 def _is_number(part: str) -> bool:
@@ -150,23 +140,18 @@ def _compose(text: str, name: str) -> yaml.Node | None:
         mark = error.problem_mark or error.context_mark
         place = f"{name}:{mark.line + 1}:{mark.column + 1}" if mark else name
         raise ConfigError(f"{place}: is not YAML: {error.problem or error.context}") from error
-    except (
-        yaml.YAMLError,
-        ValueError,
-        OverflowError,
-    ) as error:  # a character that YAML does not allow
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # a character that YAML refuses
         raise ConfigError(f"{name}: is not YAML: {' '.join(str(error).split())}") from error
     except RecursionError as error:
         raise ConfigError(f"{name}: is nested too deeply") from error
 
 
+@dataclass(frozen=True, slots=True)
 class _Reader:
-    """Turns nodes into values, and collects their places and the mistakes."""
+    """Turns nodes into values, and adds their places to `places`. Raises `ConfigError`."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.places: dict[Key, str] = {}
-        self.errors: list[str] = []
+    name: str
+    places: dict[Key, str]
 
     def value(self, node: yaml.Node | None, key: Key) -> Any:
         if node is None:
@@ -183,27 +168,22 @@ class _Reader:
         for name_node, value_node in node.value:
             place = self._place(name_node)
             if not isinstance(name_node, yaml.ScalarNode):
-                self.errors.append(f"{place}: expected a key, got a {name_node.id}")
-                continue
+                raise ConfigError(f"{place}: expected a key, got a {name_node.id}")
             name = name_node.value
             if name in values:
-                self.errors.append(f"{place}: {printable(name)}: is given twice; keep one")
+                raise ConfigError(f"{place}: {printable(name)}: is given twice; keep one")
             self.places[(*key, name)] = place
             values[name] = self.value(value_node, (*key, name))
         return values
 
     def _scalar(self, node: yaml.Node) -> Any:
-        constructor = yaml.constructor.SafeConstructor()
         try:
-            if node.tag == _INTEGER and len(node.value) > MAX_INTEGER_BITS + len("-0b"):
-                raise OverflowError("the number is too large")
-            value = constructor.construct_object(node)
+            value = yaml.constructor.SafeConstructor().construct_object(node)
             if isinstance(value, int) and value.bit_length() > MAX_INTEGER_BITS:
                 raise OverflowError("the number is too large")
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             problem = getattr(error, "problem", None) or error
-            self.errors.append(f"{self._place(node)}: cannot be understood: {problem}")
-            return None
+            raise ConfigError(f"{self._place(node)}: cannot be understood: {problem}") from error
         return value
 
     def _place(self, node: yaml.Node) -> str:

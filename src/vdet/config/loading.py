@@ -2,7 +2,6 @@
 
 import contextlib
 import difflib
-import itertools
 import reprlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,7 +18,7 @@ from vdet.config.document import (
     parse_assignment,
     read_document,
 )
-from vdet.config.kinds import SECTIONS_WITH_KINDS, SectionKinds
+from vdet.config.kinds import GROUPS, kind_names, kind_of, kind_settings
 from vdet.config.schema import Section, Settings
 from vdet.errors import ConfigError
 
@@ -31,9 +30,6 @@ _ALIASES = {"net": "default"}
 """Other names of shipped configs."""
 
 _YAML_SUFFIXES = (".yaml", ".yml")
-
-Chosen = Mapping[str, type[Section]]
-"""The class of the chosen kind, by the name of the section."""
 
 
 def find_config(name: str) -> Path:
@@ -82,21 +78,21 @@ def load_settings(
     ConfigError
         One line for each mistake, with file, line, column, key and what was expected.
     """
-    errors: list[str] = []
     layers = [Document("defaults", {"detector": {"kind": detector}})] if detector else []
     layers += [read_document(path)] if path else []
     layers += [_read_places(name, file) for name, file in (places or {}).items()]
-    layers.append(_read_assignments(assignments, errors))
-    merged, chosen = _merge(layers, errors)
-    details: list[ErrorDetails] = []
+    layers.append(_join([parse_assignment(text) for text in assignments]))
+    merged, chosen = _merge(layers)
+    fields: Any = {name: (section, section()) for name, section in chosen.items()}
+    model = create_model("Settings", __base__=Settings, **fields)
     try:
-        settings = _validate(merged.values, chosen)
+        checked = model.model_validate(merged.values)
     except ValidationError as error:
         details = error.errors()
-    if errors or details:
-        described = (_describe(detail, merged, chosen) for detail in details)
-        raise config_error(itertools.chain(errors, described), len(errors) + len(details))
-    return settings
+        raise config_error(
+            (_describe(detail, merged, model) for detail in details), len(details)
+        ) from error
+    return Settings.model_construct(**dict(checked))
 
 
 def _read_places(section: str, path: Path) -> Document:
@@ -110,18 +106,13 @@ def _read_places(section: str, path: Path) -> Document:
     return Document(document.name, {section: no_places | document.values}, places)
 
 
-def _read_assignments(assignments: Sequence[str], errors: list[str]) -> Document:
-    """Join assignments to one layer; those that cannot be read are added to the errors."""
+def _join(assignments: Sequence[Document]) -> Document:
+    """Join assignments to one layer."""
     values: Any = {}
     places: dict[Key, str] = {}
-    for text in assignments:
-        try:
-            document = parse_assignment(text)
-        except ConfigError as error:
-            errors.append(str(error))
-        else:
-            values = _joined(values, document.values)
-            places |= document.places
+    for document in assignments:
+        values = _joined(values, document.values)
+        places |= document.places
     return Document("--set", values, places)
 
 
@@ -131,38 +122,33 @@ def _joined(below: Any, above: Any) -> Any:
     return above
 
 
-def _merge(layers: Sequence[Document], errors: list[str]) -> tuple[Document, Chosen]:
-    """Lay the layers over the defaults; return them as one, and the kinds that they choose.
+def _merge(layers: Sequence[Document]) -> tuple[Document, dict[str, type[Section]]]:
+    """Lay the layers over the defaults; return them as one, and the class of each chosen kind.
 
-    Where a layer chooses an unknown kind, an error is added and the layer's section is left out.
+    Raises
+    ------
+    ConfigError
+        A layer chooses an unknown kind.
     """
     values: dict[str, Any] = {}
-    chosen: dict[str, type[Section]] = {
-        name: type(getattr(Settings(), name)) for name in SECTIONS_WITH_KINDS
-    }
+    chosen: dict[str, type[Section]] = {name: type(getattr(Settings(), name)) for name in GROUPS}
     places: dict[Key, str] = {}
     for layer in layers:
-        given = dict(layer.values)
-        for name, kinds in SECTIONS_WITH_KINDS.items():
-            section = given.get(name)
-            kind = section.get(kinds.key) if isinstance(section, dict) else None
-            if isinstance(kind, str) and kind != chosen[name].model_fields[kinds.key].default:
+        for name in GROUPS:
+            section = layer.values.get(name)
+            kind = section.get("kind") if isinstance(section, dict) else None
+            if isinstance(kind, str) and kind != kind_of(chosen[name]):
                 try:
-                    chosen[name] = kinds.settings(kind)
+                    chosen[name] = kind_settings(name, kind)
                 except ConfigError as error:
-                    key: Key = (name, kinds.key)
-                    errors.append(f"{layer.place_of(key)}: {format_key(key)}: {error}")
-                    del given[name]
-                else:
-                    values[name] = {kinds.key: kind}
-        values = _overlay(_defaults(chosen), values, given)
+                    place = layer.place_of((name, "kind"))
+                    raise ConfigError(f"{place}: {name}.kind: {error}") from error
+                values[name] = {"kind": kind}
+        sections: Any = {name: section() for name, section in chosen.items()}
+        defaults = Settings.model_construct(**sections).model_dump(mode="json")
+        values = _overlay(defaults, values, layer.values)
         places |= layer.places
     return Document("settings", values, places), chosen
-
-
-def _defaults(chosen: Chosen) -> dict[str, Any]:
-    sections: dict[str, Any] = {name: section() for name, section in chosen.items()}
-    return Settings.model_construct(**sections).model_dump(mode="json")
 
 
 def _overlay(default: Any, below: Any, above: Any) -> Any:
@@ -183,83 +169,60 @@ def _overlay(default: Any, below: Any, above: Any) -> Any:
     return above
 
 
-def _validate(values: Mapping[str, Any], chosen: Chosen) -> Settings:
-    """Check values against the sections of the chosen kinds."""
-    fields: Any = {name: (section, section()) for name, section in chosen.items()}
-    checked = create_model("Settings", __base__=Settings, **fields).model_validate(values)
-    return Settings.model_construct(
-        **{name: getattr(checked, name) for name in Settings.model_fields}
-    )
-
-
-def _describe(detail: ErrorDetails, merged: Document, chosen: Chosen) -> str:
-    key = tuple(detail["loc"])
-    place, expected = merged.place_of(key), _expected(detail, chosen)
-    return f"{place}: {format_key(key)}: {expected}" if key else f"{place}: {expected}"
-
-
-_KIND_KEYS: dict[Key, SectionKinds] = {
-    (name, kinds.key): kinds for name, kinds in SECTIONS_WITH_KINDS.items()
-}
 _EXPECTED = {
     "model_type": "should be a section, key: value",
     "tuple_type": "should be a list, or in --set the number of an item that it has, from 0",
 }
 
 
-def _expected(detail: ErrorDetails, chosen: Chosen) -> str:
+def _describe(detail: ErrorDetails, merged: Document, model: type[Settings]) -> str:
     key = tuple(detail["loc"])
+    named = f"{format_key(key)}: " if key else ""
+    return f"{merged.place_of(key)}: {named}{_expected(detail, key, model)}"
+
+
+def _expected(detail: ErrorDetails, key: Key, model: type[Settings]) -> str:
     match detail["type"]:
         case "extra_forbidden" | "invalid_key":
-            return _other_kind(key, chosen) or f"is no setting{_suggestion(key, chosen)}"
+            return _other_kind(key, model) or f"is no setting{_suggestion(key, model)}"
         case "missing":
             return "is missing"
         case "value_error":
             return str(detail["ctx"]["error"])
-        case "literal_error" if known := _KIND_KEYS.get(key):
-            message = f"should be {' or '.join(known.names)}"
+        case "literal_error" if key[1:] == ("kind",) and key[0] in GROUPS:
+            message = f"should be {' or '.join(kind_names(str(key[0])))}"
         case _:
             message = _EXPECTED.get(detail["type"]) or detail["msg"].removeprefix("Input ")
     return f"{message} (got {reprlib.repr(detail['input'])})"
 
 
-def _other_kind(key: Key, chosen: Chosen) -> str:
+def _other_kind(key: Key, model: type[Settings]) -> str:
     """Say which other kind a key belongs to; nothing where it belongs to none."""
     section, *inside = key
-    if section not in chosen or not inside:
+    if section not in GROUPS or not inside:
         return ""
-    kinds = SECTIONS_WITH_KINDS[str(section)]
-    current = chosen[str(section)].model_fields[kinds.key].default
-    owners = []
-    for kind in kinds.names:
+    current, owners = model.model_fields[section].default.kind, []
+    for kind in kind_names(section):
         with contextlib.suppress(ConfigError):  # another package's kind that cannot be loaded
-            if kind != current and inside[0] in kinds.settings(kind).model_fields:
+            if kind != current and inside[0] in kind_settings(section, kind).model_fields:
                 owners.append(kind)
     if not owners:
         return ""
-    return (
-        f"belongs to {section}.{kinds.key}: {' or '.join(owners)}, and has no effect with {current}"
-    )
+    return f"belongs to {section}.kind: {' or '.join(owners)}, and has no effect with {current}"
 
 
-def _suggestion(key: Key, chosen: Chosen) -> str:
-    names = _names_beside(key, chosen)
-    if close := difflib.get_close_matches(str(key[-1]), names, n=1):
-        return f"; did you mean {close[0]}?"
-    return f"; known here: {', '.join(names)}" if names else ""
-
-
-def _names_beside(key: Key, chosen: Chosen) -> list[str]:
-    """Return the keys of the section that `key` was looked for in; nothing if it is no section."""
-    within: Any = Settings
-    for depth, part in enumerate(key[:-1]):
-        if depth == 0 and part in chosen:
-            within = chosen[str(part)]
-        elif _is_section(within):
+def _suggestion(key: Key, model: type[Settings]) -> str:
+    """Name the key that is meant, or all keys beside it; nothing where it is in no section."""
+    within: Any = model
+    for part in key[:-1]:
+        if _is_section(within):
             within = within.model_fields[str(part)].annotation
         else:  # an item of a list
             within = next(filter(_is_section, get_args(within)), None)
-    return list(within.model_fields) if _is_section(within) else []
+    names = list(within.model_fields) if _is_section(within) else []
+    if close := difflib.get_close_matches(str(key[-1]), names, n=1):
+        return f"; did you mean {close[0]}?"
+    return f"; known here: {', '.join(names)}" if names else ""
 
 
 def _is_section(annotation: Any) -> bool:
