@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
 from vdet.synthetic.scene import Light, Line, Scene, SceneVehicle, Waypoint

@@ -18,9 +18,8 @@ from vdet.config.places import (
     RegionsSettings,
     ZoneSettings,
 )
-from vdet.config.schema import OutputSettings, Settings, SvmSettings
+from vdet.config.schema import DrawSettings, OutputSettings, Settings, SvmSettings
 from vdet.config.section import Section
-from vdet.config.video import DrawSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.protocol import DetectorModel
 from vdet.lanes.camera import CalibratedCamera

@@ -15,13 +15,8 @@ from hypothesis import settings
 
 from drawn_patches import write_patches
 from vdet.cli import main
-from vdet.config.schema import (
-    AugmentationSettings,
-    Settings,
-    SvmSettings,
-    SvmTrainingSettings,
-    TrainSettings,
-)
+from vdet.config.schema import Settings, SvmSettings, TrainSettings
+from vdet.config.train import AugmentationSettings, SvmTrainingSettings
 from vdet.detect.svm.model import save_model
 from vdet.learn.svm.dataset import find_patches
 from vdet.learn.svm.training import train

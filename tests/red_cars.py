@@ -10,21 +10,20 @@ import numpy as np
 from boxing import moved_to
 from vdet.batch.task import Work
 from vdet.boxes import NO_BOXES, Box, Boxes
-from vdet.config.schema import (
+from vdet.config.schema import Settings, SvmSettings
+from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
+from vdet.config.svm import (
     FeatureSettings,
     HeatSettings,
     HistogramSettings,
     HogSettings,
     PerspectiveSettings,
-    RulesTrackerSettings,
     ScoreSettings,
     SearchSettings,
-    Settings,
     StillSettings,
-    SvmSettings,
     WindowSettings,
 )
-from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.model import LinearModel, save_model
 from vdet.media import Frame, Picture

@@ -12,7 +12,8 @@ import pytest
 from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
 from vdet.boxes import Boxes
-from vdet.config.schema import MotionTrackerSettings, RulesTrackerSettings, Settings
+from vdet.config.schema import MotionTrackerSettings, Settings
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.media import Picture
 from vdet.media.images import Image

@@ -110,10 +110,12 @@ def test_after_other_settings_or_another_model_videos_are_made_again(
     assert run(*arguments).code == 0
     dry = (*arguments, "--skip-existing", "--dry-run")
     assert run(*dry).out.count("there already") == 2
-    for change in (("--set", "tracker.needed=0.3"), ("-c", "svm"), ("--frames", "3")):
+    (tmp_path / "steps").write_text("steps: {names: [theirs]}")
+    other_step = ("-c", tmp_path / "steps")
+    for change in (("--set", "tracker.needed=0.3"), ("-c", "svm"), ("--frames", "3"), other_step):
         assert run(*dry, *change).out.count("→") == 2
     copy = shutil.copy(shipped, tmp_path / "copy.onnx")
-    no_effect = ("train.net.steps=9", "train.svm.C=1", "output.crf=30")
+    no_effect = ("train.net.steps=9", "output.crf=30", "detector.still_score=0.7")
     for same in (*(("--set", each) for each in no_effect), ("--model", copy)):
         assert run(*dry, *same).out.count("→") == 0
 

@@ -8,11 +8,8 @@ import pytest
 
 from vdet.config.loading import load_settings
 from vdet.config.rendering import render
-from vdet.config.schema import (
-    MotionTrackerSettings,
-    RulesTrackerSettings,
-    Settings,
-)
+from vdet.config.schema import MotionTrackerSettings, Settings
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.errors import ConfigError
 
 RULES = "--set: tracker.history: belongs to tracker.kind: rules, and has no effect with motion"

@@ -5,15 +5,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdet.config.loading import find_config, load_settings
-from vdet.config.schema import (
-    HeatSettings,
-    SearchSettings,
-    Settings,
-    SvmSettings,
-    SvmTrainingSettings,
-    TrainSettings,
-    WindowSettings,
-)
+from vdet.config.schema import Settings, SvmSettings, TrainSettings
+from vdet.config.svm import HeatSettings, SearchSettings, WindowSettings
+from vdet.config.train import SvmTrainingSettings
 from vdet.errors import ConfigError
 
 WINDOWS = """\

@@ -3,15 +3,10 @@ from typing import Any
 import pytest
 
 from seed import SEED
-from vdet.config.schema import (
-    HeatSettings,
-    RulesTrackerSettings,
-    SearchSettings,
-    Settings,
-    SvmSettings,
-    WindowSettings,
-)
+from vdet.config.schema import Settings, SvmSettings
 from vdet.config.section import scale_lengths
+from vdet.config.svm import HeatSettings, SearchSettings, WindowSettings
+from vdet.config.tracker import RulesTrackerSettings
 
 WINDOWS = (WindowSettings(size=64, step=1, top=400, bottom=500),)
 BOTH = Settings(

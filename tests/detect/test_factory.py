@@ -10,7 +10,8 @@ import pytest
 
 from vdet.config.detector import DetectorSettings
 from vdet.config.loading import load_settings
-from vdet.config.schema import FeatureSettings, NetworkSettings, Settings, SvmSettings
+from vdet.config.schema import NetworkSettings, Settings, SvmSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import load_detector, model_file, trained_on
 from vdet.detect.onnx.detector import NetworkModel
 from vdet.detect.protocol import stage_pictures_of

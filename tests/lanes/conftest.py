@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from benchmarks.drawn_traffic import lane_view
 
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
 from vdet.synthetic.camera import PinholeCamera

@@ -15,9 +15,9 @@ import yaml
 from conftest import Outcome, Run
 from red_cars import SETTINGS, red_finder
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings
-from vdet.config.schema import OutputSettings, Settings, WindowSettings
+from vdet.config.schema import LaneSettings, OutputSettings, Settings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
+from vdet.config.svm import WindowSettings
 from vdet.detect.svm.model import save_model
 from vdet.draw.boxes import color_of
 from vdet.lanes.camera import CalibratedCamera, Undistorter, save_camera

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.drawing import draw_lane, lane_text, stage_pictures
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder, lane_record
 from vdet.media.images import Image

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.paint import (
     HIDDEN,

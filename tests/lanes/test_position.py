@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import LaneCurves
 from vdet.lanes.road import LaneRequest, Road, RoadFinder, RoadPosition, position_on_road

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.calibration import Calibration, calibrate
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
 from vdet.media import VideoReader

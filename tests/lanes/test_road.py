@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Float64Array
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.road import CARRY, Lane, LaneRequest, RoadFinder
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.top_view import ALONG, TopView
 from vdet.synthetic.camera import PinholeCamera
 

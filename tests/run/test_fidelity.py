@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from red_cars import HEIGHT, SETTINGS, WIDTH, car_at, drive, road
 from run.red_runs import outputs, read, run_red, video_info, with_search
-from vdet.config.schema import OutputSettings, Settings
-from vdet.config.video import DrawSettings
+from vdet.config.schema import DrawSettings, OutputSettings, Settings
 from vdet.media import ColorTags, Picture, VideoReader, VideoWriter
 from vdet.media.coding import Coding
 from vdet.media.frame import UNSPECIFIED, Planes

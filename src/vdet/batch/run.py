@@ -65,7 +65,7 @@ def run_batch(
 def write_totals(plan: Plan) -> None:
     """Write the files over all videos, from the outputs that are there. Raises `OutputError`."""
     for total in plan.totals:  # a name may be too long for `Path.exists`
-        there = {name: path for name, path in total.outputs.items() if os.path.isfile(path)}  # noqa: PTH113
+        there = {name: path for name, path in total.outputs.items() if os.path.exists(path)}  # noqa: PTH110
         with OutputFiles(overwrite=True) as files, output_errors(total.path):
             total.made_by.write(there, files.stage(total.path))
 

@@ -21,10 +21,10 @@ from vdet.run.sinks.protocol import output_state
 from vdet.run.video import VideoJob, run_video
 from vdet.version import __version__
 
-_SEARCH = {"input", "detector", "tracker", "regions"}
+_SEARCH = {"input", "detector", "tracker", "regions", "steps"}
 """The sections of the settings that tracks depend on."""
 
-_READ_BY = {"tracks": set[str](), "counts": {"counts"}, "crops": {"crops"}}
+_READ_BY = {"tracks": set[str](), "counts": {"counts"}, "crops": set[str]()}
 """The sections that a sink reads too. Another sink may read all but `train` and `labels`."""
 
 
@@ -72,10 +72,12 @@ class Work:
         load_detector(settings.detector, model)
         file, mask = model_file(settings.detector, model), settings.regions.mask
         sha256 = _digest_of(file) or None
+        # What decides in still pictures only does not count.
+        shown = settings.model_copy(update={"detector": settings.detector.showing_all()})
         wanted = (
             *(f"vdet {__version__}", sha256, job.start, job.end, job.frames, job.lanes),
             _digest_of(mask),
-            settings.model_dump_json(include=_sections(sinks, with_lanes=job.lanes is not None)),
+            shown.model_dump_json(include=_sections(sinks, with_lanes=job.lanes is not None)),
         )
         if mask:
             regions = settings.regions.model_copy(update={"mask": str(Path(mask).absolute())})

@@ -2,14 +2,9 @@
 
 from pathlib import Path
 
-from vdet.config.schema import (
-    DetectorSettings,
-    MotionTrackerSettings,
-    NetworkSettings,
-    RulesTrackerSettings,
-    SvmSettings,
-)
+from vdet.config.schema import DetectorSettings, MotionTrackerSettings, NetworkSettings, SvmSettings
 from vdet.config.section import Section
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.errors import ConfigError
 from vdet.plugins import DETECTORS, TRACKERS, load_plugin, plugin_names
 

@@ -3,41 +3,16 @@
 The defaults are those of `configs/default.yaml`, which is their printed form.
 """
 
-from pydantic import SerializeAsAny
+from typing import Annotated, Literal
+
+from pydantic import Field, SerializeAsAny, field_validator, model_validator
 
 from vdet.config.detector import DetectorSettings, NetworkSettings
-from vdet.config.labels import LabelSettings
-from vdet.config.lanes import LaneSettings
-from vdet.config.places import (
-    CountSettings,
-    LineSettings,
-    RegionSettings,
-    RegionsSettings,
-    ZoneSettings,
-)
-from vdet.config.section import Section
-from vdet.config.svm import (
-    ColorSpace,
-    FeatureSettings,
-    HeatSettings,
-    HistogramSettings,
-    HogSettings,
-    PerspectiveSettings,
-    ScoreSettings,
-    SearchSettings,
-    StillSettings,
-    SvmSettings,
-    WindowSettings,
-)
-from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings, TrackerSettings
-from vdet.config.train import (
-    AugmentationSettings,
-    MiningSettings,
-    NetworkTrainingSettings,
-    SvmTrainingSettings,
-    TrainSettings,
-)
-from vdet.config.video import CropSettings, DrawSettings, InputSettings, OutputSettings
+from vdet.config.places import CountSettings, RegionsSettings
+from vdet.config.section import Section, Share
+from vdet.config.svm import SvmSettings
+from vdet.config.tracker import MotionTrackerSettings, TrackerSettings
+from vdet.config.train import TrainSettings
 from vdet.errors import ConfigError
 
 
@@ -46,6 +21,120 @@ class StepSettings(Section):
 
     names: tuple[str, ...] = ()
     """Names of the steps, in order."""
+
+
+class LaneSettings(Section):
+    """The road in front of the camera: a trapezoid whose sides are the lines of a straight lane.
+
+    For another camera, take an undistorted frame of a straight and level road. Choose two rows:
+    the nearer one above the bonnet, the farther one a little below the horizon. Note the columns
+    at which the lines of the vehicle's lane cross them.
+    """
+
+    top: Share = 0.63
+    """Farther row, as a share of the frame's height."""
+    bottom: Share = 0.93
+    """Nearer row, as a share of the frame's height."""
+    top_left: float = Field(0.4602, ge=-2, le=3)
+    """Column of the left line in the farther row, as a share of the frame's width."""
+    top_right: float = Field(0.5382, ge=-2, le=3)
+    """Column of the right line in the farther row."""
+    bottom_left: float = Field(0.2086, ge=-2, le=3)
+    """Column of the left line in the nearer row."""
+    bottom_right: float = Field(0.7898, ge=-2, le=3)
+    """Column of the right line in the nearer row."""
+    lane_width: float = Field(3.7, gt=0, le=20)
+    """Width of the lane in metres."""
+    length: float = Field(37.0, gt=1, le=200)
+    """Distance between the two rows on the road, in metres. Measure it by dashes of known length,
+    or compute focal length × lane_width × (1 / lane width in the farther row − 1 / lane width in
+    the nearer row), all but lane_width in pixels.
+    """
+
+    @model_validator(mode="after")
+    def _is_a_trapezoid(self) -> "LaneSettings":
+        if self.bottom <= self.top:
+            raise ValueError("bottom must be below top, a larger share of the height")
+        far, near = self.top_right - self.top_left, self.bottom_right - self.bottom_left
+        if not 0 < far < 0.9 * near:
+            raise ValueError("the lines must be closer together at top than at bottom")
+        return self
+
+
+Role = Literal["vehicle", "ignored", "other"]
+"""What a labelled box is in evaluation and training."""
+
+_WORDS: dict[Role, tuple[str, ...]] = {
+    "ignored": ("tram", "train", "misc", "trailer", "caravan", "auto-rickshaw"),
+    "other": ("pedestrian", "person", "person sitting", "cyclist", "bicycle", "rider"),
+}
+_ROLES = {word: role for role, words in _WORDS.items() for word in words}
+
+
+class LabelSettings(Section):
+    """What the labels of videos and pictures mean."""
+
+    roles: dict[str, Role] = Field(_ROLES, max_length=1000)
+    """vehicle: must be found. ignored: detections there are not judged. other: left out. Without a
+    role, car, truck, bus, motorcycle and vehicle are vehicles if the detector looks for them, and
+    ignored if not.
+    """
+
+    @field_validator("roles")
+    @classmethod
+    def _add_defaults(cls, roles: dict[str, Role]) -> dict[str, Role]:
+        return _ROLES | roles
+
+
+LabelPart = Literal["id", "class", "score", "distance"]
+Seconds = Annotated[float, Field(gt=0, le=60)]
+
+
+class InputSettings(Section):
+    """The video that is read."""
+
+    max_damaged: Share = 0.05
+    """Largest accepted share of damaged or lost frames."""
+    frame_rate: float | None = Field(None, ge=0.01, le=1000)
+    """Frames per second of numbered pictures (img_%04d.png). null: 25, with a warning."""
+
+
+class OutputSettings(Section):
+    """The video that is written, in H.264."""
+
+    preset: Literal["ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow"] = (
+        "superfast"
+    )
+    """Speed of the encoder. Slower presets write smaller files."""
+    crf: int = Field(25, ge=0, le=51)
+    """Quality: 0 is the best, 51 the worst."""
+
+
+class DrawSettings(Section):
+    """What is drawn on videos and pictures."""
+
+    boxes: bool = True
+    """Draw a box around each vehicle."""
+    predicted: Literal["dashed", "plain", "hidden"] = "dashed"
+    """How to draw vehicles that are predicted, not detected: with dashed boxes, with plain boxes,
+    or not at all.
+    """
+    label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
+    """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
+    labels. null: the id in a video, the score in a picture.
+    """
+    colors: Literal["id", "class", "region", "one"] = "id"
+    """Use one colour for each id, for each class, for each polygon of the section regions, or for
+    all vehicles (one).
+    """
+    thickness: float = Field(1.0, gt=0, le=20)
+    """Factor of the width of lines, which otherwise depends on the frame."""
+    trails: Seconds | None = None
+    """Draw the path of each vehicle over this many seconds of a video."""
+    time: bool = False
+    """Draw the time since the first frame of a video."""
+    smoothing: Seconds | None = 0.4
+    """Smooth the boxes drawn into a video over this many seconds. null: do not."""
 
 
 class Settings(Section):
@@ -61,7 +150,6 @@ class Settings(Section):
     labels: LabelSettings = LabelSettings()
     input: InputSettings = InputSettings()
     output: OutputSettings = OutputSettings()
-    crops: CropSettings = CropSettings()
     draw: DrawSettings = DrawSettings()
 
     @property

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from vdet.config.labels import Role
-from vdet.config.schema import Settings
+from vdet.config.schema import Role, Settings
 from vdet.detect.classes import OUR_NAMES, WORDS, letters, our_name
 
 _REGIONS = ("ignore", "ignored", "ignore region", "ignored region", "ignored regions", "dont care")

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Float64Array
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.paint import (
     FINE_MARGIN,
     MARGIN,

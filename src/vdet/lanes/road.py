@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vdet.boxes import Box, Float64Array
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
 from vdet.lanes.curves import FrameFit, LaneCurves, NormalEquations, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask

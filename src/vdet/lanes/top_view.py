@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float64Array
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.media.images import Image
 
 ACROSS = 30.0

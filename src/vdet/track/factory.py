@@ -5,13 +5,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from vdet.boxes import Boxes
-from vdet.config.schema import (
-    MotionTrackerSettings,
-    RulesTrackerSettings,
-    Settings,
-    TrackerSettings,
-)
+from vdet.config.schema import MotionTrackerSettings, Settings, TrackerSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.motion.tracker import MotionTracker

@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 from benchmarks.patch_search import PatchSearch
 
-from vdet.config.schema import (
-    FeatureSettings,
-    HistogramSettings,
-    HogSettings,
-)
+from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import FeatureExtractor
 from vdet.detect.svm.model import LinearModel

@@ -9,7 +9,8 @@ import pytest
 from boxing import moved_to, rounded
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, by_perspective, red_finder, road
 from vdet.boxes import Box, Boxes
-from vdet.config.schema import StillSettings, SvmSettings
+from vdet.config.schema import SvmSettings
+from vdet.config.svm import StillSettings
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.search import FrameSearch

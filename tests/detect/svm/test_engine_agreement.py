@@ -20,13 +20,8 @@ from detect.svm.engine_comparison import (
 )
 from seed import SEED
 from vdet.boxes import from_sizes, iou_matrix
-from vdet.config.schema import (
-    FeatureSettings,
-    HistogramSettings,
-    HogSettings,
-    SearchSettings,
-    SvmSettings,
-)
+from vdet.config.schema import SvmSettings
+from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings, SearchSettings
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.horizon import find_horizon
 from vdet.detect.svm.kind import shipped_model

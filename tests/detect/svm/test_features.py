@@ -7,12 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from seed import SEED
-from vdet.config.schema import (
-    ColorSpace,
-    FeatureSettings,
-    HistogramSettings,
-    HogSettings,
-)
+from vdet.config.svm import ColorSpace, FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.features import (
     FeatureExtractor,
     Layout,

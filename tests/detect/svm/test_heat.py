@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vdet.boxes import Box, Float32Array
-from vdet.config.schema import HeatSettings, WindowSettings
+from vdet.config.svm import HeatSettings, WindowSettings
 from vdet.detect.svm.heat import Heat, HeatHistory, find_regions
 from vdet.detect.svm.windows import Windows, lay_grid
 

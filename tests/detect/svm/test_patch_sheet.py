@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 import seed
-from vdet.config.schema import HistogramSettings, HogSettings
+from vdet.config.svm import HistogramSettings, HogSettings
 from vdet.detect.svm.patch_sheet import TILE, patch_sheet
 from vdet.media.images import Image
 

@@ -10,7 +10,8 @@ from detect.svm.engine_comparison import fitted, log_odds, road
 from red_cars import CAR, HEIGHT, SETTINGS, THREE_SETS, WIDTH, red_finder
 from red_cars import road as plain_road
 from vdet.boxes import Float32Array, Float64Array, iou_matrix
-from vdet.config.schema import FeatureSettings, Settings, SvmSettings
+from vdet.config.schema import Settings, SvmSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import SvmModel
 from vdet.detect.svm.search import FrameSearch

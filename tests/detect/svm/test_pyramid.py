@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codings import CODINGS, FULL, HD, LIMITED, in_any_coding, smooth_picture
-from vdet.config.schema import ColorSpace, FeatureSettings
+from vdet.config.svm import ColorSpace, FeatureSettings
 from vdet.detect.svm.features import Channels, resize, split
 from vdet.detect.svm.pyramid import FramePyramid
 from vdet.media import Picture, Planes

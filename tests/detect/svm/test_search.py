@@ -5,16 +5,16 @@ import pytest
 
 import seed
 from vdet.boxes import Int32Array
-from vdet.config.schema import (
+from vdet.config.schema import SvmSettings
+from vdet.config.section import scale_lengths
+from vdet.config.svm import (
     FeatureSettings,
     HistogramSettings,
     HogSettings,
     PerspectiveSettings,
     SearchSettings,
-    SvmSettings,
     WindowSettings,
 )
-from vdet.config.section import scale_lengths
 from vdet.detect.svm.dense_search import DenseSearch
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression, LinearModel

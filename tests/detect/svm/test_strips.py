@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 
 from detect.svm.engine_comparison import SEED_FEATURES
-from vdet.config.schema import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
 from vdet.detect.svm.features import (
     Channels,
     FeatureExtractor,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vdet.config.schema import AugmentationSettings
+from vdet.config.train import AugmentationSettings
 from vdet.learn.svm.augmentation import Sample, augment, cut_off, mirrored, zoom_in
 
 NOISE = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)

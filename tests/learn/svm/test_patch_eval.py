@@ -10,15 +10,9 @@ import numpy as np
 import pytest
 
 from pages.html import Elements
-from vdet.config.schema import (
-    FeatureSettings,
-    HistogramSettings,
-    HogSettings,
-    Settings,
-    SvmSettings,
-    SvmTrainingSettings,
-    TrainSettings,
-)
+from vdet.config.schema import Settings, SvmSettings, TrainSettings
+from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.train import SvmTrainingSettings
 from vdet.evaluate.output import RunName
 from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.patch_eval import (

@@ -15,16 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import vdet
-from vdet.config.schema import (
-    AugmentationSettings,
-    FeatureSettings,
-    HistogramSettings,
-    HogSettings,
-    Settings,
-    SvmSettings,
-    SvmTrainingSettings,
-    TrainSettings,
-)
+from vdet.config.schema import Settings, SvmSettings, TrainSettings
+from vdet.config.svm import FeatureSettings, HistogramSettings, HogSettings
+from vdet.config.train import AugmentationSettings, SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor, Layout
 from vdet.detect.svm.model import load_model, save_model
 from vdet.errors import DataError

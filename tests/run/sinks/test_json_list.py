@@ -10,7 +10,7 @@ import pytest
 from red_cars import road
 from run.red_runs import result_of, write
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.lanes.road import LaneRequest, RoadFinder
 from vdet.run.sinks.protocol import Output
 from vdet.track.track import Track

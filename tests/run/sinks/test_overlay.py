@@ -11,10 +11,8 @@ import pytest
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings
 from vdet.config.places import RegionSettings, RegionsSettings
-from vdet.config.schema import Settings
-from vdet.config.video import DrawSettings
+from vdet.config.schema import DrawSettings, LaneSettings, Settings
 from vdet.draw.boxes import BLACK, WHITE, color_of, draw_box, draw_label
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder

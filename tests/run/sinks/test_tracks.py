@@ -12,7 +12,7 @@ import pytest
 
 from run.red_runs import result_of, write
 from vdet.boxes import Box
-from vdet.config.lanes import LaneSettings
+from vdet.config.schema import LaneSettings
 from vdet.errors import OutputError
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder, lane_record
 from vdet.run.result import FrameResult

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from seed import tracker_but
 from vdet.boxes import Box, Boxes
-from vdet.config.schema import RulesTrackerSettings
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.tracker import RulesTracker

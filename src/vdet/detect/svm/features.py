@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float32Array
-from vdet.config.schema import FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.media.images import Image, split_channels
 
 _CONVERSIONS = {

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Box, Float32Array
-from vdet.config.schema import HeatSettings
+from vdet.config.svm import HeatSettings
 from vdet.detect.svm.windows import Windows
 
 

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from vdet.config.schema import FeatureSettings, NetworkSettings, SvmSettings
+from vdet.config.schema import NetworkSettings, SvmSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.factory import DetectorKind
 from vdet.detect.protocol import DetectorModel
 from vdet.detect.svm.detector import SvmModel

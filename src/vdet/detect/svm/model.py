@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from vdet.archives import open_archive, read_member
 from vdet.boxes import Float32Array
-from vdet.config.schema import FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import Layout
 from vdet.errors import ModelError
 from vdet.files import read_whole, staged

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import Float64Array
-from vdet.config.schema import FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import histogram, hog_descriptor, split, to_patch
 from vdet.draw.boxes import WHITE
 from vdet.media.images import Image

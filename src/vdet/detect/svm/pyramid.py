@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from vdet.config.schema import FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import Channels, halve, resize, split
 from vdet.media import Picture, Planes
 from vdet.media.images import Image

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.config.schema import FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import cut_window
 from vdet.detect.svm.heat import Heat
 from vdet.detect.svm.patch_sheet import patch_sheet

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 from vdet.boxes import Float32Array
-from vdet.config.schema import FeatureSettings
+from vdet.config.svm import FeatureSettings
 from vdet.detect.svm.features import Channels, Layout, hog_descriptor
 from vdet.detect.svm.model import LinearModel
 from vdet.detect.svm.pyramid import FramePyramid

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Float32Array
-from vdet.config.schema import AugmentationSettings
+from vdet.config.train import AugmentationSettings
 from vdet.media.images import Image
 
 UNKNOWN_SIDES: tuple[float, ...] = (np.nan,) * 4

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vdet.boxes import BoolArray, Float32Array
-from vdet.config.schema import FeatureSettings, SvmTrainingSettings
+from vdet.config.svm import FeatureSettings
+from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import UNKNOWN_SIDES, Augmenter, Sample

@@ -21,7 +21,9 @@ from sklearn.model_selection import StratifiedKFold
 from sklearn.preprocessing import StandardScaler
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
-from vdet.config.schema import FeatureSettings, Settings, SvmTrainingSettings
+from vdet.config.schema import Settings
+from vdet.config.svm import FeatureSettings
+from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.extraction import LabelledVectors, RowNumbers

@@ -66,7 +66,6 @@ class CropSink(BaseSink):
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
         self._folder = context.files.stage_folder(path, _CROP_NAME)
-        self._suffix = f".{context.settings.crops.format}"
         self._best = BestCrops()
         self._written: dict[int, Path] = {}
 
@@ -82,7 +81,7 @@ class CropSink(BaseSink):
         for crop in crops:
             if crop.id in self._written:
                 self._written[crop.id].unlink()
-            name = f"vehicle-{crop.id:04d}-at-{crop.time:.3f}s{self._suffix}"
+            name = f"vehicle-{crop.id:04d}-at-{crop.time:.3f}s.jpg"
             self._written[crop.id] = path = self._folder / name
             path.write_bytes(encode_image(crop.image, path))
 

@@ -30,7 +30,7 @@ from dataclasses import replace
 from itertools import combinations
 
 from vdet.boxes import Box
-from vdet.config.schema import RulesTrackerSettings
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.media.images import Image
 from vdet.track.rules.car import Car, Region
 

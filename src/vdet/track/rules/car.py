@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.config.schema import RulesTrackerSettings
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.media.images import Image
 
 Point = tuple[float, float]

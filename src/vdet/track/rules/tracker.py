@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from itertools import count
 
 from vdet.boxes import Boxes
-from vdet.config.schema import RulesTrackerSettings
+from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.rules.association import Association
