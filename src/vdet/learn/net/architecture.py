@@ -15,8 +15,8 @@ from vdet.detect.onnx import layouts
 from vdet.detect.onnx.layouts import STRIDES
 
 STEM = 16
-TRUNK = ((32, 1), (64, 3), (96, 4), (128, 3))
-"""Width and number of blocks of each stage; the first block of each halves the resolution."""
+TRUNK = ((32, 0), (64, 2), (96, 3), (128, 2))
+"""Width of each stage, and the number of blocks behind its first one, which halves the size."""
 
 NECK = 64
 """Width of the joined levels and of the heads."""
@@ -59,10 +59,8 @@ class Network(nn.Module):
         self.stem_norm = nn.BatchNorm2d(STEM)
         widths = [STEM, *(width for width, _ in TRUNK)]
         self.stages = nn.ModuleList(
-            nn.Sequential(
-                Block(before, width, 2), *(Block(width, width) for _ in range(blocks - 1))
-            )
-            for before, (width, blocks) in zip(widths, TRUNK, strict=False)
+            nn.Sequential(Block(before, width, 2), *(Block(width, width) for _ in range(more)))
+            for before, (width, more) in zip(widths, TRUNK, strict=False)
         )
         self.lateral = nn.ModuleList(
             nn.Sequential(nn.Conv2d(width, NECK, 1, bias=False), nn.BatchNorm2d(NECK), nn.ReLU())
@@ -73,14 +71,13 @@ class Network(nn.Module):
         self.towers = nn.ModuleList(
             nn.Sequential(Block(NECK, NECK), Block(NECK, NECK)) for _ in STRIDES
         )
-        self.heads = nn.ModuleList(nn.Conv2d(NECK, self.columns, 1) for _ in STRIDES)
-        for head in self.heads:
-            assert isinstance(head, nn.Conv2d)
-            assert head.bias is not None
+        heads = [nn.Conv2d(NECK, self.columns, 1) for _ in STRIDES]
+        first = torch.zeros(self.columns)
+        first[0] = torch.logit(torch.tensor(_FIRST_SCORE))
+        for head in heads:
             nn.init.normal_(head.weight, std=0.01)
-            nn.init.zeros_(head.bias)
-            with torch.no_grad():
-                head.bias[0] = torch.logit(torch.tensor(_FIRST_SCORE))
+            head.bias = nn.Parameter(first.clone())
+        self.heads = nn.ModuleList(heads)
 
     def forward(self, pictures: Tensor) -> list[Tensor]:
         """Return the raw output of each level, `(B, 5 + classes, H / stride, W / stride)`.
@@ -103,16 +100,14 @@ class Network(nn.Module):
             values = stage(values)
             levels.append(values)
         low, middle, high = (
-            lateral(level) for lateral, level in zip(self.lateral, levels[1:], strict=True)
+            join(level) for join, level in zip(self.lateral, levels[1:], strict=True)
         )
         middle = self.down[0](middle + functional.interpolate(high, scale_factor=2.0))
         low = self.down[1](low + functional.interpolate(middle, scale_factor=2.0))
         middle = middle + self.up[0](low)
         high = high + self.up[1](middle)
-        return [
-            head(tower(level))
-            for level, tower, head in zip((low, middle, high), self.towers, self.heads, strict=True)
-        ]
+        parts = zip((low, middle, high), self.towers, self.heads, strict=True)
+        return [head(tower(level)) for level, tower, head in parts]
 
 
 def cell_centers(height: int, width: int) -> tuple[Tensor, Tensor]:

@@ -98,11 +98,10 @@ def start_from(network: Network, path: Path, pictures: Tensor) -> None:
             biases.append(bias)
             if layer.bias is not None:
                 layer.bias.copy_(bias.reshape(layer.bias.shape))
-        else:
+        elif isinstance(layer, nn.BatchNorm2d):
             _undo(layer, inputs[0], biases[-1])
 
-    kinds = nn.Conv2d | nn.BatchNorm2d
-    layers = [each for each in network.modules() if isinstance(each, kinds)]
+    layers = [each for each in network.modules() if isinstance(each, nn.Conv2d | nn.BatchNorm2d)]
     hooks = [layer.register_forward_pre_hook(load) for layer in layers]
     try:
         folded = iter(_convolutions(path))
@@ -130,13 +129,8 @@ def _convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     ]
 
 
-def _undo(norm: nn.Module, inputs: Tensor, bias: Tensor) -> None:
+def _undo(norm: nn.BatchNorm2d, inputs: Tensor, bias: Tensor) -> None:
     """Set a normalisation so that it changes nothing but adds a bias."""
-    assert isinstance(norm, nn.BatchNorm2d)
-    assert norm.running_mean is not None
-    assert norm.running_var is not None
     variance, mean = torch.var_mean(inputs, (0, 2, 3))
-    norm.running_mean.copy_(mean)
-    norm.running_var.copy_(variance)
-    norm.weight.copy_(torch.sqrt(variance + norm.eps))
-    norm.bias.copy_(bias + mean)
+    scale = {"weight": torch.sqrt(variance + norm.eps), "bias": bias + mean}
+    norm.load_state_dict({**scale, "running_mean": mean, "running_var": variance}, strict=False)

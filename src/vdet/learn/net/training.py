@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from vdet.config.train import NetworkTrainingSettings
 from vdet.errors import DataError
-from vdet.files import OutputFiles
+from vdet.files import staged
 from vdet.learn.net.architecture import Network, cell_centers, decode, flatten
 from vdet.learn.net.assignment import Vehicles, assign
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
@@ -59,6 +59,12 @@ class Batch:
     pictures: Tensor
     vehicles: Vehicles
     ignored: Vehicles
+
+    @property
+    def inputs(self) -> Tensor:
+        """The pictures as the network takes them."""
+        pictures = self.pictures.permute(0, 3, 1, 2).float()
+        return pictures.contiguous(memory_format=torch.channels_last)
 
 
 def _batches(
@@ -137,9 +143,9 @@ def _check(sources: Sequence[Source], settings: NetworkTrainingSettings) -> None
         raise DataError("no picture has a vehicle; give labelled pictures")
     names = {each.name for each in sources}
     if unknown := sorted(settings.weights.keys() - names):
+        known = ", ".join(sorted(names))
         raise DataError(
-            f"train.net.weights: no set of pictures is named {unknown[0]}; there are "
-            f"{', '.join(sorted(names))}"
+            f"train.net.weights: no set of pictures is named {unknown[0]}; there are {known}"
         )
 
 
@@ -167,18 +173,18 @@ class _Run:
         self.averaged = copy.deepcopy(self._network)
         weights = [each for each in self._network.parameters() if each.ndim > 1]
         others = [each for each in self._network.parameters() if each.ndim <= 1]
-        self._optimizer = torch.optim.AdamW(
-            [
-                {"params": weights, "weight_decay": _WEIGHT_DECAY},
-                {"params": others, "weight_decay": 0.0},
-            ],
-            lr=settings.rate,
-        )
+        groups = [{"params": weights}, {"params": others, "weight_decay": 0.0}]
+        self._optimizer = torch.optim.AdamW(groups, settings.rate, weight_decay=_WEIGHT_DECAY)
+        self._parts = {
+            "network": self._network,
+            "averaged": self.averaged,
+            "optimizer": self._optimizer,
+        }
         self.step = 0
 
     def start_from(self, path: Path, batch: Batch) -> None:
         """Take the first weights from an exported network. Raises `DataError`."""
-        start_from(self._network, path, _inputs(batch))
+        start_from(self._network, path, batch.inputs)
         self.averaged.load_state_dict(self._network.state_dict())
 
     @property
@@ -215,38 +221,29 @@ class _Run:
 
     def save(self, path: Path) -> None:
         """Write the state to a file."""
-        state = {
-            "settings": self._learnt_with,
-            "step": self.step,
-            "network": self._network.state_dict(),
-            "averaged": self.averaged.state_dict(),
-            "optimizer": self._optimizer.state_dict(),
-        }
-        with OutputFiles(overwrite=True) as files:
-            torch.save(state, files.stage(path))
+        parts = {name: part.state_dict() for name, part in self._parts.items()}
+        with staged(path, overwrite=True) as temporary:
+            torch.save({"settings": self._learnt_with, "step": self.step, **parts}, temporary)
 
     def restore(self, path: Path) -> None:
         """Go on from a file that `save` has written. Raises `DataError`."""
         try:
             state: dict[str, Any] = torch.load(path, weights_only=True)
             same = state["settings"] == self._learnt_with
-            self._network.load_state_dict(state["network"])
-            self.averaged.load_state_dict(state["averaged"])
-            self._optimizer.load_state_dict(state["optimizer"])
+            for name, part in self._parts.items():
+                part.load_state_dict(state[name])
             self.step = state["step"]
         except Exception as error:  # torch raises many kinds for a file of another form
             raise DataError(f"{path}: is no checkpoint of this training; remove it") from error
         if not same:
-            raise DataError(
-                f"{path}: belongs to a training with other settings, pictures or another base; "
-                "remove it"
-            )
+            others = "with other settings, other pictures or another base"
+            raise DataError(f"{path}: belongs to a training {others}; remove it")
 
 
 def _loss(network: Network, batch: Batch) -> Tensor:
     height, width = batch.pictures.shape[1:3]
     centers, strides = cell_centers(height, width)
-    raw = flatten(network(_inputs(batch)))
+    raw = flatten(network(batch.inputs))
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
     found = assign(scores, boxes, batch.vehicles, centers, strides)
     targets = torch.zeros_like(scores)
@@ -265,12 +262,6 @@ def _loss(network: Network, batch: Batch) -> Tensor:
         reduction="sum",
     )
     return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(found.iou), 1)
-
-
-def _inputs(batch: Batch) -> Tensor:
-    """Return the pictures as the network takes them."""
-    pictures = batch.pictures.permute(0, 3, 1, 2).float()
-    return pictures.contiguous(memory_format=torch.channels_last)
 
 
 def _inside(ignored: Vehicles, centers: Tensor) -> tuple[Tensor, Tensor]:
