@@ -26,7 +26,7 @@ from vdet.files import check_output
     nargs=2,
     multiple=True,
 )
-@option("--base FILE", "Start from the weights of this network, which vdet train-net has written.")
+@option("--base FILE", "Start from the weights of a network that vdet train-net has written.")
 @options.settings_options("train.net.steps=4000")
 @options.overwrite_option
 def train_net(
@@ -39,9 +39,9 @@ def train_net(
 ) -> None:
     """Train a network on labelled pictures.
 
-    Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The state of the
-    training is kept beside the network, as .ckpt. If the training was stopped, the same command
-    continues it. The metrics are written beside the network as JSON.
+    Each DATA is a set of labelled pictures: COCO, KITTI, YOLO or Pascal VOC. The training saves its
+    state beside the network, as .ckpt; if it is stopped, the same command resumes it. The metrics
+    are written beside the network, as JSON.
     Needs torch and onnx: pip install torch onnx
     """
     if not data and not clips:
@@ -49,11 +49,9 @@ def train_net(
     options.check_suffix(output, ".onnx", what="networks")
     settings = choice.read()
     try:
-        import onnx  # noqa: F401
-        import torch  # noqa: F401
+        from vdet.learn.net.run import NetworkJob, train_to_file
     except ImportError as error:
-        raise DataError("torch or onnx is not installed; pip install torch onnx") from error
-    from vdet.learn.net.run import NetworkJob, train_to_file
+        raise DataError(f"{error.name} is not installed; pip install torch onnx") from error
     from vdet.workers import limit_library_threads
 
     limit_library_threads()
@@ -65,8 +63,6 @@ def train_net(
     with live_bar(total=settings.train.net.steps, unit=" steps") as bar:
 
         def advance(step: int, loss: float) -> None:
-            if bar.n == 0:  # a training that continues is not as fast as its first step seems
-                bar.initial = step - 1
             bar.set_postfix_str(f"loss {loss:.3f}", refresh=False)
             bar.update(step - bar.n)
 

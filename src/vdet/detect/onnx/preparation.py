@@ -11,6 +11,7 @@ from vdet.boxes import Float32Array
 from vdet.media import Picture
 from vdet.media.images import Image
 
+_MULTIPLE = 32  # of pixels: the stride of the coarsest cells
 GREY = 114
 """Value of the input beyond the frame."""
 
@@ -114,10 +115,7 @@ def _scaled_picture(picture: Picture, width: int, height: int) -> Image:
     return planes.coding.to_bgr((first, second, third))
 
 
-def size_of_area(width: int, height: int, pixels: int, multiple: int) -> tuple[int, int]:
-    """Return width and height of about `pixels` in the shape of a frame, in whole multiples."""
-    factor = (pixels / (width * height)) ** 0.5
-    return (
-        max(1, round(width * factor / multiple)) * multiple,
-        max(1, round(height * factor / multiple)) * multiple,
-    )
+def size_of_area(width: int, height: int, pixels: int) -> tuple[int, int]:
+    """Return width and height of about `pixels` in the shape of a frame, for our own networks."""
+    factor = (pixels / (width * height)) ** 0.5 / _MULTIPLE
+    return max(1, round(width * factor)) * _MULTIPLE, max(1, round(height * factor)) * _MULTIPLE

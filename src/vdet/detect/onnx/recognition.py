@@ -13,22 +13,13 @@ from pydantic import Field, ValidationError
 
 from vdet.config.section import Section
 from vdet.config.train import NetworkScoreSettings
-from vdet.detect.onnx.layouts import (
-    Layout,
-    RawBoxes,
-    cell_centers,
-    center_columns,
-    center_rows,
-    final_rows,
-    named_columns,
-    our_cells,
-)
+from vdet.detect.onnx import layouts
+from vdet.detect.onnx.layouts import Layout, RawBoxes, cell_centers
 from vdet.detect.onnx.preparation import GREY, InputForm, size_of_area
 from vdet.detect.onnx.session import TYPES, Array, Session
 from vdet.errors import ModelError
 from vdet.media import Picture
 
-_MULTIPLE = 32
 _MAX_SIDE = 16_384
 _MAX_PIXELS = 16_000_000
 _MOST_FINAL_ROWS = 1000
@@ -165,9 +156,9 @@ def read_header(session: Session) -> Header | None:
 
 def _ours(session: Session, header: Header, width: int, height: int) -> Recognized:
     """Return a network of ours for frames of one size."""
-    size = size_of_area(width, height, header.pixels, _MULTIPLE)
+    size = size_of_area(width, height, header.pixels)
     form = InputForm(*size, rows_first=True, dtype=np.uint8)
-    layout = partial(our_cells, cells=cell_centers(*size), score=header.calibration)
+    layout = partial(layouts.our_cells, cells=cell_centers(*size), score=header.calibration)
     reasons = ("it has a header of vdet",)
     return Recognized(session, "vdet", reasons, header.classes, form, layout, header)
 
@@ -176,7 +167,9 @@ def _rt_detr(session: Session, names: Sequence[str]) -> Recognized:
     places = {name: place for place, name in enumerate(session.output_names)}
     if not {"labels", "boxes", "scores"} <= set(places):
         raise _unknown(session, f"it has an input {_SIZES}, but outputs {', '.join(places)}")
-    layout = partial(named_columns, order=(places["labels"], places["boxes"], places["scores"]))
+    layout = partial(
+        layouts.named_columns, order=(places["labels"], places["boxes"], places["scores"])
+    )
     reasons = (f"it has an input {_SIZES}", "its outputs are labels, boxes and scores")
     form = replace(_form(session, None), fit="stretch")
     found = Recognized(session, "RT-DETR", reasons, tuple(names) or COCO, form, layout)
@@ -188,7 +181,7 @@ def _by_shape(session: Session, names: Sequence[str]) -> Recognized:
     metadata = _ultralytics_metadata(session)
     form = _form(session, metadata.size)
     names = tuple(names) or metadata.names
-    found = Recognized(session, "", (), names, form, final_rows)
+    found = Recognized(session, "", (), names, form, layouts.final_rows)
     outputs = found.outputs_for_grey()
     shape = outputs[0].shape
     size = f"{form.width}×{form.height}"
@@ -196,36 +189,32 @@ def _by_shape(session: Session, names: Sequence[str]) -> Recognized:
     rule = _rule(shape[1:], cells, metadata) if len(shape) == 3 and shape[0] == 1 else None
     if rule is None:
         raise _unknown(session, f"for an input of {size} it gives {_shapes(outputs)}")
+    name, reason, classes, layout = rule
     seen = ("its metadata has the keys of Ultralytics",) if metadata.names else ()
-    reasons = (*seen, f"its output is {shape}: {rule.reason}")
-    names = _names(session, names, rule.classes)
-    found = replace(found, name=rule.name, reasons=reasons, names=names, layout=rule.layout)
-    return _as_yolox(found) if rule.name == "YOLOX" else found
+    reasons = (*seen, f"its output is {shape}: {reason}")
+    names = _names(session, names, classes)
+    found = replace(found, name=name, reasons=reasons, names=names, layout=layout)
+    return _as_yolox(found) if name == "YOLOX" else found
 
 
-class _Rule(NamedTuple):
-    """A form of output: its name, the reason for it, its number of classes (None: any)."""
-
-    name: str
-    reason: str
-    classes: int | None
-    layout: Layout
+_Rule = tuple[str, str, int | None, Layout]
+"""A form of output: its name, the reason for it, its number of classes (None: any), its layout."""
 
 
 def _rule(shape: Sequence[int], cells: int, metadata: "_Metadata") -> _Rule | None:
     """Return the form of an output of this many rows and columns, if it is known."""
     rows, columns = shape
     known = len(metadata.names)
-    final = _Rule("boxes after suppression", "rows of box, score and class", None, final_rows)
+    final = "boxes after suppression", "rows of box, score and class", None, layouts.final_rows
     if columns == 6 and metadata.is_final:
         return final
     if columns == cells and known in (0, rows - 4):
         reason = "columns of box and class scores"
-        return _Rule("Ultralytics v8 or later", reason, rows - 4, center_columns)
+        return "Ultralytics v8 or later", reason, rows - 4, layouts.center_columns
     if rows == 3 * cells and known in (0, columns - 5):
-        return _Rule("Ultralytics v5", "three boxes a cell", columns - 5, center_rows)
-    if rows == cells and columns >= 6 and not known:
-        return _Rule("YOLOX", "one box a cell, and no metadata", columns - 5, center_rows)
+        return "Ultralytics v5", "three boxes a cell", columns - 5, layouts.center_rows
+    if rows == cells and columns >= 6 and not known:  # an exact number: before any number of rows
+        return "YOLOX", "one box a cell, and no metadata", columns - 5, layouts.center_rows
     return final if columns == 6 and rows <= _MOST_FINAL_ROWS else None
 
 
@@ -237,7 +226,7 @@ def _as_yolox(found: Recognized) -> Recognized:
         return found
     grid = cell_centers(found.form.width, found.form.height)
     reasons = (*found.reasons, "its boxes are relative to cells")
-    return replace(found, layout=partial(center_rows, grid=grid), reasons=reasons)
+    return replace(found, layout=partial(layouts.center_rows, grid=grid), reasons=reasons)
 
 
 def _names(session: Session, names: tuple[str, ...], count: int | None) -> tuple[str, ...]:

@@ -44,25 +44,11 @@ class Vehicles:
         return len(self.boxes)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Assignment:
-    """Pairs of cells and vehicles: each cell has at most one vehicle.
-
-    `picture` and `cell` name the cell, `vehicle` the row of its vehicle, `iou` their overlap; all
-    `(m,)`.
-    """
-
-    picture: Tensor
-    cell: Tensor
-    vehicle: Tensor
-    iou: Tensor
-
-
 @torch.no_grad()
 def assign(
     scores: Tensor, boxes: Tensor, vehicles: Vehicles, centers: Tensor, strides: Tensor
-) -> Assignment:
-    """Return which cells are to find which vehicle.
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return which cells are to find which vehicle; a cell has at most one.
 
     Parameters
     ----------
@@ -72,6 +58,12 @@ def assign(
         `(B, cells, 4)`: x1, y1, x2, y2, pixels.
     centers, strides
         Of the cells, see `cell_centers`.
+
+    Returns
+    -------
+    row, cell, iou
+        The row of each vehicle, the cell in its picture, and the overlap of their boxes; all
+        `(m,)`.
     """
     middle = (vehicles.boxes[:, :2] + vehicles.boxes[:, 2:]) / 2
     half = (vehicles.boxes[:, 2:] - vehicles.boxes[:, :2]) / 2
@@ -96,7 +88,7 @@ def assign(
     row, cell = torch.nonzero(chosen, as_tuple=True)
     keep = _one_for_each_cell(vehicles.picture[row] * len(centers) + cell, costs[row, cell])
     row, cell = row[keep], cell[keep]
-    return Assignment(vehicles.picture[row], cell, row, overlaps[row, cell])
+    return row, cell, overlaps[row, cell]
 
 
 def _cheapest(costs: Tensor, overlaps: Tensor) -> Tensor:

@@ -47,11 +47,6 @@ class NetworkJob:
         """The file of the metrics."""
         return self.output.with_suffix(".json")
 
-    @property
-    def checkpoint(self) -> Path:
-        """The file of the training's state."""
-        return self.output.with_suffix(".ckpt")
-
 
 @dataclass(frozen=True, slots=True)
 class NetworkMetrics:
@@ -71,10 +66,8 @@ class NetworkMetrics:
         for source in self.sources:
             yield f"{source.name:<28}{source.pictures:6d} pictures {source.vehicles:8d} vehicles"
         loss = "" if self.loss is None else f"; loss at the end {self.loss:.3f}"
-        yield (
-            f"{self.parameters:,} parameters after {self.steps:,} steps, "
-            f"{self.seconds / 60:.1f} minutes{loss}"
-        )
+        duration = f"{self.steps:,} steps, {self.seconds / 60:.1f} minutes"
+        yield f"{self.parameters:,} parameters after {duration}{loss}"
 
 
 def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) -> NetworkMetrics:
@@ -93,6 +86,7 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) ->
         A file cannot be written.
     """
     began = time.monotonic()
+    checkpoint = job.output.with_suffix(".ckpt")
     base = {}
     if job.base:
         header = read_header(Session(job.base))
@@ -106,7 +100,7 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) ->
         losses.append(loss)
         progress(step, loss)
 
-    network = train_network(sources, learning, job.checkpoint, base=job.base, progress=advance)
+    network = train_network(sources, learning, checkpoint, base=job.base, progress=advance)
     report = NetworkMetrics(
         sources=tuple(source.report() for source in sources),
         steps=learning.steps,
@@ -127,5 +121,5 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) ->
     )
     export_network(network, header, job.output, overwrite=job.overwrite)
     write_json(asdict(report), str(job.metrics), overwrite=job.overwrite)
-    job.checkpoint.unlink(missing_ok=True)
+    checkpoint.unlink(missing_ok=True)
     return report

@@ -245,23 +245,19 @@ def _loss(network: Network, batch: Batch) -> Tensor:
     centers, strides = cell_centers(height, width)
     raw = flatten(network(batch.inputs))
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
-    found = assign(scores, boxes, batch.vehicles, centers, strides)
+    row, cell, iou = assign(scores, boxes, batch.vehicles, centers, strides)
+    cells = batch.vehicles.picture[row], cell
     targets = torch.zeros_like(scores)
-    targets[found.picture, found.cell] = found.iou
+    targets[cells] = iou
     counted = torch.ones_like(scores)
     counted[_inside(batch.ignored, centers)] = 0
-    counted[found.picture, found.cell] = 1
-    whole = found.iou.sum().clamp(min=1)
+    counted[cells] = 1
+    whole = iou.sum().clamp(min=1)
     score_loss = (quality_focal_loss(scores, targets) * counted).sum() / whole
-    overlap = giou(boxes[found.picture, found.cell], batch.vehicles.boxes[found.vehicle])
-    box_loss = ((1 - overlap) * found.iou).sum() / whole
-    class_loss = functional.cross_entropy(
-        raw[found.picture, found.cell, 5:],
-        batch.vehicles.classes[found.vehicle],
-        ignore_index=UNKNOWN,
-        reduction="sum",
-    )
-    return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(found.iou), 1)
+    box_loss = ((1 - giou(boxes[cells], batch.vehicles.boxes[row])) * iou).sum() / whole
+    classes, outputs = batch.vehicles.classes[row], raw[..., 5:][cells]
+    class_loss = functional.cross_entropy(outputs, classes, ignore_index=UNKNOWN, reduction="sum")
+    return score_loss + BOX_WEIGHT * box_loss + CLASS_WEIGHT * class_loss / max(len(iou), 1)
 
 
 def _inside(ignored: Vehicles, centers: Tensor) -> tuple[Tensor, Tensor]:
