@@ -1,8 +1,10 @@
 """A network in an ONNX file as a detector, of the kind `net`."""
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -119,19 +121,17 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
 
 
 def trained_on(path: Path) -> tuple[str, ...]:
-    """Return the names of the sets that a network of ours was trained on; of others, nothing.
+    """Return the names of the sets that a network of ours and its bases were trained on.
 
-    Those of the networks that it was trained from are among them.
+    Other networks do not name them.
     """
     header = read_header(Session(path))
-    provenance = header.provenance if header else None
+    provenance: Any = header.provenance if header else None
     names: list[str] = []
-    try:
+    with contextlib.suppress(LookupError, TypeError, AttributeError):  # written by another program
         while provenance:
             names += (str(source["name"]) for source in provenance["report"]["sources"])
             provenance = provenance.get("base")
-    except (LookupError, TypeError, AttributeError):
-        return ()
     return tuple(dict.fromkeys(names))
 
 

@@ -54,10 +54,7 @@ def our_cells(
 def center_columns(outputs: Sequence[Array], least: float) -> RawBoxes:
     """Read Ultralytics v8 and v11: `(1, 4 + nc, n)`, columns of middle, size and class scores."""
     table = outputs[0][0].T
-    classes = table[:, 4:].argmax(axis=1)
-    scores = table[np.arange(len(table)), 4 + classes]
-    rows = np.flatnonzero(scores >= least)
-    return _raw(_around(table[rows, :2], table[rows, 2:4]), scores[rows], classes[rows])
+    return _of_best_classes(table[:, :2], table[:, 2:4], table[:, 4:], least)
 
 
 def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = None) -> RawBoxes:
@@ -66,16 +63,12 @@ def center_rows(outputs: Sequence[Array], least: float, *, grid: Cells | None = 
     `grid` are the cells of the input where middles and sizes are relative to those, as in YOLOX.
     """
     table = outputs[0][0]
-    classes = table[:, 5:].argmax(axis=1)
-    scores = table[:, 4] * table[np.arange(len(table)), 5 + classes]
-    rows = np.flatnonzero(scores >= least)
-    middle, size = table[rows, :2], table[rows, 2:4]
+    middle, size = table[:, :2], table[:, 2:4]
     if grid is not None:
         centers, strides = grid
-        stride = strides[rows, np.newaxis]
-        middle = centers[rows] + (middle - 0.5) * stride  # offsets from the cell's corner
-        size = np.exp(np.minimum(size, 20)) * stride
-    return _raw(_around(middle, size), scores[rows], classes[rows])
+        middle = centers + (middle - 0.5) * strides[:, np.newaxis]  # offsets from the cell's corner
+        size = np.exp(np.minimum(size, 20)) * strides[:, np.newaxis]
+    return _of_best_classes(middle, size, table[:, 4:5] * table[:, 5:], least)
 
 
 def final_rows(outputs: Sequence[Array], least: float) -> RawBoxes:
@@ -104,8 +97,14 @@ def cell_centers(width: int, height: int) -> Cells:
     return np.concatenate(centers).astype(np.float32), np.concatenate(strides).astype(np.float32)
 
 
-def _around(middle: Array, size: Array) -> Array:
-    return np.concatenate([middle - size / 2, middle + size / 2], axis=1)
+def _of_best_classes(middle: Array, size: Array, scores: Array, least: float) -> RawBoxes:
+    """Return a box of its best class for each row of `scores`, `(n, classes)`."""
+    classes = scores.argmax(axis=1)
+    best = scores[np.arange(len(scores)), classes]
+    rows = np.flatnonzero(best >= least)
+    half = size[rows] / 2
+    boxes = np.concatenate([middle[rows] - half, middle[rows] + half], axis=1)
+    return _raw(boxes, best[rows], classes[rows])
 
 
 def _raw(boxes: Array, scores: Array, classes: Array) -> RawBoxes:

@@ -38,11 +38,11 @@ class Header(Section):
 
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
-    pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS, description="of the scaled frame")
+    pixels: int = Field(147_456, ge=1024, le=_MAX_PIXELS)
+    """Size of the scaled frame."""
     calibration: NetworkScoreSettings = NetworkScoreSettings()
-    provenance: dict[str, Any] = Field(
-        default={}, description="what it was trained on and how, and its metrics"
-    )
+    provenance: dict[str, Any] = Field({})
+    """What it was trained on and how, and its metrics."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

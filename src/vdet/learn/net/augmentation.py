@@ -78,12 +78,8 @@ class SampleDrawer:
         y = round(height * rng.uniform(0.3, 0.7))
         image = np.empty((height, width, 3), np.uint8)
         parts = []
-        for left, top, right, bottom in (
-            (0, 0, x, y),
-            (x, 0, width, y),
-            (0, y, x, height),
-            (x, y, width, height),
-        ):
+        places = (0, 0, x, y), (x, 0, width, y), (0, y, x, height), (x, y, width, height)
+        for left, top, right, bottom in places:
             scale = drawing.magnified * _scale(rng, _MOSAIC_SCALES)
             fit = width / (right - left)  # the scale refers to the width of the whole picture
             part = _place(rng, self._pick(rng), (right - left, bottom - top), scale * fit / 2)
@@ -117,14 +113,7 @@ def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scal
     angle = rng.normal(0, _TILT) if rng.random() < _TILTED else 0.0
     turn = cv2.getRotationMatrix2D((width / 2, height / 2), angle, 1.0)
     placing = np.array([[a, 0, shift_x], [0, b, shift_y], [0, 0, 1]])
-    warped = cv2.warpAffine(
-        image,
-        turn @ placing,
-        size,
-        flags=cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_CONSTANT,
-        borderValue=(GREY,) * 3,
-    )
+    warped = cv2.warpAffine(image, turn @ placing, size, borderValue=(GREY,) * 3)
     factors = np.array([x_factor, y_factor] * 2, np.float32)
     offset = np.array([left, top] * 2, np.float32)
     boxes = _turned(sample.boxes * factors + offset, turn)

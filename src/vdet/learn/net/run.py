@@ -87,10 +87,7 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) ->
     """
     began = time.monotonic()
     checkpoint = job.output.with_suffix(".ckpt")
-    base = {}
-    if job.base:
-        header = read_header(Session(job.base))
-        base["base"] = header.provenance if header else {}
+    base = read_header(Session(job.base)) if job.base else None
     sources = [image_source(path, settings) for path in job.pictures]
     sources += [clip_source(video, truth, settings) for video, truth in job.clips]
     learning = settings.train.net
@@ -116,7 +113,7 @@ def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) ->
             "program": f"vdet {__version__}",
             "training": learning.model_dump(mode="json"),
             "report": asdict(report),
-            **base,
+            **({"base": base.provenance} if base else {}),
         },
     )
     export_network(network, header, job.output, overwrite=job.overwrite)

@@ -27,8 +27,6 @@ UNKNOWN = -1
 EVERY = 4
 """Every N-th frame of a labelled video is used: neighbours are nearly equal."""
 
-_VEHICLE = "vehicle"
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
@@ -131,10 +129,8 @@ def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
 
 def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray) -> Sample:
     classes = [CLASSES.index(name) if name in CLASSES else UNKNOWN for name in names]
-    is_other = np.array([name not in (*CLASSES, _VEHICLE) for name in names], np.bool_)
-    return Sample(
-        image, boxes.astype(np.float32), np.array(classes, np.int64), ignored | is_other
-    ).shrunk()
+    ignored = ignored | np.array([name not in (*CLASSES, "vehicle") for name in names], np.bool_)
+    return Sample(image, boxes.astype(np.float32), np.array(classes, np.int64), ignored).shrunk()
 
 
 def join(samples: Sequence[Sample], image: Image) -> Sample:

@@ -81,12 +81,10 @@ def _batches(
 def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
     is_small = step < _SMALL * settings.steps
     is_plain = step >= (1 - _PLAIN) * settings.steps
-    return Drawing(
-        width=settings.width // 2 if is_small else settings.width,
-        height=settings.height // 64 * 32 if is_small else settings.height,
-        magnified=_MAGNIFIED if is_small else 1.0,
-        mosaics=0.0 if is_plain else _MOSAICS,
-    )
+    mosaics = 0.0 if is_plain else _MOSAICS
+    if is_small:
+        return Drawing(settings.width // 2, settings.height // 64 * 32, _MAGNIFIED, mosaics)
+    return Drawing(settings.width, settings.height, 1.0, mosaics)
 
 
 def train_network(
