@@ -156,10 +156,10 @@ def test_vehicles_outside_the_regions_do_not_count(
     np.testing.assert_array_equal(truth.ignored, outside | clip.truth.ignored)
 
 
-def test_truth_beyond_the_video_is_refused_with_its_line(
+def test_truth_beyond_the_video_is_refused(
     clip_path: Path, tmp_path: Path, variant: OfModel
 ) -> None:
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
-    with pytest.raises(TruthError, match=r"gt\.txt:2: the frame is number 31 of a video of 30"):
+    with pytest.raises(TruthError, match=r"gt\.txt: has a box in frame 31 of a video of 30"):
         find_tracks(open_clip(clip_path, truth), [variant()])

@@ -156,7 +156,7 @@ WICKED_TRACKS = {
 
 DEEP = 1_000_000
 WICKED_TRACKS |= {
-    "deep COCO": ("t.coco.json", '{"images": ' + "[" * DEEP, "is not COCO .*recursion limit"),
+    "deep COCO": ("t.coco.json", '{"images": ' + "[" * DEEP, "is not COCO .*nested too deeply"),
     "no numbers in COCO": (
         "t.coco.json",
         '{"images": [], "categories": [], "annotations": [{"bbox": [1e999, NaN, 1, 1]}]}',

@@ -40,7 +40,7 @@ def checked_video(
     rate: float | None = None,
 ) -> LabelledVideo:
     """Return checked labels as a video."""
-    checked = checked_labels(path, rows, frame_count=frame_count)
+    checked = checked_labels(path, rows)
     return LabelledVideo.of(checked, frame_count=frame_count, rate=rate)
 
 

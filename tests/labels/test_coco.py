@@ -39,28 +39,32 @@ def changed(name: str, number: int, **values: object) -> bytes:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"{", ": is not COCO with tracks: Invalid JSON"),
-        (b'{"images": []}', ": is not COCO with tracks: annotations: Field required"),
+        (b"{", ": is not COCO with tracks: invalid JSON"),
+        (b'{"images": []}', ": is not COCO with tracks: the list annotations is missing"),
         (
             changed("images", 1, id=1),
-            ": is not COCO with tracks: images: Value error, an id appears twice",
+            ": is not COCO with tracks: images.1: the id 1 is there already",
         ),
         (changed("images", 1, frame_index=4), ": a frame_index of images appears twice"),
         (changed("images", 1, video_id=2), ": has images of several videos"),
-        (changed("images", 1, frame_index=-1), ": is not COCO with tracks: images.1.frame_index"),
+        (
+            changed("images", 1, time=0.15),
+            ":images.1: frame 5 is at 0.15 s; times must",
+        ),
+        (changed("images", 1, frame_index=-1), ": is not COCO with tracks: images.1: frame_index"),
         (
             changed("categories", 1, id=1),
-            ": is not COCO with tracks: categories: Value error, an id appears twice",
+            ": is not COCO with tracks: categories.1: the id 1 is there already",
         ),
         (changed("annotations", 2, image_id=9), ":annotations.2: no image has the id 9"),
         (changed("annotations", 2, category_id=9), ":annotations.2: no category has the id 9"),
         (
             changed("annotations", 2, bbox=[1, 2, 3]),
-            ": is not COCO with tracks: annotations.2.bbox",
+            ": is not COCO with tracks: annotations.2: bbox",
         ),
         (
             changed("annotations", 2, track_id=None),
-            ": is not COCO with tracks: annotations.2.track",
+            ": is not COCO with tracks: annotations.2: track",
         ),
     ],
 )

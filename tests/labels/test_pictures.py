@@ -24,6 +24,7 @@ from labels.writers import (
     write_yolo,
 )
 from vdet.errors import ImageError, TruthError
+from vdet.labels import json_stream, parsing
 from vdet.labels import pictures as module
 from vdet.labels.label import from_size
 from vdet.labels.pictures import LabelledPictures
@@ -125,7 +126,7 @@ def test_too_many_pictures_or_boxes_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_coco(tmp_path, SCENE)
-    for name, most in (("MAX_PICTURES", 1), ("MAX_LABELS", 3)):
+    for name, most in (("MAX_PICTURES", 1), ("MAX_BOXES", 3)):
         with monkeypatch.context() as patch:
             patch.setattr(module, name, most)
             with pytest.raises(TruthError, match="cut it into parts"):
@@ -178,6 +179,19 @@ class TestCoco:
         ] * 2
         assert len(read_labelled_pictures(tmp_path / "set").pictures) == 2
 
+    def test_a_file_may_be_larger_than_what_is_held_of_it(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        path = self.edited(tmp_path, "annotations", 0, segmentation=[[0.5] * 20_000])
+        monkeypatch.setattr(parsing, "MAX_BYTES", 50_000)
+        monkeypatch.setattr(json_stream, "_CHUNK", 100)
+        found = read_labelled_pictures(path).pictures
+        assert path.stat().st_size > 100_000
+        assert [len(each.labels) for each in found] == [3, 0]
+        monkeypatch.setattr(json_stream, "MAX_ENTRY", 50_000)
+        with pytest.raises(TruthError, match=r"is not COCO: annotations\.0: invalid JSON"):
+            read_labelled_pictures(path)
+
     def test_two_folders_with_the_first_picture_are_refused(self, tmp_path: Path) -> None:
         path = write_coco(tmp_path / "train", SCENE).rename(tmp_path / "labels.json")
         write_pictures(tmp_path / "val", SCENE)
@@ -189,29 +203,29 @@ class TestCoco:
         [
             ("annotations", 1, {"image_id": 7}, "annotations.1: no image has the id 7"),
             ("annotations", 1, {"category_id": 70}, "annotations.1: no category has the id 70"),
-            ("annotations", 1, {"bbox": [1, 2, 3]}, "annotations.1.bbox.3: Field required"),
-            ("annotations", 1, {"bbox": [1, 2, 3, "4"]}, "annotations.1.bbox.3: Input should be"),
-            ("annotations", 1, {"bbox": [1, 2, 3, 1e9]}, "annotations.1.bbox.3: Input should be"),
-            ("annotations", 1, {"iscrowd": 2}, "annotations.1.iscrowd: Input should be"),
-            ("images", 1, {"id": 0}, "images: Value error, an id appears twice"),
+            ("annotations", 1, {"bbox": [1, 2, 3]}, "annotations.1: bbox.3: Field required"),
+            ("annotations", 1, {"bbox": [1, 2, 3, "4"]}, "annotations.1: bbox.3: Input should be"),
+            ("annotations", 1, {"bbox": [1, 2, 3, 1e9]}, "annotations.1: bbox.3: Input should be"),
+            ("annotations", 1, {"iscrowd": 2}, "annotations.1: iscrowd: Input should be"),
+            ("images", 1, {"id": 0}, "images.1: the id 0 is there already"),
             ("images", 1, {"file_name": "a.png"}, "has the picture a.png twice"),
             (
                 "images",
                 0,
                 {"file_name": "../a.png"},
-                "images.0.file_name: Value error, ../a.png leads out",
+                "images.0: file_name: ../a.png leads out",
             ),
             (
                 "images",
                 1,
                 {"file_name": "/a.png"},
-                "images.1.file_name: Value error, /a.png leads out",
+                "images.1: file_name: /a.png leads out",
             ),
             ("images", 1, {"file_name": "x" * 300}, "is not the name of a file"),
             ("images", 1, {"file_name": "a\u202eb"}, "is not the name of a file"),
-            ("images", 1, {"width": -3}, "images.1.width: Input should be greater"),
-            ("categories", 1, {"id": 1}, "categories: Value error, an id appears twice"),
-            ("categories", 1, {"name": None}, "categories.1.name: Input should be a valid string"),
+            ("images", 1, {"width": -3}, "images.1: width: Input should be greater"),
+            ("categories", 1, {"id": 1}, "categories.1: the id 1 is there already"),
+            ("categories", 1, {"name": None}, "categories.1: name: Input should be a valid string"),
         ],
     )
     def test_a_wrong_entry_is_refused_by_its_number(
@@ -265,7 +279,7 @@ class TestYolo:
         ("line", "words"),
         [
             ("0 0.5 0.5 0.1", "YOLO has 5 columns .* has 4"),
-            ("0 0.1 0.1 0.2 0.1 0.2 0.2", "YOLO has 5 columns .* has 7"),
+            ("0 0.1 0.1 0.2 0.1 0.2 0.2 0.3", "YOLO has 5 columns .* has 8"),
             ("5 0.5 0.5 0.1 0.1", r"class 5 has no name; data\.yaml has 5 names"),
             ("-1 0.5 0.5 0.1 0.1", "class -1 has no name"),
             ("0.5 0.5 0.5 0.1 0.1", "'0.5' is not a whole number"),
@@ -280,6 +294,13 @@ class TestYolo:
         path.write_text(f"0 0.5 0.5 0.1 0.1\n{line}\n", encoding="utf-8")
         with pytest.raises(TruthError, match=rf"a\.txt:2: {words}"):
             read_labelled_pictures(tmp_path)
+
+    def test_a_polygon_is_taken_as_its_box(self, tmp_path: Path) -> None:
+        path = write_yolo(tmp_path, SCENE)
+        path.write_text("0 0.5 0.5 0.1 0.1\n1 0.25 0.5 0.5 0.75 0.375 1\n", encoding="utf-8")
+        image = read_labelled_pictures(tmp_path).pictures[0]
+        assert image.classes == ("car", "truck")
+        assert image.boxes[1].tolist() == [0.25 * WIDTH, 0.5 * HEIGHT, 0.5 * WIDTH, HEIGHT]
 
     @pytest.mark.parametrize(
         ("text", "words"),

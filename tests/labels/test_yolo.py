@@ -7,7 +7,7 @@ import pytest
 from labels.saving import car, frame, written
 from vdet.boxes import Box
 from vdet.errors import TruthError
-from vdet.labels import yolo
+from vdet.labels import parsing
 from vdet.labels.yolo import YOLO, read_yolo
 
 DATA = "names: [car, truck]\nwidth: 200\nheight: 100\n"
@@ -45,7 +45,8 @@ class TestWriting:
     def test_names_of_classes_and_pictures_stand_in_files(self) -> None:
         data = written(YOLO, [frame(0, car(1, class_name="bus"), car(2))])
         assert member(data, "data.yaml") == (
-            'path: .\ntrain: train.txt\nnames:\n  0: "bus"\n  1: "car"\nwidth: 1280\nheight: 720\n'
+            "path: .\ntrain: train.txt\nval: train.txt\n"
+            'names:\n  0: "bus"\n  1: "car"\nwidth: 1280\nheight: 720\n'
         )
         assert member(data, "train.txt") == "images/train/frame_000000.png\n"
 
@@ -97,7 +98,7 @@ def test_what_does_not_fit_is_refused_with_its_place(data: bytes, message: str) 
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yolo, "MAX_BYTES", 100_000)
+    monkeypatch.setattr(parsing, "MAX_BYTES", 100_000)
     data = archive(labels__f0=" " * 60_000, labels__f1=" " * 60_000)
     assert len(data) < 1000
     with pytest.raises(TruthError, match=r"its labels are larger than 100,000 bytes"):

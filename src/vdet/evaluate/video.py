@@ -43,7 +43,6 @@ class Clip:
     truth_path: Path
     truth: LabelledVideo
     until: int | None
-    roles: Roles = DEFAULT_ROLES
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +119,7 @@ def open_clip(
     truth = read_truth(truth_path, roles)
     if until is not None:
         truth = truth.until(until)
-    return Clip(video, truth_path, truth, until or truth.last_frame or None, roles)
+    return Clip(video, truth_path, truth, until or truth.last_frame or None)
 
 
 def evaluate_clips(
@@ -232,9 +231,7 @@ def find_tracks(
                 frames = results[0].frame.index + 1
                 advance(1)
         info = reader.info
-    if clip.until is not None and frames < clip.until:
-        # raises an error that names the line
-        read_truth(clip.truth_path, clip.roles, frame_count=frames)
+    clip.truth.check_end(clip.truth_path, frames)
     truth = clip.truth.until(frames)
     return [
         (

@@ -7,24 +7,27 @@ Source: Lin et al., "Microsoft COCO: Common Objects in Context", 2014; cocodatas
 format"; Dave et al., "TAO: A Large-Scale Benchmark for Tracking Any Object", 2020.
 """
 
+import io
 import json
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, BinaryIO, Generic, Self, TypeVar
+from typing import Annotated, Any, BinaryIO
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError
+from pydantic import AfterValidator, Field, TypeAdapter
+from pydantic.dataclasses import dataclass
 
-from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
 from vdet.files import printable
-from vdet.labels.formats import UNKNOWN, Format, SourceVideo
+from vdet.labels.formats import UNKNOWN, Format, SourceVideo, best_classes
+from vdet.labels.json_stream import JsonLists
 from vdet.labels.label import Label, from_size, limited, line_error
-from vdet.labels.parsing import LIMIT, Index, Number, first_mistake, read_text, text_of
-from vdet.labels.pictures import LabelledPicture
+from vdet.labels.parsing import LIMIT, Index, Number, checked_times, first_mistake
+from vdet.labels.pictures import MAX_BOXES, MAX_PICTURES, LabelledPicture
 from vdet.labels.video import SavedTracks
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks
 
 _VIDEO = 1
 """Id of the only video."""
@@ -33,97 +36,55 @@ _ANNOTATIONS = "annotations"  # the folder of label files in the COCO set itself
 _MAX_NAME = 255  # bytes, as in most file systems
 
 
-class CocoWriter:
-    """Keeps images and annotations, each as its text, and writes all at the end.
+def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
+    """Write all images and annotations, each on its line.
 
     An annotation has a `score`, and an image its `time` in seconds, which other programs ignore.
     `attributes.occluded` says that the box is predicted.
     """
-
-    def __init__(self, file: BinaryIO, video: SourceVideo | None) -> None:
-        assert video is not None  # `needs_video` says so
-        self._file = file
-        self._name = video.name
-        self._size = {"width": video.width, "height": video.height}
-        self._images: list[str] = []
-        self._annotations: list[str] = []
-        self._categories: dict[str, int] = {}  # name: id, in the order of their ids
-        self._classes: dict[int, ClassScores] = defaultdict(ClassScores)
-
-    def write(self, frame: FrameTracks) -> None:
-        """Keep a frame and its boxes."""
-        image = {
-            "id": len(self._images) + 1,
-            "video_id": _VIDEO,
-            "frame_index": frame.index,
-            "file_name": f"frame_{frame.index:06}.png",
-            **self._size,
-            "time": round(frame.time, 6),
-        }
-        self._images.append(json.dumps(image))
+    size = {"width": video.width, "height": video.height}
+    categories: dict[str, int] = defaultdict(lambda: len(categories) + 1)  # the id of each name
+    images: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
+    for number, frame in enumerate(frames, start=1):
+        name = f"frame_{frame.index:06}.png"
+        image = {"id": number, "video_id": _VIDEO, "frame_index": frame.index, "file_name": name}
+        images.append({**image, **size, "time": round(frame.time, 6)})
         for track in frame.tracks:
-            self._classes[track.id].add(track.class_name or UNKNOWN, track.score)
-            self._annotations.append(json.dumps(self._annotation(track)))
-
-    def _annotation(self, track: Track) -> dict[str, Any]:
-        x, y, width, height = track.box.xywh
-        return {
-            "id": len(self._annotations) + 1,
-            "image_id": len(self._images),
-            "category_id": self._category(track.class_name or UNKNOWN),
-            "track_id": track.id,
-            "bbox": [x, y, width, height],
-            "area": width * height,
-            "iscrowd": 0,
-            "score": round(track.score, 4),
-            "attributes": {"occluded": track.predicted},
-        }
-
-    def _category(self, name: str) -> int:
-        return self._categories.setdefault(name, len(self._categories) + 1)
-
-    def end(self) -> None:
-        """Write the whole file."""
-        tracks = [
-            {"id": id_, "video_id": _VIDEO, "category_id": self._category(classes.best or UNKNOWN)}
-            for id_, classes in sorted(self._classes.items())
-        ]
-        categories = [{"id": number, "name": name} for name, number in self._categories.items()]
-        lists = {
-            "videos": [json.dumps({"id": _VIDEO, "name": self._name, **self._size})],
-            "images": self._images,
-            "tracks": map(json.dumps, tracks),
-            "annotations": self._annotations,
-            "categories": map(json.dumps, categories),
-        }
-        parts = (f'"{name}": [\n' + ",\n".join(items) + "\n]" for name, items in lists.items())
-        self._file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
+            x, y, width, height = track.box.xywh
+            annotations.append(
+                {
+                    "id": len(annotations) + 1,
+                    "image_id": number,
+                    "category_id": categories[track.class_name or UNKNOWN],
+                    "track_id": track.id,
+                    "bbox": [x, y, width, height],
+                    "area": width * height,
+                    "iscrowd": 0,
+                    "score": round(track.score, 4),
+                    "attributes": {"occluded": track.predicted},
+                }
+            )
+    tracks = [
+        {"id": id_, "video_id": _VIDEO, "category_id": categories[name]}
+        for id_, name in best_classes(frames).items()
+    ]
+    lists: dict[str, Sequence[Any]] = {
+        "videos": [{"id": _VIDEO, "name": video.name, **size}],
+        "images": images,
+        "tracks": tracks,
+        "annotations": annotations,
+        "categories": [{"id": number, "name": name} for name, number in categories.items()],
+    }
+    parts = (
+        f'"{name}": [\n' + ",\n".join(map(json.dumps, items)) + "\n]"
+        for name, items in lists.items()
+    )
+    file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
 
 _Id = Annotated[int, Field(ge=-LIMIT, le=LIMIT)]
 _Side = Annotated[int, Field(ge=1, le=LIMIT)]
-
-
-class _Category(BaseModel, frozen=True):
-    id: int
-    name: str = Field(max_length=1000)
-
-
-class _Annotation(BaseModel, frozen=True):
-    image_id: int
-    category_id: int
-    bbox: tuple[Number, Number, Number, Number]
-    iscrowd: int = Field(0, ge=0, le=1, strict=False)
-
-
-class _Image(BaseModel, frozen=True):
-    id: int
-    width: _Side | None = None
-    height: _Side | None = None
-
-    @property
-    def size(self) -> tuple[int, int] | None:
-        return (self.width, self.height) if self.width and self.height else None
 
 
 def _inside(name: str) -> str:
@@ -136,66 +97,106 @@ def _inside(name: str) -> str:
     return name
 
 
-class _Picture(_Image, frozen=True):
+_entry = partial(dataclass, frozen=True, slots=True, kw_only=True)
+
+
+@_entry
+class _Category:
+    id: int
+    name: str = Field(max_length=1000)
+
+
+@_entry
+class _Annotation:
+    image_id: int
+    category_id: int
+    bbox: tuple[Number, Number, Number, Number]
+    iscrowd: int = Field(0, ge=0, le=1, strict=False)
+
+
+@_entry
+class _TrackAnnotation(_Annotation):
+    track_id: _Id
+    score: Number = 1.0
+    attributes: dict[str, Any] = Field({})
+
+
+@_entry
+class _Image:
+    id: int
+    width: _Side | None = None
+    height: _Side | None = None
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        return (self.width, self.height) if self.width and self.height else None
+
+
+@_entry
+class _Picture(_Image):
     file_name: Annotated[str, Field(min_length=1, max_length=1000), AfterValidator(_inside)]
 
 
-class _Frame(_Image, frozen=True):
+@_entry
+class _Frame(_Image):
     frame_index: Index
     video_id: _Id = _VIDEO
-    time: Number | None = None
+    time: float | None = None
 
 
-class _Attributes(BaseModel, frozen=True):
-    occluded: bool = Field(False, strict=False)
+class _Document:
+    """The content of a COCO file, of which only what is needed is kept.
 
+    `images` and `categories` are by their ids, `annotations` by that of their image, each with its
+    number in the file. Raises `TruthError`.
+    """
 
-class _TrackAnnotation(_Annotation, frozen=True):
-    track_id: _Id
-    score: Number = 1.0
-    attributes: _Attributes = _Attributes()
-
-
-ImageT = TypeVar("ImageT", _Picture, _Frame)
-AnnotationT = TypeVar("AnnotationT", bound=_Annotation)
-EntryT = TypeVar("EntryT", _Category, _Picture, _Frame)
-
-
-def _unique(entries: tuple[EntryT, ...]) -> tuple[EntryT, ...]:
-    if len({each.id for each in entries}) < len(entries):
-        raise ValueError("an id appears twice")
-    return entries
-
-
-class _Document(BaseModel, Generic[ImageT, AnnotationT], frozen=True):
-    images: Annotated[tuple[ImageT, ...], AfterValidator(_unique)]
-    annotations: tuple[AnnotationT, ...]
-    categories: Annotated[tuple[_Category, ...], AfterValidator(_unique)]
-
-    @classmethod
-    def of(cls, path: Path, text: str, name: str) -> Self:
-        """Read the text of a file. Raises `TruthError`."""
+    def __init__(
+        self, path: Path, file: BinaryIO, form: str, image: type, annotation: type
+    ) -> None:
+        self.path = path
+        self.images: dict[int, Any] = {}
+        self.categories: dict[int, Any] = {}
+        self.annotations: dict[int, list[tuple[int, Any]]] = defaultdict(list)
+        kinds = {"images": image, "annotations": annotation, "categories": _Category}
+        adapters = {name: TypeAdapter[Any](kind) for name, kind in kinds.items()}
+        lists = JsonLists(file)
         try:
-            return cls.model_validate_json(text, strict=True)
-        except ValidationError as error:
-            raise TruthError(f"{path}: is not {name}: {first_mistake(error)}") from error
+            for name, number, text in lists.entries(kinds):
+                self._add(name, number, adapters[name].validate_json(text, strict=True))
+            if missing := kinds.keys() - lists.found:
+                raise ValueError(f"the list {min(missing)} is missing")
+        except ValueError as error:  # also a ValidationError
+            place = f": {lists.place}" if lists.place else ""
+            raise TruthError(f"{path}: is not {form}{place}: {first_mistake(error)}") from error
 
-    def labels(self, path: Path) -> Iterator[tuple[ImageT, AnnotationT, Label]]:
-        """Yield each annotation with its image and as a label. Raises `TruthError`."""
-        images = {each.id: each for each in self.images}
-        names = {each.id: each.name for each in self.categories}
-        for number, each in enumerate(self.annotations):
-            place = f"annotations.{number}"
-            if each.image_id not in images:
-                raise line_error(path, place, f"no image has the id {each.image_id}")
-            if each.category_id not in names:
-                raise line_error(path, place, f"no category has the id {each.category_id}")
-            box, ignored = from_size(*each.bbox), bool(each.iscrowd)
-            yield (
-                images[each.image_id],
-                each,
-                Label(place, box, names[each.category_id], ignored=ignored),
-            )
+    def _add(self, name: str, number: int, entry: Any) -> None:
+        if number == (MAX_PICTURES if name == "images" else MAX_BOXES):
+            raise ValueError(f"there are more than {number:,} {name}; cut the file into parts")
+        if name == "annotations":
+            self.annotations[entry.image_id].append((number, entry))
+            return
+        known = self.images if name == "images" else self.categories
+        if entry.id in known:
+            raise ValueError(f"the id {entry.id} is there already")
+        known[entry.id] = entry
+
+    def labels(self) -> Iterator[tuple[Any, list[tuple[Any, Label]]]]:
+        """Yield each image with its annotations, each also as a label. Raises `TruthError`."""
+        for image_id in self.annotations.keys() - self.images.keys():
+            number, _ = self.annotations[image_id][0]
+            raise line_error(self.path, f"annotations.{number}", f"no image has the id {image_id}")
+        for image in self.images.values():
+            found = self.annotations.pop(image.id, ())
+            yield image, [(each, self._label(number, each)) for number, each in found]
+
+    def _label(self, number: int, annotation: _Annotation) -> Label:
+        place = f"annotations.{number}"
+        category = self.categories.get(annotation.category_id)
+        if category is None:
+            raise line_error(self.path, place, f"no category has the id {annotation.category_id}")
+        box = from_size(*annotation.bbox)
+        return Label(place, box, category.name, ignored=bool(annotation.iscrowd))
 
 
 def read_coco(path: Path, data: bytes) -> SavedTracks:
@@ -205,14 +206,16 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
     ------
     TruthError
         The file is not of this form, has several videos, an id of images or categories or a frame
-        appears twice, or an annotation names an image or a category that is not there.
+        appears twice, a time is wrong, or an annotation names an image or a category that is not
+        there.
     """
-    form = _Document[_Frame, _TrackAnnotation]
-    video = form.of(path, text_of(path, data), "COCO with tracks")
-    if len({image.video_id for image in video.images}) > 1:
+    form = "COCO with tracks"
+    document = _Document(path, io.BytesIO(data), form, _Frame, _TrackAnnotation)
+    images: list[_Frame] = list(document.images.values())
+    if len({image.video_id for image in images}) > 1:
         raise TruthError(f"{path}: has images of several videos; give a file for each")
-    frames = {image.frame_index: image for image in video.images}
-    if len(frames) < len(video.images):
+    frames = {each.frame_index: (f"images.{number}", each) for number, each in enumerate(images)}
+    if len(frames) < len(images):
         raise TruthError(f"{path}: a frame_index of images appears twice")
     labels = (
         replace(
@@ -220,19 +223,25 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
             frame=image.frame_index + 1,
             id=each.track_id,
             score=each.score,
-            predicted=each.attributes.occluded,
+            predicted=bool(each.attributes.get("occluded")),
         )
-        for image, each, label in video.labels(path)
+        for image, annotations in document.labels()
+        for each, label in annotations
     )
+    times = {
+        index: (place, each.time)
+        for index, (place, each) in frames.items()
+        if each.time is not None
+    }
     return SavedTracks(
         tuple(limited(path, labels)),
         listed=tuple(sorted(frames)),
-        times={index: image.time for index, image in frames.items() if image.time is not None},
-        size=frames[min(frames)].size if frames else None,
+        times=checked_times(path, times),
+        size=images[0].size if images else None,
     )
 
 
-COCO = Format("COCO", ".coco.json", read_coco, CocoWriter, needs_video=True)
+COCO = Format("COCO", ".coco.json", read_coco, whole=_write)
 
 
 def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
@@ -245,28 +254,30 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
     ------
     TruthError
         The file is not of this form, an annotation names a picture or a category that is not
-        there, an id appears twice, or a picture lies outside.
+        there, an id appears twice, there are more than `MAX_PICTURES` or `MAX_BOXES`, or a picture
+        lies outside.
     """
-    found = _Document[_Picture, _Annotation].of(path, read_text(path), "COCO")
-    labels: dict[int, list[Label]] = defaultdict(list)
-    for image, _, label in found.labels(path):
-        labels[image.id].append(label)
-    folder = _picture_folder(path, found.images)
-    for image in found.images:
-        yield LabelledPicture(folder / image.file_name, path, tuple(labels[image.id]), image.size)
+    try:
+        with path.open("rb") as file:
+            document = _Document(path, file, "COCO", _Picture, _Annotation)
+    except OSError as error:
+        raise TruthError(f"{path}: cannot be read: {error.strerror}") from error
+    folder = _picture_folder(path, [image.file_name for image in document.images.values()])
+    for image, annotations in document.labels():
+        labels = tuple(label for _, label in annotations)
+        yield LabelledPicture(folder / image.file_name, path, labels, image.size)
 
 
-def _picture_folder(path: Path, images: Sequence[_Picture]) -> Path:
+def _picture_folder(path: Path, names: Sequence[str]) -> Path:
     """Return the folder that the names of pictures are relative to: that with the first one."""
     near = path.parent
-    if not images or (near / images[0].file_name).is_file():
+    if not names or (near / names[0]).is_file():
         return near
     above = [near, near.parent] if near.name == _ANNOTATIONS else [near]
     below = (each for folder in above for each in sorted(folder.iterdir()) if each.is_dir())
-    name = images[0].file_name
-    found = [folder for folder in (*above, *below) if (folder / name).is_file()]
+    found = [folder for folder in (*above, *below) if (folder / names[0]).is_file()]
     if len(found) != 1:
         which = " and ".join(str(folder) for folder in found[:2])
         what = f"lies in {which}" if found else "is missing: it should lie beside it or below"
-        raise TruthError(f"{path}: its first picture, {name}, {what}")
+        raise TruthError(f"{path}: its first picture, {names[0]}, {what}")
     return found[0]

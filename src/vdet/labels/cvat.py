@@ -6,83 +6,63 @@ the end.
 Source: the CVAT manual, "XML annotation format", section "Interpolation".
 """
 
-import io
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 from xml.sax.saxutils import escape, quoteattr
 
-from vdet.archives import ArchiveError, list_members, open_archive, read_member
-from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
 from vdet.files import escaped
-from vdet.labels.formats import UNKNOWN, Format, SourceVideo
+from vdet.labels.formats import Format, SourceVideo, best_classes
 from vdet.labels.label import Label, limited
-from vdet.labels.parsing import MAX_BYTES, parse_number, parse_whole, text_of
+from vdet.labels.parsing import archive_texts, parse_number, parse_whole, text_of
 from vdet.labels.video import SavedTracks
 from vdet.labels.xml_reader import Element, read_xml
-from vdet.track.track import FrameTracks
+from vdet.track.track import FrameTracks, Track
 
 _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
 
 
-class CvatWriter:
-    """Keeps the boxes of each track, and writes all at the end.
+def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
+    """Write a track for each vehicle; a predicted box is `occluded`."""
+    for line in _lines(video, frames):
+        file.write(f"{line}\n".encode())
 
-    A predicted box is `occluded`. The label of a track is the class with most score, or `vehicle`.
-    """
 
-    def __init__(self, file: BinaryIO, video: SourceVideo | None) -> None:
-        assert video is not None  # `needs_video` says so
-        self._file = file
-        self._video = video
-        self._boxes: dict[int, list[tuple[int, str]]] = defaultdict(list)  # frame and its XML
-        self._classes: dict[int, ClassScores] = defaultdict(ClassScores)
-        self._frames = 0
-
-    def write(self, frame: FrameTracks) -> None:
-        """Keep the boxes of a frame."""
-        self._frames = frame.index + 1
+def _lines(video: SourceVideo, frames: Sequence[FrameTracks]) -> Iterator[str]:
+    count = max(frames[-1].index + 1 if frames else 0, video.frames or 0)
+    boxes: dict[int, list[tuple[int, Track]]] = defaultdict(list)
+    for frame in frames:
         for track in frame.tracks:
-            x1, y1, x2, y2 = track.box.pixels
-            corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
-            text = f'occluded="{int(track.predicted)}" keyframe="1" {corners} z_order="0"'
-            self._boxes[track.id].append((frame.index, text))
-            self._classes[track.id].add(track.class_name or UNKNOWN, track.score)
-
-    def end(self) -> None:
-        """Write the whole file."""
-        for line in self._lines():
-            self._file.write(f"{line}\n".encode())
-
-    def _lines(self) -> Iterator[str]:
-        video = self._video
-        count = max(self._frames, video.frames or 0)
-        labels = {id_: escaped(self._classes[id_].best or UNKNOWN) for id_ in sorted(self._boxes)}
-        names = (f"<label><name>{escape(each)}</name></label>" for each in set(labels.values()))
-        yield '<?xml version="1.0" encoding="utf-8"?>'
-        yield "<annotations>"
-        yield "  <version>1.1</version>"
-        yield "  <meta><task>"
-        yield f"    <name>{escape(escaped(video.name))}</name>"
-        yield f"    <size>{count}</size><mode>interpolation</mode>"
-        yield f"    <start_frame>0</start_frame><stop_frame>{max(0, count - 1)}</stop_frame>"
-        yield f"    <labels>{''.join(sorted(names))}</labels>"
-        size = f"<width>{video.width}</width><height>{video.height}</height>"
-        yield f"    <original_size>{size}</original_size>"
-        yield "  </task></meta>"
-        for id_, label in labels.items():
-            yield f'  <track id="{id_}" label={quoteattr(label)} source="auto">'
-            yield from _box_lines(self._boxes[id_], count)
-            yield "  </track>"
-        yield "</annotations>"
+            boxes[track.id].append((frame.index, track))
+    labels = {id_: escaped(name) for id_, name in best_classes(frames).items()}
+    names = sorted(f"<label><name>{escape(each)}</name></label>" for each in set(labels.values()))
+    yield '<?xml version="1.0" encoding="utf-8"?>'
+    yield "<annotations>"
+    yield "  <version>1.1</version>"
+    yield "  <meta><task>"
+    yield f"    <name>{escape(escaped(video.name))}</name>"
+    yield f"    <size>{count}</size><mode>interpolation</mode>"
+    yield f"    <start_frame>0</start_frame><stop_frame>{max(0, count - 1)}</stop_frame>"
+    yield f"    <labels>{''.join(names)}</labels>"
+    size = f"<width>{video.width}</width><height>{video.height}</height>"
+    yield f"    <original_size>{size}</original_size>"
+    yield "  </task></meta>"
+    for id_, label in labels.items():
+        yield f'  <track id="{id_}" label={quoteattr(label)} source="auto">'
+        yield from _box_lines(boxes[id_], count)
+        yield "  </track>"
+    yield "</annotations>"
 
 
-def _box_lines(boxes: list[tuple[int, str]], count: int) -> Iterator[str]:
+def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
     """Yield the boxes of a track, and a box outside in the frame after each stretch of them."""
     following = [frame for frame, _ in boxes[1:]]
-    for (frame, text), after in zip(boxes, [*following, None], strict=True):
+    for (frame, track), after in zip(boxes, [*following, None], strict=True):
+        x1, y1, x2, y2 = track.box.pixels
+        corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
+        text = f'occluded="{int(track.predicted)}" keyframe="1" {corners} z_order="0"'
         yield f'    <box frame="{frame}" outside="0" {text}></box>'
         if after != frame + 1 and frame + 1 < count:
             yield f'    <box frame="{frame + 1}" outside="1" {text}></box>'
@@ -99,8 +79,6 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
     TruthError
         The XML is broken, declares a document type, is nested too deep, or is of another format.
     """
-    if data.startswith(b"PK"):
-        data = _unpacked(path, data)
     labels: list[Label] = []
     sizes: list[tuple[int, int]] = []
 
@@ -119,18 +97,18 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
                 width, height = (parse_whole(opened[-1].value(s)) for s in ("width", "height"))
                 sizes.append((width, height))
 
-    read_xml(path, text_of(path, data), "annotations", take)
+    read_xml(path, _text(path, data), "annotations", take)
     size = sizes[-1] if sizes and min(sizes[-1]) > 0 else None
     return SavedTracks(tuple(limited(path, labels)), size=size)
 
 
-def _unpacked(path: Path, data: bytes) -> bytes:
-    try:
-        list_members(io.BytesIO(data))
-        with open_archive(io.BytesIO(data)) as archive:
-            return read_member(archive, _MEMBER, most=MAX_BYTES)
-    except ArchiveError as error:
-        raise TruthError(f"{path}: {error}") from error
+def _text(path: Path, data: bytes) -> str:
+    if not data.startswith(b"PK"):
+        return text_of(path, data)
+    texts = archive_texts(path, data, lambda name: str(name) == _MEMBER)
+    if not texts:
+        raise TruthError(f"{path}: has no {_MEMBER}; export the task as 'CVAT for video 1.1'")
+    return texts[_MEMBER]
 
 
 def _labels(track: Element, box: Element) -> Iterator[Label]:
@@ -148,4 +126,4 @@ def _labels(track: Element, box: Element) -> Iterator[Label]:
         yield Label(box.line, corners, name, frame + 1, id_, predicted=predicted)
 
 
-CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, CvatWriter, needs_video=True)
+CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, whole=_write)

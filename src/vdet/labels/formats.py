@@ -4,13 +4,13 @@ Formats of tracks are registered in the group `vdet.formats`, those of labelled 
 `vdet.picture_formats`: see `vdet.plugins`.
 """
 
-import io
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO
 
-from vdet.archives import ArchiveError, list_members
+from vdet.detect.classes import ClassScores
 from vdet.errors import TruthError
 from vdet.labels.parsing import numbered_lines, text_of
 from vdet.labels.pictures import LabelledPicture
@@ -42,14 +42,11 @@ class SourceVideo:
     frames: int | None = None
 
 
-class TrackWriter(Protocol):
-    """Writes the tracks of a video into a binary file that another opens and closes."""
+Lines = Callable[[FrameTracks], Iterable[str]]
+"""Returns the lines of a frame, each with its end."""
 
-    def write(self, frame: FrameTracks) -> None:
-        """Add a frame."""
-
-    def end(self) -> None:
-        """Write what is left. It is not called after an error."""
+WriteWhole = Callable[[BinaryIO, SourceVideo, Sequence[FrameTracks]], None]
+"""Writes all frames of a video into a binary file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,18 +63,50 @@ class Format:
         Function that takes the path of a file, for messages, and its content. It raises
         `TruthError` with the place of the first mistake; the labels that it returns are not
         checked otherwise.
-    write
-        Function that takes a binary file and the video and returns the writer. There is no video
-        if the tracks are of still pictures.
-    needs_video
-        Whether it cannot be written without a video.
+    lines, heading
+        Of a format with lines for each frame: the function that returns them, and the first line of
+        the file.
+    whole
+        Of a format that is written at the end: the function that does it. It needs a video; the
+        other formats can also be written of still pictures.
     """
 
     name: str
     suffix: str
     read: Callable[[Path, bytes], SavedTracks]
-    write: Callable[[BinaryIO, SourceVideo | None], TrackWriter]
-    needs_video: bool = False
+    lines: Lines | None = None
+    heading: str = ""
+    whole: WriteWhole | None = None
+
+    @property
+    def needs_video(self) -> bool:
+        """Whether it cannot be written without a video."""
+        return self.whole is not None
+
+    def write(self, file: BinaryIO, video: SourceVideo | None) -> "TrackWriter":
+        """Return a writer into a binary file, which another opens and closes."""
+        return TrackWriter(self, file, video)
+
+
+class TrackWriter:
+    """Writes the tracks of a video into a binary file."""
+
+    def __init__(self, form: Format, file: BinaryIO, video: SourceVideo | None) -> None:
+        self._form, self._file, self._video = form, file, video
+        self._kept: list[FrameTracks] = []
+        self._file.write(form.heading.encode())
+
+    def write(self, frame: FrameTracks) -> None:
+        """Add a frame."""
+        if self._form.lines:
+            self._file.writelines(line.encode() for line in self._form.lines(frame))
+        else:
+            self._kept.append(replace(frame, facts={}))
+
+    def end(self) -> None:
+        """Write what is left. It is not called after an error."""
+        if self._form.whole and self._video:
+            self._form.whole(self._file, self._video, self._kept)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,31 +133,12 @@ class PictureFormat:
         return all((folder / name).is_dir() for name in self.folders)
 
 
-class LineWriter:
-    """Writes lines of text for each frame.
-
-    Parameters
-    ----------
-    lines
-        Function that returns the lines of a frame, each with its end.
-    heading
-        The first line of the file, if there is one.
-    """
-
-    def __init__(
-        self, file: BinaryIO, lines: Callable[[FrameTracks], Iterable[str]], heading: str = ""
-    ) -> None:
-        self._file = file
-        self._lines = lines
-        self._file.write(heading.encode())
-
-    def write(self, frame: FrameTracks) -> None:
-        """Add the lines of a frame."""
-        for line in self._lines(frame):
-            self._file.write(line.encode())
-
-    def end(self) -> None:
-        """Do nothing: all lines are written."""
+def best_classes(frames: Iterable[FrameTracks]) -> dict[int, str]:
+    """Return the class of each track, by ascending id: that with most score, or `UNKNOWN`."""
+    classes: dict[int, ClassScores] = defaultdict(ClassScores)
+    for track in (track for frame in frames for track in frame.tracks):
+        classes[track.id].add(track.class_name or UNKNOWN, track.score)
+    return {id_: scores.best or UNKNOWN for id_, scores in sorted(classes.items())}
 
 
 def track_formats() -> list[Format]:
@@ -141,7 +151,7 @@ def picture_formats() -> list[PictureFormat]:
     return [load_plugin(PICTURE_FORMATS, name) for name in plugin_names(PICTURE_FORMATS)]
 
 
-def track_suffixes() -> Sequence[str]:
+def track_suffixes() -> list[str]:
     """Return how the names of files of tracks may end."""
     return [each.suffix for each in track_formats()]
 
@@ -169,22 +179,17 @@ def recognise(path: Path, data: bytes) -> Format:
     if by_name and by_name.suffix not in _UNCLEAR:
         return by_name
     content = _content(path, data)
-    if content:
-        form: Format = load_plugin(FORMATS, content)
-        return form
-    if by_name is None:
+    form: Format | None = load_plugin(FORMATS, content) if content else by_name
+    if form is None:
         suffixes = ", ".join(track_suffixes())
         raise TruthError(f"{path}: is empty; give tracks or truth, as in {suffixes}")
-    return by_name
+    return form
 
 
 def _content(path: Path, data: bytes) -> str | None:
     """Return the name under which the format of a file is registered; None if it is empty."""
     if data.startswith(b"PK"):
-        try:
-            return "cvat" if "annotations.xml" in list_members(io.BytesIO(data)) else "yolo"
-        except ArchiveError as error:
-            raise TruthError(f"{path}: {error}") from error
+        return "cvat" if b"annotations.xml" in data else "yolo"
     _, first = next(numbered_lines(text_of(path, data)), (0, ""))
     match first[:1]:
         case "":

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
-from vdet.labels.formats import Format, LineWriter, PictureFormat
+from vdet.labels.formats import Format, PictureFormat
 from vdet.labels.label import Label, limited
 from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_text, text_of
 from vdet.labels.pictures import LabelledPicture, labelled_pairs
@@ -79,5 +79,5 @@ def read_kitti_pictures(folder: Path) -> Iterator[LabelledPicture]:
         yield LabelledPicture(picture, file, tuple(parse(file, read_text(file))))
 
 
-KITTI = Format("KITTI tracking", ".kitti.txt", read_kitti, lambda file, _: LineWriter(file, _lines))
+KITTI = Format("KITTI tracking", ".kitti.txt", read_kitti, _lines)
 KITTI_PICTURES = PictureFormat("KITTI", ("image_2", "label_2"), read_kitti_pictures)

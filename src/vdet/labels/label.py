@@ -75,23 +75,25 @@ def limited(path: Path, labels: Iterable[Label]) -> Iterator[Label]:
         yield label
 
 
-def checked_labels(
-    path: Path, labels: Iterable[Label], *, frame_count: int | None = None
-) -> tuple[Label, ...]:
+def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
     """Return the labels of the file `path` if they can all be boxes of one video.
 
     Raises
     ------
     TruthError
-        A frame before the first or beyond `frame_count`, a negative id of a vehicle, an id twice
-        in a frame, a box without area, or a name of more than 100 characters.
+        A frame before the first, a negative id of a vehicle, an id twice in a frame, a box without
+        area, or a name of more than 100 characters.
     """
     checked: list[Label] = []
     places: dict[tuple[int, int], int | str] = {}
     for label in labels:
-        mistake = _mistake_in_video(label, frame_count) or mistake_in_box(label)
+        mistake = mistake_in_box(label)
         key = label.frame, label.id
-        if mistake is None and key in places and label.id != NO_ID:
+        if label.frame < 1:
+            mistake = "the frame comes before the video's first"
+        elif label.id < (NO_ID if label.ignored else 0):
+            mistake = f"id {label.id} is negative; number the vehicles from 0 or 1"
+        elif key in places and label.id != NO_ID:
             place = places[key]
             named = f"line {place}" if isinstance(place, int) else place
             mistake = f"id {label.id} is in the same frame already ({named})"
@@ -100,18 +102,6 @@ def checked_labels(
         places[key] = label.place
         checked.append(label)
     return tuple(checked)
-
-
-def _mistake_in_video(label: Label, frame_count: int | None) -> str | None:
-    if label.frame < 1:
-        return "the frame comes before the video's first"
-    if frame_count is not None and label.frame > frame_count:
-        return (
-            f"the frame is number {label.frame} of a video of {frame_count}; is it another video's?"
-        )
-    if label.id < (NO_ID if label.ignored else 0):
-        return f"id {label.id} is negative; number the vehicles from 0 or 1"
-    return None
 
 
 def mistake_in_box(label: Label) -> str | None:

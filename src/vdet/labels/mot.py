@@ -6,7 +6,7 @@ Source: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, tabl
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from vdet.labels.formats import Format, LineWriter
+from vdet.labels.formats import Format
 from vdet.labels.label import Label, from_size, limited
 from vdet.labels.parsing import label_lines, parse_number, parse_whole, text_of
 from vdet.labels.video import SavedTracks
@@ -60,4 +60,4 @@ def _label(place: int | str, columns: Sequence[str]) -> Label:
     )
 
 
-MOT = Format("MOTChallenge", ".txt", read_mot, lambda file, _: LineWriter(file, _lines))
+MOT = Format("MOTChallenge", ".txt", read_mot, _lines)

@@ -2,12 +2,13 @@
 
 import io
 import re
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path, PurePosixPath
 from typing import Annotated
 
 from pydantic import Field, ValidationError
 
+from vdet.archives import ArchiveError, list_members, open_archive, read_member
 from vdet.errors import TruthError
 from vdet.files import read_whole
 from vdet.labels.label import Label, line_error
@@ -17,6 +18,9 @@ LIMIT = 10_000_000
 
 MAX_BYTES = 64_000_000
 """Largest size of a file of boxes."""
+
+_LATEST = 1e11
+"""Largest time in seconds, three thousand years of wall-clock time."""
 
 Number = Annotated[float, Field(ge=-LIMIT, le=LIMIT, allow_inf_nan=False)]
 Index = Annotated[int, Field(ge=0, le=LIMIT)]
@@ -65,7 +69,7 @@ def label_lines(
     parse: Callable[[int | str, list[str]], Label],
     *,
     form: str,
-    counts: Sequence[int],
+    counts: Sequence[int] | None,
     separator: str | None = None,
     member: str = "",
 ) -> Iterator[Label]:
@@ -79,7 +83,7 @@ def label_lines(
     form
         Name of the format, for messages.
     counts
-        How many columns a line may have; all lines have as many as the first.
+        How many columns a line may have; all lines have as many as the first. None: `parse` checks.
     separator
         What stands between columns; None for spaces.
     member
@@ -93,12 +97,12 @@ def label_lines(
     for line, content in numbered_lines(text):
         columns = content.split(separator)
         place: int | str = f"{member}:{line}" if member else line
-        if len(columns) not in counts:
+        if counts is not None and len(columns) not in counts:
             wanted = " or ".join(map(str, counts))
             between = "commas" if separator else "spaces"
             what = f"{form} has {wanted} columns between {between}; this line has {len(columns)}"
             raise line_error(path, place, what)
-        counts = (len(columns),)
+        counts = counts and (len(columns),)
         try:
             label = parse(place, columns)
         except ValueError as error:
@@ -137,8 +141,53 @@ def parse_whole(text: str) -> int:
     return int(value)
 
 
-def first_mistake(error: ValidationError) -> str:
+def checked_times(path: Path, times: Mapping[int, tuple[int | str, float]]) -> dict[int, float]:
+    """Return the time of each frame; `times` has the place in the file and the time by frame.
+
+    Times may be those of a wall clock. The first one may be negative, as in videos.
+
+    Raises
+    ------
+    TruthError
+        A time is not a number or is too large, or is less than that of an earlier frame.
+    """
+    latest = -_LATEST
+    for frame, (place, time) in sorted(times.items()):
+        if not latest <= time <= _LATEST:
+            what = f"frame {frame} is at {time:g} s; times must be numbers that do not fall"
+            raise line_error(path, place, what)
+        latest = time
+    return {frame: time for frame, (_, time) in times.items()}
+
+
+def archive_texts(
+    path: Path, data: bytes, is_wanted: Callable[[PurePosixPath], bool]
+) -> dict[str, str]:
+    """Return the texts of the members of a zip file that are wanted, by their names.
+
+    Raises
+    ------
+    TruthError
+        The archive is damaged, a name in it leads out of it, or the members are larger than
+        `MAX_BYTES` together, or are not text.
+    """
+    try:
+        names = [name for name in list_members(io.BytesIO(data)) if is_wanted(PurePosixPath(name))]
+        with open_archive(io.BytesIO(data)) as archive:
+            if sum(archive.getinfo(name).file_size for name in names) > MAX_BYTES:
+                what = f"its labels are larger than {MAX_BYTES:,} bytes; cut the video into parts"
+                raise ArchiveError(what)
+            members = {name: read_member(archive, name, most=MAX_BYTES) for name in names}
+    except ArchiveError as error:
+        raise TruthError(f"{path}: {error}") from error
+    return {name: text_of(path, member) for name, member in members.items()}
+
+
+def first_mistake(error: ValueError) -> str:
     """Say in one line what is wrong in a document, and where."""
+    if not isinstance(error, ValidationError):
+        return str(error)
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
     place = ".".join(str(part) for part in first["loc"])
-    return f"{place}: {first['msg']}" if place else first["msg"]
+    what = first["msg"].removeprefix("Value error, ")
+    return f"{place}: {what}" if place else what

@@ -11,12 +11,15 @@ from vdet.boxes import BoolArray, Float64Array
 from vdet.detect.classes import our_name
 from vdet.errors import ImageError, TruthError
 from vdet.files import printable
-from vdet.labels.label import MAX_IN_FRAME, MAX_LABELS, Label, line_error, mistake_in_box
+from vdet.labels.label import MAX_IN_FRAME, Label, line_error, mistake_in_box
 from vdet.labels.roles import DEFAULT_ROLES, Roles
 from vdet.media.images import Image, is_picture_name, read_image
 
-MAX_PICTURES = 100_000
+MAX_PICTURES = 200_000
 """Largest number of pictures in one set."""
+
+MAX_BOXES = 2_000_000
+"""Largest number of boxes in one set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,16 +97,16 @@ def checked_pictures(
     ------
     TruthError
         There is no picture, a picture is missing or appears twice, a box has no area, or there are
-        more than `MAX_PICTURES`, `MAX_LABELS` in all or `MAX_IN_FRAME` in one picture.
+        more than `MAX_PICTURES`, `MAX_BOXES` in all or `MAX_IN_FRAME` in one picture.
     """
     checked: dict[Path, LabelledPicture] = {}
     others: Counter[str] = Counter()
     boxes = 0
     for picture in pictures:
         boxes += len(picture.labels)
-        if len(checked) == MAX_PICTURES or boxes > MAX_LABELS:
+        if len(checked) == MAX_PICTURES or boxes > MAX_BOXES:
             raise TruthError(
-                f"{name}: has more than {MAX_PICTURES:,} pictures or {MAX_LABELS:,} boxes; cut it "
+                f"{name}: has more than {MAX_PICTURES:,} pictures or {MAX_BOXES:,} boxes; cut it "
                 "into parts"
             )
         if picture.path in checked:

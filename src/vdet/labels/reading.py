@@ -50,9 +50,7 @@ def read_predictions(path: Path) -> LabelledVideo:
     return LabelledVideo.of(saved.labels, frame_count=saved.frame_count, rate=saved.rate)
 
 
-def read_truth(
-    path: Path, roles: Roles = DEFAULT_ROLES, *, frame_count: int | None = None
-) -> LabelledVideo:
+def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
     """Read the truth of a video from any format of tracks.
 
     Boxes without a label are vehicles. In MOTChallenge flag 0 marks an ignore region, also in the
@@ -62,8 +60,6 @@ def read_truth(
     ----------
     roles
         Which labels are vehicles, which are ignore regions, and which are left out.
-    frame_count
-        Number of frames of the video if known; boxes in later frames are refused.
 
     Raises
     ------
@@ -78,8 +74,7 @@ def read_truth(
     labels: Iterable[Label] = form.read(path, data).labels
     if form is MOT:  # in the older form, the column of the score is the flag
         labels = (replace(each, ignored=each.score == 0 or each.ignored) for each in labels)
-    checked = checked_labels(path, _with_roles(path, labels, roles), frame_count=frame_count)
-    return LabelledVideo.of(checked, frame_count=frame_count)
+    return LabelledVideo.of(checked_labels(path, _with_roles(path, labels, roles)))
 
 
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:

@@ -6,16 +6,24 @@ JSON lines have a record for each frame, even one without a box. CSV has a row f
 import csv
 import io
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, ValidationError
 
 from vdet.errors import TruthError
-from vdet.labels.formats import Format, LineWriter
+from vdet.labels.formats import Format
 from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
-from vdet.labels.parsing import LIMIT, Index, Number, first_mistake, numbered_lines, text_of
+from vdet.labels.parsing import (
+    LIMIT,
+    Index,
+    Number,
+    checked_times,
+    first_mistake,
+    numbered_lines,
+    text_of,
+)
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
 
@@ -54,13 +62,13 @@ class _TrackRecord(BaseModel, frozen=True):
 
 class _FrameRecord(BaseModel, frozen=True):
     frame: Index
-    time: Number
+    time: float
     tracks: tuple[_TrackRecord, ...]
 
 
 class _Row(_TrackRecord, frozen=True):
     frame: Index
-    time: Number
+    time: float
 
 
 def _json_lines(frame: FrameTracks) -> Iterator[str]:
@@ -87,9 +95,10 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a row for each box; what is not known is an empty cell."""
     for track in frame.tracks:
         known = _track_record(track)
-        cells = frame.index, f"{frame.time:.6f}", track.id, *track.box.xywh, f"{track.score:.4f}"
-        flag, extra = int(track.predicted), (known["distance"], known["lane"])
-        yield _csv_line([*cells, flag, track.class_name, *known["foot"], *extra])
+        place, score = track.box.xywh, f"{track.score:.4f}"
+        cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, int(track.predicted))
+        others = (track.class_name, *known["foot"], known["distance"], known["lane"])
+        yield _csv_line((*cells, *others))
 
 
 def _csv_line(cells: Iterable[object]) -> str:
@@ -104,16 +113,20 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        The file is empty, a line is not such a record, or frames do not ascend.
+        The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
-    times: dict[int, float] = {}
+    times: _Times = {}
     labels = tuple(limited(path, _json_labels(path, text_of(path, data), times)))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(labels, listed=tuple(times), times=times)
+    return SavedTracks(labels, listed=tuple(times), times=checked_times(path, times))
 
 
-def _json_labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Label]:
+_Times = dict[int, tuple[int | str, float]]
+"""The line and the time of each frame."""
+
+
+def _json_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
     """Yield the boxes of every record, and put the time of every frame into `times`."""
     last = -1
     for line, content in numbered_lines(text):
@@ -126,7 +139,7 @@ def _json_labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Lab
         if record.frame <= last:
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         last = record.frame
-        times[last] = record.time
+        times[last] = line, record.time
         for each in record.tracks:
             yield each.labelled(line, last)
 
@@ -139,51 +152,39 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        A column is missing or appears twice, a row has another number of cells, or a cell is not
-        what its column needs.
+        A column is missing or appears twice, a row has another number of cells, a cell is not what
+        its column needs, or a time is wrong.
     """
-    times: dict[int, float] = {}
+    times: _Times = {}
     labels = tuple(limited(path, _csv_labels(path, text_of(path, data), times)))
-    return SavedTracks(labels, times=times)
+    return SavedTracks(labels, times=checked_times(path, times))
 
 
-def _csv_labels(path: Path, text: str, times: dict[int, float]) -> Iterator[Label]:
+def _csv_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
     """Yield the label of every row, and put the time of its frame into `times`."""
-    table = csv.reader(io.StringIO(text, newline=""), strict=True)
+    table = csv.DictReader(io.StringIO(text, newline=""), strict=True)
     try:
-        header = next(table, [])
-        _check_header(header)
-        for cells in filter(None, table):
-            row = _row(header, cells)
-            times[row.frame] = row.time
+        names = table.fieldnames or ()
+        if any(names.count(name) != 1 for name in _NEEDED):
+            needed = ", ".join(_NEEDED)
+            raise ValueError(f"the header must name each of these columns once: {needed}")
+        for cells in table:
+            if None in cells or None in cells.values():
+                raise ValueError(f"this line has not the {len(names)} columns of the header")
+            row = _row({name: text for name, cell in cells.items() if (text := cell.strip())})
+            times[row.frame] = table.line_num, row.time
             yield row.labelled(table.line_num, row.frame)
-    except ValidationError as error:
-        raise line_error(path, table.line_num, first_mistake(error)) from error
-    except (ValueError, csv.Error) as error:
-        raise line_error(path, max(1, table.line_num), str(error)) from error
+    except ValueError as error:  # also a ValidationError
+        raise line_error(path, max(1, table.reader.line_num), first_mistake(error)) from error
+    except csv.Error as error:
+        raise line_error(path, max(1, table.reader.line_num), str(error)) from error
 
 
-def _check_header(header: Sequence[str]) -> None:
-    if any(header.count(name) != 1 for name in _NEEDED):
-        raise ValueError(f"the header must name each of these columns once: {', '.join(_NEEDED)}")
-    for name in _OPTIONAL:
-        if header.count(name) > 1:
-            raise ValueError(f"the header names the column {name} twice")
+def _row(cells: dict[str, Any]) -> _Row:
+    if "foot_x" in cells and "foot_y" in cells:
+        cells["foot"] = cells["foot_x"], cells["foot_y"]
+    return _Row.model_validate(cells)
 
 
-def _row(header: Sequence[str], cells: Sequence[str]) -> _Row:
-    if len(cells) != len(header):
-        raise ValueError(f"the header has {len(header)} columns; this line has {len(cells)}")
-    known: dict[str, Any] = {
-        name: text.strip() for name, text in zip(header, cells, strict=True) if text.strip()
-    }
-    if "foot_x" in known and "foot_y" in known:
-        known["foot"] = known["foot_x"], known["foot_y"]
-    return _Row.model_validate(known)
-
-
-JSON_LINES = Format(
-    "JSON lines", ".jsonl", read_json_lines, lambda file, _: LineWriter(file, _json_lines)
-)
-_HEADING = _csv_line([*_NEEDED, *_OPTIONAL])
-CSV = Format("CSV", ".csv", read_csv, lambda file, _: LineWriter(file, _csv_lines, _HEADING))
+JSON_LINES = Format("JSON lines", ".jsonl", read_json_lines, _json_lines)
+CSV = Format("CSV", ".csv", read_csv, _csv_lines, _csv_line([*_NEEDED, *_OPTIONAL]))

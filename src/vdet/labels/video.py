@@ -4,11 +4,13 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 from vdet.boxes import BoolArray, Box, Float64Array, Int64Array
 from vdet.detect.classes import our_name
+from vdet.errors import TruthError
 from vdet.labels.label import Label
 from vdet.track.track import FrameTracks, Track
 
@@ -150,6 +152,13 @@ class LabelledVideo:
     def last_frame(self) -> int:
         """Number of the video's last frame as far as it is known; 0 if there is none."""
         return max(self.frame_count or 0, int(self.frames[-1]) if len(self) else 0)
+
+    def check_end(self, path: Path, frames: int) -> None:
+        """Refuse boxes of the file `path` beyond a video's last frame. Raises `TruthError`."""
+        last = int(self.frames.max(initial=0))
+        if last > frames:
+            what = f"has a box in frame {last} of a video of {frames}; is it another video's?"
+            raise TruthError(f"{path}: {what}")
 
     def frame(self, number: int) -> "LabelledVideo":
         """Return the rows of one frame, counted from 1, in their order."""

@@ -62,13 +62,11 @@ def read_xml(path: Path, text: str, root: str, take: Callable[[list[Element]], N
         The XML is broken, declares a document type, is nested deeper than `MAX_DEPTH`, has another
         root, or `take` has raised a ValueError.
     """
-    parser = expat.ParserCreate()
-    reader = _Reader(parser, root, take)
-    parser.buffer_text = True
-    parser.StartDoctypeDeclHandler = reader.refuse_doctype
-    parser.StartElementHandler = reader.start
-    parser.EndElementHandler = reader.end
-    parser.CharacterDataHandler = reader.text
+    if "<!DOCTYPE" in text:
+        line = text.count("\n", 0, text.index("<!DOCTYPE")) + 1
+        what = "the XML declares a document type, which labels do not need; remove it"
+        raise line_error(path, line, what)
+    parser = _parser(root, take)
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -78,33 +76,28 @@ def read_xml(path: Path, text: str, root: str, take: Callable[[list[Element]], N
         raise line_error(path, parser.CurrentLineNumber, str(error)) from error
 
 
-class _Reader:
-    """The handlers of a parser."""
+def _parser(root: str, take: Callable[[list[Element]], None]) -> expat.XMLParserType:
+    parser = expat.ParserCreate()
+    opened: list[Element] = []
 
-    def __init__(
-        self, parser: expat.XMLParserType, root: str, take: Callable[[list[Element]], None]
-    ) -> None:
-        self._parser = parser
-        self._root = root
-        self._take = take
-        self._open: list[Element] = []
-
-    def refuse_doctype(self, *_: object) -> None:
-        raise ValueError("the XML declares a document type, which labels do not need; remove it")
-
-    def start(self, name: str, attributes: dict[str, str]) -> None:
-        if not self._open and name != self._root:
-            raise ValueError(f"<{name:.40}> where the format has <{self._root}>")
-        if len(self._open) == MAX_DEPTH:
+    def start(name: str, attributes: dict[str, str]) -> None:
+        if not opened and name != root:
+            raise ValueError(f"<{name:.40}> where the format has <{root}>")
+        if len(opened) == MAX_DEPTH:
             raise ValueError(f"more than {MAX_DEPTH} nested elements")
-        self._open.append(Element(name, attributes, self._parser.CurrentLineNumber))
+        opened.append(Element(name, attributes, parser.CurrentLineNumber))
 
-    def text(self, part: str) -> None:
-        element = self._open[-1]
-        element.text += part[: _MAX_TEXT - len(element.text)]
+    def add_text(part: str) -> None:
+        opened[-1].text += part[: _MAX_TEXT - len(opened[-1].text)]
 
-    def end(self, _: str) -> None:
-        self._take(self._open)
-        element = self._open.pop()
-        if self._open:
-            self._open[-1].values.setdefault(element.name, []).append(element.text)
+    def end(_: str) -> None:
+        take(opened)
+        element = opened.pop()
+        if opened:
+            opened[-1].values.setdefault(element.name, []).append(element.text)
+
+    parser.buffer_text = True
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.CharacterDataHandler = add_text
+    return parser

@@ -9,29 +9,27 @@ Source: docs.ultralytics.com, "Object detection datasets overview"; the CVAT man
 YOLO".
 """
 
-import io
 import json
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
-from vdet.archives import ArchiveError, list_members, open_archive, read_member
-from vdet.config import document
+from vdet.config.document import MAX_BYTES, parse_document
 from vdet.errors import ConfigError, ImageError, TruthError
 from vdet.files import escaped, printable
 from vdet.labels.formats import UNKNOWN, Format, PictureFormat, SourceVideo
-from vdet.labels.label import NO_ID, Label, limited
+from vdet.labels.label import Label, limited
 from vdet.labels.parsing import (
     LIMIT,
-    MAX_BYTES,
+    archive_texts,
     label_lines,
     parse_number,
     parse_whole,
     read_text,
-    text_of,
 )
 from vdet.labels.pictures import LabelledPicture, pictures_below
 from vdet.labels.video import SavedTracks
@@ -42,52 +40,42 @@ _DATA = "data.yaml"
 _NO_LABELS = "classes.txt"  # label tools write it beside the labels
 _NUMBER = re.compile(r"([0-9]{1,8})$", re.ASCII)
 _COLUMNS = 5
+_POLYGON_COLUMNS = 7  # the least: the class and three points
 
 Size = tuple[int, int]
 """Width and height in pixels."""
 
 
-class YoloWriter:
-    """Keeps the labels of each frame, and writes all at the end.
-
-    Boxes end at the sides of the frame; a box that lies outside is left out.
-    """
-
-    def __init__(self, file: BinaryIO, video: SourceVideo | None) -> None:
-        assert video is not None  # `needs_video` says so
-        self._file = file
-        self._size = video.width, video.height
-        self._classes: dict[str, int] = {}  # name: number, in the order of their numbers
-        self._labels: dict[int, str] = {}  # by frame
-
-    def write(self, frame: FrameTracks) -> None:
-        """Keep the labels of a frame."""
-        self._labels[frame.index] = "".join(self._line(track) for track in frame.tracks)
-
-    def _line(self, track: Track) -> str:
-        width, height = self._size
-        box = track.box.rounded.clipped(width, height)
-        if not box.area:
-            return ""
-        number = self._classes.setdefault(track.class_name or UNKNOWN, len(self._classes))
-        x, y = box.center
-        shares = (x / width, y / height, box.width / width, box.height / height)
-        return f"{number} {' '.join(f'{share:.6f}' for share in shares)} {track.id}\n"
-
-    def end(self) -> None:
-        """Write the whole archive."""
-        classes = "".join(
+def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
+    """Write the archive. Boxes end at the sides of the frame; one outside of it is left out."""
+    size = video.width, video.height
+    classes: dict[str, int] = {}  # name: number, in the order of their numbers
+    names = {frame.index: f"frame_{frame.index:06}" for frame in frames}
+    pictures = "".join(f"images/train/{name}.png\n" for name in names.values())
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        _add(archive, "train.txt", pictures)
+        for frame in frames:
+            lines = "".join(_line(track, size, classes) for track in frame.tracks)
+            _add(archive, f"labels/train/{names[frame.index]}.txt", lines)
+        listed = "".join(
             f"  {number}: {json.dumps(escaped(name), ensure_ascii=False)}\n"
-            for name, number in (self._classes or {UNKNOWN: 0}).items()
+            for name, number in (classes or {UNKNOWN: 0}).items()
         )
-        size = "width: {}\nheight: {}\n".format(*self._size)
-        names = {index: f"frame_{index:06}" for index in self._labels}
-        with zipfile.ZipFile(self._file, "w", zipfile.ZIP_DEFLATED) as archive:
-            _add(archive, _DATA, f"path: .\ntrain: train.txt\nnames:\n{classes}{size}")
-            pictures = "".join(f"images/train/{name}.png\n" for name in names.values())
-            _add(archive, "train.txt", pictures)
-            for index, labels in self._labels.items():
-                _add(archive, f"labels/train/{names[index]}.txt", labels)
+        sides = "width: {}\nheight: {}\n".format(*size)
+        parts = "train: train.txt\nval: train.txt\n"  # Ultralytics needs both
+        _add(archive, _DATA, f"path: .\n{parts}names:\n{listed}{sides}")
+
+
+def _line(track: Track, size: Size, classes: dict[str, int]) -> str:
+    """Return the line of a track, and give its class a number."""
+    width, height = size
+    box = track.box.rounded.clipped(width, height)
+    if not box.area:
+        return ""
+    number = classes.setdefault(track.class_name or UNKNOWN, len(classes))
+    x, y = box.center
+    shares = (x / width, y / height, box.width / width, box.height / height)
+    return f"{number} {' '.join(f'{share:.6f}' for share in shares)} {track.id}\n"
 
 
 def _add(archive: zipfile.ZipFile, name: str, text: str) -> None:
@@ -106,61 +94,46 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
     Raises
     ------
     TruthError
-        The archive is damaged, a name in it leads out of it, its labels are larger than
-        `MAX_BYTES`, there is no `data.yaml` with names and the size of the frames, two files are of
-        one frame, or a line is not of this form.
+        The archive is damaged, a name in it leads out of it, its labels are too large, there is no
+        `data.yaml` with names and the size of the frames, two files are of one frame, or a line is
+        not of this form.
     """
-    try:
-        members = list_members(io.BytesIO(data))
-        with open_archive(io.BytesIO(data)) as archive:
-            names, size = _described(path, archive, members)
-            files = _label_files(path, archive, members)
-            texts = {
-                index: (name, text_of(path, read_member(archive, name, most=MAX_BYTES)))
-                for index, name in sorted(files.items())
-            }
-    except ArchiveError as error:
-        raise TruthError(f"{path}: {error}") from error
-    labels = (
-        label
-        for index, (name, text) in texts.items()
-        for label in label_lines(
-            path,
-            text,
-            partial(_label, names=names, size=size, frame=index + 1),
-            form="YOLO with tracks",
-            counts=(_COLUMNS + 1, _COLUMNS + 2),
-            member=printable(name),
-        )
-    )
-    return SavedTracks(tuple(limited(path, labels)), listed=tuple(texts), size=size)
-
-
-def _described(
-    path: Path, archive: zipfile.ZipFile, members: Sequence[str]
-) -> tuple[list[str], Size]:
-    """Return the names and the size of frames in `data.yaml`, at the top or in a folder."""
-    found = [name for name in members if PurePosixPath(name).name == _DATA]
-    if not found:
+    texts = archive_texts(path, data, lambda name: name.name == _DATA or _is_label_file(name))
+    described = [name for name in texts if PurePosixPath(name).name == _DATA]
+    if not described:
         raise TruthError(f"{path}: needs {_DATA} with the names of the classes")
-    first = min(found, key=lambda name: (name.count("/"), name))
+    first = min(described, key=lambda name: (name.count("/"), name))
     where = f"{path}:{printable(first)}"
-    text = text_of(path, read_member(archive, first, most=document.MAX_BYTES))
-    values = _values(lambda: document.parse_document(text, where))
+    values = _values(texts[first], where)
     names = _class_names(values, where)
-    size = values.get("width"), values.get("height")
+    size: Any = values.get("width"), values.get("height")
     if not all(isinstance(side, int) and 0 < side <= LIMIT for side in size):
         raise TruthError(
             f"{where}: does not say how large the frames are; add the lines 'width: 1280' and "
             "'height: 720' with the pixels of yours"
         )
-    return names, size  # type: ignore[return-value]  # checked above
+    frames = _frames(path, [name for name in texts if name not in described])
+    labels = (
+        label
+        for index, name in sorted(frames.items())
+        for label in label_lines(
+            path,
+            texts[name],
+            partial(_track_label, names=names, size=size, frame=index + 1),
+            form="YOLO with tracks",
+            counts=(_COLUMNS + 1, _COLUMNS + 2),
+            member=printable(name),
+        )
+    )
+    return SavedTracks(tuple(limited(path, labels)), listed=tuple(sorted(frames)), size=size)
 
 
-def _values(read: Callable[[], document.Document]) -> Mapping[str, Any]:
-    """Return the values of a YAML document that `read` reads."""
+def _values(text: str, where: str) -> Mapping[str, Any]:
+    """Return the values of `data.yaml`."""
+    if len(text) > MAX_BYTES:
+        raise TruthError(f"{where}: is larger than {MAX_BYTES:,} bytes")
     try:
-        return read().values
+        return parse_document(text, where).values
     except ConfigError as error:
         raise TruthError(str(error).splitlines()[0]) from error
 
@@ -175,12 +148,9 @@ def _class_names(values: Mapping[str, Any], where: str) -> list[str]:
     return names
 
 
-def _label_files(path: Path, archive: zipfile.ZipFile, members: Sequence[str]) -> dict[int, str]:
-    """Return the names of all files of labels by their frame."""
+def _frames(path: Path, names: Sequence[str]) -> dict[int, str]:
+    """Return the names of files of labels by their frame."""
     files: dict[int, str] = {}
-    names = [name for name in members if _is_label_file(PurePosixPath(name))]
-    if sum(archive.getinfo(name).file_size for name in names) > MAX_BYTES:
-        raise TruthError(f"{path}: its labels are larger than {MAX_BYTES:,} bytes; cut the video")
     for name in names:
         number = _NUMBER.search(PurePosixPath(name).stem)
         if number is None:
@@ -199,31 +169,39 @@ def _is_label_file(name: PurePosixPath) -> bool:
     return name.suffix.lower() == ".txt" and "labels" in name.parts[:-1]
 
 
-def _label(
-    place: int | str, columns: Sequence[str], names: Sequence[str], size: Size, frame: int = 1
-) -> Label:
-    """Return the label of a line: a box, and with more columns its id, or its score and its id.
+def _label(place: int | str, columns: Sequence[str], names: Sequence[str], size: Size) -> Label:
+    """Return the label of a line: a box, or a polygon with three points or more, as its box.
 
     Raises
     ------
     ValueError
-        The class has no name, or a number is not between 0 and 1.
+        There are too few columns, the class has no name, or a number is not between 0 and 1.
     """
+    count = len(columns)
+    if count != _COLUMNS and (count < _POLYGON_COLUMNS or count % 2 == 0):
+        raise ValueError(
+            f"YOLO has {_COLUMNS} columns between spaces, or the points of a polygon; this line "
+            f"has {count}"
+        )
     number = parse_whole(columns[0])
     if not 0 <= number < len(names):
         raise ValueError(f"class {number} has no name; {_DATA} has {len(names)} names")
-    shares = [parse_number(column) for column in columns[1:_COLUMNS]]
+    shares = [parse_number(column) for column in columns[1:]]
     if not all(0 <= share <= 1 for share in shares):
         raise ValueError("a number is not between 0 and 1; YOLO has shares of the picture")
-    x, y, width, height = (share * size[i % 2] for i, share in enumerate(shares))
-    return Label(
-        place,
-        (x - width / 2, y - height / 2, x + width / 2, y + height / 2),
-        names[number],
-        frame,
-        parse_whole(columns[-1]) if len(columns) > _COLUMNS else NO_ID,
-        parse_number(columns[_COLUMNS]) if len(columns) > _COLUMNS + 1 else 1.0,
-    )
+    xs, ys = ([share * side for share in shares[i::2]] for i, side in enumerate(size))
+    if count == _COLUMNS:  # middle and size
+        xs, ys = ([middle - side / 2, middle + side / 2] for middle, side in (xs, ys))
+    return Label(place, (min(xs), min(ys), max(xs), max(ys)), names[number])
+
+
+def _track_label(
+    place: int | str, columns: Sequence[str], names: Sequence[str], size: Size, frame: int
+) -> Label:
+    """Return the label of a line with a box and its id, or its score and its id."""
+    label = _label(place, columns[:_COLUMNS], names, size)
+    score = parse_number(columns[_COLUMNS]) if len(columns) > _COLUMNS + 1 else 1.0
+    return replace(label, frame=frame, id=parse_whole(columns[-1]), score=score)
 
 
 def read_yolo_pictures(folder: Path) -> Iterator[LabelledPicture]:
@@ -240,7 +218,7 @@ def read_yolo_pictures(folder: Path) -> Iterator[LabelledPicture]:
     data = next((p for p in (folder / _DATA, folder.parent / _DATA) if p.is_file()), None)
     if data is None:
         raise TruthError(f"{folder}: needs {_DATA} with the names of the classes, here or above")
-    names = _class_names(_values(lambda: document.read_document(data)), str(data))
+    names = _class_names(_values(read_text(data), str(data)), str(data))
     images, labels = folder / "images", folder / "labels"
     files = {file for file in labels.rglob("*.txt") if file.name != _NO_LABELS}
     for picture in pictures_below(images):
@@ -260,9 +238,9 @@ def _labelled(picture: Path, file: Path, names: Sequence[str]) -> LabelledPictur
     except ImageError as error:
         raise TruthError(str(error)) from error
     parse = partial(_label, names=names, size=size)
-    labels = label_lines(file, read_text(file), parse, form="YOLO", counts=[_COLUMNS])
+    labels = label_lines(file, read_text(file), parse, form="YOLO", counts=None)
     return LabelledPicture(picture, file, tuple(labels), size)
 
 
-YOLO = Format("YOLO", ".yolo.zip", read_yolo, YoloWriter, needs_video=True)
+YOLO = Format("YOLO", ".yolo.zip", read_yolo, whole=_write)
 YOLO_PICTURES = PictureFormat("YOLO", ("images", "labels"), read_yolo_pictures)

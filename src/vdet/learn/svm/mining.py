@@ -104,7 +104,7 @@ class VideoSource:
                     yield LabelledFrame(name, frame.index, image, search(image), labels)
                 advance(1)
         if number < last:
-            read_truth(self.truth, roles, frame_count=number)  # raises an error with the line
+            truth.check_end(self.truth, number)
 
     def _last(self, truth: LabelledVideo) -> int:
         last = min(self.last or truth.last_frame, truth.last_frame)
