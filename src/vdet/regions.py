@@ -1,6 +1,5 @@
 """Regions: the parts of the frames of one video in which vehicles are shown."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -9,7 +8,7 @@ import numpy as np
 from vdet.boxes import BoolArray
 from vdet.config.places import RegionsSettings
 from vdet.errors import ConfigError
-from vdet.media.images import Image, read_header, read_image
+from vdet.media.images import read_header, read_image
 from vdet.polygons import Point
 
 _WHITE = 128
@@ -17,7 +16,7 @@ _WHITE = 128
 
 
 class Regions:
-    """The regions, laid over frames of `width` × `height` pixels.
+    """The regions of the settings, in pixels of frames of `width` × `height`.
 
     Attributes
     ----------
@@ -45,32 +44,22 @@ class Regions:
         for each in settings.polygons:
             named = self.included if each.kind == "include" else self.excluded
             named[each.name] = [(x * across, y * down) for x, y in each.points]
-        self._numbers = np.zeros((height, width), np.uint8)
-        for number, corners in reversed(list(enumerate(self.included.values(), start=1))):
-            _fill(self._numbers, corners, number)  # where two overlap, the first counts
-        shown = self._numbers.copy() if self.included else np.ones_like(self._numbers)
-        for corners in self.excluded.values():
-            _fill(shown, corners, 0)
+        shown = np.full((height, width), not self.included, np.uint8)
+        for polygons, value in ((self.included, 1), (self.excluded, 0)):
+            for corners in polygons.values():  # with the pixels of their sides
+                cv2.fillPoly(shown, [np.floor(corners).astype(np.int32)], value)
         self.pixels: BoolArray = shown > 0
         if settings.mask:
             self.pixels &= _read_mask(settings.mask, width, height)
 
     def contains(self, point: Point) -> bool:
-        """Tell whether a vehicle whose foot is at a point, x and y in pixels, is shown.
+        """Return whether a vehicle whose foot is at a point, x and y in pixels, is shown.
 
         A point outside the frame counts as at its edge.
         """
-        return bool(self.pixels[self._place(point)])
-
-    def number_at(self, point: Point) -> int:
-        """Return the number, from 1, of the first included polygon around a point; 0 in none."""
-        return int(self._numbers[self._place(point)])
-
-    def _place(self, point: Point) -> tuple[int, int]:
-        """Return the row and the column of a point."""
         height, width = self.pixels.shape
         x, y = min(max(int(point[0]), 0), width - 1), min(max(int(point[1]), 0), height - 1)
-        return y, x
+        return bool(self.pixels[y, x])
 
 
 def lay_regions(settings: RegionsSettings, width: int, height: int) -> Regions | None:
@@ -100,8 +89,3 @@ def _read_mask(path: str, width: int, height: int) -> BoolArray:
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
     scaled = cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(scaled >= _WHITE)
-
-
-def _fill(canvas: Image, corners: Sequence[Point], value: int) -> None:
-    """Fill a polygon with the pixels of its sides."""
-    cv2.fillPoly(canvas, [np.floor(np.array(corners)).astype(np.int32)], value)

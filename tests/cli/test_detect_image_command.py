@@ -39,7 +39,9 @@ def test_json_has_the_boxes(run: Run, picture: Path, model_path: Path, scene: Sc
     assert (item["image"], item["width"], item["height"]) == (str(picture), 320, 180)
     assert item["boxes"]
     for box in item["boxes"]:
-        assert set(box) == {"x", "y", "width", "height", "score"}
+        assert set(box) == {
+            *("x", "y", "width", "height", "score", "class", "foot", "distance", "lane")
+        }
         assert 0 < box["score"] <= 1
         assert 0 <= box["x"] < box["x"] + box["width"] <= 320
     near = [true.box for true in true_boxes(scene, 10) if true.box.width > 20]

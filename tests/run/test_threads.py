@@ -4,7 +4,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from itertools import islice
 
 import pytest
@@ -144,7 +144,7 @@ class TestWriteAsync:
     @pytest.mark.parametrize("depth", [1, 4, 100])
     def test_passes_all_items_on_in_order(self, depth: int) -> None:
         taken: list[int] = []
-        with write_async(taken.append, depth) as hand_over:
+        with write_async(taken.append, depth, within=nullcontext()) as hand_over:
             hand_all(range(50), hand_over)
         assert taken == list(range(50))
 
@@ -203,7 +203,7 @@ class TestWriteAsync:
             time.sleep(0.2)
             passed.append(item)
 
-        with write_async(take, timeout=0.1, depth=9, extra=lambda: SOON) as put:
+        with write_async(take, 9, within=nullcontext(), timeout=0.1, extra=lambda: SOON) as put:
             for item in range(5):
                 put(item)
         assert passed == list(range(5))
@@ -240,7 +240,7 @@ class TestAllTogether:
         source: Iterable[int], function: Callable[[int], int], take: Callable[[int], object]
     ) -> None:
         with ExitStack() as stack:
-            hand_over = stack.enter_context(write_async(take))
+            hand_over = stack.enter_context(write_async(take, within=nullcontext()))
             items = stack.enter_context(prefetch(source))
             for _, result in stack.enter_context(map_ordered(function, items, threads=2)):
                 hand_over(result)

@@ -123,10 +123,8 @@ class DrawSettings(Section):
     """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
     labels. null: the id in a video, the score in a picture.
     """
-    colors: Literal["id", "class", "region", "one"] = "id"
-    """Use one colour for each id, for each class, for each polygon of the section regions, or for
-    all vehicles (one).
-    """
+    colors: Literal["id", "class", "one"] = "id"
+    """Use one colour for each id, for each class, or for all vehicles (one)."""
     thickness: float = Field(1.0, gt=0, le=20)
     """Factor of the width of lines, which otherwise depends on the frame."""
     trails: Seconds | None = None

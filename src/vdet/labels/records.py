@@ -73,12 +73,13 @@ class _Row(_TrackRecord, frozen=True):
 
 def _json_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a record: `frame`, `time`, `tracks`, and the facts that are known about the frame."""
-    tracks = [_track_record(track) for track in frame.tracks]
+    tracks = [track_record(track) for track in frame.tracks]
     record = {"frame": frame.index, "time": round(frame.time, 6), "tracks": tracks}
     yield json.dumps({**record, **frame.facts}) + "\n"
 
 
-def _track_record(track: Track) -> dict[str, Any]:
+def track_record(track: Track) -> dict[str, Any]:
+    """Return what is known of a track as values for JSON; boxes are rounded to whole pixels."""
     return {
         "id": track.id,
         **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
@@ -94,7 +95,7 @@ def _track_record(track: Track) -> dict[str, Any]:
 def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     """Yield a row for each box; what is not known is an empty cell."""
     for track in frame.tracks:
-        known = _track_record(track)
+        known = track_record(track)
         place, score = track.box.xywh, f"{track.score:.4f}"
         cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, int(track.predicted))
         others = (track.class_name, *known["foot"], known["distance"], known["lane"])

@@ -27,7 +27,7 @@ FIRST_FRAMES = 5
 
 @dataclass(frozen=True, slots=True)
 class Pipeline:
-    """What the frames of one video go through, or what one still picture goes through.
+    """Detector, tracker and steps for the frames of one video, or for one still picture.
 
     Attributes
     ----------
@@ -52,12 +52,12 @@ class Pipeline:
         *,
         threads: int = 1,
     ) -> Generator[FrameResult]:
-        """Find and follow the vehicles.
+        """Find and follow the vehicles; yield the result of each frame.
 
         Parameters
         ----------
         source
-            The video, for the results.
+            The video, for `FrameResult.source`.
         threads
             Number of frames that are searched at once. The results do not depend on it.
 
@@ -82,12 +82,11 @@ class Pipeline:
             for (frame, searched), candidates in results:
                 time, picture = float(frame.time), frame.picture
                 if searched:
-                    detections = detector.detect(candidates)
-                    tracks = tracker.update(detections, time, picture)
+                    found = detector.detect(candidates)
+                    tracks = tracker.update(found, time, picture)
                 else:
-                    detections = NO_BOXES
-                    tracks = tracker.carry(time, picture)
-                result = FrameResult(source, frame, detections, tuple(tracks), searched=searched)
+                    found, tracks = NO_BOXES, tracker.carry(time, picture)
+                result = FrameResult(source, frame, found, tuple(tracks), searched=searched)
                 for step in self.steps:
                     result = step.apply(result)
                 yield result
@@ -103,7 +102,7 @@ def build(
     steps: Sequence[Step] = (),
     lanes: LaneRequest | None = None,
 ) -> Pipeline:
-    """Build what the frames of a video go through, or one still picture.
+    """Make the pipeline of a video, or of one still picture.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ def build(
     steps
         Steps in addition to those of the settings.
     lanes
-        If it is given, the lane is found too, and the distance and the lane of each vehicle.
+        If given, the lane is found too, and the distance and the lane of each vehicle.
 
     Raises
     ------
@@ -139,13 +138,13 @@ def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
     """Return the images that `DetectorModel.for_video` gets, and an iterable of all frames."""
     rest = iter(frames)
     first = list(itertools.islice(rest, FIRST_FRAMES))
-    # A list iterator lets go of its list at the end; the list itself would stay for the whole run.
+    # A list iterator releases its list at the end; the list itself would stay for the whole run.
     return [frame.image for frame in first], itertools.chain(iter(first), rest)
 
 
 @contextmanager
 def named_errors(source: Path, kind: type[VdetError]) -> Iterator[None]:
-    """Put the name of the video or picture before what is wrong with it."""
+    """Raise errors of settings and of pictures as `kind`, with the name of the source."""
     try:
         yield
     except (ConfigError, ImageError) as error:

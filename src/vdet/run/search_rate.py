@@ -44,22 +44,20 @@ class SearchRate:
             A time is not a finite number, or is not later than that of the frame before.
         """
         steps: deque[float] = deque(maxlen=_STEPS)
-        before: Frame | None = None
-        since = math.inf  # seconds since the latest search
+        before, since = None, 0.0  # time of the frame before, seconds since the latest search
         for position, frame in enumerate(frames):
-            if before is not None:
-                step = float(frame.time - before.time)
-                steps.append(step)
-                since += step
-            if not (math.isfinite(frame.time) and (before is None or step > 0)):
+            step = math.inf if before is None else float(frame.time - before)
+            if not (step > 0 and math.isfinite(frame.time)):
                 raise ValueError(
                     f"frame {frame.index} is at {float(frame.time):g} s; "
                     "give each frame a finite time, later than that of the frame before"
                 )
+            if before is not None:
+                steps.append(step)
+            since, before = since + step, frame.time
             is_searched = self._is_due(position, since, steps)
             if is_searched:
                 since = 0.0
-            before = frame
             yield frame, is_searched
 
     def _is_due(self, position: int, since: float, steps: Iterable[float]) -> bool:

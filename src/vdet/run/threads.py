@@ -1,183 +1,154 @@
-"""Threads with bounded queues: items keep their order, an error in one thread ends all.
+"""Threads that read, search and write ahead: items keep their order, an error in one ends all.
 
 Each part is a context manager. When its block ends, its threads have ended. There is one exception:
 a thread that hangs in a read or write (for instance on a network disk that is gone) is abandoned
 after `JOIN_TIMEOUT`, together with the files that only it has open.
 """
 
-import contextlib
 import queue
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import AbstractContextManager, nullcontext, suppress
-from typing import Generic, TypeVar
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from itertools import islice
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
 
-POLL_INTERVAL = 0.1  # seconds between checks whether the other side has ended
 JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
+_DEPTH = 4  # items between two threads
 _AHEAD = 8
 """Largest number of items that `map_ordered` takes ahead for each thread."""
 
 
-class _End:
-    """The last entry of a queue, with the error that ended the items, if there was one."""
-
-    def __init__(self, error: BaseException | None = None) -> None:
-        self.error = error
-
-
 class StalledError(Exception):
-    """The other side did not give or take an item in time."""
+    """A read or a write did not end in time."""
 
 
-class _ClosedError(Exception):
-    """Ends a thread when the other side has ended with an error."""
+class _Thread:
+    """A thread that makes calls in turn; unlike a pool, it does not keep the program from ending.
+
+    It is a context manager. At the end of the block, all calls are still made.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._calls: queue.SimpleQueue[Callable[[], object] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+
+    def __enter__(self) -> "_Thread":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._calls.put(None)
+        self._thread.join(JOIN_TIMEOUT)
+
+    def submit(self, call: Callable[..., R], *arguments: Any) -> Future[R]:
+        future: Future[R] = Future()
+        self._calls.put(partial(_settle, future, call, *arguments))
+        return future
+
+    def _run(self) -> None:
+        while call := self._calls.get():
+            call()
+            del call  # else it holds the item until the next one comes
 
 
-class _Channel(Generic[T]):
-    """A bounded queue that either side can close."""
-
-    def __init__(self, depth: int) -> None:
-        self._queue: queue.Queue[T | _End] = queue.Queue(depth)
-        self._closed = threading.Event()
-        self.done = 0  # items whose taker has come back for the next one
-
-    def put(self, item: T | _End, timeout: float | None = None) -> bool:
-        """Wait for room; return False if the queue is closed."""
-        waited = 0.0
-        while not self._closed.is_set():
-            with suppress(queue.Full):
-                self._queue.put(item, timeout=POLL_INTERVAL)
-                return True
-            waited += POLL_INTERVAL
-            if timeout is not None and waited >= timeout:
-                raise StalledError
-        return False
-
-    def take(self, timeout: float | None = None) -> Iterator[T]:
-        while not isinstance(item := self._next(timeout), _End):
-            yield item
-            self.done += 1
-        if item.error is not None:
-            raise item.error
-
-    def close(self) -> None:
-        self._closed.set()
-
-    def _next(self, timeout: float | None) -> T | _End:
+def _settle(future: Future[R], call: Callable[..., R], *arguments: Any) -> None:
+    if future.set_running_or_notify_cancel():
         try:
-            item = self._queue.get(timeout=timeout)
-        except queue.Empty:
-            raise StalledError from None
-        return _End(_ClosedError()) if self._closed.is_set() else item
+            future.set_result(call(*arguments))
+        except BaseException as error:
+            future.set_exception(error)
 
 
-@contextlib.contextmanager
+def _result(future: Future[R], timeout: float | None) -> R:
+    """Wait for a result; raise `StalledError` if it does not come within `timeout` seconds."""
+    try:
+        return future.result(timeout)
+    except TimeoutError:
+        if future.done():  # then it is an error of the call itself
+            raise
+        raise StalledError from None
+
+
+@contextmanager
 def prefetch(
-    items: Iterable[T], depth: int = 4, *, timeout: float | None = None
+    items: Iterable[T], depth: int = _DEPTH, *, timeout: float | None = None
 ) -> Iterator[Iterator[T]]:
-    """Take `items` in a thread, ahead of the reader; at most `depth` wait, and one for room.
+    """Take `items` in a thread, at most `depth` ahead of the reader.
 
     A generator is closed in that thread too. If the next item does not come within `timeout`
     seconds, `StalledError` is raised.
     """
-    channel: _Channel[T] = _Channel(depth)
+    iterator = iter(items)
+    ahead: deque[Future[list[T]]] = deque()
 
-    def fill() -> None:
+    def take_one() -> list[T]:
+        return list(islice(iterator, 1))
+
+    with _Thread("vdet-prefetch") as thread:
+        ahead.extend(thread.submit(take_one) for _ in range(depth))
+
+        def taken() -> Iterator[T]:
+            while item := _result(ahead.popleft(), timeout):
+                ahead.append(thread.submit(take_one))
+                yield item.pop()
+
         try:
-            with _closing(items):
-                for item in items:
-                    if not channel.put(item):
-                        return
-            channel.put(_End())
-        except BaseException as error:
-            channel.put(_End(error))
-
-    thread = threading.Thread(target=fill, name="vdet-prefetch", daemon=True)
-    thread.start()
-    try:
-        yield channel.take(timeout)
-    finally:
-        channel.close()
-        thread.join(JOIN_TIMEOUT)
+            yield taken()
+        finally:
+            for future in ahead:
+                future.cancel()
+            if isinstance(iterator, Generator):
+                thread.submit(iterator.close)
 
 
-def run_in_thread(call: Callable[[], T], *, timeout: float | None = None) -> T:
-    """Return the result of `call`; it runs in a thread, so that Ctrl-C works even if it hangs.
-
-    `StalledError` is raised if it does not end within `timeout` seconds.
-    """
-    with prefetch((call() for _ in range(1)), timeout=timeout) as results:
-        return next(results)
-
-
-@contextlib.contextmanager
+@contextmanager
 def write_async(
     take: Callable[[T], object],
-    depth: int = 4,
+    depth: int = _DEPTH,
     *,
-    within: AbstractContextManager[object] | None = None,
+    within: AbstractContextManager[object],
     timeout: float | None = None,
     extra: Callable[[], float] = lambda: 0.0,
 ) -> Iterator[Callable[[T], None]]:
     """Give a function that passes items to `take` in a thread; at most `depth` items wait.
 
     The thread enters and leaves the context manager `within`, with an error if the block ends with
-    one. An error in the thread is raised by the next call, or when the block ends. A call raises
+    one. An error in the thread is raised by a later call, or when the block ends. A call raises
     `StalledError` if there is no room within `timeout` seconds. So does the end of the block if the
     last items, or leaving `within`, get no further within `timeout` and the `extra` seconds.
     """
-    channel: _Channel[T] = _Channel(depth)
-    failures: list[BaseException] = []
+    waiting: deque[Future[object]] = deque()
 
-    def drain() -> None:
+    with _Thread("vdet-write") as thread:
+
+        def wait(most: int, limit: float | None) -> None:
+            """Wait until at most `most` calls are not done."""
+            while waiting and (len(waiting) > most or waiting[0].done()):
+                _result(waiting.popleft(), limit)
+
+        def put(item: T) -> None:
+            wait(depth - 1, timeout)
+            waiting.append(thread.submit(take, item))
+
+        waiting.append(thread.submit(within.__enter__))
         try:
-            with within or nullcontext():
-                for item in channel.take():
-                    take(item)
-        except BaseException as error:
-            failures.append(error)
-            channel.close()
-
-    def put(item: T) -> None:
-        if not channel.put(item, timeout):
-            raise failures[0]
-
-    thread = threading.Thread(target=drain, name="vdet-write", daemon=True)
-    thread.start()
-    try:
-        yield put
-        channel.put(_End(), timeout)
-        _join(thread, channel, None if timeout is None else timeout + extra())
-    except BaseException:
-        with suppress(StalledError):
-            channel.put(_End(_ClosedError()), JOIN_TIMEOUT)
-        thread.join(JOIN_TIMEOUT)
-        channel.close()
-        raise
-    if failures:
-        raise failures[0]
+            yield put
+            limit = None if timeout is None else timeout + extra()
+            wait(0, limit)
+        except BaseException:
+            thread.submit(within.__exit__, *sys.exc_info())
+            raise
+        _result(thread.submit(within.__exit__, None, None, None), limit)
 
 
-def _join(thread: threading.Thread, channel: _Channel[T], timeout: float | None) -> None:
-    """Wait for the end of a thread that takes items, as long as it gets on."""
-    done = -1
-    while thread.is_alive():
-        if channel.done == done:
-            raise StalledError
-        done = channel.done
-        thread.join(timeout)
-
-
-def _closing(items: Iterable[object]) -> AbstractContextManager[object]:
-    return contextlib.closing(items) if isinstance(items, Generator) else nullcontext()
-
-
-@contextlib.contextmanager
+@contextmanager
 def map_ordered(
     function: Callable[[T], R],
     items: Iterable[T],

@@ -1,13 +1,14 @@
-"""A run: a video is read, searched and followed, and the results go to sinks."""
+"""A run: read a video, search its frames, follow the vehicles, and give the results to sinks."""
 
 import logging
 import time
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from vdet.boxes import NO_BOXES
 from vdet.config.schema import Settings
@@ -16,51 +17,51 @@ from vdet.detect.protocol import DetectorModel, stage_pictures_of
 from vdet.errors import FrameSizeError, VideoError
 from vdet.files import OutputFiles
 from vdet.lanes.road import LaneRequest
-from vdet.media import Frame, VideoReader
+from vdet.media import VideoReader
 from vdet.progress import Progress, no_progress
 from vdet.run.loop import Pipeline, build, named_errors, peek
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import Output, SinkContext, check_sinks, open_sinks, sink_kind
 from vdet.run.steps import Step
-from vdet.run.threads import StalledError, prefetch, run_in_thread
+from vdet.run.threads import StalledError, prefetch
 from vdet.track.track import VideoTracker
 from vdet.workers import core_count
 
 log = logging.getLogger("vdet")
 
 LEAD = Fraction(2)
-"""Seconds before a moment that are searched for it: what detector and tracker remember."""
+"""Seconds before the frame at `VideoJob.at` that are processed too, for detector and tracker."""
 
 IO_TIMEOUT = 120.0  # seconds
 
 
 @dataclass(frozen=True, slots=True)
 class VideoJob:
-    """A video, the part of it that is searched, and the outputs.
+    """A video, the part of it that is processed, and the outputs.
 
     Attributes
     ----------
     start, end
-        Seconds from the first frame; frames with start ≤ time < end are searched.
+        Seconds from the first frame; frames with start ≤ time < end are processed.
     frames
-        Largest number of frames to search.
+        Largest number of frames to process.
     at
         Time of the stage pictures, seconds from the first frame. If no output needs more, only the
-        frames from 2 s before it are searched.
+        frames from 2 s before it are processed.
     lanes
-        If it is given, the lane is found too, and everything is drawn on undistorted frames.
+        If given, the lane is found too, and everything is drawn on undistorted frames.
     inputs
         Other files that are read, such as settings; outputs never replace them.
     overwrite
-        Outputs that are there already are replaced.
+        Replace outputs that are there already.
     threads
         Number of threads that search; None for one per core.
     codec_threads
         Number of threads of the encoder; None for one per core.
     timeout
-        Seconds in which the next frame must be read or written; after that the job fails, so that
-        a disk or a network that hangs does not stop a batch. The duration of the part before
-        `start` is added to it.
+        Seconds in which the next frame must be read or written. After that the job fails, so that
+        a disk or a network that hangs does not stop a batch. Reading gets the duration of the part
+        before `start` in addition.
     """
 
     source: Path
@@ -78,7 +79,7 @@ class VideoJob:
 
     @property
     def is_part(self) -> bool:
-        """Whether only a part of the video is searched."""
+        """Whether only a part of the video is processed."""
         return (self.start, self.end, self.frames) != (None, None, None)
 
     @property
@@ -94,14 +95,14 @@ class VideoJob:
 
 @dataclass(frozen=True, slots=True)
 class RunTotals:
-    """What a run did.
+    """Totals of a run.
 
     Attributes
     ----------
     width, height
         Size of the upright frames, pixels.
     frames, tracks
-        Number of frames searched, and of tracks shown (ids).
+        Number of frames processed, and of tracks shown (ids).
     seconds
         Wall time.
     """
@@ -115,7 +116,7 @@ class RunTotals:
 
 @dataclass(frozen=True, slots=True)
 class OpenVideo:
-    """A video that is read, and the results of its frames."""
+    """A video that is being read, and the results of its frames."""
 
     reader: VideoReader
     pipeline: Pipeline
@@ -141,31 +142,45 @@ def open_video(
     Reading and searching run in threads.
     """
     timeout = job.timeout + float(job.start or 0)
+    reading = _reader_and_frames(job, settings)
+    try:
+        with (
+            named_errors(job.source, VideoError),
+            prefetch(reading, timeout=timeout) as read,
+        ):
+            reader: VideoReader = next(read)
+            _check_times(job, reader.length)
+            images, frames = peek(read)
+            make = partial(
+                build, settings=settings, video=reader.info, images=images, lanes=job.lanes
+            )
+            try:
+                pipeline = make(model, tracker=tracker, steps=steps)
+            except FrameSizeError as error:
+                log.warning("%s: gets no boxes: %s", job.source, error)
+                pipeline = make(as_model(lambda _: NO_BOXES))
+            del make, images  # otherwise they stay in memory for the whole run
+            threads = job.threads or core_count()
+            with closing(pipeline.follow(frames, job.source, threads=threads)) as results:
+                yield OpenVideo(reader, pipeline, results)
+    except StalledError as error:
+        raise VideoError(
+            f"{job.source}: nothing could be read or written for {timeout:g} s; check the disk or "
+            "the network"
+        ) from error
 
-    open_reader = partial(
-        VideoReader,
+
+def _reader_and_frames(job: VideoJob, settings: Settings) -> Generator[Any]:
+    """Yield the reader, and then its frames; the thread that reads them opens and closes it."""
+    with VideoReader(
         job.source,
         start=job.start,
         end=job.end,
         frames=job.frames,
         settings=settings.input,
-    )
-    with ExitStack() as stack:
-        stack.enter_context(named_errors(job.source, VideoError))
-        stack.enter_context(_no_stall(job.source, timeout))
-        reader = run_in_thread(open_reader, timeout=timeout)
-        read = stack.enter_context(prefetch(_frames(reader), timeout=timeout))
-        _check_times(job, reader.length)
-        images, frames = peek(read)
-        make = partial(build, settings=settings, video=reader.info, images=images, lanes=job.lanes)
-        try:
-            pipeline = make(model, tracker=tracker, steps=steps)
-        except FrameSizeError as error:
-            log.warning("%s: gets no boxes: %s", job.source, error)
-            pipeline = make(as_model(lambda _: NO_BOXES))
-        del make, images  # else they stay in memory for the whole run
-        results = pipeline.follow(frames, job.source, threads=job.threads or core_count())
-        yield OpenVideo(reader, pipeline, stack.enter_context(closing(results)))
+    ) as reader:
+        yield reader
+        yield from reader
 
 
 def run_video(
@@ -179,7 +194,7 @@ def run_video(
 ) -> RunTotals:
     """Run a job. Its outputs appear under their names together, at the end of the run.
 
-    Reading, searching and encoding run in threads; tracking and drawing in the calling one.
+    Reading, searching and encoding run in threads, tracking and drawing in the calling one.
 
     Parameters
     ----------
@@ -201,7 +216,8 @@ def run_video(
     """
     began = time.perf_counter()
     only_at = job.needs_only_at
-    job = _without_early_frames(job)
+    if only_at and job.frames is None:
+        job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
     with (
         OutputFiles(overwrite=job.overwrite) as files,
         open_video(job, model, settings, tracker=tracker, steps=steps) as video,
@@ -229,13 +245,6 @@ def run_video(
         *(job.source, seconds - writing, writing),
     )
     return RunTotals(info.width, info.height, frames, len(ids), seconds)
-
-
-def _without_early_frames(job: VideoJob) -> VideoJob:
-    """Return a job that reads only the frames that are needed for the moment `at`."""
-    if not job.needs_only_at or job.frames is not None:
-        return job
-    return replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
 
 
 def _context(
@@ -274,20 +283,3 @@ def _check_seen(job: VideoJob, last: Fraction | None, length: Fraction | None) -
 
 def _at_end(length: Fraction | None) -> str:
     return "; check them" if length is None else f"; it ends at {float(length):.2f} s"
-
-
-def _frames(reader: VideoReader) -> Generator[Frame]:
-    """Yield all frames; the thread that reads them closes the reader."""
-    with reader:
-        yield from reader
-
-
-@contextmanager
-def _no_stall(source: Path, timeout: float) -> Iterator[None]:
-    try:
-        yield
-    except StalledError as error:
-        raise VideoError(
-            f"{source}: nothing could be read or written for {timeout:g} s; check the disk or "
-            "the network"
-        ) from error

@@ -20,7 +20,10 @@ ITEMS = (
         "image": "a.png",
         "width": 320,
         "height": 240,
-        "boxes": [{"x": 1, "y": 2, "width": 3, "height": 4, "score": 0.5679}],
+        "boxes": [
+            {"x": 1, "y": 2, "width": 3, "height": 4, "score": 0.5679, "class": "car"}
+            | {"foot": [2.5, 6.0], "distance": None, "lane": None}
+        ],
     },
     {"image": str(Path("in") / "b.png"), "width": 64, "height": 48, "boxes": []},
 )
@@ -28,7 +31,7 @@ ITEMS = (
 
 RESULTS = (
     result_of(
-        Track(1, Box.sized(1, 2, 3, 4), 0.567891, predicted=False),
+        Track(1, Box.sized(1, 2, 3, 4), 0.567891, False, "car"),
         source=Path("a.png"),
         image=road(),
     ),

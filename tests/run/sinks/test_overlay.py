@@ -11,9 +11,8 @@ import pytest
 from red_cars import CAR, HEIGHT, WIDTH, road
 from run.red_runs import VIDEO, result_of
 from vdet.boxes import Box
-from vdet.config.places import RegionSettings, RegionsSettings
 from vdet.config.schema import DrawSettings, LaneSettings, Settings
-from vdet.draw.boxes import BLACK, WHITE, color_of, draw_box, draw_label
+from vdet.draw.boxes import BLACK, color_of, draw_box, draw_label
 from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, Road, RoadFinder
 from vdet.media import Picture, VideoInfo
@@ -177,23 +176,6 @@ def test_colors_can_be_those_of_the_classes() -> None:
     colors = [tuple(image[149, box.pixels[0] + 25].tolist()) for box in boxes]
     assert colors[0] == colors[1]
     assert len(set(colors)) == 4
-
-
-def test_colors_can_be_those_of_the_regions() -> None:
-    halves = {
-        "left": ((0, 0), (0.5, 0), (0.5, 1), (0, 1)),
-        "middle": ((0.5, 0), (0.7, 0), (0.7, 1), (0.5, 1)),
-    }
-    polygons = [RegionSettings(name=name, points=points) for name, points in halves.items()]
-    settings = Settings(
-        draw=DrawSettings(colors="region"), regions=RegionsSettings(polygons=tuple(polygons))
-    )
-    boxes = [Box.sized(x, 100, 40, 40) for x in (10, 80, 170, 260)]
-    image = shown(Overlay(settings, None), result_of(*boxes, image=white(320, 240) // 2))
-    one, same, other, outside = (tuple(image[139, box.pixels[0] + 20].tolist()) for box in boxes)
-    assert one == same
-    assert len({one, other, outside}) == 3
-    assert outside == WHITE
 
 
 # Trails

@@ -4,7 +4,6 @@ from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -63,17 +62,16 @@ def test_numbered_pictures_are_no_video_to_show(tmp_path: Path) -> None:
     assert page_of(tmp_path / "page").all("video") == []
 
 
-def test_the_still_is_the_first_frame_that_shows_something(tmp_path: Path) -> None:
-    black = np.zeros_like(road())
-    checks = cv2.resize(np.indices((6, 8)).sum(axis=0).astype(np.uint8) % 2 * 255, (320, 240))
-    scene = np.ascontiguousarray(np.repeat(checks[..., np.newaxis], 3, axis=2))
-    frames = [black, black, scene, 255 - scene]
+def test_the_still_is_the_first_frame_that_shows_the_most_vehicles(tmp_path: Path) -> None:
+    black, bright = np.zeros_like(road()), np.full_like(road(), 250)
+    images = [black, bright, black]
     results = [
-        result_of(image=image, index=n, time=Fraction(n, 25)) for n, image in enumerate(frames)
+        result_of(*[CAR] * min(n, 1), image=image, index=n, time=Fraction(n, 25))
+        for n, image in enumerate(images)
     ]
     write(Output("page", tmp_path / "page"), results)
     (still,) = page_of(tmp_path / "page").all("img", **{"class": "still"})
-    assert abs(picture(still["src"]).astype(int) - scene).mean() < 10
+    assert picture(still["src"]).mean() > 150
 
 
 def test_a_page_is_replaced_only_where_that_is_asked_for(red_clip: Path, tmp_path: Path) -> None:

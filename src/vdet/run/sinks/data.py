@@ -12,8 +12,7 @@ from typing import Any, BinaryIO, Self
 from vdet.errors import OutputError
 from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
-from vdet.labels.records import JSON_LINES
-from vdet.lanes.road import lane_record
+from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import (
     STANDARD_OUTPUT,
@@ -22,7 +21,6 @@ from vdet.run.sinks.protocol import (
     SinkContext,
     SinkKind,
 )
-from vdet.track.track import Track
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import join_counts, write_counts
 from vdet.traffic.records import VehicleRecords, join_records, write_records
@@ -81,10 +79,8 @@ TRACKS = SinkKind(TrackSink, track_suffixes, "tracks", writes_standard_output=Tr
 class JsonSink(BaseSink):
     """Collects an item per picture, and writes the list at the end, if there is an item.
 
-    Each item has `image`, `width`, `height` and `boxes`: a list of objects with `x`, `y`, `width`,
-    `height` (pixels of the input picture) and `score`. If lanes are searched for, it also has
-    `lane`, as in `.jsonl` tracks, and each box has `distance` (metres, two decimals) and `lane`, as
-    in `Track`, null where they are not known.
+    Each item has `image`, `width`, `height` and `boxes`: the tracks of the picture as in `.jsonl`,
+    without `id` and `predicted`. If lanes are searched for, it also has `lane`, as in `.jsonl`.
     """
 
     def __init__(self, path: Path, context: SinkContext) -> None:
@@ -107,24 +103,11 @@ class JsonSink(BaseSink):
             "image": str(result.source),
             "width": result.frame.picture.width,
             "height": result.frame.picture.height,
-            "boxes": [_box(track, on_road=result.road is not None) for track in result.tracks],
+            "boxes": [track_record(track) for track in result.tracks],
         }
-        if result.road:
-            item["lane"] = lane_record(result.road.lane)
-        self._items.append(item)
-
-
-def _box(track: Track, *, on_road: bool) -> dict[str, Any]:
-    """Return the values of a vehicle; with `on_road` also its place on the road."""
-    values: dict[str, Any] = {
-        **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
-        "score": round(track.score, 4),
-    }
-    if on_road:
-        metres = track.distance
-        values["distance"] = None if metres is None else round(metres, 2)
-        values["lane"] = track.lane
-    return values
+        for box in item["boxes"]:
+            del box["id"], box["predicted"]  # they say nothing in a still picture
+        self._items.append(item | dict(result.frame_tracks.facts))
 
 
 JSON = SinkKind(JsonSink, what="lists of boxes", writes_standard_output=True, takes="pictures")

@@ -30,7 +30,6 @@ from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import PICTURE_SUFFIXES, encode_image
 from vdet.media.writer import VIDEO_SUFFIXES, may_replace_video
 from vdet.polygons import Point
-from vdet.regions import Regions
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.run.threads import write_async
@@ -40,9 +39,6 @@ from vdet.traffic.counter import VehicleCounter
 
 VIDEO_LABEL = ("id",)
 PICTURE_LABEL = ("score",)
-_OTHER_CLASSES = 10
-"""Colours for classes that are not among `OUR_NAMES`."""
-
 FINISH_RATE = 5_000_000
 """Bytes a second. At its end an .mp4 is written once more, with its index in front."""
 
@@ -53,19 +49,16 @@ class Overlay:
     Parameters
     ----------
     video
-        The video; None for a picture, which has no trails, no time and no smoothing.
+        None for a still picture, which has no trails, no time and no smoothing.
     """
 
     def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
-        self._settings = settings
-        self._draws = settings.draw
-        self._regions: Regions | None = None
+        self._settings, self._draw = settings, settings.draw
         self._start = video.start if video else None
         automatic = VIDEO_LABEL if video else PICTURE_LABEL
-        self._label = automatic if settings.draw.label is None else settings.draw.label
-        self._steady = (
-            SteadyBoxes(settings.draw.smoothing) if video and settings.draw.smoothing else None
-        )
+        self._label = automatic if self._draw.label is None else self._draw.label
+        smoothing = self._draw.smoothing if video else None
+        self._steady = SteadyBoxes(smoothing) if smoothing else None
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
         self._missed: set[int] = set()
 
@@ -75,14 +68,12 @@ class Overlay:
         If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
         are drawn where they lie in it.
         """
-        shown = self._shown(result)
-        picture = result.frame.picture
-        surface = self._surface(result)
-        colors = {track.id: self._color(track, picture) for track in shown}
+        shown, surface = self._shown(result), self._surface(result)
+        colors = {track.id: self._color(track) for track in shown}
         shown = _placed(shown, result.road, surface)
         self._draw_trails(surface, shown, colors, float(result.frame.time))
         self._draw_vehicles(surface, shown, colors)
-        if self._draws.time and self._start is not None:
+        if self._draw.time and self._start is not None:
             time = time_text(result.frame.time - self._start)
             draw_label(surface, time, (0, surface.shape[0]), BLACK)
         if result.counter and self._settings.counts.drawn:
@@ -105,24 +96,23 @@ class Overlay:
         tracks = list(result.tracks)
         if self._steady:
             tracks = self._steady.update(tracks, float(result.frame.time))
-        if self._draws.predicted == "hidden":
+        if self._draw.predicted == "hidden":
             tracks = [track for track in tracks if track.id not in self._missed]
         return sorted(tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(
         self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color], now: float
     ) -> None:
-        longest = self._draws.trails
+        longest = self._draw.trails
         if self._start is None or not longest:
             return
         for track in shown:
             self._trails.setdefault(track.id, []).append((now, track.foot))
-        for id_, points in list(self._trails.items()):
-            if kept := [point for point in points if now - point[0] <= longest]:
-                self._trails[id_] = kept
-            else:
-                del self._trails[id_]
-        width = line_width(surface, self._draws.thickness)
+        for number, points in list(self._trails.items()):
+            self._trails[number] = [point for point in points if now - point[0] <= longest]
+            if not self._trails[number]:
+                del self._trails[number]
+        width = line_width(surface, self._draw.thickness)
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
             draw_trail(surface, path, colors[track.id], width)
@@ -130,33 +120,23 @@ class Overlay:
     def _draw_vehicles(
         self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color]
     ) -> None:
-        settings = self._draws
-        if settings.boxes:
-            for track in shown:
-                dashed = settings.predicted == "dashed" and track.id in self._missed
-                color, thickness = colors[track.id], settings.thickness
-                draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
+        for track in shown if self._draw.boxes else ():
+            dashed = self._draw.predicted == "dashed" and track.id in self._missed
+            color, thickness = colors[track.id], self._draw.thickness
+            draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:
             if text := label_text(track, self._label):
                 draw_label(surface, text, (track.box.x1, track.box.y1), colors[track.id])
 
-    def _color(self, track: Track, picture: Picture) -> Color:
-        match self._draws.colors:
+    def _color(self, track: Track) -> Color:
+        match self._draw.colors:
             case "id":
-                number: int | None = track.id
+                number = track.id
             case "class":
                 number = _class_number(track.class_name)
-            case "region":
-                number = self._region_number(track, picture)
             case "one":
                 return GREEN
-        return WHITE if number is None else color_of(number)
-
-    def _region_number(self, track: Track, picture: Picture) -> int | None:
-        """Return the number of the first polygon in which a vehicle stands; None in none."""
-        if self._regions is None:
-            self._regions = Regions(self._settings.regions, picture.width, picture.height)
-        return self._regions.number_at(track.foot) or None
+        return color_of(number) if number else WHITE
 
 
 def label_text(track: Track, parts: Sequence[str]) -> str:
@@ -177,12 +157,11 @@ def time_text(time: Fraction) -> str:
     return f"{minutes // 60}:{minutes % 60:02}:{rest // 1000:02}.{rest % 1000:03}"
 
 
-def _class_number(name: str | None) -> int | None:
-    if name is None:
-        return None
+def _class_number(name: str | None) -> int:
+    """Return the number of a class for its colour; 0 where the class is not known."""
     if name in OUR_NAMES:
         return OUR_NAMES.index(name) + 1
-    return len(OUR_NAMES) + 1 + zlib.crc32(name.encode()) % _OTHER_CLASSES
+    return zlib.crc32(name.encode()) if name else 0
 
 
 def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> list[Track]:

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vdet.config.rendering import render
-from vdet.media.images import Image, is_picture_name
+from vdet.media import Picture
+from vdet.media.images import is_picture_name
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, write_page
 from vdet.pages.video import Player, VideoPage, write_index
 from vdet.run.result import FrameResult
@@ -15,7 +16,6 @@ from vdet.traffic.counts import MinuteCount
 from vdet.traffic.overview import BestCrops, Crop, HeatMap, Levels
 from vdet.traffic.records import VehicleRecords
 
-_EVEN = 6.0  # standard deviation of a frame that shows nothing, such as one that is faded in
 _THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
@@ -32,8 +32,7 @@ class PageSink(BaseSink):
         self._levels = Levels()
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._counter: VehicleCounter | None = None
-        self._still: Image | None = None
-        self._is_even = True
+        self._fullest: Picture | None = None
         self._frames = 0
         self._start = self._last = float(video.start)
 
@@ -49,9 +48,8 @@ class PageSink(BaseSink):
             self._start = frame.time
         self._frames += 1
         self._last = frame.time
-        if self._still is None or self._is_even:
-            self._still = picture.image.copy()
-            self._is_even = float(self._still.std()) < _EVEN
+        if self._fullest is None or len(frame.tracks) > self._levels.most:
+            self._fullest = picture
         self._records.add(frame)
         self._levels.add(frame)
         self._heat.add(frame)
@@ -71,7 +69,7 @@ class PageSink(BaseSink):
             records=self._records.end(),
             thumbnails=self._thumbnails,
             levels=self._levels,
-            still=None if self._still is None else self._heat.over(self._still),
+            still=self._heat.over(self._fullest.image) if self._fullest else None,
             player=self._player(),
             settings=render(self.context.settings),
             counts=_by_minute(self._counter.counts().minutes) if self._counter else {},
