@@ -168,7 +168,7 @@ class TestDetectImage:
         assert result.code == 0, result.err
         assert (out / "b.json").read_text() == result.out
         (found,) = json.loads(result.out)[0]["boxes"]
-        assert set(found) == {"x", "y", "width", "height", "score"}
+        assert found.keys() >= {"x", "y", "width", "height", "score", "class"}
         assert 0 < found["score"] <= 1
         assert json.loads(result.out)[1]["boxes"] == []
 
