@@ -10,10 +10,10 @@ from click.shell_completion import ShellComplete
 
 from conftest import Run
 from vdet.cli.command import Command
+from vdet.cli.evaluate import grid
 from vdet.cli.main import cli
 from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
-from vdet.evaluate.sweep import grid
 
 
 def commands(group: click.Group, *names: str) -> Iterator[tuple[tuple[str, ...], click.Command]]:

@@ -1,5 +1,7 @@
 """`vdet eval`: measure detection, tracking or the classifier."""
 
+import itertools
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -10,6 +12,7 @@ from vdet.cli.command import command
 from vdet.cli.messages import progress_steps
 from vdet.cli.options import option
 from vdet.cli.results import Results, results_options
+from vdet.errors import ConfigError
 from vdet.version import __version__
 
 
@@ -186,7 +189,6 @@ def video(
     base = choice.read()
     from vdet.evaluate.output import RunName
     from vdet.evaluate.show_video import plain, result_lines, video_page
-    from vdet.evaluate.sweep import grid
     from vdet.evaluate.video import Variant, evaluate_clips, open_clip
     from vdet.labels.roles import Roles
     from vdet.regions import check_mask
@@ -210,6 +212,52 @@ def video(
         plain(runs, name),
         lambda: video_page(runs, "; ".join(name.lines())),
     )
+
+
+def grid(sweeps: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return every combination of the values, each as assignments for `load_settings`.
+
+    Parameters
+    ----------
+    sweeps
+        `KEY=VALUE,VALUE…` each. A comma inside brackets belongs to its value.
+
+    Returns
+    -------
+    The combinations in the order of the values; the last key changes fastest. A single empty
+    combination if there are no sweeps.
+
+    Raises
+    ------
+    ConfigError
+        There is no `=`, a value is empty, or a key is swept twice.
+    """
+    axes = [_axis(text) for text in sweeps]
+    keys = [axis[0].partition("=")[0] for axis in axes]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise ConfigError(f"--sweep {key}: is given twice; put all its values in one")
+    return list(itertools.product(*axes))
+
+
+def _axis(text: str) -> list[str]:
+    key, equals, values = (part.strip() for part in text.partition("="))
+    found = [value.strip() for value in _split(values)]
+    if not (key and equals and all(found)):
+        raise ConfigError(f"--sweep {text}: expected KEY=VALUE,VALUE, as in tracker.needed=0.1,0.2")
+    return [f"{key}={value}" for value in dict.fromkeys(found)]
+
+
+def _split(values: str) -> list[str]:
+    """Split at the commas outside brackets."""
+    parts, depth = [""], 0
+    for letter in values:
+        depth += (letter in "[{") - (letter in "]}")
+        if letter == "," and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return parts
 
 
 eval_group = click.Group(

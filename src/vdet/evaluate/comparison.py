@@ -29,7 +29,7 @@ MAX_PAIRS = 25_000_000
 """Largest number of pairs of a vehicle and a track, and of their boxes over all frames."""
 
 UNMATCHED = -1
-"""Stands for the partner of a vehicle that no track has found."""
+"""Partner of a vehicle that no track has found."""
 
 _IGNORED_SHARE = 0.5
 _KEEP_BONUS = 1000.0  # larger than any sum of overlaps
@@ -108,7 +108,7 @@ class Comparison:
 def compare(
     prediction: LabelledVideo, truth: LabelledVideo, *, rate: float | None = None
 ) -> Comparison:
-    """Put predictions beside the truth of the same video, apply the ignore regions, pair boxes.
+    """Compare predictions with the truth of the same video: apply ignore regions and pair boxes.
 
     Boxes are paired at IoU 0.5 and above. A pair of the previous frame stays together if it still
     overlaps enough; the others are paired so that the sum of IoU is largest. As in TrackEval, a

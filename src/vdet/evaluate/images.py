@@ -20,13 +20,13 @@ from vdet.run.pictures import detect_picture
 from vdet.run.threads import map_ordered
 
 SIZES = (0.03, 0.06, 0.12)
-"""Where the classes of width begin and end, shares of the picture's width."""
+"""The limits between the classes of width, as shares of the picture's width."""
 SIZE_NAMES = ("<3 %", "3–6 %", "6–12 %", ">12 %")
 
 
 @dataclass(frozen=True, slots=True)
 class Counting:
-    """What counts.
+    """The rule that says which boxes count.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ def _widths(boxes: Float64Array) -> Float64Array:
 
 @dataclass(frozen=True, slots=True)
 class SizeScores:
-    """Of the vehicles of one size: counts and ratios; a ratio is None without vehicles.
+    """Counts and ratios of the vehicles of one size; a ratio is None without vehicles.
 
     A false positive has the size of its own box.
     """
@@ -142,7 +142,7 @@ _RATIOS = ("precision", "recall", "f1", "mean_iou", "ap50", "ap50_95")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class F1Curve:
-    """F1 at every score: scores descending, float64 `(n,)`, and F1, float64 `(n,)`.
+    """F1 at every score: `scores`, descending, and `f1`, float64 `(n,)` each.
 
     Detections are taken by descending score, as for the average precision.
     """
@@ -177,7 +177,7 @@ class MeasuredSet:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImagesResult:
-    """What counted, the sources of pictures with their scores, and the mean of these."""
+    """The sources of pictures with their scores, the mean of these, and the rule for counting."""
 
     counting: Counting
     sources: tuple[MeasuredSet, ...]

@@ -16,8 +16,8 @@ ABSENT = "–"
 class RunName:
     """Which detector was measured.
 
-    Its kind, model file, file of settings and changes to them, and the names of the data that the
-    model was trained on, as far as its file says.
+    The fields are its kind, its model file, the file of settings and the changes to them, and the
+    names of the training data if the model file contains them.
     """
 
     detector: str
@@ -33,19 +33,19 @@ class RunName:
         config: str | None,
         assignments: tuple[str, ...],
     ) -> "RunName":
-        """Return which detector is measured; `model` is its file, None for the shipped one."""
+        """Return the name of a run; `model` is the model file, None for the shipped one."""
         file = model_file(detector, model)
         return RunName(detector.kind, file, config, assignments, trained_on(detector, file))
 
     def lines(self) -> list[str]:
-        """Return which detector was measured, and what its model was trained on."""
+        """Return the detector, and the data that its model was trained on, as lines of text."""
         model = f", model {self.model.name}" if self.model else ""
         settings = " ".join([self.config or "default", *self.assignments])
         lines = [f"vdet {__version__}, detector {self.detector}{model}, settings {settings}"]
         return [*lines, f"trained on {', '.join(self.trained_on)}"] if self.trained_on else lines
 
     def values(self) -> dict[str, Any]:
-        """Return which detector was measured as values for JSON."""
+        """Return the same facts as values for JSON."""
         return {
             "program": f"vdet {__version__}",
             "detector": self.detector,

@@ -51,7 +51,7 @@ def lines(result: ImagesResult, run: RunName) -> Iterator[str]:
 
 
 def counting_line(result: ImagesResult) -> str:
-    """Return what counted."""
+    """Return the rule for counting as text."""
     counting = result.counting
     text = f"boxes from score {counting.score:.2f}"
     if counting.least_width:
@@ -82,7 +82,7 @@ def _size_cell(size: SizeScores) -> str:
 
 
 def others_lines(result: ImagesResult) -> list[str]:
-    """Return the labels that are not vehicles, a line for each set that has such labels."""
+    """Return a line for each set with labels that are not vehicles."""
     found = []
     for labelled in (source.labelled for source in result.sources):
         shown = labelled.others[:_MOST_OTHERS]

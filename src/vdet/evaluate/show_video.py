@@ -164,7 +164,7 @@ def video_page(runs: Sequence[RunResult], what: str) -> str:
 
 
 def _timeline(clip: ClipResult) -> Timeline:
-    """Return when each vehicle was found and by which track, when missed, and the false alarms."""
+    """Return the chart of found and missed vehicles and false alarms over time."""
     ids = clip.comparison.vehicle_ids.tolist()
     rows = {id_: row for row, id_ in enumerate(ids)}
     spans = []

@@ -37,7 +37,7 @@ _KEPT = 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """A video and the truth of its first frames; `until` is the last of these, None for all."""
+    """A video and the truth of its frames up to number `until`; None: of all frames."""
 
     video: Path
     truth_path: Path
@@ -61,8 +61,8 @@ class Variant:
 class ClipResult:
     """The scores of one video under one of the settings.
 
-    `name` stands in tables; `video` is the file, None where a file of tracks is scored. The frames
-    up to `until`, counted from 1, are compared. `left_out` is the number of boxes in later ones.
+    `name` is shown in tables; `video` is the file, None if a file of tracks is scored. The frames
+    up to `until`, counted from 1, are compared. `left_out` is the number of boxes in later frames.
     """
 
     name: str
@@ -92,7 +92,7 @@ class RunResult:
 
     @staticmethod
     def of(assignments: tuple[str, ...], clips: Sequence[ClipResult]) -> "RunResult":
-        """Add the scores of all clips, taken as one."""
+        """Return the result with the total of all clips, taken as one video."""
         if len(clips) == 1:
             return RunResult(assignments, tuple(clips), clips[0].scores)
         total = score_comparison(pool([clip.comparison for clip in clips]))
@@ -271,14 +271,14 @@ _Search = Callable[[Picture, int | None], Any]
 
 @dataclass(frozen=True, slots=True)
 class _Sharing:
-    """A detector whose search is that of several."""
+    """A detector that shares its search with others."""
 
     search: _Search
     detect: Callable[[Any], Boxes]
 
 
 def _shared(search: _Search) -> _Search:
-    """Return a search that runs once for each frame, whichever thread asks for it first."""
+    """Return a search that runs once for each frame, also if several threads ask for it."""
     cached, lock = lru_cache(_KEPT)(search), threading.Lock()
 
     def locked(picture: Picture, index: int | None) -> Any:

@@ -88,7 +88,7 @@ _Side = Annotated[int, Field(ge=1, le=LIMIT)]
 
 
 def _inside(name: str) -> str:
-    """Refuse the name of a picture that leads out of the set, or cannot be one."""
+    """Refuse the name of a picture that leads out of the set or cannot be a file name."""
     inside = PurePosixPath(name)
     if inside.is_absolute() or ".." in inside.parts:
         raise ValueError(f"{printable(name)} leads out of the set")
@@ -145,9 +145,9 @@ class _Frame(_Image):
 
 
 class _Document:
-    """The content of a COCO file, of which only what is needed is kept.
+    """The needed content of a COCO file.
 
-    `images` and `categories` are by their ids, `annotations` by that of their image, each with its
+    `images` and `categories` are by id; `annotations` are by the id of their image, each with its
     number in the file. Raises `TruthError`.
     """
 
@@ -269,7 +269,7 @@ def read_coco_pictures(path: Path) -> Iterator[LabelledPicture]:
 
 
 def _picture_folder(path: Path, names: Sequence[str]) -> Path:
-    """Return the folder that the names of pictures are relative to: that with the first one."""
+    """Return the folder that the names of pictures are relative to: the one with the first."""
     near = path.parent
     if not names or (near / names[0]).is_file():
         return near

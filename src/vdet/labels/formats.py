@@ -1,4 +1,4 @@
-"""What a format of labels is, and which one a file has.
+"""The types of label formats, and the choice of the format of a file.
 
 Formats of tracks are registered in the group `vdet.formats`, those of labelled pictures in
 `vdet.picture_formats`: see `vdet.plugins`.
@@ -19,19 +19,19 @@ from vdet.plugins import FORMATS, PICTURE_FORMATS, load_plugin, plugin_names
 from vdet.track.track import FrameTracks
 
 UNKNOWN = "vehicle"
-"""What a vehicle without a class is called where a format needs a name."""
+"""Name of a vehicle without a class, for formats that need a name."""
 
 
 @dataclass(frozen=True, slots=True)
 class SourceVideo:
-    """What a file of tracks says about its video.
+    """Facts about a video that files of tracks contain.
 
     Attributes
     ----------
     name
-        Of the file, without its folder.
+        Name of the file, without its folder.
     width, height
-        Of the upright frames, pixels.
+        Size of the upright frames, pixels.
     frames
         Number of frames of the video, if only a part of it is read and the number is known.
     """
@@ -58,17 +58,17 @@ class Format:
     name
         For messages.
     suffix
-        How the names of its files end, lower case, beginning with a dot.
+        Ending of the names of its files, lower case, with a leading dot.
     read
         Function that takes the path of a file, for messages, and its content. It raises
         `TruthError` with the place of the first mistake; the labels that it returns are not
         checked otherwise.
     lines, heading
-        Of a format with lines for each frame: the function that returns them, and the first line of
-        the file.
+        For a format with lines for each frame: the function that returns them, and the first line
+        of the file.
     whole
-        Of a format that is written at the end: the function that does it. It needs a video; the
-        other formats can also be written of still pictures.
+        For a format that is written at the end: the function that writes it. Such a format needs a
+        video; the others also take still pictures.
     """
 
     name: str
@@ -152,28 +152,28 @@ def picture_formats() -> list[PictureFormat]:
 
 
 def track_suffixes() -> list[str]:
-    """Return how the names of files of tracks may end."""
+    """Return the endings of files of tracks."""
     return [each.suffix for each in track_formats()]
 
 
 def format_for(path: Path) -> Format | None:
-    """Return the format that the name of a file ends in; None if it is none of them."""
+    """Return the format that the ending of a name stands for; None if it is not known."""
     name = path.name.lower()
     fitting = [each for each in track_formats() if name.endswith(each.suffix)]
     return max(fitting, key=lambda each: len(each.suffix), default=None)
 
 
 _UNCLEAR = (".txt", ".csv")
-"""Suffixes that files of several formats have: the first line decides."""
+"""Endings that several formats share; the first line of the file decides."""
 
 
 def recognise(path: Path, data: bytes) -> Format:
-    """Return the format of a file, by its name, or by its content where the name leaves it open.
+    """Return the format of a file, by its name, or by its content if the name is ambiguous.
 
     Raises
     ------
     TruthError
-        The file is empty, and its name does not end as that of a format.
+        The file is empty, and its name has the ending of no format.
     """
     by_name = format_for(path)
     if by_name and by_name.suffix not in _UNCLEAR:

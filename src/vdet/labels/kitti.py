@@ -18,7 +18,7 @@ from vdet.track.track import FrameTracks
 _OBJECT_COLUMNS = 15
 _TRACK_COLUMNS = 17  # frame and id, then those of an object
 _TYPES = {None: "Car", "car": "Car", "vehicle": "Car", "truck": "Truck", "bus": "Truck"}
-"""What our classes are called; there is no bus. All others are Misc."""
+"""KITTI's names of our classes. It has no bus; all other classes are Misc."""
 _BEFORE = "-1 -1 -10"  # truncated, occluded, alpha: not known
 _AFTER = "-1 -1 -1 -1000 -1000 -1000 -10"  # size, place and direction in metres: not known
 

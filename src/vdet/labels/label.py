@@ -1,4 +1,4 @@
-"""A labelled box as it is in a file, and the checks that hold for every format."""
+"""A labelled box from a file, and the checks that apply to every format."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ Corners = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A box as it is in a file.
+    """A labelled box of a file.
 
     Attributes
     ----------
     place
-        Its line in the file, or other words for its place, such as "annotations.3".
+        Its line in the file, or a description of its place, such as "annotations.3".
     box
         x1, y1, x2, y2 in pixels of the frame from 0; the far sides are exclusive.
     name
-        What the file calls it; None where the file has no names.
+        Its name in the file; None if the file has no names.
     frame
         Number of the frame, from 1; 1 in a picture.
     score
@@ -40,7 +40,7 @@ class Label:
     ignored
         Whether it is an ignore region, and not a vehicle.
     predicted, foot, distance, lane
-        As in `vdet.track.track.Track`; None where the file does not say.
+        As in `vdet.track.track.Track`; None if the file does not have them.
     """
 
     place: int | str
@@ -57,12 +57,12 @@ class Label:
 
 
 def from_size(x: float, y: float, width: float, height: float) -> Corners:
-    """Return the corners of a box that is given by its near corner and its size."""
+    """Return the corners of a box from its top-left corner and its size."""
     return x, y, x + width, y + height
 
 
 def line_error(path: Path | str, place: int | str, what: str) -> TruthError:
-    """Return the error that says what is wrong in a line, or another place, of a file."""
+    """Return the error for a mistake in a line, or in another place, of a file."""
     return TruthError(f"{path}:{place}: {what}")
 
 
@@ -105,7 +105,7 @@ def checked_labels(path: Path, labels: Iterable[Label]) -> tuple[Label, ...]:
 
 
 def mistake_in_box(label: Label) -> str | None:
-    """Say why a label cannot be a box with a name; None if it can."""
+    """Return what is wrong with the box or the name of a label; None if nothing is."""
     width, height = label.box[2] - label.box[0], label.box[3] - label.box[1]
     if width <= 0 or height <= 0 or width * height <= 0:
         return f"the box has no area: {width:g} wide, {height:g} high"

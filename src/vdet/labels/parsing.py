@@ -1,4 +1,4 @@
-"""Text files and the numbers in them, read strictly."""
+"""Strict readers of text files, archives, and the numbers in them."""
 
 import io
 import re
@@ -14,7 +14,7 @@ from vdet.files import read_whole
 from vdet.labels.label import Label, line_error
 
 LIMIT = 10_000_000
-"""Largest frame number, id or pixel. A larger number is damage, and would overflow later."""
+"""Largest frame number, id or pixel coordinate. Larger numbers are damage, and would overflow."""
 
 MAX_BYTES = 64_000_000
 """Largest size of a file of boxes."""
@@ -38,8 +38,8 @@ def text_of(path: Path, data: bytes) -> str:
     """Return the text of the content of a file. Raises `TruthError` if it is not UTF-8."""
     try:
         text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes") from error
+    except UnicodeDecodeError:
+        text = "\0"
     if "\0" in text:
         raise TruthError(f"{path}: is not text (UTF-8); give a file of boxes")
     return text
@@ -78,14 +78,14 @@ def label_lines(
     Parameters
     ----------
     parse
-        Function that takes the place of a line and its columns and returns the label. It raises a
-        ValueError that says what is wrong.
+        Function that takes the place of a line and its columns, and returns the label. Its
+        ValueError becomes the message.
     form
         Name of the format, for messages.
     counts
         How many columns a line may have; all lines have as many as the first. None: `parse` checks.
     separator
-        What stands between columns; None for spaces.
+        Text between columns; None for spaces.
     member
         Name of the file in the archive `path`; empty if the text is that of `path`.
 
@@ -184,7 +184,7 @@ def archive_texts(
 
 
 def first_mistake(error: ValueError) -> str:
-    """Say in one line what is wrong in a document, and where."""
+    """Return one line that describes the first mistake in a document, and its place."""
     if not isinstance(error, ValidationError):
         return str(error)
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]

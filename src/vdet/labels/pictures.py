@@ -1,4 +1,4 @@
-"""Labelled pictures: the values, and the checks that hold for every form of them."""
+"""Labelled pictures: the values, and the checks that apply to every form."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -29,12 +29,12 @@ class LabelledPicture:
     Attributes
     ----------
     path, file
-        The file of the picture, and that of the labels.
+        The file of the picture, and the file of its labels.
     labels
-        From a reader, as they are in the file. In `LabelledPictures` only vehicles and ignore
+        From a reader: all labels of the file. In `LabelledPictures`: only vehicles and ignore
         regions, each with an area; `name` is one of `OUR_NAMES`.
     size
-        Width and height of the picture in pixels; None if the labels do not say.
+        Width and height of the picture in pixels; None if the labels do not contain them.
     """
 
     path: Path
@@ -63,7 +63,7 @@ class LabelledPicture:
         Raises
         ------
         ImageError
-            It cannot be read, or has not the size that its labels were made for.
+            It cannot be read, or its size differs from that in its labels.
         """
         image = read_image(self.path)
         height, width = image.shape[:2]
@@ -79,8 +79,8 @@ class LabelledPicture:
 class LabelledPictures:
     """Labelled pictures of one source.
 
-    `name` stands in tables. `others` are the labels that are neither vehicles nor ignore regions,
-    each with the number of its boxes, the most frequent first; these boxes are left out.
+    `name` is shown in tables. `others` are the labels that are neither vehicles nor ignore regions,
+    each with the number of its boxes, the most frequent first. These boxes are left out.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Files of labels, of any format: tracks, predictions, truth, and labelled pictures."""
+"""Readers of tracks, predictions, truth and labelled pictures in any format."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -21,7 +21,7 @@ def read_tracks(path: Path, rate: float | None = None) -> SavedTracks:
     Parameters
     ----------
     rate
-        Frames per second, for formats without times; None: their frames have no times.
+        Frames per second, for formats without times. None leaves their frames without times.
 
     Raises
     ------
@@ -101,13 +101,13 @@ def read_labelled_pictures(path: Path, roles: Roles = DEFAULT_ROLES) -> Labelled
     Raises
     ------
     TruthError
-        There is no labelled set, or it has a mistake; the message names the place of the first.
+        There is no labelled set, or it has a mistake; the message names its place.
     """
     return checked_pictures(str(path), _pictures(path), roles)
 
 
 def holds_labelled_pictures(path: Path) -> bool:
-    """Tell whether a path looks like labelled pictures, and not like a folder of patches."""
+    """Return whether a path looks like labelled pictures, not like a folder of patches."""
     if not path.is_dir():
         return path.suffix.lower() == ".json"
     return any(form.is_in(path) for form in picture_formats()) or bool(_coco_files(path))

@@ -19,7 +19,7 @@ def _key(word: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Roles:
-    """What labels mean; case, spaces and punctuation do not matter.
+    """The meaning of labels; case, spaces and punctuation do not matter.
 
     Attributes
     ----------
@@ -65,9 +65,9 @@ class Roles:
 
 
 DEFAULT_ROLES = Roles.from_settings(Settings())
-"""The roles where no setting changes them."""
+"""The roles of the default settings."""
 
 
 def is_region(label: str | None) -> bool:
-    """Return whether a label says that its box is a region, and no single thing."""
+    """Return whether a label marks a region, not a single object."""
     return label is not None and letters(label) in _REGION_LETTERS

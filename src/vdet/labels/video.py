@@ -1,4 +1,4 @@
-"""The labels of a video: as a file has them, and as columns for metrics."""
+"""The labels of a video: as read from a file, and as columns for metrics."""
 
 import math
 from collections import defaultdict
@@ -27,9 +27,9 @@ class SavedTracks:
         The frames that the file lists, also those without a box, counted from 0, ascending; empty
         where it lists only boxes.
     times
-        Seconds of each frame that the file has a time for; empty where the format has no times.
+        Seconds of each frame with a time in the file; empty if the format has no times.
     size
-        Width and height of the frames in pixels; None where the file does not say.
+        Width and height of the frames in pixels; None if the file does not contain them.
     """
 
     labels: tuple[Label, ...]
@@ -44,7 +44,7 @@ class SavedTracks:
 
     @property
     def rate(self) -> float | None:
-        """Frames per second from the first time to the last; None if the file does not say."""
+        """Frames per second from the first time to the last; None if that is not known."""
         if not self.times:
             return None
         first, last = min(self.times), max(self.times)
@@ -63,11 +63,10 @@ class SavedTracks:
 
     @property
     def frames(self) -> tuple[FrameTracks, ...]:
-        """The frames with a box and those that are listed, in order, made anew at each call.
+        """The frames with a box and the listed frames, in order; computed at each call.
 
         Boxes are rounded to whole pixels, and scores lie between 0 and 1. A class is one of
-        `OUR_NAMES` where the label means one, else the label. The time of a frame is NaN where it
-        is not known: see `has_times`.
+        `OUR_NAMES` if the label means one, else the label. An unknown time is NaN: see `has_times`.
         """
         by_frame: dict[int, list[Label]] = defaultdict(list)
         for label in self.labels:
@@ -113,12 +112,12 @@ class LabelledVideo:
     scores
         float64 `(n,)`: confidence of a prediction, higher is better; 1 for truth.
     ignored
-        bool `(n,)`: of truth, the row is an ignore region, not a vehicle to be found; of
-        predictions, it counts only if it finds a vehicle.
+        bool `(n,)`. In truth: the row is an ignore region, not a vehicle to be found. In
+        predictions: the row counts only if it finds a vehicle.
     frame_count
-        Number of frames of the video, None if the file does not say.
+        Number of frames of the video, None if it is not known.
     rate
-        Frames per second, None if the file does not say.
+        Frames per second, None if they are not known.
     """
 
     frames: Int64Array
@@ -150,7 +149,7 @@ class LabelledVideo:
 
     @property
     def last_frame(self) -> int:
-        """Number of the video's last frame as far as it is known; 0 if there is none."""
+        """Number of the last known frame of the video; 0 if there is none."""
         return max(self.frame_count or 0, int(self.frames[-1]) if len(self) else 0)
 
     def check_end(self, path: Path, frames: int) -> None:

@@ -40,7 +40,8 @@ def _labelled(picture: Path, file: Path) -> LabelledPicture:
             case ["annotation", "object"]:
                 labels.append(_label(opened[-1]))
             case ["annotation", "size"]:
-                sizes.append((_whole(opened[-1], "width"), _whole(opened[-1], "height")))
+                width, height = (parse_whole(opened[-1].value(s)) for s in ("width", "height"))
+                sizes.append((width, height))
 
     read_xml(file, read_text(file), "annotation", take)
     known = [size for size in sizes if min(size) > 0]  # some tools write 0
@@ -51,13 +52,9 @@ def _label(element: Element) -> Label:
     left, top, right, bottom = (
         parse_number(element.value(side)) for side in ("xmin", "ymin", "xmax", "ymax")
     )
-    difficult = "difficult" in element.values and _whole(element, "difficult") == 1
+    difficult = element.values.get("difficult", ["0"])[0].strip() == "1"
     name = element.value("name")
     return Label(element.line, (left - 1, top - 1, right, bottom), name, ignored=difficult)
-
-
-def _whole(element: Element, name: str) -> int:
-    return parse_whole(element.value(name))
 
 
 VOC_PICTURES = PictureFormat("Pascal VOC", ("JPEGImages", "Annotations"), read_voc_pictures)

@@ -1,4 +1,4 @@
-"""XML files of labels, read with limits, so that a hostile file can do no harm."""
+"""A reader of XML labels with limits against hostile files."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ _MAX_TEXT = 1000  # characters
 
 @dataclass(slots=True)
 class Element:
-    """An element that is open; `text` is complete when it ends.
+    """An open element; its `text` is complete when it ends.
 
     `values` are the texts of the elements that have ended in it, by their names.
     """
@@ -53,8 +53,8 @@ def read_xml(path: Path, text: str, root: str, take: Callable[[list[Element]], N
     root
         Name of the first element.
     take
-        Function that gets the open elements, from the root on, whenever the last of them ends. It
-        raises a ValueError that says what is wrong.
+        Function that gets the open elements, from the root on, whenever the last of them ends. Its
+        ValueError becomes the message.
 
     Raises
     ------

@@ -1,8 +1,9 @@
 """YOLO: a text file of labels for each picture or frame, and `data.yaml` with the classes.
 
-A line is the number of a class, and x and y of the middle, width and height of the box as shares of
-the frame. Tracks lie in a zip file, and their lines end with the id: the standard form has none,
-but Ultralytics writes it when it tracks, and so does CVAT ("Ultralytics YOLO Detection Track").
+A line is the number of a class, and the centre (x, y), width and height of the box as shares of the
+frame, or the points of a polygon. Tracks lie in a zip file, and their lines end with the id. The
+standard form has no id, but Ultralytics writes it in tracking, and so does CVAT ("Ultralytics YOLO
+Detection Track").
 `data.yaml` has the names of the classes, and for tracks also `width` and `height` of the frames in
 pixels, which others ignore.
 Source: docs.ultralytics.com, "Object detection datasets overview"; the CVAT manual, "Ultralytics

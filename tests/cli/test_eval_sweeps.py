@@ -1,7 +1,7 @@
 import pytest
 
+from vdet.cli.evaluate import grid
 from vdet.errors import ConfigError
-from vdet.evaluate.sweep import grid
 
 
 def test_the_values_of_a_key_in_their_order() -> None:
