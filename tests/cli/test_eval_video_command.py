@@ -64,8 +64,8 @@ def test_several_videos_and_a_sweep(
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        ((), 2, "1 videos, 0 --truth; give one for each"),
-        (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "1 videos, 2 --truth"),
+        ((), 2, "give one --truth for each video (videos: 1, truths: 0)"),
+        (("--truth", "gt.txt", "--truth", "gt.txt"), 2, "(videos: 1, truths: 2)"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
         (
             ("--truth", "gt.txt", "--sweep", "detector.heat.threshold"),

@@ -23,25 +23,12 @@ def drive(id_: int, frames: range, x: float = 0) -> list[Label]:
     return [row(0, frame, id_, x, 60, 40, 40) for frame in frames]
 
 
-def run(assignments: tuple[str, ...], found: range) -> RunResult:
-    clip = score_video("clip", video(*drive(1, found)), video(*drive(7, TEN)))
-    return RunResult.of(assignments, [clip])
-
-
 def test_a_timeline_names_vehicles_tracks_and_false_alarms() -> None:
     found = video(*drive(4, range(1, 5)), *drive(9, range(6, 11)), *drive(5, TEN, x=200))
     clip = score_video("clip", found, video(*drive(7, TEN)))
     text = Elements(video_page([RunResult.of((), [clip])], "")).text
     for name in ("vehicle 7", "#4", "#9", "missed: 5–5", "false alarms", "false alarm, track 5"):
         assert name in text
-
-
-def test_a_sweep_has_a_row_for_each_setting() -> None:
-    grid = [run((f"a={a}", f"b={b}"), range(1, 3 + a + b)) for a in (1, 2) for b in (1, 2)]
-    seen = Elements(video_page(grid, "<what>"))
-    for words in ("<what>; best of 4 settings: a=2 b=2", "a=1 b=2"):
-        assert words in seen.text
-    assert len(seen.all("tr", **{"class": "best"})) == 1
 
 
 def test_a_mistake_is_shown_by_its_middle_frame_with_boxes(clip_path: Path) -> None:

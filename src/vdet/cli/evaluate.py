@@ -185,7 +185,8 @@ def video(
     vehicles outside the regions do not count.
     """
     if len(videos) != len(truths):
-        raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
+        given = f"videos: {len(videos)}, truths: {len(truths)}"
+        raise click.UsageError(f"give one --truth for each video ({given})")
     base = choice.read()
     from vdet.evaluate.output import RunName
     from vdet.evaluate.show_video import plain, result_lines, video_page

@@ -60,7 +60,8 @@ def mine(
     check_output(output, overwrite=overwrite, inputs=inputs)
     videos = [path for path in sources if not holds_labelled_pictures(path)]
     if len(videos) != len(truths):
-        raise click.UsageError(f"{len(videos)} videos, {len(truths)} --truth; give one for each")
+        given = f"videos: {len(videos)}, truths: {len(truths)}"
+        raise click.UsageError(f"give one --truth for each video ({given})")
     labels = dict(zip(videos, truths, strict=True))
     labelled = [
         mining.VideoSource(path, labels[path], every, first, until)

@@ -13,17 +13,10 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field, ValidationError
 
 from vdet.errors import TruthError
+from vdet.labels import parsing
 from vdet.labels.formats import Format
 from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
-from vdet.labels.parsing import (
-    LIMIT,
-    Index,
-    Number,
-    checked_times,
-    first_mistake,
-    numbered_lines,
-    text_of,
-)
+from vdet.labels.parsing import Index, Number
 from vdet.labels.video import SavedTracks
 from vdet.track.track import FrameTracks, Track
 
@@ -42,7 +35,7 @@ class _TrackRecord(BaseModel, frozen=True):
     label: str | None = Field(None, alias="class")
     foot: tuple[Number, Number] | None = None
     distance: Number | None = None
-    lane: Annotated[int, Field(ge=-LIMIT, le=LIMIT)] | None = None
+    lane: Annotated[int, Field(ge=-parsing.LIMIT, le=parsing.LIMIT)] | None = None
 
     def labelled(self, line: int, frame: int) -> Label:
         """Return the label in a frame, counted from 0."""
@@ -117,10 +110,10 @@ def read_json_lines(path: Path, data: bytes) -> SavedTracks:
         The file is empty, a line is not such a record, frames do not ascend, or a time is wrong.
     """
     times: _Times = {}
-    labels = tuple(limited(path, _json_labels(path, text_of(path, data), times)))
+    labels = tuple(limited(path, _json_labels(path, parsing.text_of(path, data), times)))
     if not times:
         raise TruthError(f"{path}: is empty; it should have a record for every frame")
-    return SavedTracks(labels, listed=tuple(times), times=checked_times(path, times))
+    return SavedTracks(labels, listed=tuple(times), times=parsing.checked_times(path, times))
 
 
 _Times = dict[int, tuple[int | str, float]]
@@ -130,13 +123,13 @@ _Times = dict[int, tuple[int | str, float]]
 def _json_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
     """Yield the boxes of every record, and put the time of every frame into `times`."""
     last = -1
-    for line, content in numbered_lines(text):
+    for line, content in parsing.numbered_lines(text):
         if len(times) == MAX_LABELS:
             raise line_error(path, line, f"has more than {MAX_LABELS:,} frames; cut it into parts")
         try:
             record = _FrameRecord.model_validate_json(content, strict=True)
         except ValidationError as error:
-            raise line_error(path, line, first_mistake(error)) from error
+            raise line_error(path, line, parsing.first_mistake(error)) from error
         if record.frame <= last:
             raise line_error(path, line, f"frame {record.frame} comes after frame {last}")
         last = record.frame
@@ -157,8 +150,8 @@ def read_csv(path: Path, data: bytes) -> SavedTracks:
         its column needs, or a time is wrong.
     """
     times: _Times = {}
-    labels = tuple(limited(path, _csv_labels(path, text_of(path, data), times)))
-    return SavedTracks(labels, times=checked_times(path, times))
+    labels = tuple(limited(path, _csv_labels(path, parsing.text_of(path, data), times)))
+    return SavedTracks(labels, times=parsing.checked_times(path, times))
 
 
 def _csv_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
@@ -176,7 +169,9 @@ def _csv_labels(path: Path, text: str, times: _Times) -> Iterator[Label]:
             times[row.frame] = table.line_num, row.time
             yield row.labelled(table.line_num, row.frame)
     except ValueError as error:  # also a ValidationError
-        raise line_error(path, max(1, table.reader.line_num), first_mistake(error)) from error
+        raise line_error(
+            path, max(1, table.reader.line_num), parsing.first_mistake(error)
+        ) from error
     except csv.Error as error:
         raise line_error(path, max(1, table.reader.line_num), str(error)) from error
 

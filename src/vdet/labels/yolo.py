@@ -22,16 +22,10 @@ from typing import Any, BinaryIO
 from vdet.config.document import MAX_BYTES, parse_document
 from vdet.errors import ConfigError, ImageError, TruthError
 from vdet.files import escaped, printable
+from vdet.labels import parsing
 from vdet.labels.formats import UNKNOWN, Format, PictureFormat, SourceVideo
 from vdet.labels.label import Label, limited
-from vdet.labels.parsing import (
-    LIMIT,
-    archive_texts,
-    label_lines,
-    parse_number,
-    parse_whole,
-    read_text,
-)
+from vdet.labels.parsing import label_lines, parse_number, parse_whole, read_text
 from vdet.labels.pictures import LabelledPicture, pictures_below
 from vdet.labels.video import SavedTracks
 from vdet.media.images import read_header
@@ -99,7 +93,9 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
         `data.yaml` with names and the size of the frames, two files are of one frame, or a line is
         not of this form.
     """
-    texts = archive_texts(path, data, lambda name: name.name == _DATA or _is_label_file(name))
+    texts = parsing.archive_texts(
+        path, data, lambda name: name.name == _DATA or _is_label_file(name)
+    )
     described = [name for name in texts if PurePosixPath(name).name == _DATA]
     if not described:
         raise TruthError(f"{path}: needs {_DATA} with the names of the classes")
@@ -108,7 +104,7 @@ def read_yolo(path: Path, data: bytes) -> SavedTracks:
     values = _values(texts[first], where)
     names = _class_names(values, where)
     size: Any = values.get("width"), values.get("height")
-    if not all(isinstance(side, int) and 0 < side <= LIMIT for side in size):
+    if not all(isinstance(side, int) and 0 < side <= parsing.LIMIT for side in size):
         raise TruthError(
             f"{where}: does not say how large the frames are; add the lines 'width: 1280' and "
             "'height: 720' with the pixels of yours"
