@@ -154,7 +154,7 @@ def _patches(path: Path) -> dict[str, bytes]:
         (("--from", "10"), 1, "gt.txt: covers the frames up to 9; mine some of these"),
         (("-o", "mined.npz"), 1, "mined.npz: patches are written as .zip; name it so"),
         (("--truth", "none.txt"), 1, "none.txt: cannot be read"),
-        (("--truth", "a.txt", "--truth", "b.txt"), 2, "1 videos, 2 --truth; give one for each"),
+        (("--truth", "a.txt", "--truth", "b.txt"), 2, "(videos: 1, truths: 2)"),
         (("--set", "train.mine.probability=-1"), 1, "train.mine.probability"),
         (("--set", BELOW), 1, "road.mp4: no search window fits into a frame of 320×180 pixels"),
     ],
