@@ -11,6 +11,7 @@ MAX_ENTRY = 16_000_000
 
 _CHUNK = 1_000_000  # bytes
 _SPACE = " \t\n\r"
+_ENDS = _SPACE + ",:]}"  # what may follow a value
 
 
 class JsonLists:
@@ -68,7 +69,7 @@ class JsonLists:
     def _next(self) -> str:
         """Go to the next character that is no space and return it; "" at the end."""
         while True:
-            if self._at == len(self._text) and not self._ended:
+            while self._at == len(self._text) and not self._ended:
                 self._read_on()
             char = self._text[self._at : self._at + 1]
             if not char or char not in _SPACE:
@@ -94,7 +95,9 @@ class JsonLists:
             except RecursionError:
                 raise ValueError("invalid JSON: nested too deeply") from None
             else:
-                if end < len(self._text) or self._ended:
+                # A number may go on with a dot or an exponent that has not been read.
+                follows = self._text[end : end + 1]
+                if self._ended or (follows and follows in _ENDS):
                     self._at = end
                     return self._text[begin:end]
             if self._ended or end - begin > MAX_ENTRY:
