@@ -22,6 +22,8 @@ def run() -> NoReturn:
     prepare_streams()
     for name, value in SINGLE_THREADED.items():
         os.environ.setdefault(name, value)
+    # A worker that is killed leaves semaphores, which loky removes; the user need not know of it.
+    sys.warnoptions.append("ignore::UserWarning:loky.backend.resource_tracker")
     for number in _signals():
         signal.signal(number, _interrupt)
     _watch_for_signals()

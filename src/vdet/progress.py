@@ -28,11 +28,6 @@ def reporting(report: Callable[[int, int | None], object]) -> Progress:
 
     def begin(total: int | None) -> Advance:
         done = itertools.count(1)
-
-        def advance(count: int) -> None:
-            for _ in range(count):
-                report(next(done), total)
-
-        return advance
+        return lambda count: [report(next(done), total) for _ in range(count)]
 
     return begin

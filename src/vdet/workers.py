@@ -115,7 +115,6 @@ class LocalProcesses:
         """Yield each item's number and result; see `Workers`."""
         from loky import ProcessPoolExecutor
 
-        _start_quiet_tracker()
         executor = ProcessPoolExecutor(
             max(1, min(self.count, len(items))),
             initializer=_initialize_worker,
@@ -156,22 +155,6 @@ def _ignored_sigint() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
-
-
-def _start_quiet_tracker() -> None:
-    """Start the process of joblib that removes what ended processes leave, without its warnings.
-
-    A worker that is killed leaves semaphores. They are removed; the user need not know of them.
-    """
-    from loky.backend import resource_tracker
-
-    # The process takes its filters from here as it starts; it runs none of our code.
-    options = list(sys.warnoptions)
-    sys.warnoptions.append(f"ignore::UserWarning:{resource_tracker.__name__}")
-    try:
-        resource_tracker.ensure_running()
-    finally:
-        sys.warnoptions[:] = options
 
 
 def _initialize_worker(parent: int) -> None:

@@ -147,7 +147,6 @@ def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     [
         ("tracker.history=12", {"tracker": {"history": 12}}),
         (" heat.blur = 3 # px", {"heat": {"blur": 3}}),
-        ("search.windows.1.overlap=0.5", {"search": {"windows": {1: {"overlap": 0.5}}}}),
         ("detector.heat.frames=3", {"detector": {"heat": {"frames": 3}}}),
         ("train.svm.C=1e-3", {"train": {"svm": {"C": 0.001}}}),
         ("a=b=c", {"a": "b=c"}),

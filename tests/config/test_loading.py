@@ -68,17 +68,6 @@ def test_a_list_in_a_file_replaces_the_whole_default_list(path: Path) -> None:
     assert search.perspective.sizes == (0.5,)
 
 
-def test_an_assignment_may_name_one_item_of_a_list() -> None:
-    loaded = load_settings(None, ["detector.search.perspective.sizes.1=0.07"], detector="svm")
-    first, _, *others = SearchSettings().perspective.sizes
-    assert loaded.svm.search.perspective.sizes == (first, 0.07, *others)
-
-
-def test_an_assignment_may_name_one_setting_of_an_item(path: Path) -> None:
-    windows = load(path, WINDOWS, "detector.search.windows.1.step=2").svm.search.windows
-    assert windows == (FIRST, SECOND.model_copy(update={"step": 2}))
-
-
 def test_all_errors_are_given_at_once(path: Path) -> None:
     text = "detector: {heat: {frames: 0, blur: -1}}\ntrain:\n  svm: {C: -1}\ntrakcer: {}\n"
     assert sorted(refusal(path, text, "output.crf=99")) == [
@@ -137,7 +126,7 @@ def test_a_mistake_in_the_detector_is_explained_in_one_line(
         ),
         ("heat: {frames: 3}", "1:1: heat: is no setting; known here: detector, tracker, regions, "),
         ("'': 1", "1:1: : is no setting; known here: detector, tracker, "),
-        ("draw: {label: score}", "1:8: draw.label: should be a list, "),
+        ("draw: {label: score}", "1:8: draw.label: should be a list (got"),
         ("draw: {label: [speed]}", "1:16: draw.label[0]: should be 'id', 'class', 'score' or "),
         ("draw: {trails: 0}", "1:8: draw.trails: should be greater than 0 (got 0)"),
     ],
@@ -160,26 +149,7 @@ def test_each_missing_key_of_an_item_is_named(path: Path) -> None:
         ("heat.frames=x", "heat.frames: should be a valid integer"),
         ("heat.frames.0=5", "heat.frames: should be a valid integer"),
         ("heat.frames" + ".a" * 5000 + "=3", "heat.frames: should be a valid integer"),
-        (
-            "search.perspective.sizes.7=0.3",
-            "search.perspective.sizes: should be a list, or in",
-        ),
-        (
-            "search.perspective.sizes.-1=0.3",
-            "search.perspective.sizes: should be a list, or in",
-        ),
-        (
-            "search.perspective.sizes.x=0.3",
-            "search.perspective.sizes: should be a list, or in",
-        ),
-        (
-            "search.perspective.sizes.0=3",
-            "search.perspective.sizes[0]: should be less than or equ",
-        ),
-        (
-            "search.windows.0.size=64",
-            "search.windows: should be a list, or in --set the number of",
-        ),
+        ("search.windows.0.size=64", "search.windows: should be a list (got"),
     ],
 )
 def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
@@ -194,8 +164,8 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("tracker.0=3", "tracker[0]: is no setting; known here: kind, smallest, "),
-        ("0=3", "[0]: is no setting; known here: detector, tracker, "),
+        ("tracker.0=3", "tracker.0: is no setting; known here: kind, smallest, "),
+        ("0=3", "0: is no setting; known here: detector, tracker, "),
         ("9" * 5000 + "=3", "9999"),
     ],
 )
@@ -204,20 +174,6 @@ def test_a_mistake_in_an_assignment_is_explained_in_one_line(assignment: str, me
         load_settings(None, [assignment], detector="svm")
     (line,) = str(error.value).split("\n")
     assert line.startswith(f"--set: {message}")
-
-
-@pytest.mark.parametrize(
-    ("assignment", "message"),
-    [
-        ("1.sise=3", "windows[1].sise: is no setting; did you mean size?"),
-        ("0.0=3", "windows[0][0]: is no setting; known here: size, "),
-    ],
-)
-def test_a_mistake_in_an_assignment_to_an_item_of_the_file_is_explained(
-    path: Path, assignment: str, message: str
-) -> None:
-    (line,) = refusal(path, WINDOWS, f"detector.search.windows.{assignment}")
-    assert line.startswith(f"--set: detector.search.{message}")
 
 
 _NAMES = st.sampled_from(

@@ -15,9 +15,6 @@ import numpy.typing as npt
 from vdet.progress import Advance, Progress, no_progress
 from vdet.run.video import VideoJob
 
-_ROW = np.dtype([("done", "i8"), ("expected", "i8"), ("ended", "?")])
-"""Of a file: frames done and expected, 0 for unknown."""
-
 
 @dataclass(frozen=True, slots=True)
 class FrameCounts:
@@ -29,9 +26,12 @@ class FrameCounts:
     path: Path
     sizes: tuple[float, ...]
 
-    def _rows(self) -> npt.NDArray[np.void]:
-        """Return the counts of all files; changes are seen by all processes."""
-        return np.memmap(self.path, _ROW, "r+", shape=(len(self.sizes),))
+    def _rows(self) -> npt.NDArray[np.int64]:
+        """Return frames done, frames expected (0: unknown), and whether it has ended, by file.
+
+        Changes are seen by all processes.
+        """
+        return np.memmap(self.path, np.int64, "r+", shape=(len(self.sizes), 3))
 
     def progress_of(self, number: int) -> Progress:
         """Return a `Progress` that counts the frames of a file.
@@ -39,15 +39,15 @@ class FrameCounts:
         It counts nothing in a process that cannot see `path`, as on another machine.
         """
         try:
-            rows = self._rows()
+            row = self._rows()[number]
         except OSError:
             return no_progress
 
         def start(expected: int | None) -> Advance:
-            rows[number] = (0, expected or 0, False)
+            row[:] = 0, expected or 0, False
 
             def advance(frames: int) -> None:
-                rows["done"][number] += frames
+                row[0] += frames
 
             return advance
 
@@ -55,21 +55,20 @@ class FrameCounts:
 
     def end(self, number: int, frames: int | None) -> None:
         """Note that a file has ended; `frames` is None if it failed."""
-        rows = self._rows()
-        done = rows["done"][number] if frames is None else frames
-        rows[number] = (done, done, True)
+        row = self._rows()[number]
+        row[:] = *[row[0] if frames is None else frames] * 2, True
 
     def state(self) -> tuple[int, int, int]:
         """Return the frames done, the frames of all files, and how many files have ended.
 
         The frames of files that are not begun are guessed from their sizes.
         """
-        rows, sizes = self._rows(), np.array(self.sizes)
-        known = (rows["expected"] > 0) | rows["ended"]
-        ratio = rows["expected"][known].sum() / max(sizes[known].sum(), 1e-9)
-        expected = np.where(known, rows["expected"], sizes * ratio)
-        total = np.maximum(expected, rows["done"]).sum()
-        return int(rows["done"].sum()), round(float(total)), int(rows["ended"].sum())
+        sizes = np.array(self.sizes)
+        done, expected, ended = self._rows().T
+        known = (expected > 0) | (ended > 0)
+        guessed = sizes * expected[known].sum() / max(sizes[known].sum(), 1e-9)
+        total = np.maximum(np.where(known, expected, guessed), done).sum()
+        return int(done.sum()), round(float(total)), int(ended.sum())
 
 
 @contextmanager
@@ -77,7 +76,7 @@ def frame_counts(jobs: Sequence[VideoJob]) -> Iterator[FrameCounts | None]:
     """Give counts for jobs of which none is begun; None where there is no room for them."""
     try:
         file = tempfile.NamedTemporaryFile(prefix="vdet-")  # noqa: SIM115
-        file.truncate(len(jobs) * _ROW.itemsize)
+        file.truncate(len(jobs) * 3 * 8)
     except OSError:
         yield None
         return

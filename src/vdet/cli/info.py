@@ -2,7 +2,7 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -10,9 +10,6 @@ from vdet.cli.command import command
 from vdet.cli.options import PATH
 from vdet.cli.results import Results, facts_options
 from vdet.files import printable
-
-if TYPE_CHECKING:
-    from av.audio.stream import AudioStream
 
 Facts = dict[str, Any]
 """Values for JSON, by name; each is also a line of text."""
@@ -122,13 +119,10 @@ def _video(path: Path) -> Facts:
             "rate": float(info.rate),
             "start": float(info.start),
             "seconds": None if info.duration is None else float(info.duration),
-            "sounds": list(map(_sound, container.streams.audio)),
+            "sounds": [
+                sound.codec_context.name if sound.codec_context else "unknown"
+                for sound in container.streams.audio
+            ],
             **asdict(info.tags),
             "horizon": find_horizon(images),
         }
-
-
-def _sound(stream: "AudioStream") -> str:
-    context = stream.codec_context
-    form = f"{context.name}, {context.sample_rate} Hz" if context else "unknown"
-    return form if stream.language in (None, "und") else f"{form}, {stream.language}"

@@ -280,25 +280,25 @@ def output_option(shown: str, text: str) -> Callable[[F], F]:
     return option(shown, text, PATH, multiple=True, expose_value=False, callback=_want)
 
 
-def _want(context: click.Context, option: click.Parameter, paths: tuple[Path, ...]) -> None:
-    wanted = context.meta.setdefault(_WANTED, [])
-    wanted.extend((option.name, path) for path in paths)
+def _want(context: click.Context, option: click.Parameter, given: tuple[Any, ...]) -> None:
+    wanted = [each if isinstance(each, tuple) else (option.name, each) for each in given]
+    context.meta.setdefault(_WANTED, []).extend(wanted)
 
 
-def _want_named(context: click.Context, _: click.Parameter, texts: tuple[str, ...]) -> None:
-    for text in texts:
-        name, equals, path = text.partition("=")
-        if not (name and equals and path):
-            raise click.UsageError(f"--sink {text}: expected NAME=FILE, as in tracks=out.csv")
-        context.meta.setdefault(_WANTED, []).append((name, Path(path)))
+def _parse_sink(text: str) -> Wanted:
+    name, _, path = text.partition("=")
+    if not (name and path):
+        raise click.BadParameter(f"{text}: expected NAME=FILE, as in tracks=out.csv")
+    return name, Path(path)
 
 
 sink_option = option(
     "--sink NAME=FILE",
     "Write another output: the name of a sink, and a file. Can be repeated.",
+    _parse_sink,
     multiple=True,
     expose_value=False,
-    callback=_want_named,
+    callback=_want,
 )
 
 

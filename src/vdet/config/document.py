@@ -110,7 +110,7 @@ def parse_document(text: str, name: str) -> Document:
 
 
 def parse_assignment(text: str) -> Document:
-    """Read `key.key=value` as `--set` takes it; list items are named by number, from 0.
+    """Read `key.key=value` as `--set` takes it.
 
     Raises
     ------
@@ -118,19 +118,14 @@ def parse_assignment(text: str) -> Document:
         There is no `=`, a part of the key is missing, or the value is not YAML.
     """
     key, equals, value = text.partition("=")
-    parts = key.strip().split(".")
-    if not equals or not all(parts):
+    path: Key = tuple(key.strip().split("."))
+    if not equals or not all(path):
         raise ConfigError(f"--set {text}: expected KEY=VALUE, as in output.crf=18")
     name, places = "--set", dict[Key, str]()
-    path: Key = tuple(int(part) if _is_number(part) else part for part in parts)
     nested = _Reader(name, places).value(_compose(value, name), path)
     for part in reversed(path):
         nested = {part: nested}
     return Document(name, nested, dict.fromkeys([*places, path], name))
-
-
-def _is_number(part: str) -> bool:
-    return part.isascii() and part.isdecimal() and len(part) < 10
 
 
 def _compose(text: str, name: str) -> yaml.Node | None:

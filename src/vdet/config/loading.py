@@ -68,10 +68,9 @@ def load_settings(
     file holds the keys of this section; for `regions` one that is not named `.yaml` or `.yml` is a
     mask. It lies above `path`, and replaces all places of the section.
 
-    A list in a later layer replaces the whole list of an earlier one; an assignment may name one
-    item of it (`detector.search.windows.0.step=2`). Where a layer chooses another kind of detector
-    or method of tracking than the layers below, that section starts from the defaults of this kind.
-    All assignments are one layer.
+    A list in a later layer replaces the whole list of an earlier one. Where a layer chooses another
+    kind of detector or tracker than the layers below, that section starts from the defaults of this
+    kind. All assignments are one layer.
 
     Raises
     ------
@@ -81,7 +80,10 @@ def load_settings(
     layers = [Document("defaults", {"detector": {"kind": detector}})] if detector else []
     layers += [read_document(path)] if path else []
     layers += [_read_places(name, file) for name, file in (places or {}).items()]
-    layers.append(_join([parse_assignment(text) for text in assignments]))
+    assigned = Document("--set", {})
+    for text in assignments:
+        assigned = _over(assigned, parse_assignment(text))
+    layers.append(assigned)
     merged, chosen = _merge(layers)
     fields: Any = {name: (section, section()) for name, section in chosen.items()}
     model = create_model("Settings", __base__=Settings, **fields)
@@ -106,14 +108,10 @@ def _read_places(section: str, path: Path) -> Document:
     return Document(document.name, {section: no_places | document.values}, places)
 
 
-def _join(assignments: Sequence[Document]) -> Document:
-    """Join assignments to one layer."""
-    values: Any = {}
-    places: dict[Key, str] = {}
-    for document in assignments:
-        values = _joined(values, document.values)
-        places |= document.places
-    return Document("--set", values, places)
+def _over(below: Document, above: Document) -> Document:
+    """Lay a document over another one."""
+    values = _joined(below.values, above.values)
+    return Document(below.name, values, below.places | above.places)
 
 
 def _joined(below: Any, above: Any) -> Any:
@@ -123,16 +121,15 @@ def _joined(below: Any, above: Any) -> Any:
 
 
 def _merge(layers: Sequence[Document]) -> tuple[Document, dict[str, type[Section]]]:
-    """Lay the layers over the defaults; return them as one, and the class of each chosen kind.
+    """Return the layers as one, and the class of the settings of each chosen kind.
 
     Raises
     ------
     ConfigError
         A layer chooses an unknown kind.
     """
-    values: dict[str, Any] = {}
+    merged = Document("settings", {})
     chosen: dict[str, type[Section]] = {name: type(getattr(Settings(), name)) for name in GROUPS}
-    places: dict[Key, str] = {}
     for layer in layers:
         for name in GROUPS:
             section = layer.values.get(name)
@@ -143,36 +140,12 @@ def _merge(layers: Sequence[Document]) -> tuple[Document, dict[str, type[Section
                 except ConfigError as error:
                     place = layer.place_of((name, "kind"))
                     raise ConfigError(f"{place}: {name}.kind: {error}") from error
-                values[name] = {"kind": kind}
-        sections: Any = {name: section() for name, section in chosen.items()}
-        defaults = Settings.model_construct(**sections).model_dump(mode="json")
-        values = _overlay(defaults, values, layer.values)
-        places |= layer.places
-    return Document("settings", values, places), chosen
+                merged.values[name] = {}
+        merged = _over(merged, layer)
+    return merged, chosen
 
 
-def _overlay(default: Any, below: Any, above: Any) -> Any:
-    """Lay values over those of the layers below; `default` holds where no layer gives a list."""
-    if isinstance(default, dict) and above is None:  # a section of which nothing is given
-        return {} if below is None else below
-    if isinstance(default, dict) and isinstance(above, dict):
-        below = below if isinstance(below, dict) else {}
-        given = {
-            key: _overlay(default.get(key), below.get(key), value) for key, value in above.items()
-        }
-        return below | given
-    items = default if below is None else below
-    if isinstance(items, list) and isinstance(above, dict) and above.keys() <= {*range(len(items))}:
-        return [
-            _overlay(item, item, above[i]) if i in above else item for i, item in enumerate(items)
-        ]
-    return above
-
-
-_EXPECTED = {
-    "model_type": "should be a section, key: value",
-    "tuple_type": "should be a list, or in --set the number of an item that it has, from 0",
-}
+_EXPECTED = {"model_type": "should be a section, key: value", "tuple_type": "should be a list"}
 
 
 def _describe(detail: ErrorDetails, merged: Document, model: type[Settings]) -> str:

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import get_args
 
 import yaml
 from pydantic.fields import FieldInfo
@@ -22,30 +22,24 @@ def render(settings: Settings) -> str:
     return "\n".join([HEADING, *_section(settings, "")]) + "\n"
 
 
-def _section(section: Section, indent: str, *, comments: bool = True) -> Iterator[str]:
+def _section(section: Section, indent: str) -> Iterator[str]:
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
-        if value is None and not comments:  # an item says only what it has
-            continue
         if isinstance(value, Section):
             if not indent:
                 yield ""
             yield from _comment(_first_line(type(value)), indent)
             yield f"{indent}{name}:"
             yield from _section(value, indent + "  ")
-        elif isinstance(value, dict) and value:
-            yield from _comment(field.description or "", indent)
-            yield f"{indent}{name}:"
-            yield from (f"{indent}  {_scalar(key)}: {_scalar(each)}" for key, each in value.items())
-        elif item := _item_section(field):
-            yield from _comment(field.description or "", indent)
+            continue
+        yield from _comment(field.description or "", indent)
+        if item := _item_section(field):
             yield from _item_keys(item, indent)
-            yield f"{indent}{name}:" if value else f"{indent}{name}: []"
-            yield from _items(value, indent + "  ")
-        else:
-            if comments and field.description:
-                yield from _comment(field.description, indent)
-            yield f"{indent}{name}: {_scalar(value)}"
+        # An item of a list says only what it has.
+        plain = value if value is None else to_jsonable_python(value, exclude_none=True)
+        style, width = None if isinstance(plain, list) else False, WIDTH - len(indent)
+        text = yaml.safe_dump({name: plain}, default_flow_style=style, sort_keys=False, width=width)
+        yield from textwrap.indent(text, indent).splitlines()
 
 
 def _item_keys(item: type[Section], indent: str) -> Iterator[str]:
@@ -56,13 +50,6 @@ def _item_keys(item: type[Section], indent: str) -> Iterator[str]:
         yield from textwrap.wrap(
             f"{name}: {field.description}", WIDTH, initial_indent=key, subsequent_indent=rest
         )
-
-
-def _items(items: tuple[Section, ...], indent: str) -> Iterator[str]:
-    for item in items:
-        first, *rest = _section(item, indent + "  ", comments=False)
-        yield f"{indent}- {first.strip()}"
-        yield from rest
 
 
 def _item_section(field: FieldInfo) -> type[Section] | None:
@@ -80,9 +67,3 @@ def _first_line(section: type[Section]) -> str:
 def _comment(text: str, indent: str) -> list[str]:
     prefix = f"{indent}# "
     return textwrap.wrap(text, WIDTH, initial_indent=prefix, subsequent_indent=prefix)
-
-
-def _scalar(value: Any) -> str:
-    plain = to_jsonable_python(value)  # of a tuple a list, of a section a mapping
-    text: str = yaml.safe_dump(plain, default_flow_style=True, width=10_000)
-    return text.removesuffix("\n").removesuffix("...").strip()

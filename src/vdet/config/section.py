@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
 class _FrameLength:
@@ -22,6 +22,12 @@ class Section(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nothing_given(cls, values: Any) -> Any:
+        """Take a section without keys, which is null in YAML, for the defaults."""
+        return {} if values is None else values
 
 
 S = TypeVar("S", bound=Section)

@@ -3,7 +3,7 @@
 import math
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from vdet.config.detector import DetectorSettings, Foot, Searches
 from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
@@ -11,13 +11,7 @@ from vdet.config.section import FRAME_LENGTH, Pixels, Section, Share
 ColorSpace = Literal["YCrCb", "HSV", "LUV", "HLS", "YUV", "RGB"]
 
 
-def _are_distinct(channels: tuple[int, ...]) -> tuple[int, ...]:
-    if len(set(channels)) != len(channels):
-        raise ValueError("channels must differ from one another")
-    return channels
-
-
-ChannelNumbers = Annotated[tuple[Literal[0, 1, 2], ...], AfterValidator(_are_distinct)]
+ChannelNumbers = Annotated[tuple[Literal[0, 1, 2], ...], Field(max_length=3)]
 
 
 class HogSettings(Section):
