@@ -14,7 +14,7 @@ from vdet.config.schema import DetectorSettings, MotionTrackerSettings, Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.detector import Candidates, SvmDetector
 from vdet.errors import TruthError
-from vdet.evaluate.video import Variant, find_tracks, follow_together, open_clip
+from vdet.evaluate.video import Variant, evaluate_clip, follow_together, open_clip
 from vdet.media import Frame, Picture, VideoInfo, VideoReader
 from vdet.run.loop import build, peek
 from vdet.run.result import FrameResult
@@ -138,9 +138,9 @@ def test_only_the_frames_that_the_truth_covers_are_read(
 ) -> None:
     steps: list[int] = []
     clip = open_clip(clip_path, truth_path)
-    ((found, _),) = find_tracks(clip, [variant()], lambda _: steps.append)
-    assert found.frame_count == len(steps) == FRAMES
-    assert found.rate == 25
+    (result,) = evaluate_clip(clip, [variant()], lambda _: steps.append)
+    assert result.until == len(steps) == FRAMES
+    assert result.comparison.seconds == FRAMES / 25
 
 
 def test_vehicles_outside_the_regions_do_not_count(
@@ -149,11 +149,11 @@ def test_vehicles_outside_the_regions_do_not_count(
     clip = open_clip(clip_path, truth_path)
     middle = 220  # of 320 pixels; two of the three vehicles are to the left of it
     left = "{name: left, points: [[0, 0], [0.6875, 0], [0.6875, 1], [0, 1]]}"
-    ((found, truth),) = find_tracks(clip, [variant(f"regions.polygons=[{left}]")])
-    assert (found.boxes[:, [0, 2]].mean(axis=1) <= middle).all()
-    outside = truth.boxes[:, [0, 2]].mean(axis=1) > middle
-    assert 0 < outside.sum() < len(truth)
-    np.testing.assert_array_equal(truth.ignored, outside | clip.truth.ignored)
+    (result,) = evaluate_clip(clip, [variant(f"regions.polygons=[{left}]")])
+    for frame in result.comparison.frames:
+        for boxes in (frame.vehicle_boxes, frame.track_boxes):
+            assert (boxes[:, [0, 2]].mean(axis=1) <= middle).all()
+    assert 0 < result.scores.vehicle_boxes < (~clip.truth.ignored).sum()
 
 
 def test_truth_beyond_the_video_is_refused(
@@ -162,4 +162,4 @@ def test_truth_beyond_the_video_is_refused(
     truth = tmp_path / "gt.txt"
     truth.write_text("1,1,10,10,50,50,1,3,1\n31,1,10,10,50,50,1,3,1\n")
     with pytest.raises(TruthError, match=r"gt\.txt: has a box in frame 31 of a video of 30"):
-        find_tracks(open_clip(clip_path, truth), [variant()])
+        evaluate_clip(open_clip(clip_path, truth), [variant()])

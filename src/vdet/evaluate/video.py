@@ -127,18 +127,12 @@ def evaluate_clips(
 ) -> list[RunResult]:
     """Find the vehicles in every clip, in one pass for all settings, and score each.
 
-    Arguments and errors as of `find_tracks`, which is called for each clip.
+    Arguments and errors as of `evaluate_clip`, which is called for each clip.
     """
-    found = [find_tracks(clip, variants, progress) for clip in clips]
+    results = [evaluate_clip(clip, variants, progress) for clip in clips]
     return [
-        RunResult.of(
-            variant.assignments,
-            [
-                score_video(str(clip.video), *compared, video=clip.video)
-                for clip, compared in zip(clips, of_clips, strict=True)
-            ],
-        )
-        for variant, of_clips in zip(variants, zip(*found, strict=True), strict=True)
+        RunResult.of(variant.assignments, of_clips)
+        for variant, of_clips in zip(variants, zip(*results, strict=True), strict=True)
     ]
 
 
@@ -194,13 +188,12 @@ def best(runs: Sequence[RunResult]) -> RunResult:
     return max(runs, key=lambda run: run.total.f1)
 
 
-def find_tracks(
+def evaluate_clip(
     clip: Clip, variants: Sequence[Variant], progress: Progress = no_progress
-) -> list[tuple[LabelledVideo, LabelledVideo]]:
-    """Find and follow the vehicles of a clip under each of the settings, in one pass.
+) -> list[ClipResult]:
+    """Find the vehicles of a clip under each of the settings, in one pass, and score them.
 
-    Return the tracks and the truth for each of them. Vehicles of the truth that stand outside the
-    regions are ignored.
+    Vehicles of the truth that stand outside the regions are ignored.
 
     Parameters
     ----------
@@ -233,13 +226,13 @@ def find_tracks(
         info = reader.info
     clip.truth.check_end(clip.truth_path, frames)
     truth = clip.truth.until(frames)
-    return [
-        (
-            LabelledVideo.of(each, frame_count=frames, rate=float(info.rate)),
-            _in_regions(truth, lay_regions(variant.settings.regions, info.width, info.height)),
-        )
-        for each, variant in zip(rows, variants, strict=True)
-    ]
+    results = []
+    for variant, labels in zip(variants, rows, strict=True):
+        found = LabelledVideo.of(labels, frame_count=frames, rate=float(info.rate))
+        regions = lay_regions(variant.settings.regions, info.width, info.height)
+        counted = _in_regions(truth, regions)
+        results.append(score_video(str(clip.video), found, counted, video=clip.video))
+    return results
 
 
 def follow_together(

@@ -80,7 +80,7 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
         The XML is broken, declares a document type, is nested too deep, or is of another format.
     """
     labels: list[Label] = []
-    sizes: list[tuple[int, int]] = []
+    size: list[tuple[int, int] | None] = [None]
 
     def take(opened: list[Element]) -> None:
         match [each.name for each in opened]:
@@ -94,12 +94,10 @@ def read_cvat(path: Path, data: bytes) -> SavedTracks:
             case ["annotations", "image"]:
                 raise ValueError("CVAT for images; export the task as 'CVAT for video 1.1'")
             case ["annotations", "meta", _, "original_size"]:
-                width, height = (parse_whole(opened[-1].value(s)) for s in ("width", "height"))
-                sizes.append((width, height))
+                size[0] = opened[-1].size
 
     read_xml(path, _text(path, data), "annotations", take)
-    size = sizes[-1] if sizes and min(sizes[-1]) > 0 else None
-    return SavedTracks(tuple(limited(path, labels)), size=size)
+    return SavedTracks(tuple(limited(path, labels)), size=size[0])
 
 
 def _text(path: Path, data: bytes) -> str:

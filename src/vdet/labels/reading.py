@@ -80,10 +80,10 @@ def read_truth(path: Path, roles: Roles = DEFAULT_ROLES) -> LabelledVideo:
 def _with_roles(path: Path, labels: Iterable[Label], roles: Roles) -> Iterator[Label]:
     """Yield vehicles and ignore regions."""
     for label in labels:
-        try:
-            role = "vehicle" if label.name is None else roles.known_role_of(label.name)
-        except ValueError as error:
-            raise line_error(path, label.place, str(error)) from error
+        role = "vehicle" if label.name is None else roles.role_of(label.name)
+        if role is None:
+            what = f"label {label.name!r:.40} is unknown; give it a role in labels.roles, or use "
+            raise line_error(path, label.place, f"{what}one of: {roles.known}")
         if role != "other":
             yield replace(label, score=1.0, ignored=label.ignored or role == "ignored")
 

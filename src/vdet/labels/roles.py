@@ -52,16 +52,10 @@ class Roles:
         """Return the role of a label; None if it is unknown."""
         return self.words.get(_key(label))
 
-    def known_role_of(self, label: str) -> Role:
-        """Return the role of a label. Raises ValueError, with all known words, if it has none."""
-        role = self.role_of(label)
-        if role is None:
-            named = (", ".join(WORDS.get(word, (word,))) for word in self.words)
-            raise ValueError(
-                f"label {label!r:.40} is unknown; give it a role in labels.roles, or use one of: "
-                + ", ".join(named)
-            )
-        return role
+    @property
+    def known(self) -> str:
+        """All known words, for messages."""
+        return ", ".join(", ".join(WORDS.get(word, (word,))) for word in self.words)
 
 
 DEFAULT_ROLES = Roles.from_settings(Settings())

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vdet.labels.formats import PictureFormat
 from vdet.labels.label import Label
-from vdet.labels.parsing import parse_number, parse_whole, read_text
+from vdet.labels.parsing import parse_number, read_text
 from vdet.labels.pictures import LabelledPicture, labelled_pairs
 from vdet.labels.xml_reader import Element, read_xml
 
@@ -31,7 +31,7 @@ def read_voc_pictures(folder: Path) -> Iterator[LabelledPicture]:
 
 def _labelled(picture: Path, file: Path) -> LabelledPicture:
     labels: list[Label] = []
-    sizes: list[tuple[int, int]] = []
+    size: list[tuple[int, int] | None] = [None]
 
     def take(opened: list[Element]) -> None:
         match [each.name for each in opened]:
@@ -40,12 +40,10 @@ def _labelled(picture: Path, file: Path) -> LabelledPicture:
             case ["annotation", "object"]:
                 labels.append(_label(opened[-1]))
             case ["annotation", "size"]:
-                width, height = (parse_whole(opened[-1].value(s)) for s in ("width", "height"))
-                sizes.append((width, height))
+                size[0] = opened[-1].size
 
     read_xml(file, read_text(file), "annotation", take)
-    known = [size for size in sizes if min(size) > 0]  # some tools write 0
-    return LabelledPicture(picture, file, tuple(labels), known[-1] if known else None)
+    return LabelledPicture(picture, file, tuple(labels), size[0])
 
 
 def _label(element: Element) -> Label:

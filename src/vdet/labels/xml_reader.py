@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from vdet.labels.label import line_error
+from vdet.labels.parsing import parse_whole
 
 MAX_DEPTH = 32
 """Largest number of nested XML elements; label files have 5."""
@@ -31,6 +32,12 @@ class Element:
         if name not in self.attributes:
             raise ValueError(f"<{self.name:.40}> without its '{name}'")
         return self.attributes[name]
+
+    @property
+    def size(self) -> tuple[int, int] | None:
+        """The whole numbers in `width` and `height`; None if one is 0, as some tools write."""
+        width, height = (parse_whole(self.value(name)) for name in ("width", "height"))
+        return (width, height) if min(width, height) > 0 else None
 
     def value(self, name: str) -> str:
         """Return the text of an element in it. Raises ValueError where there is not exactly one."""
