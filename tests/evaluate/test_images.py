@@ -60,23 +60,6 @@ def test_results_do_not_depend_on_threads(red_set: LabelledPictures, model: SvmM
             assert np.array_equal(frame.scores, same.scores)
 
 
-def test_each_set_is_scored_and_progress_counts_all_pictures(
-    red_set: LabelledPictures, model: SvmModel, tmp_path: Path
-) -> None:
-    empty = write_set(tmp_path / "empty", {"a": None})
-    totals: list[int | None] = []
-
-    def progress(total: int | None) -> object:
-        totals.append(total)
-        return lambda _: None
-
-    result = evaluate_images([red_set, empty], model, COUNTING, progress=progress)  # type: ignore[arg-type]
-    assert totals == [7]
-    assert [source.scores.vehicles for source in result.sources] == [5, 0]
-    assert result.sources[0].scores.f1 == 1
-    assert result.mean.f1 == 1
-
-
 def test_a_picture_that_cannot_be_read_is_named(red_set: LabelledPictures, model: SvmModel) -> None:
     red_set.pictures[2].path.write_bytes(b"no picture")
     with pytest.raises(ImageError, match=r"2\.png: is not a picture"):
