@@ -226,13 +226,13 @@ def evaluate_clip(
         info = reader.info
     clip.truth.check_end(clip.truth_path, frames)
     truth = clip.truth.until(frames)
-    results = []
+    scored = []
     for variant, labels in zip(variants, rows, strict=True):
         found = LabelledVideo.of(labels, frame_count=frames, rate=float(info.rate))
         regions = lay_regions(variant.settings.regions, info.width, info.height)
         counted = _in_regions(truth, regions)
-        results.append(score_video(str(clip.video), found, counted, video=clip.video))
-    return results
+        scored.append(score_video(str(clip.video), found, counted, video=clip.video))
+    return scored
 
 
 def follow_together(
