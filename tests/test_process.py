@@ -140,7 +140,7 @@ def test_too_little_memory_is_reported_in_one_line(running: list[Running], tmp_p
     ids=lambda command: command[0],
 )
 @pytest.mark.parametrize("full", [True, False], ids=["full", "closed"])
-def test_standard_output_that_takes_nothing_is_told_in_one_line(
+def test_standard_output_that_takes_nothing_is_reported_in_one_line(
     command: list[str], full: bool, running: list[Running], tmp_path: Path
 ) -> None:
     write_drive(tmp_path / "drive.mp4", 2)

@@ -149,7 +149,7 @@ class Tracker:
     def carry(self, time: float, image: Image | Picture | None = None) -> list[Track]:
         """Follow the vehicles into a frame in which no detector looked for them.
 
-        Nothing is missed there. The tracks are predicted. Arguments as of `update`.
+        No detection counts as missed. The tracks are predicted. Arguments: see `update`.
         """
         return self._tracker.carry(time, _picture(image))
 

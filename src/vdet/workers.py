@@ -236,15 +236,13 @@ class DaskCluster:
         self, ended: "distributed.as_completed", client: "distributed.Client"
     ) -> None:
         """Wait until an item has ended; raise `ClusterError` if there is no worker for long."""
-        seen = asked = time.monotonic()
+        seen = time.monotonic()
         while not ended.has_ready():  # type: ignore[no-untyped-call]
-            time.sleep(0.02)
-            if (now := time.monotonic()) < asked + 1:
-                continue
-            asked = now
+            time.sleep(0.05)
             with contextlib.suppress(OSError):  # the scheduler has ended, and so have all items
-                seen = now if client.nthreads() else seen  # type: ignore[no-untyped-call]
-            if now > seen + self.lost_timeout:
+                if client.nthreads():  # type: ignore[no-untyped-call]
+                    seen = time.monotonic()
+            if time.monotonic() > seen + self.lost_timeout:
                 raise ClusterError(
                     f"{self.address}: all workers have ended; start some with `dask worker "
                     f"{self.address}`, and run this again"

@@ -8,7 +8,7 @@ from typing import TypeVar
 import pytest
 
 from running import write_drive
-from vdet.batch.plan import OutputSuffix, Plan, Total, make_plan
+from vdet.batch.plan import OutputSuffix, Plan, PlannedTotal, make_plan
 from vdet.batch.run import each_once, run_batch, write_totals
 from vdet.batch.task import Work
 from vdet.config.schema import Settings
@@ -88,7 +88,7 @@ def test_a_total_is_made_from_the_outputs_that_are_there(tmp_path: Path) -> None
     outputs = {name: tmp_path / f"{name}.txt" for name in ("a", "failed", "b")}
     for name in ("a", "b"):
         outputs[name].write_text(f"of {name}")
-    total = Total(BatchTotal("all", join), tmp_path / "all.txt", outputs)
+    total = PlannedTotal(BatchTotal("all", join), tmp_path / "all.txt", outputs)
     (tmp_path / "all.txt").write_text("of an earlier run")
     write_totals(Plan(tmp_path, (), (), (total,)))
     assert (tmp_path / "all.txt").read_text() == "a: of a\nb: of b\n"
@@ -99,7 +99,7 @@ def test_a_total_that_cannot_be_made_leaves_nothing(tmp_path: Path) -> None:
         target.write_text("half")
         raise OSError(28, "No space left on device")
 
-    total = Total(BatchTotal("all", fail), tmp_path / "all.txt", {})
+    total = PlannedTotal(BatchTotal("all", fail), tmp_path / "all.txt", {})
     with pytest.raises(OutputError, match=r"all.txt: .*No space left"):
         write_totals(Plan(tmp_path, (), (), (total,)))
     assert list(tmp_path.iterdir()) == []

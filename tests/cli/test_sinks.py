@@ -210,7 +210,7 @@ class TestBatch:
             (("--sink", "json=.json"), 2, "json: cannot be written with -d"),
             (("--sink", "stages=.png", "--at", "1"), 2, "stages: cannot be written with -d"),
             (("--sink", "tallies=.csv"), 1, f"tallies: is no sink; {KNOWN}"),
-            (("--tracks", ".csv", "--sink", "tracks=.csv"), 2, "tracks is given .csv twice"),
+            (("--tracks", ".csv", "--sink", "tracks=.csv"), 1, "both would become"),
         ],
     )
     def test_what_cannot_be_is_refused_before_any_work(

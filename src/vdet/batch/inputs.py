@@ -24,14 +24,14 @@ VIDEO_INPUT_SUFFIXES = frozenset((
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class InputVideo:
     """A video, and its `place`: its path below the folder or the pattern that it was found by."""
 
     path: Path
     place: Path
 
 
-def find_sources(clips: Sequence[Path]) -> list[Source]:
+def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     """Return the videos of `clips`, each once.
 
     Each clip is one of these, and its videos are in the order of their names:
@@ -44,8 +44,7 @@ def find_sources(clips: Sequence[Path]) -> list[Source]:
       that has no such character. If the pattern ends in a suffix, as ``*.raw`` does, all files that
       match are taken for videos.
 
-    Pictures below a folder that are no video, as one of them is missing, are left out with a
-    warning (logger "vdet").
+    Numbered pictures of which one is missing are left out with a warning (logger "vdet").
 
     Raises
     ------
@@ -54,7 +53,7 @@ def find_sources(clips: Sequence[Path]) -> list[Source]:
     VideoError
         One of `clips` is an address, or numbered pictures with a gap.
     """
-    found: dict[tuple[Path, Path], Source] = {}
+    found: dict[tuple[Path, Path], InputVideo] = {}
     for clip in clips:
         sources = sorted(_videos_of(clip), key=lambda source: source.place)
         if not sources:
@@ -78,20 +77,20 @@ def matches_in(clip: Path, folder: Path) -> bool:
     return True
 
 
-def _videos_of(clip: Path) -> Iterable[Source]:
+def _videos_of(clip: Path) -> Iterable[InputVideo]:
     if clip.is_dir():
         return _below(clip, clip)
     if clip.exists():
-        return [Source(clip, Path(clip.name))]
+        return [InputVideo(clip, Path(clip.name))]
     if glob.has_magic(str(clip)):
         return _matching(clip)
     refuse_stream(clip)
     if find_sequence(clip):
-        return [Source(clip, Path(f"{clip.absolute().parent.name}{clip.suffix}"))]
+        return [InputVideo(clip, Path(f"{clip.absolute().parent.name}{clip.suffix}"))]
     return []
 
 
-def _matching(pattern: Path) -> Iterator[Source]:
+def _matching(pattern: Path) -> Iterator[InputVideo]:
     plain = [parent for parent in pattern.parents if not glob.has_magic(str(parent))]
     takes_all = bool(pattern.suffix) and not glob.has_magic(pattern.suffix)
     for name in glob.glob(str(pattern), recursive=True):  # noqa: PTH207  # Path.glob cannot start at /
@@ -99,21 +98,21 @@ def _matching(pattern: Path) -> Iterator[Source]:
         if path.is_dir():
             yield from _below(path, plain[0])
         elif takes_all or _is_video(path):
-            yield Source(path, path.relative_to(plain[0]))
+            yield InputVideo(path, path.relative_to(plain[0]))
 
 
-def _below(folder: Path, base: Path) -> Iterator[Source]:
+def _below(folder: Path, base: Path) -> Iterator[InputVideo]:
     for root, folders, names in os.walk(folder, onerror=_refuse_unreadable):
         folders[:] = [name for name in folders if not name.startswith(".")]
         videos = [path for name in names if _is_video(path := Path(root, name))]
         for path in videos:
-            yield Source(path, path.relative_to(base))
+            yield InputVideo(path, path.relative_to(base))
         suffixes = {Path(name).suffix.lower() for name in names if not name.startswith(".")}
         if not videos and suffixes & PICTURE_SUFFIXES:
             yield from _pictures_in(Path(root), base)
 
 
-def _pictures_in(folder: Path, base: Path) -> Iterator[Source]:
+def _pictures_in(folder: Path, base: Path) -> Iterator[InputVideo]:
     """Give the numbered pictures of a folder as one video, named as the folder."""
     try:
         sequence = find_sequence(folder)
@@ -123,7 +122,7 @@ def _pictures_in(folder: Path, base: Path) -> Iterator[Source]:
     assert sequence is not None
     place = Path(folder.absolute().name) if folder == base else folder.relative_to(base)
     suffix = Path(sequence.pattern).suffix
-    yield Source(folder, place.with_name(f"{place.name}{suffix}"))
+    yield InputVideo(folder, place.with_name(f"{place.name}{suffix}"))
 
 
 def _is_video(path: Path) -> bool:

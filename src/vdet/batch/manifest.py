@@ -38,7 +38,7 @@ class Record:
     error
         None if all went well; else there are no outputs, and of the numbers only the seconds.
     digest
-        Of everything that the outputs depend on: see `vdet.batch.task`. None without outputs.
+        SHA-256 of all that the outputs depend on: see `vdet.batch.task`. None without outputs.
     sizes, times
         Bytes of each output and the time of its last change (nanoseconds since 1970), by its path;
         of a folder the sum and the latest of the files in it.

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from vdet.batch.inputs import Source, find_sources, matches_in
+from vdet.batch.inputs import InputVideo, find_sources, matches_in
 from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
@@ -39,7 +39,7 @@ class OutputSuffix:
 
 
 @dataclass(frozen=True, slots=True)
-class Total:
+class PlannedTotal:
     """A file over all videos of a batch.
 
     `outputs` are those that it is made from, by the name of their video.
@@ -57,7 +57,7 @@ class Plan:
     folder: Path
     jobs: tuple[VideoJob, ...]
     skipped: tuple[VideoJob, ...]
-    totals: tuple[Total, ...] = ()
+    totals: tuple[PlannedTotal, ...] = ()
 
     @property
     def manifest(self) -> Path:
@@ -120,10 +120,10 @@ def make_plan(
 
 
 def _totals(
-    sources: Sequence[Source], folder: Path, suffixes: Sequence[OutputSuffix]
-) -> tuple[Total, ...]:
+    sources: Sequence[InputVideo], folder: Path, suffixes: Sequence[OutputSuffix]
+) -> tuple[PlannedTotal, ...]:
     return tuple(
-        Total(
+        PlannedTotal(
             total,
             folder / f"{total.name}{total.suffix or each.suffix or ''}",
             {
@@ -137,7 +137,7 @@ def _totals(
 
 
 def _job(
-    source: Source, folder: Path, common: VideoJob, suffixes: Sequence[OutputSuffix]
+    source: InputVideo, folder: Path, common: VideoJob, suffixes: Sequence[OutputSuffix]
 ) -> VideoJob:
     place = folder / source.place
     outputs = tuple(Output(each.sink, _path(place, each)) for each in suffixes)
@@ -193,7 +193,7 @@ def _replacing_ours(job: VideoJob, written: Mapping[str, Written], manifest: Pat
     return replace(job, overwrite=any(os.path.lexists(output.path) for output in job.outputs))
 
 
-def _refuse_nested(clips: Iterable[Path], sources: Iterable[Source], folder: Path) -> None:
+def _refuse_nested(clips: Iterable[Path], sources: Iterable[InputVideo], folder: Path) -> None:
     resolved = folder.resolve()
     for clip in clips:
         if matches_in(clip, folder):
@@ -216,7 +216,7 @@ def _identity(path: Path) -> tuple[int, int] | None:
     return None
 
 
-def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[Total], folder: Path) -> None:
+def _refuse_shared(jobs: Iterable[VideoJob], totals: Iterable[PlannedTotal], folder: Path) -> None:
     """Refuse an output with the name of another output, of a total, the manifest or an input."""
     inputs = {_identity(path) for job in jobs for path in (job.source, *job.inputs)} - {None}
     owners = {folder / MANIFEST: "the manifest"}

@@ -37,11 +37,11 @@ class Work:
     model
         A model file; None for the shipped one, or for a detector without one.
     threads
-        Of the search, of the decoder and of the encoder of each video; None for one per core.
+        Number of threads of search, decoder and encoder of each video; None for one per core.
     digest
         SHA-256 of program, model and settings, and of the part and lanes that are wanted.
     model_name, model_sha256
-        Of the model file in use; None for a detector without one.
+        Name and SHA-256 of the model file; None for a detector without one.
     """
 
     settings: Settings

@@ -76,9 +76,6 @@ def read_suffixes(wanted: Sequence[Wanted], *, no_video: bool) -> "list[OutputSu
     from vdet.batch.plan import OutputSuffix
 
     suffixes = [OutputSuffix(sink, _suffix(sink, path)) for sink, path in wanted]
-    for each in suffixes:
-        if suffixes.count(each) > 1:
-            raise click.UsageError(f"{each.sink} is given {each.suffix} twice; leave one out")
     if not no_video and not any(each.sink == "video" for each in suffixes):
         suffixes.insert(0, OutputSuffix("video"))
     return suffixes

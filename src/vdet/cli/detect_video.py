@@ -145,7 +145,12 @@ def detect_video(
 
 def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[options.Wanted]]:
     source, *outputs = clips
-    if len(outputs) > 1 or (outputs and outputs[0].is_file() and not _is_ours(outputs[0])):
+    is_kept = False
+    if outputs and outputs[0].is_file():
+        from vdet.media.writer import may_replace_video
+
+        is_kept = not may_replace_video(outputs[0])
+    if len(outputs) > 1 or is_kept:
         shown = shlex.join(map(str, clips[:2])) + (" …" if len(clips) > 2 else "")
         raise click.UsageError(
             f"{outputs[0]} would be the output, and a video that vdet did not write is kept; "
@@ -154,12 +159,6 @@ def _in_and_out(clips: tuple[Path, ...], *, no_video: bool) -> tuple[Path, list[
     if no_video == bool(outputs):
         raise click.UsageError("give OUT, or --no-video without OUT; or -d DIR for several videos")
     return source, [("video", path) for path in outputs]
-
-
-def _is_ours(video: Path) -> bool:
-    from vdet.media.writer import may_replace_video
-
-    return may_replace_video(video)
 
 
 def _process_one(

@@ -11,8 +11,8 @@ Searches = Annotated[
     Field(
         gt=0,
         le=1000,
-        description="Least number of frames that are searched in a second of video. In the others, "
-        "the tracker moves the vehicles on. null: all frames are searched.",
+        description="Search at least this many frames in a second of video. The tracker predicts "
+        "where the vehicles are in the others. null: search all frames.",
     ),
 ]
 
@@ -22,7 +22,7 @@ Foot = Annotated[
         ge=-0.5,
         le=0.5,
         description="Distance from the tyres down to the lower edge of a box, as a share of its "
-        "height. Distances of vehicles are corrected by it.",
+        "height. It corrects the distances of vehicles.",
     ),
 ]
 

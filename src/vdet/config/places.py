@@ -50,25 +50,21 @@ class PlacedSection(Section):
             )
         return width / given_width, height / given_height
 
-    def check_inside(self, what: str, points: Iterable[Point]) -> None:
-        """Raise a `ValueError` that names `what` if one of its points lies outside the frame."""
+    def check_places(self, places: Iterable[tuple[str, Iterable[Point]]]) -> None:
+        """Raise a `ValueError` if a name is given twice, or a point is not in the frame."""
         width, height = self.size or (1, 1)
-        for x, y in points:
-            if not (0 <= x <= width and 0 <= y <= height):
-                unit = "" if self.size else "; shares are 0 to 1, and for pixels give size"
-                raise ValueError(
-                    f"{what}: the point [{x:g}, {y:g}] lies outside the frame of "
-                    f"{width}×{height}{unit}"
-                )
-
-
-def _check_names(names: Iterable[str]) -> None:
-    """Raise a `ValueError` if a name is given twice."""
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            raise ValueError(f"{name}: this name is given twice; give each its own")
-        seen.add(name)
+        seen: set[str] = set()
+        for name, points in places:
+            if name in seen:
+                raise ValueError(f"{name}: this name is given twice; give each its own")
+            seen.add(name)
+            for x, y in points:
+                if not (0 <= x <= width and 0 <= y <= height):
+                    unit = "" if self.size else "; shares are 0 to 1, and for pixels give size"
+                    raise ValueError(
+                        f"{name}: the point [{x:g}, {y:g}] lies outside the frame of "
+                        f"{width}×{height}{unit}"
+                    )
 
 
 class PolygonSection(Section):
@@ -117,9 +113,7 @@ class RegionsSettings(PlacedSection):
 
     @model_validator(mode="after")
     def _lie_in_the_frame(self) -> "RegionsSettings":
-        _check_names(each.name for each in self.polygons)
-        for each in self.polygons:
-            self.check_inside(each.name, each.points)
+        self.check_places((each.name, each.points) for each in self.polygons)
         return self
 
 
@@ -160,16 +154,13 @@ class CountSettings(PlacedSection):
     drawn: bool = False
     """Draw the lines and zones with their running counts into the video."""
     confirmed: float = Field(0.2, ge=0, le=10)
-    """Ignore vehicles that are detected over a shorter time, in seconds."""
+    """Ignore vehicles that are detected for fewer seconds than this."""
 
     def __bool__(self) -> bool:
         return bool(self.lines or self.zones)
 
     @model_validator(mode="after")
     def _lie_in_the_frame(self) -> "CountSettings":
-        _check_names([line.name for line in self.lines] + [zone.name for zone in self.zones])
-        for line in self.lines:
-            self.check_inside(line.name, (line.start, line.end))
-        for zone in self.zones:
-            self.check_inside(zone.name, zone.points)
+        lines = [(line.name, (line.start, line.end)) for line in self.lines]
+        self.check_places([*lines, *((zone.name, zone.points) for zone in self.zones)])
         return self

@@ -157,10 +157,10 @@ class HeatSettings(Section):
     blur: Annotated[int, Field(ge=1, le=100_000), FRAME_LENGTH] = 15
     """Side of the Gaussian kernel that blurs the heat, in pixels."""
     threshold: float = Field(0.075, ge=0)
-    """A region is hot where the heat is higher."""
+    """Heat above which a pixel is hot."""
     regions: Literal["outline", "votes"] = "votes"
-    """outline: each hot region is a detection, with its bounding box. votes: the boxes of the hits
-    in a region decide how many vehicles it shows, and where.
+    """outline: each connected hot area is a detection, with its bounding box. votes: the boxes of
+    the hits in an area decide how many vehicles it shows, and where.
     """
     votes: float = Field(0.12, ge=0)
     """Least weight of hits that agree on a vehicle, with votes."""

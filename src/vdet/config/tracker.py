@@ -46,25 +46,25 @@ class RulesTrackerSettings(TrackerSettings):
     history: int = Field(10, ge=1, le=1000)
     """Number of detections that a car's box is averaged over."""
     min_region: Pixels = 50
-    """Ignore regions narrower or lower than this."""
+    """Ignore detections narrower or lower than this."""
     near: Pixels = 50
-    """Largest distance of a region that is close to a car."""
+    """Largest distance of a detection that is close to a car."""
     confident_peak: float = Field(2.0, ge=0)
-    """A region with a higher peak is trusted sooner."""
+    """A detection with a higher peak is trusted sooner."""
     detections_needed: int = Field(10, ge=1)
     """Detections in a row before a car is shown."""
     confident_detections_needed: int = Field(3, ge=1)
     """Detections in a row before a car is shown, after a confident peak."""
     wide: Pixels = 200
-    """A wider region is always good enough for its car."""
+    """A wider detection is always good enough for its car."""
     good_fraction: Share = 2 / 3
-    """So is a region wider than this share of its car."""
+    """A detection wider than this share of its car is good enough too."""
     max_combined: Pixels = 250
-    """Two regions of one car, combined, must be narrower than this."""
+    """Two detections of one car, combined, must be narrower than this."""
     combined_tolerance: Share = 1 / 3
-    """Their width may differ from the car's by this share of it."""
+    """The width of the two may differ from the car's by this share of it."""
     merge_overlap: Pixels = 40
-    """Cars in one region that overlap by more, across and down, become one."""
+    """Cars in one detection that overlap by more, across and down, become one."""
     match_distance: Pixels = 50
     """Largest distance from its last place at which a car's image is searched."""
     match_score: Share = 0.5

@@ -8,16 +8,16 @@ from vdet.config.section import Section, Share
 
 
 class AugmentationSettings(Section):
-    """Samples made of each training patch and learnt too."""
+    """Further samples that are made from the training patches."""
 
     mirror: bool = True
-    """Add the mirror image. The samples below are made of both."""
+    """Add the mirror image of each patch. The samples below are made from both."""
     cut: Share = 0.15
-    """Share of patches of which a copy is added that the frame's left or right side cuts off by 15
-    to 50 %.
+    """Share of patches that are added again, cut off by 15 to 50 % at the left or right, as by the
+    side of the frame.
     """
     parts: Share = 0.05
-    """Share of vehicle patches of which a crop, 40 to 60 % of the width and height, is added as a
+    """Share of vehicle patches from which a crop, 40 to 60 % of the width and height, is added as a
     non-vehicle.
     """
 
