@@ -72,7 +72,7 @@ def test_a_file_that_ended_when_its_process_was_killed_is_made_again(tmp_path: P
     clip = write_drive(tmp_path / "clip.mp4", 3)
     outputs = [OutputSuffix("tracks", ".csv")]
     plan = make_plan([clip], tmp_path / "out", VideoJob(Path()), outputs)
-    workers = FakeWorkers(1, deadly=list(enumerate(plan.jobs)), kills_left=1)
+    workers = FakeWorkers(1, deadly=plan.jobs, kills_left=1)
     work = Work(Settings(), None, threads=1)
     ((job, record),) = run_batch(plan, work, workers=workers)
     assert len(workers.calls) == 2

@@ -10,11 +10,8 @@ from tqdm import tqdm
 
 from conftest import Run
 from running import until, write_drive
-from vdet.batch.plan import Plan
-from vdet.cli.batch import batch_bar
 from vdet.cli.main import cli
 from vdet.cli.messages import counted, progress_steps
-from vdet.run.video import VideoJob
 
 
 class Terminal(io.StringIO):
@@ -34,22 +31,6 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
 
     monkeypatch.setattr("tqdm.tqdm", Bar)
     return terminal
-
-
-def plan_of(*names: str) -> Plan:
-    """Return a plan of the first frames of videos."""
-    return Plan(Path(), tuple(VideoJob(Path(name), frames=100) for name in names), ())
-
-
-def test_the_bar_of_a_batch_counts_files_and_frames(terminal: Terminal) -> None:
-    with batch_bar(plan_of("a.mp4", "b.mp4", "c.mp4")) as counts:
-        assert counts is not None
-        counts.progress_of(0)(100)(100)
-        counts.end(0, 100)
-        counts.progress_of(1)(50)(25)
-    last = terminal.getvalue().rstrip("\n").rpartition("\r")[2]
-    assert " 125/225 frames [" in last  # the third file is as long as the mean of the others
-    assert " frames/s, 1 of 3 files]" in last
 
 
 def test_a_bar_shows_that_the_program_is_at_work(
@@ -108,11 +89,8 @@ class TestNamesThatControlATerminal:
 
 
 def test_there_is_no_bar_with_quiet(terminal: Terminal) -> None:
-    with click.Context(cli, obj=True).scope():
-        with batch_bar(plan_of("a.mp4")) as counts:
-            assert counts is None
-        with progress_steps("") as steps:
-            steps("fitting", None)
+    with click.Context(cli, obj=True).scope(), progress_steps("") as steps:
+        steps("fitting", None)
     assert terminal.getvalue() == ""
 
 

@@ -9,10 +9,8 @@ from typing import TypeVar
 
 from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import Plan
-from vdet.batch.progress import FrameCounts
 from vdet.batch.task import Work, process_file, record_of_killed
 from vdet.files import OutputFiles, make_folder, output_errors
-from vdet.progress import no_progress
 from vdet.run.video import VideoJob
 from vdet.temporary import remove_stale
 from vdet.workers import WorkerKilledError, Workers, is_repeated
@@ -21,17 +19,10 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-def run_batch(
-    plan: Plan, work: Work, *, workers: Workers, counts: FrameCounts | None = None
-) -> Generator[tuple[VideoJob, Record]]:
+def run_batch(plan: Plan, work: Work, *, workers: Workers) -> Generator[tuple[VideoJob, Record]]:
     """Process the files of a plan; yield each when it has ended, with its record in the manifest.
 
     At the end, temporary files of killed worker processes are removed.
-
-    Parameters
-    ----------
-    counts
-        They get the frames of each job of the plan, by its number.
 
     Raises
     ------
@@ -41,19 +32,15 @@ def run_batch(
         The cluster of `workers` cannot be used, or its scheduler has ended.
     """
     make_folder(plan.folder)
-    function = partial(_process_numbered, work=work, counts=counts)
+    function = partial(_process, work=work)
     try:
         with (
             open_manifest(plan.manifest) as add,
-            closing(
-                each_once(function, list(enumerate(plan.jobs)), workers, again=_replacing)
-            ) as results,
+            closing(each_once(function, plan.jobs, workers, again=_replacing)) as results,
         ):
-            for (number, job), result in results:
+            for job, result in results:
                 record = result or record_of_killed(job, work)
                 add(record)
-                if counts:
-                    counts.end(number, record.frames)
                 yield job, record
         write_totals(plan)
     finally:
@@ -70,18 +57,13 @@ def write_totals(plan: Plan) -> None:
             total.made_by.write(there, files.stage(total.path))
 
 
-def _process_numbered(
-    numbered: tuple[int, VideoJob], *, work: Work, counts: FrameCounts | None
-) -> Record:
-    number, job = _replacing(numbered) if is_repeated() else numbered
-    progress = counts.progress_of(number) if counts else no_progress
-    return process_file(job, work=work, progress=progress)
+def _process(job: VideoJob, *, work: Work) -> Record:
+    return process_file(_replacing(job) if is_repeated() else job, work=work)
 
 
-def _replacing(numbered: tuple[int, VideoJob]) -> tuple[int, VideoJob]:
+def _replacing(job: VideoJob) -> VideoJob:
     """Return a job that replaces its outputs: when its process was killed, it may have ended."""
-    number, job = numbered
-    return number, replace(job, overwrite=True)
+    return replace(job, overwrite=True)
 
 
 def each_once(

@@ -16,7 +16,6 @@ from vdet.batch.manifest import Record
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector, model_file
 from vdet.errors import in_one_line
-from vdet.progress import Progress, no_progress
 from vdet.run.sinks.protocol import output_state
 from vdet.run.video import VideoJob, run_video
 from vdet.version import __version__
@@ -127,16 +126,16 @@ def _digest_of(path: Path | str | None) -> str:
     return ""
 
 
-def process_file(job: VideoJob, *, work: Work, progress: Progress = no_progress) -> Record:
+def process_file(job: VideoJob, *, work: Work) -> Record:
     """Run a job, and return its record.
 
-    Errors are recorded, and not raised. `progress` is as `run_video` takes it.
+    Errors are recorded, and not raised.
     """
     began, record = time.perf_counter(), _record(job, work)
     digest = result_digest(work.digest, job.source)
     with _collected_warnings(job) as warnings:
         try:
-            record = replace(record, digest=digest, **_run(job, work, progress))
+            record = replace(record, digest=digest, **_run(job, work))
         except Exception as failure:
             record = replace(record, error=in_one_line(failure))
             if os.environ.get("VDET_DEBUG") == "1":
@@ -151,11 +150,11 @@ def record_of_killed(job: VideoJob, work: Work) -> Record:
     return replace(_record(job, work), error=error)
 
 
-def _run(job: VideoJob, work: Work, progress: Progress) -> dict[str, Any]:
+def _run(job: VideoJob, work: Work) -> dict[str, Any]:
     """Run a job, and return what its record says about the result."""
     job = replace(job, threads=work.threads, codec_threads=work.threads)
     model = load_detector(work.settings.detector, work.model)
-    totals = run_video(job, model, work.settings, progress=progress)
+    totals = run_video(job, model, work.settings)
     states = {str(each.path.absolute()): output_state(each) or (0, 0) for each in job.outputs}
     return {
         "width": totals.width,

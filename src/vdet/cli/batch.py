@@ -2,24 +2,21 @@
 
 import logging
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from vdet.cli.messages import counted, is_quiet, live_bar, print_lines, print_message
+from vdet.cli.messages import counted, is_quiet, print_lines, print_message, progress_steps
 from vdet.cli.options import Wanted, bundle, jobs_option, option, scheduler_option
 from vdet.errors import failure_code
 
 if TYPE_CHECKING:
-    from tqdm import tqdm
-
     from vdet.batch.manifest import Record
     from vdet.batch.plan import OutputSuffix, Plan
-    from vdet.batch.progress import FrameCounts
     from vdet.batch.task import Work
     from vdet.run.video import VideoJob
     from vdet.workers import Workers
@@ -28,11 +25,6 @@ log = logging.getLogger("vdet")
 
 _SUFFIX = re.compile(r"(\.[a-z0-9_-]+)+", re.ASCII)
 """The ending of an output's name, such as `.csv` or `.cars.csv`."""
-
-_BAR = (
-    "{percentage:3.0f}%|{bar:10}| {n_fmt}/{total_fmt} frames "
-    "[{elapsed}<{remaining}, {rate_noinv_fmt}{postfix}]"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,12 +138,14 @@ def _run(plan: "Plan", work: "Work", workers: "Workers") -> int:
 
     failed = 0
     with (
-        batch_bar(plan) as counts,
-        closing(run_batch(plan, work, workers=workers, counts=counts)) as results,
+        progress_steps(" files") as steps,
+        closing(run_batch(plan, work, workers=workers)) as results,
     ):
+        advance = steps("", len(plan.jobs))
         for job, record in results:
             _print_result(job, record)
             failed += record.error is not None
+            advance(1)
     if not is_quiet():
         skipped = f"{len(plan.skipped)} there already, " if plan.skipped else ""
         done = counted(len(plan.jobs) - failed, "file")
@@ -167,27 +161,3 @@ def _print_result(job: "VideoJob", record: "Record") -> None:
     elif not is_quiet():
         found = f"{counted(record.frames, 'frame')}, {counted(record.tracks, 'track')}"
         print_message(f"{job.source}: {found}, {record.seconds:.1f} s")
-
-
-@contextmanager
-def batch_bar(plan: "Plan") -> "Iterator[FrameCounts | None]":
-    """Give counts of frames to the files of a plan, and show them in a bar.
-
-    Gives None where there is no bar, or no temporary file for the counts can be made.
-    """
-    from vdet.batch.progress import frame_counts
-
-    counts: FrameCounts | None = None
-
-    def show(bar: "tqdm[Any]") -> None:
-        if counts is None:
-            return
-        bar.n, bar.total, ended = counts.state()
-        bar.set_postfix_str(f"{ended} of {counted(len(plan.jobs), 'file')}", refresh=False)
-
-    with (
-        frame_counts(plan.jobs) as made,
-        live_bar(refresh=show, bar_format=_BAR, unit=" frames") as bar,
-    ):
-        counts = None if bar.disable else made
-        yield counts

@@ -3,7 +3,7 @@
 import logging
 import threading
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,13 +100,11 @@ def progress_steps(unit: str) -> Iterator[Steps]:
 
 
 @contextmanager
-def live_bar(
-    *, refresh: "Callable[[tqdm[Any]], object]" = lambda _: None, **options: Any
-) -> "Iterator[tqdm[Any]]":
+def live_bar(**options: Any) -> "Iterator[tqdm[Any]]":
     """Give a bar that is drawn at least every `REFRESH_INTERVAL`: the program is at work.
 
-    Before each time, and at the end, `refresh` is called with the bar. There is no bar with
-    `--quiet`, and where standard error is no terminal: its `disable` is then true.
+    There is no bar with `--quiet`, and where standard error is no terminal: its `disable` is then
+    true.
     """
     from tqdm import tqdm
 
@@ -114,13 +112,9 @@ def live_bar(
     ended = threading.Event()
     with tqdm(disable=disable, dynamic_ncols=True, **options) as bar:
 
-        def draw() -> None:
-            refresh(bar)
-            bar.refresh()
-
         def repeat() -> None:
             while not ended.wait(REFRESH_INTERVAL):
-                draw()
+                bar.refresh()
 
         if bar.disable:
             yield bar
@@ -132,4 +126,3 @@ def live_bar(
         finally:
             ended.set()
             thread.join()
-            draw()
