@@ -8,7 +8,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import astuple
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -122,29 +121,22 @@ def check_sink(
     """
     folder = path if kind.marker else path.parent
     folder.mkdir(parents=True, exist_ok=True)
-    write = partial(_write, kind, path, settings or Settings(), still)
-    with suppress(_RunFailsError):
-        write(fails=True)
-    assert not _content(path), "a failed run left its output"
-    write()
-    assert _content(path), "a run that ended well left no output"
+    for fails in (True, False):
+        with suppress(KeyboardInterrupt):
+            _write(kind, path, settings or Settings(), still=still, fails=fails)
+        assert bool(_content(path)) is not fails, (
+            "a failed run left its output" if fails else "a run that ended well left no output"
+        )
     assert not list(folder.glob("*.vdet-*")), "temporary files are left"
 
 
-class _RunFailsError(Exception):
-    """The error that ends a run."""
-
-
-def _write(
-    kind: SinkKind, path: Path, settings: Settings, still: bool, *, fails: bool = False
-) -> None:
-    """Write a picture or three frames through the sink."""
+def _write(kind: SinkKind, path: Path, settings: Settings, *, still: bool, fails: bool) -> None:
+    """Write a picture or three frames through the sink; the run may end with an error."""
     rate = Fraction(RATE)
-    video = VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
-    given = None if still else video
-    steps = make_steps(StepContext(settings, WIDTH, HEIGHT, given))
+    video = None if still else VideoInfo(Path("check.mp4"), WIDTH, HEIGHT, rate, 1 / rate, frames=3)
+    steps = make_steps(StepContext(settings, WIDTH, HEIGHT, video))
     with OutputFiles() as files:
-        context = SinkContext(files, settings, given, stage_pictures=lambda i, _: {"frame": i})
+        context = SinkContext(files, settings, video, stage_pictures=lambda i, _: {"frame": i})
         with kind.open(path, context) as sink:
             for index in range(1 if still else 3):
                 result = _result(index)
@@ -154,7 +146,7 @@ def _write(
                 assert (result.frame.image == _scene(index)).all(), "the sink changed the frame"
             assert not _content(path), "the output is there before the run has ended"
             if fails:
-                raise _RunFailsError
+                raise KeyboardInterrupt
 
 
 def _content(path: Path) -> list[Path]:

@@ -91,12 +91,11 @@ def _table(videos: "Mapping[str, Counts]") -> list[str]:
             each for counts in videos.values() for each in counts.totals
         )
     rows = [
-        (name, total.name, total.direction, str(total.count), _listed(total.classes))
+        (
+            *(name, total.name, total.direction, str(total.count)),
+            ", ".join(f"{kind} {number}" for kind, number in total.classes.items()),
+        )
         for name, each in totals.items()
         for total in each
     ]
     return table(("file", "name", "direction", "count", "classes"), rows)
-
-
-def _listed(classes: Mapping[str, int]) -> str:
-    return ", ".join(f"{name} {number}" for name, number in classes.items())
