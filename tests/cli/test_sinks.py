@@ -64,7 +64,7 @@ class TestDetectVideo:
     ) -> None:
         result = run("detect-video", clip, out / "a.mp4", "--sink", text)
         assert result.code == 2
-        assert f"--sink {text}: expected NAME=FILE, as in tracks=out.csv" in result.err
+        assert f"{text}: expected NAME=FILE, as in tracks=out.csv" in result.err
         assert names(out) == []
 
     @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ class TestBatch:
     @pytest.mark.parametrize(
         ("arguments", "code", "words"),
         [
-            (("--sink", "tracks"), 2, "--sink tracks: expected NAME=FILE"),
+            (("--sink", "tracks"), 2, "tracks: expected NAME=FILE"),
             (
                 ("--sink", "tracks=a.csv"),
                 2,
