@@ -50,7 +50,7 @@ def test_a_complete_file_replaces_the_older_one_if_asked_and_keeps_its_permissio
     path.chmod(0o440)
     with staged(path, overwrite=True) as temporary:
         temporary.write_text("newer")
-        assert temporary.stat().st_mode & 0o777 == 0o640, "others can read what is private"
+        assert temporary.parent.stat().st_mode & 0o777 == 0o700, "others can read what is private"
     assert path.read_text() == "newer"
     assert path.stat().st_mode & 0o777 == 0o440
 

@@ -20,11 +20,11 @@ _ASIDE = ".older"  # folder in a temporary one, for files that are replaced
 
 
 MayReplace = Callable[[Path], bool]
-"""Says whether a file that is there may be replaced, if the user asks for it."""
+"""Returns whether an existing file may be replaced, if the user asks for it."""
 
 
 def any_file(_: Path) -> bool:
-    """Let every file be replaced."""
+    """Allow every file to be replaced."""
     return True
 
 
@@ -138,9 +138,6 @@ class OutputFiles:
         with output_errors(path):
             temporary = self._temporary_folder(path.parent) / path.name
             temporary.touch()
-            if self._overwrite and path.is_file() and not path.is_symlink():
-                # What replaces a private file is private from the beginning.
-                temporary.chmod(stat.S_IMODE(path.stat().st_mode) | stat.S_IRUSR | stat.S_IWUSR)
         self._may_replace[path] = may_replace
         return temporary
 

@@ -34,7 +34,7 @@ def create_folder(parent: Path, cleanup: contextlib.ExitStack) -> Path:
         candidate = parent / f".vdet-{_HOST}-{secrets.token_hex(8)}"
         # An interrupt may come as soon as the folder is there.
         cleanup.callback(shutil.rmtree, candidate, ignore_errors=True)
-        candidate.mkdir()
+        candidate.mkdir(0o700)  # what is private stays so while it is written
         with contextlib.suppress(FileNotFoundError):  # another run took it for stale
             descriptor = os.open(candidate, _FOLDER_FLAGS)
             cleanup.callback(os.close, descriptor)

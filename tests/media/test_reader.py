@@ -20,7 +20,7 @@ from vdet.media import Frame, VideoReader
 from vdet.media.coding import Coding
 from vdet.media.frame import ColorTags
 from vdet.media.images import Orientation
-from vdet.media.reader import Clock
+from vdet.media.reader import next_time
 
 Image = NDArray[np.uint8]
 Number = Callable[[Image], int]
@@ -145,7 +145,7 @@ def test_all_eight_orientations_are_upright(
     np.testing.assert_array_equal(image, expected)
 
 
-def test_other_video_streams_are_told(
+def test_other_video_streams_are_reported(
     tmp_path: Path, write_clip: Writer, read_number: Number, warnings: Warnings
 ) -> None:
     source, path = write_clip(tmp_path / "front.mp4"), tmp_path / "both.mp4"
@@ -179,7 +179,7 @@ def write_hdr(path: Path, transfer: int, luma: int, *, bits: int = 10, matrix: i
 
 @pytest.mark.parametrize(("transfer", "name"), [(16, "PQ"), (18, "HLG")])
 @pytest.mark.parametrize("share", [0, 0.01, 0.18, 0.5])
-def test_hdr_is_read_as_standard_range_and_told(
+def test_hdr_is_read_as_standard_range_and_reported(
     transfer: int, name: str, share: float, *, tmp_path: Path, warnings: Warnings
 ) -> None:
     """`share` of the light of reference white, 203 cd/m², is shown as so much light."""
@@ -384,8 +384,11 @@ class TestRefusals:
 
 
 def clock_times(*stamps: int | None) -> list[Fraction]:
-    clock = Clock(TICK, PERIOD)
-    return [clock.time(stamp) for stamp in stamps]
+    times: list[Fraction] = []
+    for stamp in stamps:
+        stated = None if stamp is None else stamp * TICK
+        times.append(next_time(times[-1] if times else None, stated, PERIOD))
+    return times
 
 
 def test_a_missing_stamp_is_one_period_after_the_frame_before() -> None:

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import av
@@ -14,7 +13,6 @@ from numpy.typing import NDArray
 
 from vdet.config.schema import OutputSettings
 from vdet.media import VideoReader, VideoWriter
-from vdet.media.restarts import continuous_packets
 
 Number = Callable[[NDArray[np.uint8]], int]
 Writer = Callable[..., Path]
@@ -134,32 +132,3 @@ def test_sound_without_times_of_its_own_is_left_out_with_a_warning(
     copy(repeated, read_number)
     (warning,) = warnings()
     assert "sound packets left out: damaged, or without a time of their own" in warning
-
-
-PICTURES, SOUND_STREAM = 0, 1
-
-
-def packet(stream: int, milliseconds: int) -> Any:
-    """Return what is read of a packet of 40 ms."""
-    return SimpleNamespace(
-        stream_index=stream,
-        pts=milliseconds,
-        dts=milliseconds,
-        duration=40,
-        time_base=Fraction(1, 1000),
-        is_corrupt=False,
-        size=1,
-    )
-
-
-def joined(packets: list[Any]) -> list[tuple[int, int]]:
-    """Return stream and time of each packet on the common time line."""
-    main: Any = SimpleNamespace(
-        index=PICTURES, guessed_rate=Fraction(25), time_base=Fraction(1, 1000), average_rate=None
-    )
-    container: Any = SimpleNamespace(
-        format=SimpleNamespace(flags=0x0200),
-        streams=SimpleNamespace(audio=[SimpleNamespace(index=SOUND_STREAM)]),
-        demux=lambda _: iter(packets),
-    )
-    return [(each.stream_index, each.pts or 0) for each in continuous_packets(container, main)]

@@ -33,7 +33,7 @@ def test_the_rate_of_numbered_pictures_is_a_setting(tmp_path: Path, process: Pro
     assert_whole(shown, list(range(5)), Fraction(2997, 100))
 
 
-def test_numbers_that_rise_by_a_step_and_an_assumed_rate_are_told(
+def test_numbers_that_rise_by_a_step_and_an_assumed_rate_are_reported(
     tmp_path: Path, process: Process
 ) -> None:
     pattern = write_pictures(tmp_path / "50% [a]{b}~*?" / "0_%04d.png", range(6, 18, 3))

@@ -1,4 +1,4 @@
-"""How pictures hold colours: BT.601 or BT.709, the full or the limited range, high dynamic range.
+"""Colour coding of pictures: BT.601 or BT.709, full or limited range, high dynamic range.
 
 References for high dynamic range: ITU-R BT.2100 (transfer functions), BT.2408 (reference white),
 BT.2087 (primaries).
@@ -30,7 +30,7 @@ _LUMA_STEPS, _CHROMA_STEPS = 219 / 255, 224 / 255  # of the limited range, for o
 
 
 def _table(new_base: float, base: float, steps: float) -> Image:
-    """Return what each value becomes if `base` becomes `new_base`, and a step `steps`."""
+    """Return a lookup table that maps `base` to `new_base` and a step of 1 to `steps`."""
     values = new_base + (np.arange(256) - base) * steps
     return np.asarray(np.rint(values.clip(0, 255)), np.uint8)
 
@@ -43,7 +43,7 @@ _LIMITED_LUMA, _LIMITED_CHROMA = _table(16, 0, _LUMA_STEPS), _table(128, 128, _C
 class Coding:
     """A coding of colours: its matrix, and whether luma uses 0 to 255 or 16 to 235.
 
-    What is common to all pictures is BT.601 with the full range, as OpenCV's YCrCb has it.
+    The common coding of all pictures is BT.601 with the full range, as in OpenCV's YCrCb.
     """
 
     matrix: Literal["bt601", "bt709"] = "bt601"
@@ -51,7 +51,7 @@ class Coding:
 
     @classmethod
     def of(cls, picture: av.VideoFrame) -> "Coding | None":
-        """Return how a decoded 4:2:0 picture is coded; None for pictures of another form."""
+        """Return the coding of a decoded 4:2:0 picture; None for other pixel formats."""
         matrix = _MATRICES.get(picture.colorspace)
         is_flipped = any(plane.line_size < 0 for plane in picture.planes)  # rows from below
         if picture.format.name not in _PLANAR or matrix is None or is_flipped:
@@ -60,18 +60,18 @@ class Coding:
         return cls(matrix, full_range)
 
     def to_common(self, layers: Layers) -> Layers:
-        """Return values of this coding in the common one."""
+        """Convert values of this coding to the common coding."""
         stretched = layers if self.full_range else _looked_up(layers, _FULL_LUMA, _FULL_CHROMA)
         return stretched if self.matrix == "bt601" else _recoded(stretched, _FROM_BT709)
 
     def to_bgr(self, layers: Layers) -> Image:
-        """Return values of this coding as BGR uint8 `(H, W, 3)`, as large as luma."""
+        """Convert values of this coding to BGR, uint8 `(H, W, 3)`, of the size of luma."""
         luma, *chroma = self.to_common(layers)
         blue, red = (_as_large(each, luma) for each in chroma)
         return np.asarray(cv2.cvtColor(cv2.merge([luma, red, blue]), cv2.COLOR_YCrCb2BGR), np.uint8)
 
     def from_common(self, layers: Layers) -> Layers:
-        """Return values of the common coding in this one."""
+        """Convert values of the common coding to this coding."""
         recoded = layers if self.matrix == "bt601" else _recoded(layers, _TO_BT709)
         return recoded if self.full_range else _looked_up(recoded, _LIMITED_LUMA, _LIMITED_CHROMA)
 
@@ -85,7 +85,7 @@ def _looked_up(layers: Layers, for_luma: Image, for_chroma: Image) -> Layers:
 
 
 def _from_rgb(matrix: str) -> Float64Array:
-    """Return what red, green and blue become in luma, blue and red chroma."""
+    """Return the matrix from red, green, blue to luma, blue chroma, red chroma; 3 × 3."""
     red, blue = LUMA_SHARES[matrix]
     luma = np.array([red, 1 - red - blue, blue])
     blue_chroma = (np.array([0, 0, 1]) - luma) / (2 - 2 * blue)
@@ -98,7 +98,7 @@ _TO_BT709 = np.linalg.inv(_FROM_BT709)
 
 
 def _recoded(layers: Layers, matrix: Float64Array) -> Layers:
-    """Return full-range values in another matrix; of luma, only what chroma adds to it changes."""
+    """Convert full-range values to another matrix; luma changes only by a share of chroma."""
     luma, *chroma = layers
     (_, *added), *mixed = matrix.tolist()
     change = _mixture(chroma, added, -128 * sum(added), cv2.CV_16S)
@@ -116,7 +116,7 @@ def _mixture(
 
 
 def _as_large(values: npt.NDArray[Any], luma: Image) -> npt.NDArray[Any]:
-    """Return values of the size of luma; of half of it, each stands for 2 × 2 pixels."""
+    """Scale chroma to the size of luma; at half size, a value stands for 2 × 2 pixels."""
     if values.shape == luma.shape:
         return values
     height, width = luma.shape
@@ -127,8 +127,8 @@ HDR_TRANSFERS = {16: "PQ", 18: "HLG"}
 """Transfer codes of ITU-T H.273, and their names."""
 
 _WHITE = 203.0  # cd/m²; reference white, which becomes white
-_PEAK = 1000.0 / _WHITE  # what is brighter is cut
-_KNEE = 0.7  # darker light is kept as it is, brighter light is compressed
+_PEAK = 1000.0 / _WHITE  # brighter light is clipped
+_KNEE = 0.7  # light above it is compressed
 _STEPS = 65_536
 _GAMMA = 2.4  # of a display for BT.709, ITU-R BT.1886
 _BT2020_TO_BT709 = np.array(
@@ -139,7 +139,7 @@ _Table = npt.NDArray[np.float32]
 
 
 class StandardRange:
-    """Converts frames of HDR video; `transfer` is a key of `HDR_TRANSFERS`."""
+    """Converts frames of HDR video to standard range; `transfer` is a key of `HDR_TRANSFERS`."""
 
     def __init__(self, transfer: int) -> None:
         signal = np.linspace(0, 1, 256)
@@ -150,7 +150,7 @@ class StandardRange:
         self._primaries = np.asarray(_BT2020_TO_BT709[::-1, ::-1] * (_STEPS - 1), np.float32)
 
     def convert(self, image: Image) -> Image:
-        """Return a frame as BGR uint8 of BT.709, shape `(H, W, 3)`; it is BT.2020 before."""
+        """Convert a BT.2020 frame to BT.709; BGR uint8 `(H, W, 3)`."""
         light = cv2.LUT(image, self._light)
         steps = cv2.transform(light, self._primaries)
         return self._coded[np.clip(steps, 0, _STEPS - 1).astype(np.uint16)]

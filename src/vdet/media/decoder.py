@@ -1,4 +1,4 @@
-"""Decode a picture stream from its first picture, or from a key frame, in spite of damage."""
+"""Decode a picture stream from its first picture, or from a key frame, despite damage."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -48,13 +48,12 @@ class Damage:
     corrupt_pictures: int = 0
     errors: int = 0
     without_picture: int = 0  # packets
-    lost_at_end: int = 0
+    is_cut_off: bool = False  # within its last packet
     _last: int | None = None  # time of a picture
     _steps: int = 0
     _regular_steps: int = 0
     _skipped: int = 0
     _read_to: int | None = None  # byte of the file
-    _largest: int = _HOLE  # packet, bytes
 
     @property
     def lost(self) -> int:
@@ -62,7 +61,7 @@ class Damage:
         is_regular = self._regular_steps >= _REGULAR * self._steps
         skipped = self._skipped if is_regular else 0
         missing = max(self.errors, self.without_picture, skipped) if self.evident else 0
-        return missing + self.lost_at_end
+        return missing + self.is_cut_off
 
     @property
     def damaged(self) -> int:
@@ -88,7 +87,6 @@ class Damage:
         if self._read_to is not None and position - self._read_to > _HOLE:
             self.evident = True
         self._read_to = max(self._read_to or 0, position + size)
-        self._largest = max(self._largest, size)
 
     def send(self, packet: "Packet[Stream]") -> None:
         """Count a packet of the stream."""
@@ -116,16 +114,6 @@ class Damage:
         if self.paired:
             self.without_picture = self.packets - self.pictures
 
-    def end(self, missing: int, file_size: int) -> bool:
-        """Count `missing` pictures as lost if the file goes on, unreadable, after the last packet.
-
-        Return whether it does. A file that was cut off ends within a packet.
-        """
-        if self._read_to is None or file_size - self._read_to <= 2 * self._largest:
-            return False
-        self.lost_at_end = max(self.lost_at_end, missing)
-        return True
-
     def _is_late(self, time: int | None) -> bool:
         if time is None or self._last is None:
             return False
@@ -144,8 +132,6 @@ class Damage:
 
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
-_THREADS = 4  # always as many: frames near damage depend on their number
-_WITHOUT_FRAME_THREADS = ("vp8", "vp9", "mpeg4")  # they would hide some errors
 _REORDERED = ("h264", "hevc")
 _ONE_PICTURE_PER_PACKET = frozenset((
     "av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png", "vp9",
@@ -222,8 +208,8 @@ class Decoder:
         for packet, following in pairwise(chain(self._read(), [None])):
             if packet is None:
                 return
-            if following is None and packet.is_corrupt:  # the file was cut off within it
-                self.damage.lost_at_end = 1
+            if following is None and packet.is_corrupt:
+                self.damage.is_cut_off = True
                 return
             self.damage.send(packet)
             if self._in_order and packet.dts is not None:
@@ -231,7 +217,8 @@ class Decoder:
             yield packet
 
     def _read(self) -> "Iterator[Packet[Stream]]":
-        waits = self._entry is not None
+        entry = self._entry
+        waits = entry is not None
         others = tuple(self.container.streams) if self._all_streams else ()
         for packet in continuous_packets(
             self.container,
@@ -241,20 +228,15 @@ class Decoder:
             on_restart=self._count_restart,
         ):
             is_picture = packet.stream_index == self.stream.index
-            if waits and not (is_picture and self._is_entry(packet)):
+            if entry and waits and is_picture:
+                waits = packet.pts != entry.pts or not packet.is_keyframe
+            if waits:
                 continue
-            waits = False
             if self._all_streams and packet.pos is not None:
                 self.damage.pass_bytes(packet.pos, packet.size)
-            if is_picture and not self._needs_older_ones(packet):
+            # What is shown before the entry may need older pictures.
+            if is_picture and not (entry and packet.pts is not None and packet.pts < entry.pts):
                 yield packet
-
-    def _is_entry(self, packet: "Packet[Stream]") -> bool:
-        return packet.is_keyframe and self._entry is not None and packet.pts == self._entry.pts
-
-    def _needs_older_ones(self, packet: "Packet[Stream]") -> bool:
-        """Return whether a picture is shown before the key frame at which decoding began."""
-        return bool(self._entry and packet.pts is not None and packet.pts < self._entry.pts)
 
     def _count_restart(self) -> None:
         self.restarts += 1
@@ -334,6 +316,5 @@ def _open(path: Path, frame_rate: float | None) -> tuple[InputContainer, VideoSt
         container.close()
         raise
     context.options = {"max_pixels": str(MAX_PIXELS)}
-    context.thread_type = "SLICE" if context.name in _WITHOUT_FRAME_THREADS else "AUTO"
-    context.thread_count = _THREADS
+    context.thread_count = 1  # with more, frames near damage differ from run to run
     return container, stream

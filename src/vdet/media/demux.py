@@ -1,4 +1,4 @@
-"""Open a video file, read its packets in spite of damage, and say what it declares."""
+"""Open a video file, read its packets despite damage, and describe what it declares."""
 
 import os
 import re
@@ -98,7 +98,7 @@ def open_input(path: Path, frame_rate: float | None = None) -> InputContainer:
 
 
 def refuse_stream(path: Path) -> None:
-    """Refuse what is no file: an address, or ``-``. Raises `VideoError`."""
+    """Refuse an address, or ``-``. Raises `VideoError`."""
     if path.exists():
         return
     if _ADDRESS.match(str(path)):
@@ -108,7 +108,7 @@ def refuse_stream(path: Path) -> None:
 
 
 def is_pipe(path: Path) -> bool:
-    """Return whether what is read from `path` can be read only once, as from a FIFO."""
+    """Return whether `path` can be read only once, as a FIFO."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
@@ -282,7 +282,7 @@ def describe(
 
 
 def _tags(container: InputContainer, stream: VideoStream) -> Tags:
-    """Return what a file says of the recording, in the words of any container."""
+    """Return metadata of the recording; their names differ between containers."""
     found = {
         name.lower(): value
         for metadata in (stream.metadata, container.metadata)

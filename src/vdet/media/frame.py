@@ -25,7 +25,7 @@ class Planes:
     blue, red
         Chroma, uint8 `(⌈H / 2⌉, ⌈W / 2⌉)`; a value stands for 2 × 2 pixels.
     is_own
-        Nobody else uses the picture, so it may be changed, and encoded.
+        Whether nothing else uses the picture, so that it may be changed and encoded.
     """
 
     def __init__(self, picture: av.VideoFrame, coding: Coding, *, is_own: bool = False) -> None:
@@ -65,7 +65,7 @@ class Planes:
         return planes
 
     def copy(self) -> "Planes":
-        """Return planes of their own, which may be changed."""
+        """Return a copy that may be changed."""
         height, width = self.shape
         return self._own(width, height, self.coding, self.layers)
 
@@ -101,7 +101,7 @@ def _plane(picture: av.VideoFrame, number: int) -> Image:
 
 
 class Picture:
-    """An upright picture. What it was made from is shared, so nobody may change it.
+    """An upright picture. It shares the memory of its pixels, which must not be changed.
 
     Parameters
     ----------
@@ -124,19 +124,19 @@ class Picture:
 
     @property
     def planes(self) -> Planes | None:
-        """The planes, if it came so."""
+        """The planes, if the picture was made from planes."""
         return self.pixels if isinstance(self.pixels, Planes) else None
 
     @cached_property
     def image(self) -> Image:
-        """BGR uint8 `(H, W, 3)`; of planes, it is made when it is first asked for."""
+        """BGR uint8 `(H, W, 3)`; converted from planes on first use."""
         return self.pixels.to_image() if isinstance(self.pixels, Planes) else self.pixels
 
 
 def bgr_of(picture: av.VideoFrame) -> Image:
     """Return a decoded picture as BGR uint8 `(H, W, 3)`.
 
-    Colour matrix and range are those that the picture names; else BT.601 and limited.
+    Colour matrix and range are those of its tags; without tags, BT.601 and limited.
     """
     if coding := Coding.of(picture):
         return Planes(picture, coding).to_image()
@@ -176,7 +176,7 @@ class ColorTags:
 
 @dataclass(frozen=True, slots=True)
 class Tags:
-    """What a file says of the recording, as it says it; None where it says nothing."""
+    """Metadata of the recording, as the file has them; None where it has none."""
 
     creation_time: str | None = None
     location: str | None = None
@@ -185,7 +185,7 @@ class Tags:
 
 @dataclass(frozen=True, slots=True)
 class VideoInfo:
-    """What is known of a video before its frames are read.
+    """Properties of a video that are known before its frames are read.
 
     `width` and `height` are of the upright picture in pixels. `rate` is the average in frames per
     second (25 where the file gives none), `time_base` the unit of the file's times in seconds,
@@ -193,7 +193,7 @@ class VideoInfo:
     declares, or an estimate: not exact, None where unknown. `orientation` says how the coded
     picture was turned to stand upright. `pixel_aspect` is the width of an upright pixel over its
     height. `color` is of the images: where the file is HDR (PQ or HLG), they are BT.709.
-    `coding` is that of the planes of the frames which come so, and of a video that is made of them.
+    `coding` is that of frames that consist of planes, and of a video that is written from them.
     """
 
     path: Path

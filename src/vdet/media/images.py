@@ -66,7 +66,7 @@ class Orientation:
 
     @classmethod
     def of_exif(cls, number: int) -> "Orientation":
-        """Return the orientation of a number, 1 to 8, in EXIF data (CIPA DC-008, 4.6.4)."""
+        """Return the orientation for an EXIF number, 1 to 8 (CIPA DC-008, 4.6.4)."""
         rotation = (0, 0, 180, 180, 90, 270, 270, 90)[number - 1]
         return cls(rotation, mirrored=number in (2, 4, 5, 7))
 
@@ -85,7 +85,7 @@ class Orientation:
 
 
 def _display_matrix(picture: "av.VideoFrame") -> npt.NDArray[np.float64]:
-    """Return what x and y become, as rows, of the display matrix (ISO/IEC 14496-12, 6.2.2)."""
+    """Return the part of the display matrix for x and y, 2 × 2 (ISO/IEC 14496-12, 6.2.2)."""
     try:
         side_data = cast(Mapping[str, bytes], picture.side_data)  # it is not typed as such
     except ValueError:  # some of it is of a kind that PyAV does not know
@@ -96,7 +96,7 @@ def _display_matrix(picture: "av.VideoFrame") -> npt.NDArray[np.float64]:
 
 
 def upright(image: Image, orientation: Orientation) -> Image:
-    """Return `image` as it is to be seen."""
+    """Turn and mirror `image` as `orientation` says."""
     turned: cv2.typing.MatLike = cv2.flip(image, 1) if orientation.mirrored else image
     if orientation.rotation:
         turned = cv2.rotate(turned, _TURNS[orientation.rotation])
@@ -121,10 +121,7 @@ def read_image(path: Path) -> Image:
         `MAX_PICTURE_SIDE`.
     """
     data = read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
-    try:
-        image = _decode(data)
-    except ImageError as error:
-        raise ImageError(f"{path}: {error}") from error
+    image = _decode(data, path)
     if _is_cut_off(data):
         log.warning("%s: was cut off, and is read as far as it goes", path)
     return image
@@ -136,7 +133,7 @@ def is_picture_name(path: Path) -> bool:
 
 
 def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
-    """Return width and height of a picture upright, in pixels, and how it becomes so.
+    """Return width and height of the upright picture, pixels, and its orientation.
 
     Only the header is decoded.
 
@@ -145,11 +142,7 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
     ImageError
         As `read_image`.
     """
-    data = read_whole(path, most=MAX_BYTES, what="picture", error=ImageError)
-    try:
-        picture = _open(data)
-    except ImageError as error:
-        raise ImageError(f"{path}: {error}") from error
+    picture = _open(read_whole(path, most=MAX_BYTES, what="picture", error=ImageError), path)
     width, height = picture.size
     turn = _orientation(picture)
     if turn.is_sideways and picture.format != _TURNED_BY_PILLOW:
@@ -160,7 +153,7 @@ def read_header(path: Path) -> tuple[tuple[int, int], Orientation]:
 def decode_image(data: bytes) -> Image | None:
     """Decode an encoded picture as `read_image` does; None where that is impossible."""
     try:
-        return _decode(data)
+        return _decode(data, Path())
     except ImageError:
         return None
 
@@ -188,20 +181,20 @@ def _is_cut_off(data: bytes) -> bool:
     return data.startswith(b"\xff\xd8") and data.rfind(_JPEG_END) < data.rfind(_JPEG_SCAN)
 
 
-def _open(data: bytes) -> "PillowImage":
-    """Read the header of a picture. Raises `ImageError`."""
+def _open(data: bytes, path: Path) -> "PillowImage":
+    """Read the header of a picture. Raises `ImageError`, which names `path`."""
     from PIL import Image as pillow  # noqa: N813
 
     try:
         picture = pillow.open(io.BytesIO(data), formats=_FORMATS)
     except (pillow.DecompressionBombError, pillow.DecompressionBombWarning) as error:
-        raise ImageError(_TOO_LARGE) from error
+        raise ImageError(f"{path}: {_TOO_LARGE}") from error
     except MemoryError:
         raise
     except Exception as error:  # Pillow raises a dozen kinds on damaged data
-        raise ImageError(_NO_PICTURE) from error
+        raise ImageError(f"{path}: {_NO_PICTURE}") from error
     if max(picture.size) > MAX_PICTURE_SIDE or math.prod(picture.size) > MAX_PICTURE_PIXELS:
-        raise ImageError(_TOO_LARGE)
+        raise ImageError(f"{path}: {_TOO_LARGE}")
     return picture
 
 
@@ -216,8 +209,8 @@ def _orientation(picture: "PillowImage") -> Orientation:
     return Orientation.of_exif(number) if number in range(1, 9) else Orientation()
 
 
-def _decode(data: bytes) -> Image:
-    picture = _open(data + _JPEG_END if _is_cut_off(data) else data)
+def _decode(data: bytes, path: Path) -> Image:
+    picture = _open(data + _JPEG_END if _is_cut_off(data) else data, path)
     turn = Orientation() if picture.format == _TURNED_BY_PILLOW else _orientation(picture)
     try:
         picture.load()
@@ -225,7 +218,7 @@ def _decode(data: bytes) -> Image:
     except MemoryError:
         raise
     except Exception as error:  # as in `_open`
-        raise ImageError(_NO_PICTURE) from error
+        raise ImageError(f"{path}: {_NO_PICTURE}") from error
 
 
 def _to_bgr(picture: "PillowImage") -> Image:

@@ -42,9 +42,8 @@ class PictureSequence:
         match = _PATTERN.fullmatch(self.pattern)
         assert match is not None
         before, digits, after = match.groups()
-        lead = "[0-9]" if digits else "[1-9]"
-        rest = "[0-9]" * (len(str(self.first).zfill(int(digits or 0))) - 1)
-        return f"{_escaped(before)}{lead}{rest}{_escaped(after)}"
+        number = "[0-9]" * len(str(self.first).zfill(int(digits or 0)))
+        return f"{_escaped(before)}{number}{_escaped(after)}"
 
 
 def find_sequence(path: Path) -> PictureSequence | None:
@@ -98,7 +97,7 @@ def _numbers(names: list[str], pattern: str) -> list[int]:
 
 
 def _only_pattern(folder: Path, names: list[str]) -> str:
-    """Return the pattern of the pictures in a folder; they must have one. Raises `VideoError`."""
+    """Return the one pattern of the pictures in a folder. Raises `VideoError`."""
     patterns = _patterns(names)
     if not patterns:
         raise VideoError(
@@ -113,7 +112,7 @@ def _only_pattern(folder: Path, names: list[str]) -> str:
 
 
 def _known(folder: Path, names: list[str]) -> str:
-    """Return the advice to give one of the patterns that there are."""
+    """Return advice that names patterns of existing pictures."""
     some = [f"{folder / printable(pattern)}" for pattern in _patterns(names)[:2]]
     return f"give {' or '.join(some)}" if some else ""
 
@@ -140,7 +139,7 @@ def _conversion(numbers: list[str]) -> str:
 
 
 def _escaped(text: str) -> str:
-    """Return a part of a pattern as a part of a pattern of `glob`, in which it means itself."""
+    """Escape a part of a pattern for `glob`."""
     return re.sub(r"([][*?{}~\\])", r"\\\1", text.replace("%%", "%"))
 
 

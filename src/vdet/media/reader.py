@@ -55,6 +55,12 @@ class VideoReader:
     settings
         How much damage is tolerated, and the rate of numbered pictures.
 
+    Attributes
+    ----------
+    length
+        Seconds from the first frame to the end of the last; None where that is not known. Before
+        all frames were read it is what the file declares.
+
     Raises
     ------
     VideoError
@@ -74,7 +80,7 @@ class VideoReader:
         self._start, self._end, self._limit = start or Fraction(0), end, frames
         self._tolerated = settings.max_damaged
         self._faults: list[str] = []
-        self._length: Fraction | None = None
+        self.length: Fraction | None = None
         self._scaled: set[tuple[int, int]] = set()
         self._frame_rate = settings.frame_rate
         self._decoder = Decoder(path, self._frame_rate)
@@ -90,7 +96,7 @@ class VideoReader:
             container, stream = self._decoder.container, self._decoder.stream
             self.info: VideoInfo = describe(path, container, stream, first)
             if not restarts_clock(container):
-                self._length = stated_duration(stream, self.info.start)
+                self.length = stated_duration(stream, self.info.start)
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
             self._faults += self._assumptions(first)
@@ -103,14 +109,6 @@ class VideoReader:
     def damaged(self) -> int:
         """Frames lost, or shown with errors, so far."""
         return self._decoder.damage.damaged
-
-    @property
-    def length(self) -> Fraction | None:
-        """Seconds from the first frame to the end of the last; None where that is not known.
-
-        Before all frames were read it is what the file declares.
-        """
-        return self._length
 
     @property
     def expected(self) -> int | None:
@@ -216,16 +214,18 @@ class VideoReader:
         self, first: av.VideoFrame, before: int
     ) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
         period = 1 / self.info.rate
-        clock = Clock(self.info.time_base, period)
+        time = None
         for index, picture in enumerate(itertools.chain([first], self._pictures), before):
-            time = clock.time(picture.pts)
+            stated = None if picture.pts is None else picture.pts * self.info.time_base
+            time = next_time(time, stated, period)
             yield index, time, picture
+        assert time is not None
         shown = max(period, picture.duration * self.info.time_base)
-        self._length = time + shown - self.info.start
-        self._check_length(index + 1, self._length)
-        if self._end is not None and self._length + period < self._end:
+        self.length = time + shown - self.info.start
+        self._check_length(index + 1, self.length)
+        if self._end is not None and self.length + period < self._end:
             self._faults.append(
-                f"ends at {float(self._length):.2f} s, before the end that was given "
+                f"ends at {float(self.length):.2f} s, before the end that was given "
                 f"({float(self._end):.2f} s)"
             )
 
@@ -234,10 +234,7 @@ class VideoReader:
         stated = stated_duration(self._decoder.stream, self.info.start)
         if stated is None or self._decoder.restarts:  # it is then that of the last part
             return
-        if stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
-            return
-        missing = round((stated - duration) * self.info.rate)
-        if not self._decoder.damage.end(missing, self._decoder.container.size):
+        if stated - duration > max(2 / self.info.rate, stated * _TOLERANCE):
             self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
 
     def _report(self) -> None:
@@ -263,25 +260,11 @@ class VideoReader:
             _log.warning("%s: %s", self.info.path, "; ".join(self._faults))
 
 
-class Clock:
-    """Gives each frame its time, later than the time of the frame before.
+def next_time(last: Fraction | None, stated: Fraction | None, period: Fraction) -> Fraction:
+    """Return the time of a frame, later than that of the frame before, `last`; in seconds.
 
-    It is the file's own time where that is so, else one frame period (`period`, seconds) after the
-    frame before.
+    It is the `stated` one where that is so, else one frame period after the frame before.
     """
-
-    def __init__(self, time_base: Fraction, period: Fraction) -> None:
-        self._time_base = time_base
-        self._period = period
-        self._last: Fraction | None = None
-
-    def time(self, pts: int | None) -> Fraction:
-        """Return the time, in seconds, of the next frame, whose timestamp is `pts` time bases."""
-        stated = None if pts is None else pts * self._time_base
-        if self._last is None:
-            self._last = stated or Fraction(0)
-        elif stated is None or stated <= self._last:
-            self._last += self._period
-        else:
-            self._last = stated
-        return self._last
+    if last is None:
+        return stated or Fraction(0)
+    return last + period if stated is None or stated <= last else stated

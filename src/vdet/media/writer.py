@@ -3,7 +3,6 @@
 import contextlib
 import io
 import logging
-from collections import Counter
 from collections.abc import Generator, Iterator
 from dataclasses import asdict
 from fractions import Fraction
@@ -28,8 +27,7 @@ from vdet.version import __version__
 
 _log = logging.getLogger("vdet")
 
-_MAX_TRIALS = 20  # packets of one stream; the first ones may be damaged
-_MAX_PACKETS = 100_000  # read in search of sound; about half an hour of it
+_MAX_TRIALS = 20  # packets of a stream; the first ones may be damaged
 
 
 class SoundCopy:
@@ -82,13 +80,12 @@ class SoundCopy:
     def _add_streams(self) -> dict[int, AudioStream]:
         """Add streams to the target; return them by their index in the source."""
         kind = self._target.format.name
-        held = _held_sounds(self._path, kind)
         streams = {}
         for stream in self._source.streams:
             if not isinstance(stream, AudioStream):
                 if stream.index != self._pictures.index or not restarts_clock(self._source):
                     stream.discard = Discard.all
-            elif stream.index in held:
+            elif _can_hold(kind, self._path, stream.index):
                 streams[stream.index] = self._target.add_stream_from_template(stream)
                 if stream.language:
                     streams[stream.index].metadata["language"] = stream.language
@@ -129,42 +126,28 @@ def _begin(packet: "Packet[Stream]") -> Fraction:
     return (packet.pts or 0) * packet.time_base
 
 
-def _held_sounds(path: Path, kind: str) -> set[int]:
-    """Return the indices of the sound streams of `path` that a file of the format `kind` can hold.
+def _can_hold(kind: str, path: Path, index: int) -> bool:
+    """Return whether a file of the format `kind` can hold a sound stream of `path`.
 
     It is tried in memory: an unknown codec and damaged parameters show only when a file is written,
     and there they would cost the picture too.
     """
-    held: set[int] = set()
-    trials: Counter[int] = Counter()
     with open_input(path) as source:
-        sounds = source.streams.audio
+        sound = source.streams[index]
         for stream in source.streams:
-            if stream not in sounds:
+            if stream is not sound:
                 stream.discard = Discard.all
-        for packet in islice(packets(source, *sounds, on_error=lambda: None), _MAX_PACKETS):
-            index = packet.stream.index
-            trials[index] += 1
-            if index not in held and trials[index] <= _MAX_TRIALS and _can_hold(kind, packet):
-                held.add(index)
-            if all(each.index in held or trials[each.index] >= _MAX_TRIALS for each in sounds):
-                break
-    return held
+        for packet in islice(packets(source, sound, on_error=lambda: None), _MAX_TRIALS):
+            try:
+                with av.open(io.BytesIO(), "w", kind) as trial:
+                    packet.stream = trial.add_stream_from_template(packet.stream)
+                    packet.pts = packet.dts = 0
+                    trial.mux(packet)
+            except (ValueError, av.FFmpegError):
+                continue
+            return True
+    return False
 
-
-def _can_hold(kind: str, packet: "Packet[Stream]") -> bool:
-    try:
-        with av.open(io.BytesIO(), "w", kind) as trial:
-            copy = trial.add_stream_from_template(packet.stream)
-            packet.stream = copy
-            packet.pts = packet.dts = 0
-            trial.mux(packet)
-    except (ValueError, av.FFmpegError):
-        return False
-    return True
-
-
-_log = logging.getLogger("vdet")
 
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv")
 
@@ -177,7 +160,7 @@ _MATRICES = {"bt601": 6, "bt709": 1}  # codes of ITU-T H.273
 
 
 def may_replace_video(path: Path) -> bool:
-    """Return whether a file may be replaced by a video: one that vdet wrote, or no video.
+    """Return whether a video may replace this file: vdet wrote it, or it is no video.
 
     `VideoWriter` marks what it writes in the comment of the file. What cannot be opened but begins
     like an MP4 file is kept: it may be a recording that was cut off, and could be repaired.
@@ -286,13 +269,10 @@ class VideoWriter:
                 self._sound.copy(since)
 
     def _check_gap(self, seconds: Fraction) -> None:
-        kind = self._container.format.name
-        scale = max(self._time_base.denominator, _COARSEST)
-        if kind != "matroska" and seconds * scale >= _MAX_STEP:
-            raise OutputError(
-                f"{self._name}: {kind} cannot hold the {float(seconds) / 3600:.0f} hours between "
-                "two frames; write .mkv"
-            )
+        ticks = seconds * max(self._time_base.denominator, _COARSEST)
+        if ticks >= _MAX_STEP and self._container.format.name != "matroska":
+            gap = f"{float(seconds) / 3600:.0f} hours between two frames"
+            raise OutputError(f"{self._name}: cannot hold the {gap}; name it .mkv")
 
     def __enter__(self) -> Self:
         return self
@@ -358,7 +338,7 @@ class VideoWriter:
 
 
 def _to_encode(picture: Picture, coding: Coding) -> av.VideoFrame:
-    """Return a picture of even sides that the encoder may have."""
+    """Return a picture with even sides that the encoder may change."""
     planes = picture.planes
     if planes is None or planes.coding != coding or picture.width % 2 or picture.height % 2:
         planes = Planes.of_image(picture.image, coding)
