@@ -24,12 +24,6 @@ def write_clip() -> Callable[..., Path]:
 
 
 @pytest.fixture
-def plain_clip(tmp_path: Path) -> Path:
-    """Twelve frames at 25 frames/s, with sound."""
-    return clips.write_clip(tmp_path / "plain.mp4", sounds=["aac"], movflags="+faststart")
-
-
-@pytest.fixture
 def warnings(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
     """Returns the warnings logged so far."""
     return lambda: [record.getMessage() for record in caplog.records if record.name == "vdet"]

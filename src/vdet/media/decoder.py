@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import chain, pairwise
@@ -48,12 +47,13 @@ class Damage:
     corrupt_pictures: int = 0
     errors: int = 0
     without_picture: int = 0  # packets
-    is_cut_off: bool = False  # within its last packet
+    lost_at_end: int = 0
     _last: int | None = None  # time of a picture
     _steps: int = 0
     _regular_steps: int = 0
     _skipped: int = 0
     _read_to: int | None = None  # byte of the file
+    _largest: int = _HOLE  # packet, bytes
 
     @property
     def lost(self) -> int:
@@ -61,7 +61,7 @@ class Damage:
         is_regular = self._regular_steps >= _REGULAR * self._steps
         skipped = self._skipped if is_regular else 0
         missing = max(self.errors, self.without_picture, skipped) if self.evident else 0
-        return missing + self.is_cut_off
+        return missing + self.lost_at_end
 
     @property
     def damaged(self) -> int:
@@ -87,6 +87,7 @@ class Damage:
         if self._read_to is not None and position - self._read_to > _HOLE:
             self.evident = True
         self._read_to = max(self._read_to or 0, position + size)
+        self._largest = max(self._largest, size)
 
     def send(self, packet: "Packet[Stream]") -> None:
         """Count a packet of the stream."""
@@ -114,6 +115,15 @@ class Damage:
         if self.paired:
             self.without_picture = self.packets - self.pictures
 
+    def end(self, missing: int, file_size: int) -> bool:
+        """Count `missing` pictures as lost if the file goes on, unreadable, after the last packet.
+
+        Return whether it does. A file that was cut off ends within a packet.
+        """
+        goes_on = self._read_to is not None and file_size - self._read_to > 2 * self._largest
+        self.lost_at_end += missing * goes_on
+        return goes_on
+
     def _is_late(self, time: int | None) -> bool:
         if time is None or self._last is None:
             return False
@@ -132,26 +142,15 @@ class Damage:
 
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
+_LARGEST_GROUP = 1000  # packets from one key frame to the next that are held in memory
 _REORDERED = ("h264", "hevc")
 _ONE_PICTURE_PER_PACKET = frozenset((
     "av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png", "vp9",
 ))  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A key frame from which all later frames can be decoded.
-
-    Attributes
-    ----------
-    pts
-        Its time, in units of the time base.
-    index
-        Number of frames shown before it.
-    """
-
-    pts: int
-    index: int
+class UncountableError(Exception):
+    """The frames before a time cannot be counted without decoding them."""
 
 
 class Decoder:
@@ -161,8 +160,14 @@ class Decoder:
     ----------
     frame_rate
         Of numbered pictures, per second; None: `ASSUMED_RATE`.
-    entry
-        Where to begin; None: at the first picture.
+    span
+        Times of the first frame, and of a later one, in units of the time base: begin at the last
+        key frame that is not after the later one. None: begin at the first picture.
+
+    Attributes
+    ----------
+    before
+        Number of frames that are shown before the first picture.
 
     Raises
     ------
@@ -171,27 +176,32 @@ class Decoder:
     """
 
     def __init__(
-        self,
-        path: Path,
-        frame_rate: float | None,
-        entry: Entry | None = None,
+        self, path: Path, frame_rate: float | None, span: tuple[int, int] | None = None
     ) -> None:
-        self._entry = entry
+        self._span = span
+        self.before = 0
         self.container, self.stream = _open(path, frame_rate)
-        # In Matroska, damage shows only as a hole between the packets of all streams.
-        self._all_streams = "matroska" in self.container.format.name
+        form, codec = self.container.format.name, self.stream.codec_context.name
+        # In Matroska, damage shows only as a hole between the packets of all streams. Where the
+        # clock may restart, the sound is read too.
+        self._all_streams = "matroska" in form
+        if not self._all_streams and not restarts_clock(self.container):
+            for other in self.container.streams:
+                if other is not self.stream:
+                    other.discard = Discard.all
         self.restarts = 0  # of the clock
-        if not self._all_streams:
-            _discard_others(self.container, self.stream)
-        codec = self.stream.codec_context.name
         # AVI has no times of presentation: pictures take those of decoding, in their order.
-        self._in_order = self.container.format.name == "avi" and codec in _REORDERED
+        self._in_order = form == "avi" and codec in _REORDERED
         self._times: deque[int] = deque()
-        paired = codec not in _WITH_HIDDEN_PACKETS
-        self.damage = Damage(period_of(self.stream), paired=paired)
+        self.is_countable = codec in _ONE_PICTURE_PER_PACKET and form != "avi" and not is_pipe(path)
+        self.damage = Damage(period_of(self.stream), paired=codec not in _WITH_HIDDEN_PACKETS)
 
     def pictures(self) -> Iterator[av.VideoFrame]:
-        """Yield the pictures that can be decoded."""
+        """Yield the pictures that can be decoded.
+
+        With a `span`, raise `UncountableError` before the first one where the frames before it
+        cannot be counted: packets have no times, are damaged, or key frames are very rare.
+        """
         for packet in chain(self._packets(), [None]):
             for picture in self._decode(packet):
                 if self._times:
@@ -205,11 +215,14 @@ class Decoder:
         self.container.close()
 
     def _packets(self) -> "Iterator[Packet[Stream]]":
-        for packet, following in pairwise(chain(self._read(), [None])):
+        found = self._read()
+        if self._span:
+            found = self._from_key_frame(found, *self._span)
+        for packet, following in pairwise(chain(found, [None])):
             if packet is None:
                 return
             if following is None and packet.is_corrupt:
-                self.damage.is_cut_off = True
+                self.damage.lost_at_end = 1
                 return
             self.damage.send(packet)
             if self._in_order and packet.dts is not None:
@@ -217,8 +230,6 @@ class Decoder:
             yield packet
 
     def _read(self) -> "Iterator[Packet[Stream]]":
-        entry = self._entry
-        waits = entry is not None
         others = tuple(self.container.streams) if self._all_streams else ()
         for packet in continuous_packets(
             self.container,
@@ -227,15 +238,32 @@ class Decoder:
             on_error=self.damage.fail,
             on_restart=self._count_restart,
         ):
-            is_picture = packet.stream_index == self.stream.index
-            if entry and waits and is_picture:
-                waits = packet.pts != entry.pts or not packet.is_keyframe
-            if waits:
-                continue
             if self._all_streams and packet.pos is not None:
                 self.damage.pass_bytes(packet.pos, packet.size)
-            # What is shown before the entry may need older pictures.
-            if is_picture and not (entry and packet.pts is not None and packet.pts < entry.pts):
+            if packet.stream_index == self.stream.index:
+                yield packet
+
+    def _from_key_frame(
+        self, found: "Iterator[Packet[Stream]]", first: int, time: int
+    ) -> "Iterator[Packet[Stream]]":
+        """Leave out the packets before the last key frame that is not after `time`."""
+        group: list[Packet[Stream]] = []
+        key, times = first, list[int]()
+        for packet in found:
+            is_sure = not (packet.is_corrupt or self.damage.evident or len(group) > _LARGEST_GROUP)
+            if packet.pts is None or not is_sure:
+                raise UncountableError
+            if packet.is_keyframe and packet.pts <= time:
+                key, group = packet.pts, []
+            group.append(packet)
+            if not packet.is_discard:
+                times.append(packet.pts)
+            if packet.dts is not None and packet.dts > time:
+                break
+        self.before = sum(first <= each < key for each in times)
+        for packet in chain(group, found):
+            # What is shown before the key frame may need older pictures.
+            if packet.pts is None or packet.pts >= key:
                 yield packet
 
     def _count_restart(self) -> None:
@@ -248,62 +276,6 @@ class Decoder:
         except av.FFmpegError:
             self.damage.fail()
             return []
-
-
-def find_entry(
-    path: Path, first: av.VideoFrame, time: int, frame_rate: float | None
-) -> Entry | None:
-    """Return the last key frame that is not after `time`, by reading the packets before it.
-
-    Parameters
-    ----------
-    first
-        The first frame of the file.
-    time
-        In units of the time base.
-
-    Returns
-    -------
-    None where the frames before it cannot be counted for sure: in interlaced video, for other
-    codecs than those of `_ONE_PICTURE_PER_PACKET`, in AVI, without times, after damage, and in
-    pipes.
-    """
-    if first.pts is None or time <= first.pts or first.interlaced_frame or is_pipe(path):
-        return None
-    container, stream = _open(path, frame_rate)
-    with closing(container):
-        codec, form = stream.codec_context.name, container.format.name
-        if codec not in _ONE_PICTURE_PER_PACKET or form == "avi":
-            return None
-        _discard_others(container, stream)
-        return _last_key_frame(container, stream, first.pts, time)
-
-
-def _last_key_frame(
-    container: InputContainer, stream: VideoStream, first: int, time: int
-) -> Entry | None:
-    errors: list[None] = []
-    times: list[int] = []
-    key: int | None = None
-    found = continuous_packets(container, stream, on_error=lambda: errors.append(None))
-    for packet in (each for each in found if each.stream_index == stream.index):
-        if packet.pts is None or packet.is_corrupt or errors:
-            return None
-        if packet.dts is not None and packet.dts > time:
-            break
-        if packet.is_keyframe and packet.pts <= time:
-            key = packet.pts
-        if not packet.is_discard:
-            times.append(packet.pts)
-    return None if key is None else Entry(key, sum(first <= each < key for each in times))
-
-
-def _discard_others(container: InputContainer, stream: VideoStream) -> None:
-    """Leave out what is not read; where the clock may restart, the sound is read too."""
-    if not restarts_clock(container):
-        for other in container.streams:
-            if other is not stream:
-                other.discard = Discard.all
 
 
 def _open(path: Path, frame_rate: float | None) -> tuple[InputContainer, VideoStream]:

@@ -4,6 +4,7 @@ import itertools
 import logging
 import math
 from collections.abc import Generator, Iterator
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Self
@@ -15,7 +16,7 @@ import numpy as np
 from vdet.config.schema import InputSettings
 from vdet.errors import VideoError
 from vdet.media.coding import HDR_TRANSFERS, Coding, StandardRange
-from vdet.media.decoder import Decoder, find_entry
+from vdet.media.decoder import Decoder, UncountableError
 from vdet.media.demux import MAX_PIXELS, check_size, describe, moving_streams, stated_duration
 from vdet.media.frame import Frame, Picture, Planes, VideoInfo, bgr_of
 from vdet.media.images import Image, Orientation, upright
@@ -33,7 +34,7 @@ class VideoReader:
 
     It gives the frames with ``start <= time - info.start < end``, and at most `frames` of them.
     Seconds count from the file's first frame, as in a player. Decoding begins at the key frame
-    before `start` where the frames before it can be counted (see `find_entry`). Elsewhere all
+    before `start` where the frames before it can be counted (see `Decoder`). Elsewhere all
     frames are decoded, and those before `start` are dropped. The frames given are the same.
 
     The first stream of moving pictures is read. Frames are turned upright, and mirrored where the
@@ -100,7 +101,7 @@ class VideoReader:
             hdr = first.color_trc in HDR_TRANSFERS
             self._standard_range = StandardRange(first.color_trc) if hdr else None
             self._faults += self._assumptions(first)
-            self._frames = self._deliver(*self._begin(first))
+            self._frames = self._deliver(self._begin(first))
         except BaseException:
             self._decoder.close()
             raise
@@ -149,31 +150,32 @@ class VideoReader:
         if streams > 1:
             yield f"has {streams} video streams; only the first is used"
 
-    def _begin(self, first: av.VideoFrame) -> tuple[av.VideoFrame, int]:
-        """Return the picture at which decoding begins, and how many are shown before it."""
+    def _begin(self, first: av.VideoFrame) -> av.VideoFrame:
+        """Return the picture at which decoding begins."""
         time = min(math.floor((self.info.start + self._start) / self.info.time_base), _MAX_TICKS)
-        entry = self._start and find_entry(self.info.path, first, time, self._frame_rate)
-        if not entry:
-            return first, 0
-        decoder = Decoder(self.info.path, self._frame_rate, entry)
-        pictures = decoder.pictures()
-        picture = next(pictures, None)
-        if picture is None or picture.pts != entry.pts or decoder.damage.evident:
+        is_countable = self._decoder.is_countable and not first.interlaced_frame
+        if not is_countable or first.pts is None or time <= first.pts:
+            return first
+        decoder = Decoder(self.info.path, self._frame_rate, (first.pts, time))
+        pictures, picture = decoder.pictures(), None
+        with suppress(UncountableError):
+            picture = next(pictures, None)
+        if picture is None or decoder.damage.evident:
             decoder.close()
-            return first, 0
+            return first
         self._decoder.close()
         self._decoder, self._pictures = decoder, pictures
-        return picture, entry.index
+        return picture
 
-    def _deliver(self, first: av.VideoFrame, before: int) -> Generator[Frame, None, None]:
+    def _deliver(self, first: av.VideoFrame) -> Generator[Frame, None, None]:
         try:
-            yield from itertools.islice(self._selected(first, before), self._limit)
+            yield from itertools.islice(self._selected(first), self._limit)
             self._report()
         finally:
             self._decoder.close()
 
-    def _selected(self, first: av.VideoFrame, before: int) -> Iterator[Frame]:
-        for index, time, picture in self._timed(first, before):
+    def _selected(self, first: av.VideoFrame) -> Iterator[Frame]:
+        for index, time, picture in self._timed(first):
             since = time - self.info.start
             if self._end is not None and since >= self._end:
                 return
@@ -210,12 +212,11 @@ class VideoReader:
         size = info.width, info.height
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
-    def _timed(
-        self, first: av.VideoFrame, before: int
-    ) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
+    def _timed(self, first: av.VideoFrame) -> Iterator[tuple[int, Fraction, av.VideoFrame]]:
         period = 1 / self.info.rate
         time = None
-        for index, picture in enumerate(itertools.chain([first], self._pictures), before):
+        pictures = itertools.chain([first], self._pictures)
+        for index, picture in enumerate(pictures, self._decoder.before):
             stated = None if picture.pts is None else picture.pts * self.info.time_base
             time = next_time(time, stated, period)
             yield index, time, picture
@@ -234,7 +235,10 @@ class VideoReader:
         stated = stated_duration(self._decoder.stream, self.info.start)
         if stated is None or self._decoder.restarts:  # it is then that of the last part
             return
-        if stated - duration > max(2 / self.info.rate, stated * _TOLERANCE):
+        if stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
+            return
+        missing = round((stated - duration) * self.info.rate)
+        if not self._decoder.damage.end(missing, self._decoder.container.size):
             self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
 
     def _report(self) -> None:
