@@ -194,14 +194,6 @@ def interrupt_after(steps: int, folder: Path, patch: pytest.MonkeyPatch) -> None
         patch.setattr(os, name, partial(interrupted, getattr(os, name)))
 
 
-def test_a_file_in_use_is_kept(tmp_path: Path) -> None:
-    with staged(tmp_path / "out.mp4") as temporary:
-        remove_stale(tmp_path)
-        assert temporary.exists()
-        with staged(tmp_path / "more.mp4"), staged(tmp_path / "other.txt"):
-            assert temporary.exists()
-
-
 def test_writing_a_file_removes_stale_files_in_its_folder(tmp_path: Path) -> None:
     leave_one(tmp_path / "a.csv")
     with staged(tmp_path / "b.mp4"):

@@ -142,7 +142,7 @@ class Damage:
 
 
 _WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
-_LARGEST_GROUP = 1000  # packets from one key frame to the next that are held in memory
+_LARGEST_GROUP = 64_000_000  # bytes from one key frame to the next, which are held in memory
 _REORDERED = ("h264", "hevc")
 _ONE_PICTURE_PER_PACKET = frozenset((
     "av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png", "vp9",
@@ -248,13 +248,14 @@ class Decoder:
     ) -> "Iterator[Packet[Stream]]":
         """Leave out the packets before the last key frame that is not after `time`."""
         group: list[Packet[Stream]] = []
-        key, times = first, list[int]()
+        key, held, times = first, 0, list[int]()
         for packet in found:
-            is_sure = not (packet.is_corrupt or self.damage.evident or len(group) > _LARGEST_GROUP)
+            is_sure = not (packet.is_corrupt or self.damage.evident or held > _LARGEST_GROUP)
             if packet.pts is None or not is_sure:
                 raise UncountableError
             if packet.is_keyframe and packet.pts <= time:
-                key, group = packet.pts, []
+                key, held, group = packet.pts, 0, []
+            held += packet.size
             group.append(packet)
             if not packet.is_discard:
                 times.append(packet.pts)

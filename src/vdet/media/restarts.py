@@ -107,7 +107,7 @@ class _Joined:
     def _next(self) -> "Packet[Stream]":
         packet, number = self._ahead.popleft()
         if packet.is_corrupt and self._ends_part(number):
-            packet = _without_flags(packet)
+            packet.is_corrupt = False  # bytes are missing after it, not in it
         _shift(packet, self._offset(number))
         return packet
 
@@ -145,15 +145,6 @@ class _Joined:
         """Return whether pictures are the last ones of their part."""
         others = (place for packet, place in self._ahead if packet.stream_index == self._main)
         return any(place != number for place in islice(others, _FLAGGED))
-
-
-def _without_flags(packet: "Packet[Stream]") -> "Packet[Stream]":
-    """Return a copy that is not marked as damaged: bytes are missing after it, not in it."""
-    copy = type(packet)(bytes(packet))
-    copy.pts, copy.dts, copy.duration = packet.pts, packet.dts, packet.duration
-    copy.time_base, copy.stream = packet.time_base, packet.stream
-    copy.is_keyframe = packet.is_keyframe
-    return copy
 
 
 def _shift(packet: "Packet[Stream]", seconds: Fraction) -> None:
