@@ -141,11 +141,11 @@ class Damage:
             self._skipped += max(0, round(step / self.period) - 1) * self.evident
 
 
-_WITH_HIDDEN_PACKETS = ("vp8", "libvpx")  # decoders of codecs with packets that show no picture
 _LARGEST_GROUP = 64_000_000  # bytes from one key frame to the next, which are held in memory
 _REORDERED = ("h264", "hevc")
 _ONE_PICTURE_PER_PACKET = frozenset((
-    "av1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png", "vp9",
+    "av1", "ffv1", "h264", "hevc", "libdav1d", "mjpeg", "mpeg1video", "mpeg2video", "mpeg4", "png",
+    "prores", "vp9",
 ))  # fmt: skip
 
 
@@ -194,7 +194,7 @@ class Decoder:
         self._in_order = form == "avi" and codec in _REORDERED
         self._times: deque[int] = deque()
         self.is_countable = codec in _ONE_PICTURE_PER_PACKET and form != "avi" and not is_pipe(path)
-        self.damage = Damage(period_of(self.stream), paired=codec not in _WITH_HIDDEN_PACKETS)
+        self.damage = Damage(period_of(self.stream), paired=codec in _ONE_PICTURE_PER_PACKET)
 
     def pictures(self) -> Iterator[av.VideoFrame]:
         """Yield the pictures that can be decoded.

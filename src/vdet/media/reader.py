@@ -222,22 +222,21 @@ class VideoReader:
             yield index, time, picture
         assert time is not None
         shown = max(period, picture.duration * self.info.time_base)
-        self.length = time + shown - self.info.start
-        self._check_length(index + 1, self.length)
+        declared, self.length = self.length, time + shown - self.info.start
+        if declared:
+            self._check_length(index + 1, declared, self.length)
         if self._end is not None and self.length + period < self._end:
             self._faults.append(
                 f"ends at {float(self.length):.2f} s, before the end that was given "
                 f"({float(self._end):.2f} s)"
             )
 
-    def _check_length(self, frames: int, duration: Fraction) -> None:
-        """Note a file that ends earlier than it declares."""
-        stated = stated_duration(self._decoder.stream, self.info.start)
-        if stated is None or self._decoder.restarts:  # it is then that of the last part
+    def _check_length(self, frames: int, declared: Fraction, found: Fraction) -> None:
+        """Note a file that ends earlier than it declares; both lengths in seconds."""
+        lack = declared - found
+        if lack <= max(2 / self.info.rate, declared * _TOLERANCE):
             return
-        if stated - duration <= max(2 / self.info.rate, stated * _TOLERANCE):
-            return
-        missing = round((stated - duration) * self.info.rate)
+        missing = round(lack * self.info.rate)
         if not self._decoder.damage.end(missing, self._decoder.container.size):
             self._faults.append(f"ends early: {frames} of {self.info.frames} frames could be read")
 
