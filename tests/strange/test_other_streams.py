@@ -94,7 +94,7 @@ def test_frames_too_small_for_any_window_pass_with_a_warning(
 ) -> None:
     shown = process(_tiny(tmp_path / "tiny.mkv", size), "-c", "svm")
     assert_complete(shown, size)
-    (warning,) = shown.warnings
+    (warning,) = [each for each in shown.warnings if "horizon" not in each]
     width, height = size
     assert "tiny.mkv: gets no boxes: no search window fits into a frame" in warning
     assert f"{width}×{height}" in warning
