@@ -172,7 +172,7 @@ def by_true_boxes(scene: Scene, index: int, road: Road) -> Iterator[Sample]:
     places = {place.id: place for place in true_places(scene, index)}
     for each in true_boxes(scene, index):
         if must_be_found(each, scene.camera.height):
-            [track] = with_positions([Track(each.id, each.box, 1.0, predicted=False)], road, 0.0)
+            [track] = with_positions([Track(each.id, each.box, 1.0, "seen")], road, 0.0)
             yield Sample(places[each.id], track)
 
 

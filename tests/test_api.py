@@ -6,6 +6,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +49,7 @@ def test_the_page_runs_and_leaves_its_files(page: tuple[Path, dict[str, Any]]) -
     assert frames_of(folder / "out.mp4") == frames_of(folder / "in.mp4")
     assert isinstance(names["detections"], vdet.Boxes)
     (track,) = names["tracks"]
-    assert (track.id, track.predicted) == (1, False)
+    assert (track.id, track.state) == (1, "seen")
     assert abs(track.box.x1 - 657) <= 10
 
 
@@ -127,13 +128,13 @@ def test_follow_searches_the_frames_that_the_settings_ask_for(clip_path: Path) -
     assert [result.searched for result in results] == [n % 4 == 0 for n in range(9)]
 
 
-def test_a_tracker_is_carried_through_frames_in_which_nobody_looked() -> None:
+def test_a_tracker_knows_its_vehicles_in_frames_in_which_nobody_looked() -> None:
     tracker = vdet.Tracker(1280, 720)
     found = vdet.Boxes([[600, 400, 700, 480]], [0.9])
     for number in range(40):
         looks = number % 4 == 0
-        tracks = tracker.update(found, number / 25) if looks else tracker.carry(number / 25)
-    assert [(track.id, track.predicted) for track in tracks] == [(1, True)]
+        tracks = tracker.update(found, number / 25) if looks else tracker.at(number / 25)
+    assert [(track.id, track.state) for track in tracks] == [(1, "between")]
 
 
 def test_follow_can_be_left_early(clip_path: Path) -> None:
@@ -183,7 +184,7 @@ class Latest:
         picture: vdet.Picture | None = None,  # noqa: ARG002
     ) -> list[vdet.Track]:
         return [
-            vdet.Track(number, each.box, 0.9, predicted=False)
+            vdet.Track(number, each.box, 0.9, state="seen")
             for number, each in enumerate(detections, start=1)
         ]
 
@@ -201,8 +202,9 @@ def red_clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("detector", [Red(), red_boxes, vdet.Detector(detector=red_boxes)])
-@pytest.mark.parametrize("tracker", [Latest(), vdet.Tracker(WIDTH, HEIGHT), "motion", None])
+@pytest.mark.parametrize("tracker", [Latest, partial(vdet.Tracker, WIDTH, HEIGHT), "motion", None])
 def test_follow_takes_objects_and_names(red_clip: Path, detector: Any, tracker: Any) -> None:
+    tracker = tracker() if callable(tracker) else tracker
     results = list(vdet.follow(red_clip, detector=detector, tracker=tracker))
     assert all(result.searched for result in results)
     (track,) = results[-1].tracks

@@ -74,7 +74,7 @@ def test_all_three_run_through_detect_video(package: Path, clip: Path, tmp_path:
     records = [json.loads(line) for line in tracks.read_text().splitlines()]
     for number, record in enumerate(records):
         (track,) = record["tracks"]
-        assert (track["id"], track["score"], track["predicted"]) == (1, 0.9, False)
+        assert (track["id"], track["score"], track["state"]) == (1, 0.9, "seen")
         assert abs(track["x"] - car_at(number).x1) <= 2
     names = sorted(path.name for path in (tmp_path / "stages").iterdir())
     assert names == ["1-red.png", "2-boxes.png"]

@@ -146,12 +146,13 @@ class Tracker:
         """
         return self._tracker.update(detections, time, _picture(image))
 
-    def carry(self, time: float, image: Image | Picture | None = None) -> list[Track]:
-        """Follow the vehicles into a frame in which no detector looked for them.
+    def at(self, time: float) -> list[Track]:
+        """Return the vehicles at another time, for a frame in which no detector looked for them.
 
-        No detection counts as missed. The tracks are predicted. Arguments: see `update`.
+        Times may not decrease from call to call. At a time before the latest `update`, at most
+        `tracker.look_ahead` seconds before it, what came later is known.
         """
-        return self._tracker.carry(time, _picture(image))
+        return self._tracker.at(time)
 
 
 def follow(

@@ -21,7 +21,7 @@ from vdet.media.images import Image
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import SinkContext, SinkKind
 from vdet.run.steps import StepContext, make_steps
-from vdet.track.track import CarryingTracker, Track, VideoTracker
+from vdet.track.track import TimedTracker, Track, VideoTracker
 
 RATE = 25
 """Frames a second of the scenes that the checks make."""
@@ -68,11 +68,11 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
     """Check a tracker; `make` returns a new one for frames of a width and height.
 
     * Two vehicles that are always detected keep one id each. Boxes lie in the frame, ids are
-      positive and in order, scores are 0 to 1, and what is detected is not `predicted`.
+      positive and in order, scores are 0 to 1, and what is detected is "seen".
     * The frame is not changed.
     * A second tracker shows the same: trackers share nothing.
     * Nothing is shown some seconds after the last detection.
-    * `carry`, if there is one, shows the same vehicles as predicted.
+    * `at`, if there is one, shows the same vehicles a moment later, between detections.
     """
     first, second = make(WIDTH, HEIGHT), make(WIDTH, HEIGHT)
     ids: set[int] = set()
@@ -85,13 +85,13 @@ def check_tracker(make: Callable[[int, int], VideoTracker]) -> None:
         assert (picture.image == _scene(index)).all(), "the tracker changed the frame"
         ids |= {track.id for track in tracks}
     assert len(tracks) == 2, f"{len(tracks)} of 2 vehicles are shown"
-    assert not any(track.predicted for track in tracks), "a detected vehicle is called predicted"
+    assert all(track.state == "seen" for track in tracks), "a detected vehicle is not called seen"
     assert len(ids) == 2, "a vehicle that is always detected changed its id"
-    if isinstance(second, CarryingTracker):
-        carried = second.carry(3.0, Picture(_scene(3 * RATE)))
-        _check_tracks(carried)
-        assert {track.id for track in carried} == ids, "carry lost a vehicle"
-        assert all(track.predicted for track in carried), "a carried vehicle is not predicted"
+    if isinstance(second, TimedTracker):
+        later = second.at(3.0)
+        _check_tracks(later)
+        assert {track.id for track in later} == ids, "a vehicle is lost a moment later"
+        assert all(track.state == "between" for track in later), "not called between"
     for index in range(3 * RATE, 30 * RATE):
         tracks = first.update(NO_BOXES, index / RATE, Picture(_scene(0) // 2))
     assert not tracks, "vehicles are shown long after the last detection"
@@ -177,5 +177,5 @@ def _scene(index: int) -> Image:
 def _result(index: int) -> FrameResult:
     frame = Frame(index, Fraction(index, RATE), Picture(_scene(index)))
     left, right = _boxes(index)
-    tracks = (Track(1, left, 0.9, predicted=False), Track(2, right, 0.9, predicted=True))
+    tracks = (Track(1, left, 0.9, "seen"), Track(2, right, 0.9, "lost"))
     return FrameResult(Path("check.mp4"), frame, _detections(index), tracks)

@@ -61,8 +61,8 @@ def test_counting_a_file_of_tracks_gives_what_the_run_gave(
 
 def write_tracks(path: Path, *, shift: int = 0) -> Path:
     """Write the tracks of a car that goes to the right, 4 pixels a frame."""
-    rows = [f"{n},{n / 25:.6f},1,{shift + 4 * n},100,40,40,0.9,0" for n in range(50)]
-    path.write_text("\n".join(["frame,time,id,x,y,width,height,score,predicted", *rows]) + "\n")
+    rows = [f"{n},{n / 25:.6f},1,{shift + 4 * n},100,40,40,0.9,seen" for n in range(50)]
+    path.write_text("\n".join(["frame,time,id,x,y,width,height,score,state", *rows]) + "\n")
     return path
 
 

@@ -61,7 +61,7 @@ def test_tracks_agree_in_every_format(
 def test_stride_is_the_setting_of_the_detector(
     run: Run, clip_path: Path, model_path: Path, tmp_path: Path
 ) -> None:
-    """Only searched frames have tracks that are not predicted."""
+    """Only searched frames have tracks that are seen."""
     given = (("--stride", "5"), ("--set", "detector.stride=5"))
     for name, stride in zip(("a.jsonl", "b.jsonl"), given, strict=True):
         tracks = ("--no-video", "--tracks", tmp_path / name, "--model", model_path)
@@ -70,7 +70,7 @@ def test_stride_is_the_setting_of_the_detector(
     records = [json.loads(line) for line in (tmp_path / "a.jsonl").read_text().splitlines()]
     assert len(records) == 30
     shown = {each["frame"] for each in records if each["tracks"]}
-    seen = {each["frame"] for each in records for t in each["tracks"] if not t["predicted"]}
+    seen = {each["frame"] for each in records for t in each["tracks"] if t["state"] == "seen"}
     assert seen
     assert seen < shown
     assert all(number % 5 == 0 for number in seen)

@@ -164,7 +164,7 @@ def test_a_mistake_in_an_assignment_to_the_detector_is_explained_in_one_line(
 @pytest.mark.parametrize(
     ("assignment", "message"),
     [
-        ("tracker.0=3", "tracker.0: is no setting; known here: kind, smallest, "),
+        ("tracker.0=3", "tracker.0: is no setting; known here: kind, look_ahead, "),
         ("0=3", "0: is no setting; known here: detector, tracker, "),
         ("9" * 5000 + "=3", "9999"),
     ],

@@ -40,8 +40,8 @@ CVAT = (
     )
     + "</annotations>\n"
 )
-CSV = "frame,time,id,x,y,width,height,predicted\n" + "".join(
-    f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,0\n" for f, i in BOXES
+CSV = "frame,time,id,x,y,width,height,state\n" + "".join(
+    f"{f},{f / 25:.2f},{i},{90 * i},40,60,50,seen\n" for f, i in BOXES
 )
 JSONL = "".join(
     json.dumps(
@@ -49,7 +49,7 @@ JSONL = "".join(
             "frame": f,
             "time": f / 25,
             "tracks": [
-                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "predicted": False}
+                {"id": i, "x": 90 * i, "y": 40, "width": 60, "height": 50, "state": "seen"}
                 for i in (1, 2)
             ],
         }
@@ -166,7 +166,7 @@ WICKED_TRACKS |= {
     "an entity in CVAT": ("t.xml", ENTITY_BOMB, ":1: the XML declares a document type"),
     "a long class": (
         "t.csv",
-        CSV.replace("predicted\n", "class\n").replace(",0\n", "," + "x" * 1000 + "\n"),
+        CSV.replace("state\n", "class\n").replace(",seen\n", "," + "x" * 1000 + "\n"),
         ":2: the label has more than 100 characters",
     ),
     "no zip file": ("t.yolo.zip", "PK" + "x" * DEEP, "neither a folder nor a readable zip"),

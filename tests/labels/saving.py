@@ -51,7 +51,7 @@ def frame(index: int, *tracks: Track) -> FrameTracks:
 
 def car(number: int = 1, box: Box = PLACE, **known: object) -> Track:
     """Return a car that the detector sees."""
-    values: dict[str, object] = {"score": 0.75, "predicted": False, "class_name": "car"} | known
+    values: dict[str, object] = {"score": 0.75, "state": "seen", "class_name": "car"} | known
     return Track(number, box, **values)  # type: ignore[arg-type]
 
 

@@ -8,7 +8,7 @@ from labels.saving import car, frame, written
 from vdet.errors import TruthError
 from vdet.labels.coco import COCO, read_coco
 
-FRAMES = [frame(4, car(3)), frame(5), frame(6, car(3), car(5, class_name="bus", predicted=True))]
+FRAMES = [frame(4, car(3)), frame(5), frame(6, car(3), car(5, class_name="bus", state="lost"))]
 
 
 def document() -> dict[str, Any]:

@@ -36,9 +36,9 @@ class TestReading:
     def test_frames_count_from_0_and_boxes_are_corners(self) -> None:
         assert rows(track(BOX)) == (row(5, 1, 3, 10, 20, 30.5, 40, name="car"),)
 
-    def test_an_occluded_box_is_predicted(self) -> None:
+    def test_an_occluded_box_is_lost(self) -> None:
         (row,) = rows(track(BOX.replace('occluded="0"', 'occluded="1"')))
-        assert row.predicted
+        assert row.state == "lost"
 
     def test_the_size_of_the_frames_is_read(self) -> None:
         assert read_cvat(FILE, document("").encode()).size == (640, 360)

@@ -7,16 +7,16 @@ from vdet.errors import TruthError
 from vdet.labels.reading import read_predictions
 from vdet.labels.video import LabelledVideo
 
-HEADER = "frame,time,id,x,y,width,height,predicted\n"
+HEADER = "frame,time,id,x,y,width,height,state\n"
 TXT = "1,1,11,21,30,40,1,-1,-1,-1\n3,1,12,21,30,40,1,-1,-1,-1\n"
-CSV = f"{HEADER}0,0.0,1,10,20,30,40,False\n2,0.08,1,11,20,30,40,True\n"
+CSV = f"{HEADER}0,0.0,1,10,20,30,40,seen\n2,0.08,1,11,20,30,40,lost\n"
 JSONL = "".join(
     json.dumps({"frame": frame, "time": frame * 0.04, "tracks": tracks}) + "\n"
     for frame, tracks in enumerate(
         [
-            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "predicted": False}],
+            [{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, "state": "seen"}],
             [],
-            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "predicted": True}],
+            [{"id": 1, "x": 11, "y": 20, "width": 30, "height": 40, "state": "lost"}],
             [],
         ]
     )
@@ -29,10 +29,10 @@ def read(folder: Path, suffix: str, content: str) -> LabelledVideo:
     return read_predictions(path)
 
 
-SCORED_CSV = "frame,time,id,x,y,width,height,score,predicted\n0,0.0,1,10,20,30,40,{score},False\n"
+SCORED_CSV = "frame,time,id,x,y,width,height,score,state\n0,0.0,1,10,20,30,40,{score},seen\n"
 SCORED_JSONL = (
     '{{"frame": 0, "time": 0.0, "tracks": [{{"id": 1, "x": 10, "y": 20, "width": 30, "height": 40, '
-    '"score": {score}, "predicted": false}}]}}\n'
+    '"score": {score}, "state": "seen"}}]}}\n'
 )
 SCORED_TXT = "1,1,11,21,30,40,{score},-1,-1,-1\n"
 SCORED = {"txt": SCORED_TXT, "csv": SCORED_CSV, "jsonl": SCORED_JSONL}
@@ -82,8 +82,8 @@ def record(**changes: object) -> str:
         ("csv", "", ":1: the header must name each of these columns once: frame, time"),
         ("csv", "frame,time,id,x,y,width\n", ":1: the header must name each of these columns"),
         ("csv", CSV + "3,0.12,1,11,20,30\n", ":4: this line has not the 8 columns"),
-        ("csv", CSV + "3,soon,1,11,20,30,40,False\n", ":4: time: Input should be a valid number"),
-        ("csv", CSV + "3,0.12,1,11,20,0,40,False\n", ":4: the box has no area"),
+        ("csv", CSV + "3,soon,1,11,20,30,40,seen\n", ":4: time: Input should be a valid number"),
+        ("csv", CSV + "3,0.12,1,11,20,0,40,seen\n", ":4: the box has no area"),
         ("csv", CSV + '3,"0.12\n', ":4: unexpected end of data"),
         ("jsonl", "", ": is empty; it should have a record for every frame"),
         ("jsonl", JSONL + "{\n", ":5: Invalid JSON"),

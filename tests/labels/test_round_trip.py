@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from hypothesis import given, settings
@@ -20,7 +21,7 @@ from vdet.labels.mot import MOT
 from vdet.labels.records import CSV, JSON_LINES
 from vdet.labels.video import SavedTracks
 from vdet.labels.yolo import YOLO
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks, State, Track
 
 WHOLE = {CSV, JSON_LINES}
 """Formats that keep all that is known of a track."""
@@ -29,7 +30,7 @@ LISTING = {JSON_LINES, COCO, YOLO}
 SCORED = {MOT, CSV, JSON_LINES, COCO, KITTI}
 SIZED = {COCO, CVAT, YOLO}
 MARKING = WHOLE | {COCO, CVAT}
-"""Formats that tell which boxes are predicted."""
+"""Formats that keep which vehicles are lost."""
 
 FORMATS = track_formats()
 every_format = pytest.mark.parametrize("form", FORMATS, ids=lambda form: form.name)
@@ -59,7 +60,7 @@ def videos(draw: st.DrawFn) -> list[FrameTracks]:
                 number,
                 draw(boxes()),
                 draw(st.integers(1, 10_000)) / 10_000,
-                draw(st.booleans()),
+                draw(st.sampled_from(get_args(State))),
                 classes[number],
                 (draw(PLACES), draw(PLACES)),
                 draw(st.none() | st.integers(0, 9999).map(lambda value: value / 100)),
@@ -80,10 +81,11 @@ def kept(form: Format, track: Track) -> Track:
         **dict.fromkeys(WHOLE, track.class_name),
     }
     whole = form in WHOLE
+    marks_lost = form in MARKING and track.state == "lost"
     return replace(
         track,
         score=track.score if form in SCORED else 1.0,
-        predicted=track.predicted and form in MARKING,
+        state=track.state if whole else "lost" if marks_lost else "seen",
         class_name=names.get(form, track.class_name or "vehicle"),
         whole_foot=track.whole_foot if whole else None,
         distance=track.distance if whole else None,

@@ -86,7 +86,7 @@ def result_of(
     """
     frame = Frame(index, time, Picture(road(CAR) if image is None else image))
     tracks = tuple(
-        Track(number, each, 0.9, predicted=False) if isinstance(each, Box) else each
+        Track(number, each, 0.9, state="seen") if isinstance(each, Box) else each
         for number, each in enumerate(vehicles, start=1)
     )
     return FrameResult(source, frame, NO_BOXES, tracks, found)

@@ -146,7 +146,7 @@ class TestPixels:
     ) -> None:
         """Far from boxes and labels, and inside boxes: luma and chroma are equal, bit for bit."""
         wanted = outputs(video=tmp_path / "out.mp4", tracks=tmp_path / "out.jsonl")
-        settings = written_with(OutputSettings(preset="ultrafast", crf=0), smoothing=None)
+        settings = written_with(OutputSettings(preset="ultrafast", crf=0))
         run_red(VideoJob(filmed, wanted), settings)
         masks = untouched(tmp_path / "out.jsonl")
         drawn = 0

@@ -94,7 +94,7 @@ def road() -> Road:
 
 
 def track_at(box: Box) -> Track:
-    return Track(1, box, 0.9, predicted=False)
+    return Track(1, box, 0.9, state="seen")
 
 
 @pytest.mark.parametrize(

@@ -113,22 +113,24 @@ def test_the_first_frame_and_every_nth_after_it_are_searched() -> None:
     assert [result.searched for result in later] == [True, False, False, True, False, False, True]
 
 
-def test_frames_that_are_not_searched_have_no_detections_and_predicted_tracks() -> None:
+def test_frames_that_are_not_searched_have_no_detections_and_tracks_between() -> None:
     results = followed(2)
     for result in results:
         if not result.searched:
             assert len(result.detections) == 0
-            assert all(track.predicted for track in result.tracks)
+            assert all(track.state == "between" for track in result.tracks)
     assert any(result.tracks for result in results if not result.searched)
 
 
-def test_a_tracker_that_cannot_carry_holds_its_vehicles() -> None:
+def test_between_searched_frames_the_boxes_of_the_rules_move_straight() -> None:
     detector = SETTINGS.detector.model_copy(update={"stride": 2})
-    results = list(follow(drive(40), SETTINGS.model_copy(update={"detector": detector})))
-    for before, after in zip(results[20::2], results[21::2], strict=True):
-        assert [track.box for track in after.tracks] == [track.box for track in before.tracks]
-        assert after.tracks
-        assert all(track.predicted for track in after.tracks)
+    tracker = SETTINGS.tracker.model_copy(update={"look_ahead": 0.2})
+    settings = SETTINGS.model_copy(update={"detector": detector, "tracker": tracker})
+    results = list(follow(drive(40), settings))
+    for before, result, after in zip(results[20::2], results[21::2], results[22::2], strict=False):
+        one, track, other = before.tracks[0], result.tracks[0], after.tracks[0]
+        assert track.box.x1 == pytest.approx((one.box.x1 + other.box.x1) / 2)
+        assert track.state == "between"
 
 
 def test_a_stage_sink_waits_for_a_searched_frame(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from vdet.boxes import NO_BOXES, Box, Boxes
 from vdet.config.schema import Settings
 from vdet.config.tracker import RulesTrackerSettings
 from vdet.media import Picture
-from vdet.track.factory import HoldingTracker, make_tracker
+from vdet.track.factory import InterpolatingTracker, make_tracker
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
 from vdet.track.track import Track
@@ -15,7 +15,7 @@ from vdet.track.track import Track
 def test_the_kind_decides_which_tracker_it_is() -> None:
     assert isinstance(make_tracker(Settings(), 1280, 720), MotionTracker)
     rules = make_tracker(SEED, 1280, 720)
-    assert isinstance(rules, HoldingTracker)
+    assert isinstance(rules, InterpolatingTracker)
     assert isinstance(rules.tracker, RulesTracker)
 
 
@@ -42,14 +42,22 @@ class SeesOne:
         picture: Picture | None = None,  # noqa: ARG002
     ) -> list[Track]:
         self.times.append(time)
-        return [Track(1, moved_to(CAR, 100 + round(100 * time), 100), 0.9, predicted=False)]
+        return [Track(1, moved_to(CAR, 100 + round(100 * time), 100), 0.9, state="seen")]
 
 
-def test_vehicles_stay_where_they_were_in_frames_that_are_not_searched() -> None:
-    tracker = HoldingTracker(SeesOne())
+def test_between_two_searched_frames_vehicles_move_straight() -> None:
+    tracker = InterpolatingTracker(SeesOne())
+    tracker.update(NO_BOXES, 1.0)
+    tracker.update(NO_BOXES, 1.4)
+    for time, x, state in ((1.0, 200, "seen"), (1.1, 210, "between"), (1.4, 240, "seen")):
+        (track,) = tracker.at(time)
+        assert (track.box, track.state) == (moved_to(CAR, x, 100), state)
+
+
+def test_after_the_latest_searched_frame_vehicles_stay_where_they_were() -> None:
+    tracker = InterpolatingTracker(SeesOne())
     (seen,) = tracker.update(NO_BOXES, 1.0)
     for time in (1.1, 1.2):
-        (held,) = tracker.carry(time)
+        (held,) = tracker.at(time)
         assert (held.id, held.box, held.score) == (seen.id, seen.box, seen.score)
-        assert held.predicted
-    assert not seen.predicted
+        assert (seen.state, held.state) == ("seen", "between")

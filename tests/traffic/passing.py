@@ -10,7 +10,7 @@ RATE = 25
 
 
 def track(number: int, box: Box, *, score: float = 0.9, **rest: object) -> Track:
-    return Track(number, box, score, **{"predicted": False, **rest})  # type: ignore[arg-type]
+    return Track(number, box, score, **{"state": "seen", **rest})  # type: ignore[arg-type]
 
 
 def frame(index: int, *tracks: Track, rate: float = RATE) -> FrameTracks:

@@ -8,7 +8,7 @@ from typing import Any
 from vdet.boxes import Box
 from vdet.config.places import CountSettings, LineSettings, ZoneSettings
 from vdet.polygons import Point
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.counter import count_frames
 from vdet.traffic.counts import Counts, Event
 
@@ -26,11 +26,11 @@ def track(
     height: int = CAR_HEIGHT,
     score: float = 0.9,
     name: str | None = None,
-    predicted: bool = False,
+    state: State = "seen",
 ) -> Track:
     """Return a track that stands at `foot`."""
     box = Box.sized(round(foot[0]) - height // 2, round(foot[1]) - height, height, height)
-    return Track(number, box, score, predicted, name, foot)
+    return Track(number, box, score, state, name, foot)
 
 
 def through(*points: tuple[float, float, float], gone: Sequence[tuple[float, float]] = ()) -> Path:

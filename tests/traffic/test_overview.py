@@ -45,7 +45,7 @@ def test_what_is_whole_in_the_frame_is_better_than_what_is_larger() -> None:
 
 
 def test_where_the_detector_did_not_see_it_there_is_no_picture() -> None:
-    assert crops([track(1, box(40), predicted=True)]) == {}
+    assert crops([track(1, box(40), state="lost")]) == {}
 
 
 def test_a_vehicle_that_is_gone_is_given_back_and_again_if_it_comes_back_better() -> None:

@@ -13,10 +13,10 @@ from vdet.track.track import FrameTracks
 from vdet.traffic.records import join_records, summarize, write_records
 
 HEADING = (
-    "id,class,first,last,seconds,seen,predicted,mean_score,best_score,"
+    "id,class,first,last,seconds,seen,between,lost,mean_score,best_score,"
     "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height\n"
 )
-FIRST = "1,,0.0,1.0,1.04,26,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30\n"
+FIRST = "1,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30\n"
 
 
 def written(path: Path, *frames: FrameTracks) -> str:
@@ -30,7 +30,7 @@ def test_csv_has_a_heading_and_a_row_a_vehicle(tmp_path: Path) -> None:
 
 
 def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
-    truck = frame(0, track(3, Box.sized(1, 2, 30, 40), class_name="truck", predicted=True, score=1))
+    truck = frame(0, track(3, Box.sized(1, 2, 30, 40), class_name="truck", state="lost", score=1))
     (item,) = json.loads(written(tmp_path / "a.JSON", truck))
     assert item == {
         "id": 3,
@@ -39,7 +39,8 @@ def test_json_is_a_list_of_vehicles(tmp_path: Path) -> None:
         "last": 0,
         "seconds": 0,
         "seen": 0,
-        "predicted": 1,
+        "between": 0,
+        "lost": 1,
         "mean_score": 1,
         "best_score": 1,
         "path": {"start": [16, 42], "end": [16, 42], "length": 0, "length_share": 0},

@@ -23,7 +23,7 @@ def test_a_vehicle_has_its_times_frames_and_path() -> None:
     found = record(*passing(51))
     assert (found.id, found.first, found.last) == (1, 0.0, 2.0)
     assert found.seconds == pytest.approx(51 / RATE), "the last frame is shown too"
-    assert (found.seen, found.predicted) == (51, 0)
+    assert found.states == {"seen": 51}
     assert found.path[0] == (30, 130)
     assert found.path[-1] == (130, 130)
     assert found.length == pytest.approx(100)
@@ -75,12 +75,12 @@ class TestPath:
         ]
         assert record(*frames).length <= PATH_STEP * WIDTH
 
-    def test_predicted_frames_add_nothing(self) -> None:
+    def test_frames_in_which_it_is_lost_add_nothing(self) -> None:
         frames = [
-            frame(0, track(1, Box.sized(0, 0, 40, 30), predicted=True)),
+            frame(0, track(1, Box.sized(0, 0, 40, 30), state="lost")),
             *(frame(n, track(1, Box.sized(100 + 10 * n, 100, 40, 30))) for n in (1, 2, 3)),
-            frame(4, track(1, Box.sized(280, 200, 40, 30), predicted=True)),
+            frame(4, track(1, Box.sized(280, 200, 40, 30), state="lost")),
         ]
         found = record(*frames)
         assert (found.path[0], found.path[-1]) == ((130, 130), (150, 130))
-        assert (found.seen, found.predicted) == (3, 2)
+        assert found.states == {"seen": 3, "lost": 2}

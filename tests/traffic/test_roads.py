@@ -53,7 +53,7 @@ def test_random_traffic(seed: int) -> None:
 
 
 def _true_track(vehicle: TrueVehicle) -> Track:
-    return Track(vehicle.id, Box(*vehicle.box.tolist()), 1.0, predicted=False)
+    return Track(vehicle.id, Box(*vehicle.box.tolist()), 1.0, state="seen")
 
 
 def _unclear(true: Sequence[FrameTracks], row: float) -> set[int]:

@@ -9,16 +9,6 @@ from vdet.track.track import FrameTracks
 DOWN = through((0, 600, 300), (4, 600, 500))
 
 
-def test_predicted_boxes_do_not_count() -> None:
-    """The tracker predicts that it goes on over the line, but it turns off before."""
-    seen = [(600.0, 300.0 + 3 * n) for n in range(30)]
-    video = feet(*seen) + [
-        FrameTracks(30 + n, (30 + n) / 25, (track((600, 390 + 5 * n), predicted=True),))
-        for n in range(20)
-    ]
-    assert events(video) == ()
-
-
 def test_a_vehicle_that_is_seen_for_a_moment_does_not_count() -> None:
     moment = feet((600, 300), (600, 350), (600, 450), (600, 500))
     assert events(moment) == ()

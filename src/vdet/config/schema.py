@@ -115,10 +115,8 @@ class DrawSettings(Section):
 
     boxes: bool = True
     """Draw a box around each vehicle."""
-    predicted: Literal["dashed", "plain", "hidden"] = "dashed"
-    """How to draw vehicles that are predicted, not detected: with dashed boxes, with plain boxes,
-    or not at all.
-    """
+    lost: Literal["dashed", "plain", "hidden"] = "dashed"
+    """How to draw vehicles that are lost: with dashed boxes, with plain boxes, or not at all."""
     label: tuple[LabelPart, ...] | None = Field(None, max_length=4)
     """Parts of the label in order: id, class, score, distance. Unknown ones are left out. []: no
     labels. null: the id in a video, the score in a picture.
@@ -131,8 +129,6 @@ class DrawSettings(Section):
     """Draw the path of each vehicle over this many seconds of a video."""
     time: bool = False
     """Draw the time since the first frame of a video."""
-    smoothing: Seconds | None = 0.4
-    """Smooth the boxes drawn into a video over this many seconds. null: do not."""
 
 
 class Settings(Section):

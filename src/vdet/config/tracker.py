@@ -8,11 +8,22 @@ from vdet.config.section import Pixels, Section, Share
 
 Seconds = Annotated[float, Field(ge=0, le=1000)]
 
+LookAhead = Annotated[
+    float,
+    Field(
+        ge=0,
+        le=10,
+        description="Search this many seconds of video ahead before a frame is shown. Vehicles are "
+        "then shown from their first detection to their last. 0: show frames at once.",
+    ),
+]
+
 
 class TrackerSettings(Section):
     """How detections become tracks. Each kind has a class of its own."""
 
     kind: str
+    look_ahead: LookAhead = 0.0
 
 
 class MotionTrackerSettings(TrackerSettings):
@@ -22,6 +33,7 @@ class MotionTrackerSettings(TrackerSettings):
     """motion: vehicles move steadily, also while they are hidden or not detected. rules: the rules
     of the original system, which count frames.
     """
+    look_ahead: LookAhead = 0.6
     smallest: Share = 0.028
     """Least width of a vehicle that is shown, as a share of the frame's."""
     least_score: Share = 0.4

@@ -75,7 +75,7 @@ def draw_box(
     box
         In pixels of the surface; it may reach beyond it.
     dashed
-        Whether the outline has gaps. This marks a box that is predicted, not detected.
+        Whether the outline has gaps. This marks a vehicle that is lost.
     thickness
         Factor of the width of the outline.
     """

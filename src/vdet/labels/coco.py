@@ -40,7 +40,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     """Write all images and annotations, each on its line.
 
     An annotation has a `score`, and an image its `time` in seconds, which other programs ignore.
-    `attributes.occluded` says that the box is predicted.
+    `attributes.occluded` says that the vehicle is lost.
     """
     size = {"width": video.width, "height": video.height}
     categories: dict[str, int] = defaultdict(lambda: len(categories) + 1)  # the id of each name
@@ -62,7 +62,7 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
                     "area": width * height,
                     "iscrowd": 0,
                     "score": round(track.score, 4),
-                    "attributes": {"occluded": track.predicted},
+                    "attributes": {"occluded": track.state == "lost"},
                 }
             )
     tracks = [
@@ -223,7 +223,7 @@ def read_coco(path: Path, data: bytes) -> SavedTracks:
             frame=image.frame_index + 1,
             id=each.track_id,
             score=each.score,
-            predicted=bool(each.attributes.get("occluded")),
+            state="lost" if each.attributes.get("occluded") else "seen",
         )
         for image, annotations in document.labels()
         for each, label in annotations

@@ -25,7 +25,7 @@ _MEMBER = "annotations.xml"  # in the zip file that CVAT exports
 
 
 def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) -> None:
-    """Write a track for each vehicle; a predicted box is `occluded`."""
+    """Write a track for each vehicle; the box of a lost one is `occluded`."""
     for line in _lines(video, frames):
         file.write(f"{line}\n".encode())
 
@@ -62,7 +62,7 @@ def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
     for (frame, track), after in zip(boxes, [*following, None], strict=True):
         x1, y1, x2, y2 = track.box.pixels
         corners = f'xtl="{x1:.2f}" ytl="{y1:.2f}" xbr="{x2:.2f}" ybr="{y2:.2f}"'
-        text = f'occluded="{int(track.predicted)}" keyframe="1" {corners} z_order="0"'
+        text = f'occluded="{int(track.state == "lost")}" keyframe="1" {corners} z_order="0"'
         yield f'    <box frame="{frame}" outside="0" {text}></box>'
         if after != frame + 1 and frame + 1 < count:
             yield f'    <box frame="{frame + 1}" outside="1" {text}></box>'
@@ -71,7 +71,7 @@ def _box_lines(boxes: Sequence[tuple[int, Track]], count: int) -> Iterator[str]:
 def read_cvat(path: Path, data: bytes) -> SavedTracks:
     """Read the XML, or the zip file with `annotations.xml` that CVAT exports.
 
-    Boxes that are `outside` are left out, boxes that are `occluded` are `predicted`. Every frame
+    Boxes that are `outside` are left out; a vehicle whose box is `occluded` is lost. Every frame
     has its own box, as CVAT exports it; nothing is interpolated.
 
     Raises
@@ -117,11 +117,13 @@ def _labels(track: Element, box: Element) -> Iterator[Label]:
     left, top, right, bottom = (
         parse_number(box.attribute(side)) for side in ("xtl", "ytl", "xbr", "ybr")
     )
-    predicted = parse_whole(box.attributes.get("occluded", "0")) == 1
+    is_occluded = parse_whole(box.attributes.get("occluded", "0")) == 1
     name = track.attribute("label")
     if not parse_whole(box.attribute("outside")):
         corners = left, top, right, bottom
-        yield Label(box.line, corners, name, frame + 1, id_, predicted=predicted)
+        yield Label(
+            box.line, corners, name, frame + 1, id_, state="lost" if is_occluded else "seen"
+        )
 
 
 CVAT = Format("CVAT for video 1.1", ".xml", read_cvat, whole=_write)

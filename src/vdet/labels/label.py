@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vdet.errors import TruthError
+from vdet.track.track import State
 
 MAX_LABELS = 500_000
 """Largest number of boxes in one file: five hours of video with one vehicle in sight."""
@@ -39,7 +40,7 @@ class Label:
         Confidence, higher is better; 1 where the file has none.
     ignored
         Whether it is an ignore region, and not a vehicle.
-    predicted, foot, distance, lane
+    state, foot, distance, lane
         As in `vdet.track.track.Track`; None if the file does not have them.
     """
 
@@ -50,7 +51,7 @@ class Label:
     id: int = NO_ID
     score: float = 1.0
     ignored: bool = False
-    predicted: bool = False
+    state: State = "seen"
     foot: tuple[float, float] | None = None
     distance: float | None = None
     lane: int | None = None

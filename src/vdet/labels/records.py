@@ -18,10 +18,10 @@ from vdet.labels.formats import Format
 from vdet.labels.label import MAX_LABELS, Label, from_size, limited, line_error
 from vdet.labels.parsing import Index, Number
 from vdet.labels.video import SavedTracks
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks, State, Track
 
 _NEEDED = ("frame", "time", "id", "x", "y", "width", "height")
-_OPTIONAL = ("score", "predicted", "class", "foot_x", "foot_y", "distance", "lane")
+_OPTIONAL = ("score", "state", "class", "foot_x", "foot_y", "distance", "lane")
 
 
 class _TrackRecord(BaseModel, frozen=True):
@@ -31,7 +31,7 @@ class _TrackRecord(BaseModel, frozen=True):
     width: Number
     height: Number
     score: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1.0
-    predicted: bool = False
+    state: State = "seen"
     label: str | None = Field(None, alias="class")
     foot: tuple[Number, Number] | None = None
     distance: Number | None = None
@@ -46,7 +46,7 @@ class _TrackRecord(BaseModel, frozen=True):
             frame + 1,
             self.id,
             self.score,
-            predicted=self.predicted,
+            state=self.state,
             foot=self.foot,
             distance=self.distance,
             lane=self.lane,
@@ -77,7 +77,7 @@ def track_record(track: Track) -> dict[str, Any]:
         "id": track.id,
         **dict(zip(("x", "y", "width", "height"), track.box.xywh, strict=True)),
         "score": round(track.score, 4),
-        "predicted": track.predicted,
+        "state": track.state,
         "class": track.class_name,
         "foot": [round(value, 2) for value in track.foot],
         "distance": None if track.distance is None else round(track.distance, 2),
@@ -90,7 +90,7 @@ def _csv_lines(frame: FrameTracks) -> Iterator[str]:
     for track in frame.tracks:
         known = track_record(track)
         place, score = track.box.xywh, f"{track.score:.4f}"
-        cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, int(track.predicted))
+        cells = (frame.index, f"{frame.time:.6f}", track.id, *place, score, track.state)
         others = (track.class_name, *known["foot"], known["distance"], known["lane"])
         yield _csv_line((*cells, *others))
 

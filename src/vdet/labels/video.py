@@ -89,7 +89,7 @@ def _track(label: Label) -> Track:
         label.id,
         Box.sized(*Box(*label.box).xywh),
         min(1.0, max(0.0, label.score)),
-        label.predicted,
+        label.state,
         None if label.name is None else our_name(label.name) or label.name,
         label.foot,
         label.distance,

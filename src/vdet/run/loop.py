@@ -1,9 +1,11 @@
 """The loop: frames → detector → tracker → steps → results."""
 
 import itertools
+from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +20,15 @@ from vdet.run.result import FrameResult
 from vdet.run.search_rate import EVERY_FRAME, SearchRate
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
-from vdet.track.factory import carrying, make_tracker
+from vdet.track.factory import make_tracker, timed
 from vdet.track.track import Track, VideoTracker
 
 FIRST_FRAMES = 5
 """Number of frames that `DetectorModel.for_video` gets."""
+
+
+_MOST_WAITING = 60
+"""Frames that wait for later ones at most: they are held in memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +40,9 @@ class Pipeline:
     steps
         Each gets every result, in the order of the frames.
     rate
-        Which frames are searched. In the others the tracker carries the vehicles on.
+        Which frames are searched.
+    look_ahead
+        Seconds of video that are searched after a frame before its tracks are known.
     is_still
         Whether the only frame is a still picture.
     """
@@ -43,6 +51,7 @@ class Pipeline:
     tracker: VideoTracker
     steps: Sequence[Step] = ()
     rate: SearchRate = EVERY_FRAME
+    look_ahead: Fraction = Fraction(0)
     is_still: bool = False
 
     def follow(
@@ -66,7 +75,20 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        tracker, detector = carrying(self.tracker), self.detector
+        tracker = timed(self.tracker)
+        with closing(self._searched(frames, source, threads, tracker)) as results:
+            for result in _delayed(results, self.look_ahead):
+                shown = tuple(tracker.at(float(result.frame.time)))
+                complete = replace(result, tracks=shown)
+                for step in self.steps:
+                    complete = step.apply(complete)
+                yield complete
+
+    def _searched(
+        self, frames: Iterable[Frame], source: Path, threads: int, tracker: VideoTracker
+    ) -> Generator[FrameResult]:
+        """Search the frames and update the tracker; yield the results, without tracks."""
+        detector = self.detector
         prepared = [step for step in self.steps if isinstance(step, ParallelStep)]
 
         def search(chosen: tuple[Frame, bool]) -> Any:
@@ -80,16 +102,22 @@ class Pipeline:
         chosen = self.rate.choose(frames)
         with map_ordered(search, chosen, threads, is_work=lambda each: each[1]) as results:
             for (frame, searched), candidates in results:
-                time, picture = float(frame.time), frame.picture
+                detections = detector.detect(candidates) if searched else NO_BOXES
                 if searched:
-                    found = detector.detect(candidates)
-                    tracks = tracker.update(found, time, picture)
-                else:
-                    found, tracks = NO_BOXES, tracker.carry(time, picture)
-                result = FrameResult(source, frame, found, tuple(tracks), searched=searched)
-                for step in self.steps:
-                    result = step.apply(result)
-                yield result
+                    tracker.update(detections, float(frame.time), frame.picture)
+                yield FrameResult(source, frame, detections, (), searched=searched)
+
+
+def _delayed(results: Iterable[FrameResult], seconds: Fraction) -> Iterator[FrameResult]:
+    """Yield each result once there are those of the `seconds` of video after it."""
+    waiting = deque[FrameResult]()
+    for result in results:
+        waiting.append(result)
+        until = result.frame.time - seconds
+        while waiting and (waiting[0].frame.time <= until or len(waiting) > _MOST_WAITING):
+            yield waiting.popleft()
+    while waiting:
+        yield waiting.popleft()
 
 
 def build(
@@ -130,8 +158,9 @@ def build(
     made = make_steps(StepContext(settings, width, height, video, lanes), steps)
     if video is None:
         return Pipeline(detector, StillTracker(), made, is_still=True)
+    tracker = tracker or make_tracker(settings, width, height)
     rate = SearchRate(settings.detector.searches, settings.detector.stride)
-    return Pipeline(detector, tracker or make_tracker(settings, width, height), made, rate)
+    return Pipeline(detector, tracker, made, rate, Fraction(settings.tracker.look_ahead))
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:
@@ -157,6 +186,6 @@ class StillTracker:
     def update(self, detections: Boxes, *_: object) -> list[Track]:
         """Return a track for each detection, with ids from 1."""
         return [
-            Track(number, each.box, each.score, predicted=False, class_name=each.class_name)
+            Track(number, each.box, each.score, "seen", class_name=each.class_name)
             for number, each in enumerate(detections, start=1)
         ]

@@ -26,7 +26,7 @@ class FrameResult:
         The lane, and the undistorted frame; None if lanes are not looked for.
     searched
         Whether the detector searched the frame: see `detector.stride`. Where it did not, there are
-        no detections, and the tracks are predicted.
+        no detections.
     counter
         It has counted up to this frame; None if there are no lines and zones. All results of a
         video share it.

@@ -1,10 +1,10 @@
 """A tracker from its settings, of any kind."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import Any
 
-from vdet.boxes import Boxes
+from vdet.boxes import Box, Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings, TrackerSettings
 from vdet.config.section import REFERENCE_HEIGHT, scale_lengths
 from vdet.config.tracker import RulesTrackerSettings
@@ -12,7 +12,7 @@ from vdet.media import Picture
 from vdet.plugins import TRACKERS, load_plugin
 from vdet.track.motion.tracker import MotionTracker
 from vdet.track.rules.tracker import RulesTracker
-from vdet.track.track import CarryingTracker, Track, VideoTracker
+from vdet.track.track import State, TimedTracker, Track, VideoTracker
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class TrackerKind:
     make: Callable[[Any, int, int], VideoTracker]
 
 
-def make_tracker(settings: Settings, width: int, height: int) -> CarryingTracker:
+def make_tracker(settings: Settings, width: int, height: int) -> TimedTracker:
     """Return a new tracker for the frames of one video, `width` × `height` pixels.
 
     Raises
@@ -40,19 +40,20 @@ def make_tracker(settings: Settings, width: int, height: int) -> CarryingTracker
         There is no such kind.
     """
     kind: TrackerKind = load_plugin(TRACKERS, settings.tracker.kind)
-    return carrying(kind.make(settings.tracker, width, height))
+    return timed(kind.make(settings.tracker, width, height))
 
 
-def carrying(tracker: VideoTracker) -> CarryingTracker:
-    """Return a tracker that can carry vehicles: the tracker itself, or one that holds its vehicles.
+def timed(tracker: VideoTracker) -> TimedTracker:
+    """Return a tracker that knows its vehicles at any time: the tracker itself, or one around it.
 
-    Held vehicles stay where they are in frames that are not searched.
+    Between two searched frames, vehicles move straight from one box to the other; after the latest
+    one they stay where they are.
     """
-    return tracker if isinstance(tracker, CarryingTracker) else HoldingTracker(tracker)
+    return tracker if isinstance(tracker, TimedTracker) else InterpolatingTracker(tracker)
 
 
-class HoldingTracker:
-    """Shows the latest tracks of another tracker again; a `CarryingTracker`.
+class InterpolatingTracker:
+    """Shows the tracks of another tracker at any time; a `TimedTracker`.
 
     Attributes
     ----------
@@ -62,16 +63,38 @@ class HoldingTracker:
 
     def __init__(self, tracker: VideoTracker) -> None:
         self.tracker = tracker
-        self._shown: list[Track] = []
+        self._searched: list[tuple[float, list[Track]]] = []
 
     def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
         """Follow the vehicles into a frame that was searched; as `VideoTracker.update`."""
-        self._shown = self.tracker.update(detections, time, picture)
-        return self._shown
+        self._searched.append((time, self.tracker.update(detections, time, picture)))
+        return self._searched[-1][1]
 
-    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
-        """Return the vehicles of the latest searched frame; as `CarryingTracker.carry`."""
-        return [replace(track, predicted=True) for track in self._shown]
+    def at(self, time: float) -> list[Track]:
+        """Return the vehicles shown at a time; as `TimedTracker.at`."""
+        while len(self._searched) > 1 and self._searched[1][0] <= time:
+            del self._searched[0]
+        (begin, tracks), *later = self._searched[:2]
+        if time <= begin:
+            return tracks
+        if not later:
+            return [_moved(track, track, 0.0) for track in tracks]
+        end, following = later[0]
+        ends = {track.id: track for track in following}
+        share = (time - begin) / (end - begin)
+        return [_moved(track, ends[track.id], share) for track in tracks if track.id in ends]
+
+
+def _moved(track: Track, end: Track, share: float) -> Track:
+    """Return a track that has done this share of its way to `end`."""
+
+    def mixed(one: tuple[float, ...], other: tuple[float, ...]) -> list[float]:
+        return [a + (b - a) * share for a, b in zip(one, other, strict=True)]
+
+    x, y = mixed(track.foot, end.foot)
+    box = Box(*mixed(astuple(track.box), astuple(end.box)))
+    state: State = "lost" if track.state == "lost" else "between"
+    return replace(track, box=box, whole_foot=(x, y), state=state)
 
 
 def _make_rules(settings: RulesTrackerSettings, width: int, height: int) -> VideoTracker:  # noqa: ARG001

@@ -2,10 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from vdet.boxes import Box, Boxes
 from vdet.media import Picture
+
+State = Literal["seen", "between", "lost"]
+"""How a vehicle is known in a frame: see `Track`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,9 +26,11 @@ class Track:
         (`tracker.history` of them), in whole pixels, which lie in the frame.
     score
         0 to 1: the share of shown boxes with such a score that are vehicles.
-    predicted
-        Whether the detector did not see the vehicle in this frame. It is then shown where its
-        motion leads or, by the rules, where its image was found again.
+    state
+        "seen": the detector saw the vehicle in this frame. "between": it saw it before and after,
+        or the frame was not searched; the box lies between its detections. "lost": it did not see
+        the vehicle again; the box is where its motion leads or, by the rules, where its image was
+        found again.
     class_name
         Its class, one of `Boxes.names`; None where the detector does not know classes.
     whole_foot
@@ -41,7 +46,7 @@ class Track:
     id: int
     box: Box
     score: float
-    predicted: bool
+    state: State
     class_name: str | None = None
     whole_foot: tuple[float, float] | None = None
     distance: float | None = None
@@ -102,24 +107,19 @@ class VideoTracker(Protocol):
 
 
 @runtime_checkable
-class CarryingTracker(VideoTracker, Protocol):
-    """A tracker that moves its vehicles on into frames that the detector did not search.
+class TimedTracker(VideoTracker, Protocol):
+    """A tracker that knows where its vehicles are at any time, also between searched frames.
 
-    `vdet.track.factory.make_tracker` adds `carry` to a tracker without it; vehicles then stay where
-    they were.
+    `vdet.track.factory.make_tracker` makes one of a tracker without `at`.
     """
 
-    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:
-        """Follow the vehicles into the next frame, which was not searched.
-
-        This frame does not count as a missed one for any vehicle. All tracks are `predicted`.
+    def at(self, time: float) -> list[Track]:
+        """Return the vehicles shown at a time, by id.
 
         Parameters
         ----------
-        time, picture
-            As `update` takes them.
-
-        Returns
-        -------
-        The vehicles shown in this frame, by id.
+        time
+            Seconds; not earlier than in the call before. Before the time of the latest `update`,
+            what came after it is known: nothing earlier than `tracker.look_ahead` before that.
+            Later than it, the vehicles move on.
         """

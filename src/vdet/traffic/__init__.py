@@ -2,8 +2,8 @@
 
 The counts of a video follow from its tracks alone (`FrameTracks`), live or from a file. The rule:
 
-1. A vehicle is where its foot is, the middle of the lower edge of its whole box. Only frames in
-   which the detector saw it count; predicted boxes do not.
+1. A vehicle is where its foot is, the middle of the lower edge of its whole box, in every frame
+   that shows it.
 2. Near a line or the border of a zone it is on neither side. Beyond, its side is settled
    after 0.1 seconds, or one height of its box away in two frames, or in the last one in which it
    is seen.

@@ -121,8 +121,7 @@ class VehicleCounter:
         for track in frame.tracks:
             if track.id in self._vehicles:
                 self._vehicles[track.id].shown = self._now
-            if not track.predicted:
-                self._see(track, self._sighting(track, frame.index), shown)
+            self._see(track, self._sighting(track, frame.index), shown)
 
     def counts(self) -> Counts:
         """Return all results; the video has ended."""

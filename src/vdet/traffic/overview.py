@@ -75,7 +75,7 @@ class BestCrops:
 def _merit(track: Track, picture: Picture) -> _Merit | None:
     """Return None where the vehicle was not seen, or is too small."""
     box = track.box.rounded
-    if track.predicted or min(box.width, box.height) < _LEAST:
+    if track.state != "seen" or min(box.width, box.height) < _LEAST:
         return None
     inside = box.x2 < picture.width and box.y2 < picture.height
     is_whole = inside and min(box.x1, box.y1) > 0

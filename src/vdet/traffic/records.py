@@ -1,15 +1,16 @@
 """A record of each vehicle, from the tracks of each frame; records as files, of many videos too."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from vdet.boxes import Box
 from vdet.detect.classes import ClassScores
 from vdet.polygons import Point
-from vdet.track.track import FrameTracks, Track
+from vdet.track.track import FrameTracks, State, Track
 from vdet.traffic.tables import VIDEO, is_json, join, write_json, write_table
 
 PATH_STEP = 0.01
@@ -20,7 +21,8 @@ Shorter moves are jitter of the boxes.
 
 _PLACE = ("x", "y", "width", "height")
 _COLUMNS = (
-    *("id", "class", "first", "last", "seconds", "seen", "predicted", "mean_score", "best_score"),
+    *("id", "class", "first", "last", "seconds", "seen", "between", "lost"),
+    *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
     *_PLACE,
 )
@@ -42,15 +44,15 @@ class VehicleRecord:
     seconds
         How long it is shown. A frame is shown until the next one, the last frame as long as the one
         before it.
-    seen, predicted
-        Number of frames that show it where the detector saw it, and where it did not.
+    states
+        Number of frames that show it in each state of `Track`.
     best_score, sum_of_scores
         Over these frames; a score is 0 to 1.
     classes
         Sums of scores over these frames, by class.
     path
         Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
-        Only frames count in which it was seen, if there are any.
+        Frames in which it was lost do not count, unless it was in all.
     """
 
     id: int
@@ -59,8 +61,7 @@ class VehicleRecord:
     last: float
     largest: Box
     seconds: float = 0.0
-    seen: int = 0
-    predicted: int = 0
+    states: Counter[State] = field(default_factory=Counter)
     best_score: float = 0.0
     sum_of_scores: float = 0.0
     classes: ClassScores = field(default_factory=ClassScores)
@@ -74,7 +75,7 @@ class VehicleRecord:
     @property
     def mean_score(self) -> float:
         """Mean of the scores of all its frames, 0 to 1."""
-        return self.sum_of_scores / (self.seen + self.predicted)
+        return self.sum_of_scores / self.states.total()
 
     @property
     def length(self) -> float:
@@ -93,12 +94,12 @@ class VehicleRecord:
         self.best_score = max(self.best_score, track.score)
         self.classes.add(track.class_name, track.score)
         self.largest = max(self.largest, track.box, key=lambda box: box.area)
-        if not (track.predicted or self.seen):
+        only_lost = self.states.total() == self.states["lost"]
+        if track.state != "lost" and only_lost:
             self.path.clear()
-        if not (track.predicted and self.seen):
+        if track.state != "lost" or only_lost:
             self._go_to(track.foot)
-        self.predicted += track.predicted
-        self.seen += not track.predicted
+        self.states[track.state] += 1
 
     def _go_to(self, point: Point) -> None:
         """Continue the path; its last point stays only if it is a step away from the one before."""
@@ -182,8 +183,7 @@ def _item(record: VehicleRecord) -> dict[str, Any]:
         "first": round(record.first, 6),
         "last": round(record.last, 6),
         "seconds": round(record.seconds, 3),
-        "seen": record.seen,
-        "predicted": record.predicted,
+        **{state: record.states[state] for state in get_args(State)},
         "mean_score": round(record.mean_score, 4),
         "best_score": round(record.best_score, 4),
         "path": {

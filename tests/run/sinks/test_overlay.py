@@ -63,11 +63,11 @@ def test_without_lanes_vehicles_are_drawn_where_they_are() -> None:
     np.testing.assert_array_equal(drawn_on(result_of(CAR)), expected)
 
 
-def test_predicted_vehicles_are_drawn_dashed() -> None:
-    seen, predicted = (Track(1, CAR, 0.9, predicted=flag) for flag in (False, True))
+def test_lost_vehicles_are_drawn_dashed() -> None:
+    seen, lost = (Track(1, CAR, 0.9, state) for state in ("seen", "lost"))
     expected = road(CAR)
     draw_box(expected, CAR, color_of(1), "#1", dashed=True)
-    dashed = drawn_on(result_of(predicted))
+    dashed = drawn_on(result_of(lost))
     np.testing.assert_array_equal(dashed, expected)
     solid = drawn_on(result_of(seen))
     lower = np.s_[CAR.pixels[3] - 1, CAR.pixels[0] : CAR.pixels[2]]
@@ -119,7 +119,7 @@ def white(width: int, height: int) -> Image:
     ],
 )
 def test_a_label_shows_what_is_asked_for_in_this_order(label: tuple[str, ...], text: str) -> None:
-    track = Track(3, CAR, 0.9, predicted=False, class_name="car", distance=23.6)
+    track = Track(3, CAR, 0.9, state="seen", class_name="car", distance=23.6)
     expected = road(CAR)
     draw_box(expected, CAR, color_of(3), text)
     np.testing.assert_array_equal(drawn_on(result_of(track), label=label), expected)
@@ -140,36 +140,22 @@ def test_boxes_can_be_hidden_and_labels_stay() -> None:
     np.testing.assert_array_equal(drawn_on(result_of(CAR), boxes=False), expected)
 
 
-PREDICTED = Track(1, CAR, 0.9, predicted=True)
-SEEN = replace(PREDICTED, predicted=False)
+LOST = Track(1, CAR, 0.9, state="lost")
+SEEN = replace(LOST, state="seen")
 
 
-def test_predicted_boxes_can_be_as_the_others_or_hidden() -> None:
-    plain = drawn_on(result_of(PREDICTED), predicted="plain")
+def test_lost_boxes_can_be_as_the_others_or_hidden() -> None:
+    plain = drawn_on(result_of(LOST), lost="plain")
     np.testing.assert_array_equal(plain, drawn_on(result_of(SEEN)))
-    hidden = drawn_on(result_of(PREDICTED), predicted="hidden")
+    hidden = drawn_on(result_of(LOST), lost="hidden")
     np.testing.assert_array_equal(hidden, road(CAR))
-
-
-@pytest.mark.parametrize("predicted", ["dashed", "hidden"])
-def test_a_vehicle_is_not_missed_in_frames_that_are_not_searched(predicted: str) -> None:
-    overlay = overlay_with(predicted=predicted)
-    seen, missed = drawn_on(result_of(SEEN)), drawn_on(result_of(PREDICTED), predicted=predicted)
-    skipped = replace(result_of(PREDICTED), searched=False)
-    for result, expected in (
-        (result_of(SEEN), seen),
-        (skipped, seen),
-        (result_of(PREDICTED), missed),
-        (skipped, missed),
-    ):
-        np.testing.assert_array_equal(shown(overlay, result), expected)
 
 
 def test_colors_can_be_those_of_the_classes() -> None:
     boxes = [Box.sized(10 + 60 * n, 100, 50, 50) for n in range(5)]
     names = ["car", "car", "truck", "tram", None]
     tracks = [
-        Track(n, box, 0.9, predicted=False, class_name=name)
+        Track(n, box, 0.9, state="seen", class_name=name)
         for n, (box, name) in enumerate(zip(boxes, names, strict=True), start=1)
     ]
     image = drawn_on(result_of(*tracks, image=white(320, 240) // 2), colors="class")
@@ -191,7 +177,7 @@ def passing(count: int, rate: int = 25) -> Iterator[FrameResult]:
 
 def trail_columns(seconds: float | None, count: int = 50, **settings: Any) -> list[int]:
     """Return the columns in which the trail of `passing` is drawn in the last frame."""
-    quiet: dict[str, Any] = {"boxes": False, "label": (), "smoothing": None, **settings}
+    quiet: dict[str, Any] = {"boxes": False, "label": (), **settings}
     overlay = overlay_with(trails=seconds, **quiet)
     *_, last = (shown(overlay, result) for result in passing(count))
     rows, columns = np.nonzero((last != 255).any(axis=2))
@@ -231,21 +217,3 @@ def test_the_time_counts_from_the_first_frame_of_the_video() -> None:
 )
 def test_a_time_is_written_as_hours_minutes_and_seconds(seconds: float, text: str) -> None:
     assert time_text(Fraction(seconds)) == text
-
-
-# Smoothing
-
-
-def test_boxes_that_tremble_are_drawn_steadily() -> None:
-    lefts = []
-    for smoothing in (None, 0.4):
-        overlay = overlay_with(smoothing=smoothing, label=(), thickness=0.1)
-        images = []
-        for number in range(40):
-            box = Box.sized(100 + number % 2 * 2, 100, 100, 80)
-            time = Fraction(number, 25)
-            result = result_of(box, image=white(320, 240), index=number, time=time)
-            images.append(shown(overlay, result))
-        drawn = [np.nonzero((image != 255).any(axis=(0, 2)))[0].min() for image in images[20:]]
-        lefts.append(np.ptp(drawn))
-    assert lefts[1] < lefts[0] == 2

@@ -21,17 +21,17 @@ from vdet.track.track import Track
 
 RESULTS = (
     result_of(
-        Track(1, Box.sized(10, 20, 30, 40), 0.98765, False, "car"), index=4, time=Fraction(4, 25)
+        Track(1, Box.sized(10, 20, 30, 40), 0.98765, "seen", "car"), index=4, time=Fraction(4, 25)
     ),
     result_of(index=5, time=Fraction(1, 3)),
     result_of(
-        Track(1, Box.sized(11, 21, 31, 41), 0.5, True, "car", (27.25, 63.504), 18.249, -1),
-        Track(2, Box.sized(0, -3, 5, 6), 1.0, predicted=False),
+        Track(1, Box.sized(11, 21, 31, 41), 0.5, "lost", "car", (27.25, 63.504), 18.249, -1),
+        Track(2, Box.sized(0, -3, 5, 6), 1.0, state="seen"),
         index=6,
         time=Fraction(6, 25),
     ),
 )
-HEADING = "frame,time,id,x,y,width,height,score,predicted,class,foot_x,foot_y,distance,lane\n"
+HEADING = "frame,time,id,x,y,width,height,score,state,class,foot_x,foot_y,distance,lane\n"
 LANE = Lane(
     curvature=-0.001,
     radius=1000.0,
@@ -58,22 +58,22 @@ def test_motchallenge_text_counts_frames_and_pixels_from_1(tmp_path: Path) -> No
 def test_csv_has_a_heading_and_counts_from_0(tmp_path: Path) -> None:
     assert written(tmp_path / "tracks.csv") == (
         f"{HEADING}"
-        "4,0.160000,1,10,20,30,40,0.9877,0,car,25.0,60.0,,\n"
-        "6,0.240000,1,11,21,31,41,0.5000,1,car,27.25,63.5,18.25,-1\n"
-        "6,0.240000,2,0,-3,5,6,1.0000,0,,2.5,3.0,,\n"
+        "4,0.160000,1,10,20,30,40,0.9877,seen,car,25.0,60.0,,\n"
+        "6,0.240000,1,11,21,31,41,0.5000,lost,car,27.25,63.5,18.25,-1\n"
+        "6,0.240000,2,0,-3,5,6,1.0000,seen,,2.5,3.0,,\n"
     )
 
 
 def test_json_lines_have_a_record_for_every_frame(tmp_path: Path) -> None:
     assert written(tmp_path / "tracks.jsonl") == (
         '{"frame": 4, "time": 0.16, "tracks": [{"id": 1, "x": 10, "y": 20, "width": 30, '
-        '"height": 40, "score": 0.9877, "predicted": false, "class": "car", "foot": [25.0, 60.0], '
+        '"height": 40, "score": 0.9877, "state": "seen", "class": "car", "foot": [25.0, 60.0], '
         '"distance": null, "lane": null}]}\n'
         '{"frame": 5, "time": 0.333333, "tracks": []}\n'
         '{"frame": 6, "time": 0.24, "tracks": [{"id": 1, "x": 11, "y": 21, "width": 31, '
-        '"height": 41, "score": 0.5, "predicted": true, "class": "car", "foot": [27.25, 63.5], '
+        '"height": 41, "score": 0.5, "state": "lost", "class": "car", "foot": [27.25, 63.5], '
         '"distance": 18.25, "lane": -1}, {"id": 2, "x": 0, "y": -3, "width": 5, '
-        '"height": 6, "score": 1.0, "predicted": false, "class": null, "foot": [2.5, 3.0], '
+        '"height": 6, "score": 1.0, "state": "seen", "class": null, "foot": [2.5, 3.0], '
         '"distance": null, "lane": null}]}\n'
     )
 

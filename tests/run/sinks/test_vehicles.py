@@ -28,7 +28,7 @@ def test_a_run_writes_the_record_and_the_picture_of_its_car(red_clip: Path, tmp_
     assert (row["id"], row["class"]) == ("1", "")
     assert float(row["first"]) == float(tracks[0]["time"])
     assert float(row["last"]) == float(tracks[-1]["time"])
-    assert int(row["seen"]) + int(row["predicted"]) == len(tracks)
+    assert sum(int(row[state]) for state in ("seen", "between", "lost")) == len(tracks)
     assert float(row["length_share"]) == pytest.approx(float(row["length"]) / WIDTH, abs=1e-3)
     assert float(row["length"]) == pytest.approx(COUNT, abs=COUNT / 4), "a pixel a frame"
     (name,) = names(tmp_path / "crops")

@@ -11,7 +11,7 @@ from vdet.track.motion.association import (
     take_over_ids,
     without_duplicates,
 )
-from vdet.track.motion.vehicle import Observation, Vehicle
+from vdet.track.motion.vehicle import Look, Observation, Vehicle
 
 # How well boxes fit
 
@@ -54,7 +54,7 @@ def vehicle(
     confirmed: bool = True,
     unseen: float = 0,
 ) -> Vehicle:
-    made = Vehicle(Observation(box, score), 0.04, MotionTrackerSettings())
+    made = Vehicle(Observation(box, score), Look(-unseen, 0.04, SIZE), MotionTrackerSettings())
     made.confirmed, made.id, made.unseen = confirmed, number, unseen
     return made
 

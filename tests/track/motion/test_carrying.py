@@ -31,7 +31,7 @@ def follow_strided(
     for number, place in enumerate(places):
         found = [] if place is None or number % stride else [place]
         if number % stride and carry:
-            shown.append(tracker.carry(number / rate))
+            shown.append(tracker.at(number / rate))
         else:
             shown.append(tracker.update(detections(found), number / rate))
     return shown

@@ -77,8 +77,8 @@ def test_through_missed_frames_a_vehicle_is_shown_where_its_motion_leads() -> No
     places = moving(CAR, dx=5, frames=40)
     clip = [[] if 30 <= n < 36 else [place] for n, place in enumerate(places)]
     shown = follow(clip)
-    assert [track.predicted for tracks in shown[28:38] for track in tracks] == (
-        [False] * 2 + [True] * 6 + [False] * 2
+    assert [track.state for tracks in shown[28:38] for track in tracks] == (
+        ["seen"] * 2 + ["lost"] * 6 + ["seen"] * 2
     )
     for place, tracks in list(zip(places, shown, strict=True))[30:]:
         assert id_at(tracks, place) == 1

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from vdet.config.schema import MotionTrackerSettings
-from vdet.track.motion.vehicle import LONGEST_LOOK, SCORE_TIME, Observation, Vehicle
+from vdet.track.motion.history import SCORE_TIME
+from vdet.track.motion.vehicle import LONGEST_LOOK, Look, Observation, Vehicle
 
 SETTINGS = MotionTrackerSettings(
     leak=0.2, needed=0.12, carried=0.22, remembered=0.42, remembered_hidden=2.02
@@ -21,18 +22,18 @@ def seen(
     frames: int, *, dx: float = 0, growth: float = 1, score: float = 1.0, seconds: float = FRAME
 ) -> Vehicle:
     """Give a vehicle after so many frames with a detection."""
-    vehicle = Vehicle(observation(score=score), seconds, SETTINGS)
+    vehicle = Vehicle(observation(score=score), Look(0, seconds, SIZE), SETTINGS)
     for n in range(1, frames):
         vehicle.predict(seconds)
         found = observation(400 + n * dx, 100 * growth**n, score)
-        vehicle.see(found, seconds, SIZE)
+        vehicle.see(found, Look(n * seconds, seconds, SIZE))
     return vehicle
 
 
 def missed(vehicle: Vehicle, frames: int, seconds: float = FRAME) -> Vehicle:
     for _ in range(frames):
         vehicle.predict(seconds)
-        vehicle.miss(seconds)
+        vehicle.miss(Look(0, seconds, SIZE))
     return vehicle
 
 
@@ -62,14 +63,14 @@ def test_a_carried_vehicle_keeps_its_velocity_and_a_lost_one_comes_to_rest() -> 
 def test_older_detections_count_less_at_the_same_pace_at_any_frame_rate(rate: int) -> None:
     vehicle = seen(10 * rate, score=1.0, seconds=1 / rate)
     for _ in range(rate):
-        vehicle.see(observation(score=0.5), 1 / rate, SIZE)
+        vehicle.see(observation(score=0.5), Look(0, 1 / rate, SIZE))
     assert vehicle.scores.value == pytest.approx(0.5 + 0.5 * np.exp(-1 / SCORE_TIME), abs=1e-3)
 
 
 def test_the_class_is_the_one_with_the_highest_sum_of_scores() -> None:
-    vehicle = Vehicle(observation(score=0.9, class_name="bus"), FRAME, SETTINGS)
+    vehicle = Vehicle(observation(score=0.9, class_name="bus"), Look(0, FRAME, SIZE), SETTINGS)
     assert vehicle.classes.best == "bus"
     for _ in range(2):
-        vehicle.see(observation(score=0.6, class_name="car"), FRAME, SIZE)
+        vehicle.see(observation(score=0.6, class_name="car"), Look(0, FRAME, SIZE))
     assert vehicle.classes.best == "car"
     assert seen(3).classes.best is None

@@ -155,7 +155,7 @@ def track_scores(
             corners, counts = (x1, y1, x2, y2), vehicle.counts
             true.append(Label(0, corners, frame=number, id=id_, ignored=not counts))
         if (number - 1) % stride:
-            tracks = tracker.carry(number / rate)
+            tracks = tracker.at(number / rate)
         else:
             tracks = tracker.update(detect(vehicles, noise, rng), number / rate)
         for track in tracks:

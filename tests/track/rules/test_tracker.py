@@ -113,8 +113,8 @@ def test_a_shown_car_without_a_region_is_found_by_its_image() -> None:
     cars = RulesTracker(tracker_but(history=1))
     show(cars, SEDAN)
     moved = moved_to(SEDAN, 130, 240)
-    assert update(cars, road(moved)) == [Track(1, moved, 1.0, predicted=True)]
-    assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, predicted=False)]
+    assert update(cars, road(moved)) == [Track(1, moved, 1.0, state="lost")]
+    assert update(cars, road(moved), moved) == [Track(1, moved, 1.0, state="seen")]
 
 
 def test_a_car_that_was_never_shown_is_not_searched() -> None:
@@ -205,7 +205,7 @@ def test_a_shown_box_is_the_average_of_the_last_ten() -> None:
     cars = RulesTracker(SEED_TRACKER)
     for x in range(100, 124, 2):
         tracks = update(cars, road(), moved_to(SEDAN, x, 200))
-    assert tracks == [Track(1, moved_to(SEDAN, 113, 200), 1.0, predicted=False)]
+    assert tracks == [Track(1, moved_to(SEDAN, 113, 200), 1.0, state="seen")]
 
 
 def test_the_two_cars_that_one_becomes_are_shown_in_the_same_frame() -> None:

@@ -106,7 +106,7 @@ class JsonSink(BaseSink):
             "boxes": [track_record(track) for track in result.tracks],
         }
         for box in item["boxes"]:
-            del box["id"], box["predicted"]  # they say nothing in a still picture
+            del box["id"], box["state"]  # they say nothing in a still picture
         self._items.append(item | dict(result.frame_tracks.facts))
 
 

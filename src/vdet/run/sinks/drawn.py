@@ -33,7 +33,6 @@ from vdet.polygons import Point
 from vdet.run.result import FrameResult
 from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
 from vdet.run.threads import write_async
-from vdet.track.steady import SteadyBoxes
 from vdet.track.track import Track
 from vdet.traffic.counter import VehicleCounter
 
@@ -49,7 +48,7 @@ class Overlay:
     Parameters
     ----------
     video
-        None for a still picture, which has no trails, no time and no smoothing.
+        None for a still picture, which has no trails and no time.
     """
 
     def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
@@ -57,10 +56,7 @@ class Overlay:
         self._start = video.start if video else None
         automatic = VIDEO_LABEL if video else PICTURE_LABEL
         self._label = automatic if self._draw.label is None else self._draw.label
-        smoothing = self._draw.smoothing if video else None
-        self._steady = SteadyBoxes(smoothing) if smoothing else None
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
-        self._missed: set[int] = set()
 
     def draw(self, result: FrameResult) -> Surface:
         """Return a copy of the frame with its vehicles: BGR or planes, as the frame came.
@@ -91,13 +87,8 @@ class Overlay:
 
     def _shown(self, result: FrameResult) -> list[Track]:
         """Return the vehicles to draw, with the boxes to draw, the farthest first."""
-        if result.searched:  # in the other frames, a vehicle is not missed
-            self._missed = {track.id for track in result.tracks if track.predicted}
-        tracks = list(result.tracks)
-        if self._steady:
-            tracks = self._steady.update(tracks, float(result.frame.time))
-        if self._draw.predicted == "hidden":
-            tracks = [track for track in tracks if track.id not in self._missed]
+        hides = self._draw.lost == "hidden"
+        tracks = [track for track in result.tracks if not (hides and track.state == "lost")]
         return sorted(tracks, key=lambda track: track.box.y2)
 
     def _draw_trails(
@@ -121,7 +112,7 @@ class Overlay:
         self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color]
     ) -> None:
         for track in shown if self._draw.boxes else ():
-            dashed = self._draw.predicted == "dashed" and track.id in self._missed
+            dashed = self._draw.lost == "dashed" and track.state == "lost"
             color, thickness = colors[track.id], self._draw.thickness
             draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:

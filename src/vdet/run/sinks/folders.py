@@ -53,7 +53,7 @@ def _with_boxes(result: FrameResult, *, is_still: bool) -> Image:
         draw_label(picture, f"{each.score:.2f}", (each.box.x1, each.box.y2), WHITE)
     for track in result.tracks:
         text = label_text(track, PICTURE_LABEL if is_still else (*VIDEO_LABEL, *PICTURE_LABEL))
-        draw_box(picture, track.box, color_of(track.id), text, dashed=track.predicted)
+        draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "lost")
     return picture
 
 

@@ -149,12 +149,12 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     """
     left = list(vehicles)
     for new in vehicles:
-        if not new.confirmed or new.id is not None or new.unseen:
+        if not new.confirmed or new.unseen:
             continue
-        lost = [v for v in left if v.id is not None and v.unseen and _distance(v, new) < _REACH]
+        lost = [v for v in left if v.confirmed and v.unseen and _may_be(v, new)]
         if lost:
             nearest = min(lost, key=lambda vehicle: _distance(vehicle, new))
-            new.id = nearest.id
+            new.continue_from(nearest)
             left.remove(nearest)
     return left
 
@@ -173,8 +173,8 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
         same = next((each for each in shown if _are_same(vehicle, each, hidden, size)), None)
         if same is None:
             kept.append(vehicle)
-        elif vehicle.id is not None:
-            same.id = vehicle.id if same.id is None else min(same.id, vehicle.id)
+        elif vehicle.confirmed:
+            same.continue_from(vehicle)
     return [vehicle for vehicle in vehicles if vehicle in kept]
 
 
@@ -197,6 +197,12 @@ def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> 
     """Tell whether one of the `hidden` vehicles was near and this one is as clear as the nearer."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
     return is_clear and any(_distance(each, vehicle) < _REACH for each in hidden)
+
+
+def _may_be(lost: Vehicle, new: Vehicle) -> bool:
+    """Tell whether a vehicle that is seen again may be the lost one: later, and near by."""
+    is_later = lost.history.last_seen < new.history.first_seen
+    return is_later and _distance(lost, new) < _REACH
 
 
 def _distance(one: Vehicle, other: Vehicle) -> float:

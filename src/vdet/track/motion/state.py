@@ -62,6 +62,14 @@ class MotionState:
         covariance = step @ self.covariance @ step.T + acceleration**2 * drift
         return MotionState(self.mean @ step.T, covariance)
 
+    def gain_from(self, expected: "MotionState", seconds: float) -> Float64Array:
+        """Return how a correction of the state `seconds` later corrects this one, `(4, 2, 2)`.
+
+        `expected` is that later state as `predicted` gives it.
+        """
+        step = np.array([[1.0, 0.0], [seconds, 1.0]])
+        return np.asarray(self.covariance @ step @ np.linalg.inv(expected.covariance))
+
     def corrected(self, box: Float64Array, noise: float, size: tuple[int, int]) -> "MotionState":
         """Take in a detected box.
 
@@ -90,6 +98,23 @@ class MotionState:
         return replace(self, mean=self.mean * factors)
 
 
+def side_cut(box: Float64Array, size: tuple[int, int]) -> tuple[int, int] | None:
+    """Return the axis on which one side of the frame cuts a box off, and the way into the frame.
+
+    The axis is 0 for x or 1 for y, the way is 1 or -1. None if no side, or both of an axis, do.
+    """
+    for axis, span in enumerate(size):
+        cut_before, cut_behind = _cuts(box, axis, span)
+        if cut_before != cut_behind:
+            return axis, 1 if cut_before else -1
+    return None
+
+
+def _cuts(box: Float64Array, axis: int, span: int) -> tuple[bool, bool]:
+    """Tell whether the near and the far side of the frame cut a box off."""
+    return bool(box[axis] <= BORDER * span), bool(box[axis + 2] >= span - BORDER * span)
+
+
 def _measurement(box: Float64Array) -> Float64Array:
     """Return centre x and y and log width and height, `(4,)`, of a box of x1, y1, x2, y2."""
     return np.concatenate([(box[:2] + box[2:]) / 2, np.log(box[2:] - box[:2])])
@@ -108,7 +133,7 @@ def _measured(
     mean, measured, seen = expected.copy(), _measurement(box), np.ones(4)
     for axis, span in enumerate(size):
         first, last = box[axis], box[axis + 2]
-        cut_before, cut_behind = first <= BORDER * span, last >= span - BORDER * span
+        cut_before, cut_behind = _cuts(box, axis, span)
         if cut_before == cut_behind:
             continue
         outward = 1 if cut_behind else -1

@@ -1,7 +1,6 @@
 """The motion tracker, frame by frame."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import count
 
 import numpy as np
@@ -17,7 +16,8 @@ from vdet.track.motion.association import (
     take_over_ids,
     without_duplicates,
 )
-from vdet.track.motion.vehicle import Observation, Vehicle
+from vdet.track.motion.history import Place
+from vdet.track.motion.vehicle import Look, Observation, Vehicle
 from vdet.track.track import Track
 
 FIRST_STEP = 0.04
@@ -25,9 +25,6 @@ FIRST_STEP = 0.04
 
 _OVERLAP = 0.3
 """Least intersection over union of a detection with the expected box of its vehicle."""
-
-SHORTEST_STEP = 0.001
-"""Least seconds between frames, also where two have the same time or the clock goes back."""
 
 
 class MotionTracker:
@@ -47,49 +44,96 @@ class MotionTracker:
         self._vehicles: list[Vehicle] = []
         self._ids = count(1)
         self._time: float | None = None
-        self._unsearched = 0.0  # seconds since the latest frame that was searched
+        self._gone: list[Vehicle] = []  # not followed any more, but shown at earlier times
 
     def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
         """Follow the vehicles into the next frame; as `VideoTracker.update`.
 
         The part of a detection outside the frame does not count.
+
+        Raises
+        ------
+        ValueError
+            The time is not later than that of the frame before.
         """
         observations = self._observations(detections)
-        seconds, self._unsearched = self._unsearched + self._move_to(time), 0.0
+        if self._time is not None and not time > self._time:
+            raise ValueError(
+                f"time {time:g} s does not come after {self._time:g} s; "
+                "make a tracker for each video"
+            )
+        seconds = FIRST_STEP if self._time is None else time - self._time
+        self._time, look = time, Look(time, seconds, self._size)
+        self._predict(seconds)
         pairs = self._pair(observations)
         for row, vehicle in enumerate(self._vehicles):
             if row in pairs:
-                vehicle.see(observations[pairs[row]], seconds, self._size)
+                vehicle.see(observations[pairs[row]], look)
             else:
-                vehicle.miss(seconds)
+                vehicle.miss(look)
         left = [o for number, o in enumerate(observations) if number not in pairs.values()]
-        new = [Vehicle(o, seconds, self._settings) for o in left if self._adds_evidence(o)]
-        self._vehicles = take_over_ids(self._staying() + new)
-        self._vehicles = without_duplicates(self._vehicles, self._size)
-        return self._tracks(seconds)
+        self._keep(self._staying())
+        new = [Vehicle(o, look, self._settings) for o in left if self._adds_evidence(o)]
+        self._vehicles = without_duplicates(take_over_ids(self._vehicles + new), self._size)
+        for vehicle, hidden in zip(self._vehicles, self._hidden(self._boxes()), strict=True):
+            vehicle.hidden += seconds * (bool(hidden) and vehicle.unseen > 0)
+        self._forget(time - 2 * self._settings.look_ahead)
+        return self.at(time)
 
-    def carry(self, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
-        """Move the vehicles on into a frame that was not searched; as `CarryingTracker.carry`.
+    def at(self, time: float) -> list[Track]:
+        """Return the vehicles shown at a time; as `TimedTracker.at`."""
+        found = [(v, place) for v in self._known() if (place := self._place(v, time)) is not None]
+        boxes = visible(np.reshape([place.box for _, place in found], (-1, 4)), self._size)
+        keep = [row for row, box in enumerate(boxes) if _least_side(box) >= 1]
+        found, boxes = [found[row] for row in keep], boxes[keep]
+        scores = [vehicle.history.scores(time) for vehicle, _ in found]
+        is_here = np.array([place.state != "lost" for _, place in found], bool)
+        hidden = are_hidden(boxes, is_here)
+        shown = [
+            row
+            for row, (_, place) in enumerate(found)
+            if self._is_clear(boxes[row], scores[row][0])
+            and not (hidden[row] and (place.bridges or place.state == "lost"))
+        ]
+        nested = are_nested(boxes[shown], [scores[row][1] for row in shown])
+        tracks = [
+            self._track(*found[row], boxes[row], scores[row][1])
+            for row, is_nested in zip(shown, nested, strict=True)
+            if not is_nested
+        ]
+        return sorted(tracks, key=lambda track: track.id)
 
-        Nothing is missed there: the evidence and the times without a detection stay as they are,
-        and the next `update` counts the seconds since the one before.
-        """
-        self._unsearched += self._move_to(time)
-        return [replace(track, predicted=True) for track in self._tracks(0.0)]
+    def _known(self) -> list[Vehicle]:
+        return [vehicle for vehicle in (*self._gone, *self._vehicles) if vehicle.confirmed]
 
-    def _move_to(self, time: float) -> float:
-        """Move all vehicles on to this time, and return the seconds since the frame before.
+    def _place(self, vehicle: Vehicle, time: float) -> Place | None:
+        """Return where a vehicle is at a time, if it is to be shown then."""
+        assert self._time is not None
+        place = vehicle.history.at(time, self._settings.look_ahead)
+        if place is not None or time < vehicle.history.last_seen or vehicle in self._gone:
+            return place
+        if not vehicle.is_present:
+            return None
+        state = vehicle.state.predicted(time - self._time, 0.0)
+        return Place(state.mean[:, 0], "lost" if vehicle.unseen else "between")
 
-        Vehicles that were not seen for too long and those out of the frame are forgotten.
-        """
-        seconds = FIRST_STEP if self._time is None else max(time - self._time, SHORTEST_STEP)
-        self._time = time
+    def _predict(self, seconds: float) -> None:
+        """Move all vehicles on; forget those not seen for too long, and those out of the frame."""
         longest = self._settings.remembered + self._settings.remembered_hidden
-        self._vehicles = [v for v in self._vehicles if v.unseen + seconds <= longest]
+        self._keep([v for v in self._vehicles if v.unseen + seconds <= longest])
         for vehicle in self._vehicles:
             vehicle.predict(seconds)
-        self._vehicles = self._staying()
-        return seconds
+        self._keep(self._staying())
+
+    def _keep(self, vehicles: list[Vehicle]) -> None:
+        """Follow only these vehicles; the others can be shown at earlier times."""
+        self._gone += [vehicle for vehicle in self._vehicles if vehicle not in vehicles]
+        self._vehicles = vehicles
+
+    def _forget(self, before: float) -> None:
+        self._gone = [each for each in self._gone if each.history.last_seen >= before]
+        for vehicle in self._vehicles:
+            vehicle.history.forget(before)
 
     def _observations(self, detections: Boxes) -> list[Observation]:
         boxes = visible(detections.sides, self._size)
@@ -135,39 +179,20 @@ class MotionTracker:
     def _hidden(self, boxes: Float64Array) -> BoolArray:
         return are_hidden(boxes, np.array([each.is_present for each in self._vehicles], bool))
 
-    def _tracks(self, seconds: float) -> list[Track]:
-        """Return the vehicles that are shown, by id; `seconds` since the latest searched frame."""
-        boxes = self._boxes()
-        shown: list[int] = []
-        for row, hidden in enumerate(self._hidden(boxes)):
-            vehicle = self._vehicles[row]
-            is_gone = bool(hidden) and vehicle.unseen > 0
-            vehicle.hidden += seconds * is_gone
-            if self._is_clear(vehicle, boxes[row]) and not is_gone:
-                shown.append(row)
-        nested = are_nested(boxes[shown], [self._vehicles[row].scores.value for row in shown])
-        tracks = [
-            self._track(self._vehicles[row], boxes[row])
-            for row, is_nested in zip(shown, nested, strict=True)
-            if not is_nested
-        ]
-        return sorted(tracks, key=lambda track: track.id)
-
-    def _is_clear(self, vehicle: Vehicle, box: Float64Array) -> bool:
-        """Tell whether it is present, wide enough and likely enough to be shown."""
+    def _is_clear(self, box: Float64Array, score: float) -> bool:
+        """Tell whether a vehicle is wide enough and likely enough to be shown."""
         is_wide = bool(box[2] - box[0] >= self._settings.smallest * self._size[0])
-        is_likely = vehicle.detection_scores.value >= self._settings.least_score
-        return vehicle.is_present and is_wide and is_likely
+        return is_wide and score >= self._settings.least_score
 
-    def _track(self, vehicle: Vehicle, box: Float64Array) -> Track:
+    def _track(self, vehicle: Vehicle, place: Place, box: Float64Array, score: float) -> Track:
         vehicle.id = next(self._ids) if vehicle.id is None else vehicle.id
         return Track(
             vehicle.id,
             Box(*box.tolist()),
-            vehicle.scores.value,
-            predicted=vehicle.unseen > 0,
+            score,
+            place.state,
             class_name=vehicle.classes.best,
-            whole_foot=Box(*vehicle.state.box.tolist()).foot,
+            whole_foot=Box(*place.box.tolist()).foot,
         )
 
 

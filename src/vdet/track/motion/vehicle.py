@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from vdet.boxes import Float64Array
 from vdet.config.schema import MotionTrackerSettings
 from vdet.detect.classes import ClassScores
-from vdet.track.motion.state import MotionState
+from vdet.track.motion.history import SCORE_TIME, History, Moment
+from vdet.track.motion.state import MotionState, side_cut
 
 LONGEST_LOOK = 0.1
 """Seconds for which one frame counts as evidence at most: a single frame must not be enough."""
-
-SCORE_TIME = 0.5
-"""Seconds over which the scores of detections are averaged."""
 
 _SLOWING_TIME = 0.8
 """Seconds in which the velocity of a vehicle unseen for longer than it is carried falls to 1/e."""
@@ -52,6 +50,19 @@ class Observation:
         return float(_NOISE / max(self.score, _LEAST_SCORE) ** 0.5)
 
 
+@dataclass(frozen=True, slots=True)
+class Look:
+    """A frame that is searched.
+
+    `time` and `seconds`, those since the searched frame before, are seconds; `size` is width and
+    height in pixels.
+    """
+
+    time: float
+    seconds: float
+    size: tuple[int, int]
+
+
 @dataclass(eq=False, slots=True)
 class RecentMean:
     """A mean of values over the latest `SCORE_TIME`; older ones count less and less."""
@@ -76,10 +87,8 @@ class Vehicle:
 
     Parameters
     ----------
-    first
-        Its first detection.
-    seconds
-        Time since the frame before.
+    first, look
+        Its first detection, and the frame.
 
     Attributes
     ----------
@@ -101,17 +110,22 @@ class Vehicle:
         The same, without the frames that have no detection.
     classes
         The classes of its detections.
+    history
+        Where it was in the latest frames.
     """
 
-    def __init__(self, first: Observation, seconds: float, settings: MotionTrackerSettings) -> None:
+    def __init__(self, first: Observation, look: Look, settings: MotionTrackerSettings) -> None:
         self._settings = settings
         self.state = MotionState.at_rest(first.box, first.noise, _VELOCITY)
+        entering = side_cut(first.box, look.size)
+        self.history = History([Moment(look.time, self.state, first.score, entering=entering)])
+        self._gain: Float64Array | None = None
         self.evidence = self.unseen = self.hidden = 0.0
         self.confirmed = False
         self.id: int | None = None
         self.scores, self.detection_scores = RecentMean(), RecentMean()
         self.classes = ClassScores()
-        self._add(first, seconds)
+        self._add(first, look.seconds)
 
     @property
     def is_present(self) -> bool:
@@ -129,21 +143,35 @@ class Vehicle:
 
     def predict(self, seconds: float) -> None:
         """Move on to the next frame, `seconds` later."""
-        self.state = self.state.predicted(seconds, _ACCELERATION)
+        expected = self.state.predicted(seconds, _ACCELERATION)
+        self._gain = self.state.gain_from(expected, seconds)
+        self.state = expected
 
-    def see(self, observation: Observation, seconds: float, size: tuple[int, int]) -> None:
-        """Take in its detection in this frame of `size`, width and height in pixels."""
-        self.state = self.state.corrected(observation.box, observation.noise, size)
+    def see(self, observation: Observation, look: Look) -> None:
+        """Take in its detection in a frame."""
+        box, score, expected = observation.box, observation.score, self.state.mean
+        self.state = self.state.corrected(box, observation.noise, look.size)
+        entering = side_cut(box, look.size)
+        moment = Moment(look.time, self.state, score, expected, self._gain, entering)
+        self.history.add(moment)
         self.unseen = self.hidden = 0.0
-        self._add(observation, seconds)
+        self._add(observation, look.seconds)
 
-    def miss(self, seconds: float) -> None:
+    def miss(self, look: Look) -> None:
         """Note a frame without a detection of it."""
+        seconds = look.seconds
         self.unseen += seconds
         lost = self.unseen > self._settings.carried
         motion = math.exp(-seconds / _SLOWING_TIME) if lost else 1.0
         self.state = self.state.slowed(motion, math.exp(-seconds / _SETTLING_TIME))
+        self.history.add(Moment(look.time, self.state, None, self.state.mean, self._gain))
         self._weigh(0.0, seconds)
+
+    def continue_from(self, other: "Vehicle") -> None:
+        """Go on with the id and the history of another track of the same vehicle."""
+        ids = [each.id for each in (self, other) if each.id is not None]
+        self.id = min(ids, default=None)
+        self.history.join(other.history)
 
     def _add(self, observation: Observation, seconds: float) -> None:
         self._weigh(observation.score, seconds)

@@ -82,7 +82,7 @@ class RulesTracker:
     def _track(self, car: Car) -> Track:
         """Return what is shown of a car; it gets its id when it is first shown."""
         car.id = next(self._ids) if car.id is None else car.id
-        return Track(car.id, car.box, car.score, car.matches > 0, car.class_name)
+        return Track(car.id, car.box, car.score, "lost" if car.matches else "seen", car.class_name)
 
 
 def large_enough(
