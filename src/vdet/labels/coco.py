@@ -44,42 +44,33 @@ def _write(file: BinaryIO, video: SourceVideo, frames: Sequence[FrameTracks]) ->
     """
     size = {"width": video.width, "height": video.height}
     categories: dict[str, int] = defaultdict(lambda: len(categories) + 1)  # the id of each name
-    images: list[dict[str, Any]] = []
-    annotations: list[dict[str, Any]] = []
+    lists: dict[str, list[str]] = {  # entries as text, which is smaller than dictionaries
+        "videos": [json.dumps({"id": _VIDEO, "name": video.name, **size})],
+        **{name: [] for name in ("images", "tracks", "annotations")},
+    }
     for number, frame in enumerate(frames, start=1):
         name = f"frame_{frame.index:06}.png"
         image = {"id": number, "video_id": _VIDEO, "frame_index": frame.index, "file_name": name}
-        images.append({**image, **size, "time": round(frame.time, 6)})
+        lists["images"].append(json.dumps({**image, **size, "time": round(frame.time, 6)}))
         for track in frame.tracks:
             x, y, width, height = track.box.xywh
-            annotations.append(
-                {
-                    "id": len(annotations) + 1,
-                    "image_id": number,
-                    "category_id": categories[track.class_name or UNKNOWN],
-                    "track_id": track.id,
-                    "bbox": [x, y, width, height],
-                    "area": width * height,
-                    "iscrowd": 0,
-                    "score": round(track.score, 4),
-                    "attributes": {"occluded": track.state == "lost"},
-                }
-            )
-    tracks = [
-        {"id": id_, "video_id": _VIDEO, "category_id": categories[name]}
-        for id_, name in best_classes(frames).items()
-    ]
-    lists: dict[str, Sequence[Any]] = {
-        "videos": [{"id": _VIDEO, "name": video.name, **size}],
-        "images": images,
-        "tracks": tracks,
-        "annotations": annotations,
-        "categories": [{"id": number, "name": name} for name, number in categories.items()],
-    }
-    parts = (
-        f'"{name}": [\n' + ",\n".join(map(json.dumps, items)) + "\n]"
-        for name, items in lists.items()
-    )
+            annotation = {
+                "id": len(lists["annotations"]) + 1,
+                "image_id": number,
+                "category_id": categories[track.class_name or UNKNOWN],
+                "track_id": track.id,
+                "bbox": [x, y, width, height],
+                "area": width * height,
+                "iscrowd": 0,
+                "score": round(track.score, 4),
+                "attributes": {"occluded": track.state == "lost"},
+            }
+            lists["annotations"].append(json.dumps(annotation))
+    for id_, name in best_classes(frames).items():
+        entry = {"id": id_, "video_id": _VIDEO, "category_id": categories[name]}
+        lists["tracks"].append(json.dumps(entry))
+    lists["categories"] = [json.dumps({"id": n, "name": name}) for name, n in categories.items()]
+    parts = (f'"{name}": [\n' + ",\n".join(items) + "\n]" for name, items in lists.items())
     file.write(("{\n" + ",\n".join(parts) + "\n}\n").encode())
 
 
