@@ -33,8 +33,7 @@ from vdet.learn.svm.dataset import PatchFile, find_patches
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.learn.svm.fitting import fit
 from vdet.media import Frame, Picture, VideoReader
-from vdet.run.loop import Pipeline, peek
-from vdet.run.search_rate import SearchRate
+from vdet.run.loop import Pipeline, SearchRate, peek
 from vdet.track.factory import make_tracker
 from vdet.workers import limit_library_threads, make_workers
 

@@ -6,6 +6,7 @@ Boxes are rounded only where a format is written or pixels are cut or drawn.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
@@ -21,8 +22,10 @@ Int32Array = npt.NDArray[np.int32]
 Int64Array = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
+_Rows = slice | Sequence[int] | npt.NDArray[Any]
+
 _NESTED = 0.8
-"""Share of a box that lies in another one, if it lies in it."""
+"""Share of a box from which on it lies in another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +90,7 @@ class Box:
         return image[y1:y2, x1:x2]
 
     def contains(self, point: tuple[float, float]) -> bool:
-        """Tell whether `point`, `(x, y)`, lies in the box."""
+        """Return whether `point`, `(x, y)`, lies in the box."""
         x, y = point
         return self.x1 <= x < self.x2 and self.y1 <= y < self.y2
 
@@ -177,22 +180,16 @@ class Boxes:
         data: Mapping[str, npt.ArrayLike] = MappingProxyType({}),
         trace: Any = None,
     ) -> None:
-        box_column = _column(sides, np.float64, (-1, 4), "sides")
-        rows = (len(box_column),)
-        columns = {
-            "sides": box_column,
-            "scores": _column(scores, np.float64, rows, "scores"),
-            "classes": _column(classes, np.int32, rows, "classes"),
-            "names": tuple(names),
-            "ids": _column(ids, np.int64, rows, "ids"),
-            "data": {
-                name: _column(values, np.float64, (*rows, *np.shape(values)[1:]), name)
-                for name, values in data.items()
-            },
-            "trace": trace,
-        }
-        for name, column in columns.items():
-            object.__setattr__(self, name, column)
+        put = partial(object.__setattr__, self)  # the class is frozen
+        rows = np.atleast_1d(sides).shape[:1]
+        put("sides", _column(sides, np.float64, (*rows, 4), "sides"))
+        put("scores", _column(scores, np.float64, rows, "scores"))
+        put("classes", _column(classes, np.int32, rows, "classes"))
+        put("names", tuple(names))
+        put("ids", _column(ids, np.int64, rows, "ids"))
+        shapes = {name: (*rows, *np.shape(values)[1:]) for name, values in data.items()}
+        put("data", {n: _column(data[n], np.float64, shape, n) for n, shape in shapes.items()})
+        put("trace", trace)
         if (self.sides[:, 2:] <= self.sides[:, :2]).any():
             raise ValueError("sides: a box has no area; give x1 < x2 and y1 < y2")
         if ((self.scores < 0) | (self.scores > 1)).any():
@@ -204,20 +201,16 @@ class Boxes:
         return len(self.sides)
 
     def __iter__(self) -> Iterator[Detection]:
-        names = self.class_names
         ids = [None] * len(self) if self.ids is None else self.ids.tolist()
-        for sides, *others in zip(
-            self.sides.tolist(), self.scores.tolist(), names, ids, strict=True
-        ):
+        scores, names = self.scores.tolist(), self.class_names
+        for sides, *others in zip(self.sides.tolist(), scores, names, ids, strict=True):
             yield Detection(Box(*sides), *others)
 
     @overload
     def __getitem__(self, rows: int) -> Detection: ...
     @overload
-    def __getitem__(self, rows: slice | Sequence[int] | npt.NDArray[Any]) -> "Boxes": ...
-    def __getitem__(
-        self, rows: int | slice | Sequence[int] | npt.NDArray[Any]
-    ) -> "Detection | Boxes":
+    def __getitem__(self, rows: _Rows) -> "Boxes": ...
+    def __getitem__(self, rows: int | _Rows) -> "Detection | Boxes":
         """Return one row, or these rows in this order with the same `names` and `trace`."""
         if isinstance(rows, int | np.integer):
             return next(iter(self[[int(rows)]]))
@@ -279,13 +272,13 @@ class Boxes:
 def _column(
     values: npt.ArrayLike | None, kind: type[np.generic], shape: tuple[int, ...], name: str
 ) -> Any:
-    """Return a read-only copy, None of None; -1 in front of `shape` stands for any length."""
+    """Return a read-only copy of this shape; None for None."""
     if values is None:
         return None
     column = np.array(values, kind)
-    if column.size == 0 and shape[0] <= 0:
-        column = column.reshape(0, *shape[1:])
-    if column.shape != (shape if shape[0] >= 0 else (*column.shape[:1], *shape[1:])):
+    if not column.size and 0 in shape:
+        column = column.reshape(shape)
+    if column.shape != shape:
         raise ValueError(f"{name}: of shape {column.shape}, expected {shape}")
     if not np.isfinite(column).all():
         raise ValueError(f"{name}: a value is not a finite number")
@@ -340,7 +333,7 @@ def coverage(boxes: Float64Array, others: Float64Array) -> Float64Array:
 
 
 def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
-    """Tell of each box whether it and a box with a higher score lie in one another.
+    """Return for each box whether it contains, or lies in, a box with a higher score.
 
     Then nearly all of the smaller one lies in the larger: at most one of them shows a vehicle.
 
@@ -349,7 +342,7 @@ def are_nested(boxes: Float64Array, scores: npt.ArrayLike) -> BoolArray:
     boxes
         x1, y1, x2, y2 of shape `(n, 4)`, each with an area.
     scores
-        Shape `(n,)`. Of equal scores, that of the larger box counts as higher.
+        Shape `(n,)`. Of two equal scores, that of the larger box counts as higher.
 
     Returns
     -------

@@ -30,7 +30,7 @@ _BUILT_IN: dict[str, dict[str, str]] = {
         "json": "vdet.run.sinks.data:JSON",
         "vehicles": "vdet.run.sinks.data:VEHICLES",
         "crops": "vdet.run.sinks.folders:CROPS",
-        "page": "vdet.run.sinks.page:PAGE",
+        "page": "vdet.run.sinks.folders:PAGE",
         "counts": "vdet.run.sinks.data:COUNTS",
     },
     STEPS: {

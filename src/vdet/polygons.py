@@ -18,9 +18,9 @@ def side_of(start: Point, end: Point, point: Point) -> float:
 
 
 def meeting(path: Segment, segment: Segment) -> float | None:
-    """Return the share of the way along `path` at which it meets a segment; None where it does not.
+    """Return where a path meets a segment, as a share of its length from its start.
 
-    Both include their ends. Where they run along one another, it is None.
+    Both include their ends. The result is None where they do not meet, and where they overlap.
     """
     (ax, ay), (bx, by) = path
     (cx, cy), (dx, dy) = segment
@@ -49,32 +49,28 @@ def sides(corners: Sequence[Point]) -> list[Segment]:
 
 
 def crosses_itself(corners: Sequence[Point]) -> bool:
-    """Tell whether two sides of a polygon have more in common than a corner between neighbours.
+    """Return whether sides of a polygon cross or touch, apart from neighbours at their corner.
 
-    A polygon without an area does.
+    This is so of a polygon without an area.
     """
     if len(set(corners)) < len(corners):
         return True
-    return any(_touch(first, second) for first, second in combinations(sides(corners), 2))
-
-
-def _touch(first: Segment, second: Segment) -> bool:
-    """Tell whether two sides have more in common than a corner."""
-    common = set(first) & set(second)
-    ends = [(first, point) for point in second] + [(second, point) for point in first]
-    if any(point not in common and distance_to(side, point) == 0 for side, point in ends):
-        return True
-    return not common and meeting(first, second) is not None
+    pairs = [(side, corner) for side in sides(corners) for corner in corners if corner not in side]
+    return any(distance_to(side, corner) == 0 for side, corner in pairs) or any(
+        meeting(first, second) is not None
+        for first, second in combinations(sides(corners), 2)
+        if not set(first) & set(second)
+    )
 
 
 def contains(corners: Sequence[Point], point: Point) -> bool:
-    """Tell whether a point lies in a polygon; one on a side may count as in or out.
+    """Return whether a point lies in a polygon; one on a side may count as in or out.
 
     It is in where a ray from it meets an odd number of sides (Shimrat 1962).
     """
     x, y = point
-    inside = False
-    for (ax, ay), (bx, by) in sides(corners):
-        if (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax):
-            inside = not inside
-    return inside
+    met = (
+        (ay > y) != (by > y) and x < ax + (y - ay) / (by - ay) * (bx - ax)
+        for (ax, ay), (bx, by) in sides(corners)
+    )
+    return sum(met) % 2 == 1

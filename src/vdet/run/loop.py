@@ -1,12 +1,14 @@
 """The loop: frames → detector → tracker → steps → results."""
 
 import itertools
+import math
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
 from vdet.boxes import NO_BOXES, Boxes
@@ -17,7 +19,6 @@ from vdet.lanes.road import LaneRequest
 from vdet.media import Frame, VideoInfo
 from vdet.media.images import Image
 from vdet.run.result import FrameResult
-from vdet.run.search_rate import EVERY_FRAME, SearchRate
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import make_tracker, timed
@@ -26,9 +27,77 @@ from vdet.track.track import Track, VideoTracker
 FIRST_FRAMES = 5
 """Number of frames that `DetectorModel.for_video` gets."""
 
-
 _MOST_WAITING = 60
-"""Frames that wait for later ones at most: they are held in memory."""
+"""Largest number of frames that wait for later ones, in memory."""
+
+_STEPS = 25
+"""Number of the latest steps from frame to frame that give the usual step."""
+
+_SLACK = 0.1
+"""How far apart searches may be beyond 1 / `searches`, in frames.
+
+With 12 searches a second, every second frame is searched at 23.976 frames/s, as at 24.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class SearchRate:
+    """How often the frames of a video are searched; the first one always is.
+
+    Frames are chosen by their times, because the frame rate that a file declares may be wrong.
+
+    Attributes
+    ----------
+    searches
+        Least number of searches a second; None for every frame.
+    stride
+        Search every `stride`-th frame, whatever `searches` is; None to go by `searches`.
+    """
+
+    searches: float | None = None
+    stride: int | None = None
+
+    def choose(self, frames: Iterable[Frame]) -> Iterator[tuple[Frame, bool]]:
+        """Yield each frame, and whether it is searched.
+
+        Raises
+        ------
+        ValueError
+            A time is not a finite number, or is not later than that of the frame before.
+        """
+        steps: deque[float] = deque(maxlen=_STEPS)
+        before, since = None, 0.0  # time of the frame before; seconds since the latest search
+        for position, frame in enumerate(frames):
+            if before is not None:
+                steps.append(float(frame.time - before))
+                if not 0 < steps[-1] < math.inf:
+                    raise ValueError(
+                        f"frame {frame.index} is at {float(frame.time):g} s; "
+                        "give each frame a finite time, later than that of the frame before"
+                    )
+                since += steps[-1]
+            before, is_searched = frame.time, self._is_due(position, since, steps)
+            since = 0.0 if is_searched else since
+            yield frame, is_searched
+
+    def _is_due(self, position: int, since: float, steps: Iterable[float]) -> bool:
+        if self.stride is not None:
+            return position % self.stride == 0
+        if self.searches is None or not position:
+            return True
+        longest, usual = 1 / self.searches, _usual(steps)
+        apart = max(1, int(longest / usual + _SLACK))  # frames
+        return since >= min((apart - 0.5) * usual, longest)
+
+
+def _usual(steps: Iterable[float]) -> float:
+    """Return the mean of the middle half, which a few odd steps do not change."""
+    ordered = sorted(steps)
+    quarter = len(ordered) // 4
+    return fmean(ordered[quarter : len(ordered) - quarter])
+
+
+EVERY_FRAME = SearchRate()
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +124,7 @@ class Pipeline:
     is_still: bool = False
 
     def follow(
-        self,
-        frames: Iterable[Frame],
-        source: Path = Path(),
-        *,
-        threads: int = 1,
+        self, frames: Iterable[Frame], source: Path = Path(), *, threads: int = 1
     ) -> Generator[FrameResult]:
         """Find and follow the vehicles; yield the result of each frame.
 

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 from vdet.boxes import Boxes
@@ -68,9 +67,9 @@ def plan_pictures(
     ----------
     out
         A file, if there is a single source and `out` has the suffix of a picture; else a folder,
-        which is made, and in which the pictures keep their names. None: no pictures.
+        in which the pictures keep their names. None: no pictures.
     stages
-        Folder of the stage pictures; several sources get a folder in it each. None: no such.
+        Folder of the stage pictures; of several sources, each gets a folder in it. None: none.
     inputs
         Other files that are read; outputs never replace them.
 
@@ -119,11 +118,11 @@ def run_pictures(
     """
     failures: list[ImageError] = []
     with _open_sinks(shared, model, settings, overwrite=overwrite) as sinks:
-        run = partial(run_picture, shared=sinks, overwrite=overwrite)
         advance = progress(len(jobs))
         for job in jobs:
             try:
-                on_result(run(job, model, settings, lanes))
+                result = run_picture(job, model, settings, lanes, shared=sinks, overwrite=overwrite)
+                on_result(result)
             except ImageError as error:
                 failures.append(error)
             advance(1)
@@ -186,7 +185,8 @@ def _open_sinks(
         detector = build(model, settings, None, [image]).detector
         return stage_pictures_of(detector)(image, detections)
 
-    with OutputFiles(overwrite=overwrite) as files:
-        context = SinkContext(files, settings, stage_pictures=stage_pictures)
-        with open_sinks(outputs, context) as sinks:
-            yield sinks
+    with (
+        OutputFiles(overwrite=overwrite) as files,
+        open_sinks(outputs, SinkContext(files, settings, stage_pictures=stage_pictures)) as sinks,
+    ):
+        yield sinks

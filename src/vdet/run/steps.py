@@ -72,13 +72,10 @@ def make_steps(context: StepContext, others: Sequence[Step] = ()) -> list[Step]:
     ConfigError
         There is no step with a name in `settings.steps.names`.
     """
-
-    def made(names: Sequence[str]) -> list[Step]:
-        steps = [load_plugin(STEPS, name)(context) for name in names]
-        return [step for step in steps if step is not None]
-
     *before, last = built_in_names(STEPS)
-    return [*made(before), *made(context.settings.steps.names), *others, *made([last])]
+    names = *before, *context.settings.steps.names, last
+    *steps, counting = [load_plugin(STEPS, name)(context) for name in names]
+    return [step for step in (*steps, *others, counting) if step is not None]
 
 
 class LaneStep:
@@ -101,12 +98,12 @@ class LaneStep:
 
 
 def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Track, ...]:
-    """Return the tracks of a frame with `distance` and `lane`, None where they are not known.
+    """Return the tracks of a frame with the `distance` and the `lane` of their feet.
 
-    They are those of the track's foot. They are not known without a lane, of a vehicle whose lower
-    edge the frame's edge cuts, and where `Road.position` does not know them.
+    Both are None without a lane, for a vehicle whose lower edge the frame cuts off, and where
+    `Road.position` does not know them.
 
-    `foot` is how far boxes end below the tyres, share of their height.
+    `foot` is how far boxes end below the tyres, as a share of their height.
     """
 
     def placed(track: Track) -> Track:
@@ -121,7 +118,7 @@ def with_positions(tracks: Sequence[Track], road: Road, foot: float) -> tuple[Tr
 
 
 class RegionStep:
-    """Leaves out what stands outside the regions."""
+    """Removes detections and vehicles that stand outside the regions."""
 
     def __init__(self, regions: Regions) -> None:
         self._regions = regions

@@ -13,14 +13,14 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
-from itertools import islice
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 JOIN_TIMEOUT = 2.0  # seconds that a thread gets to end
 _DEPTH = 4  # items between two threads
+_END = object()  # what follows the last item
 _AHEAD = 8
 """Largest number of items that `map_ordered` takes ahead for each thread."""
 
@@ -29,41 +29,39 @@ class StalledError(Exception):
     """A read or a write did not end in time."""
 
 
-class _Thread:
+class _Thread(threading.Thread):
     """A thread that makes calls in turn; unlike a pool, it does not keep the program from ending.
 
     It is a context manager. At the end of the block, all calls are still made.
     """
 
     def __init__(self, name: str) -> None:
-        self._calls: queue.SimpleQueue[Callable[[], object] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        super().__init__(name=name, daemon=True)
+        self._calls: queue.SimpleQueue[tuple[Future[Any], partial[Any]] | None]
+        self._calls = queue.SimpleQueue()
 
-    def __enter__(self) -> "_Thread":
-        self._thread.start()
+    def __enter__(self) -> Self:
+        self.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._calls.put(None)
-        self._thread.join(JOIN_TIMEOUT)
+        self.join(JOIN_TIMEOUT)
 
     def submit(self, call: Callable[..., R], *arguments: Any) -> Future[R]:
         future: Future[R] = Future()
-        self._calls.put(partial(_settle, future, call, *arguments))
+        self._calls.put((future, partial(call, *arguments)))
         return future
 
-    def _run(self) -> None:
-        while call := self._calls.get():
-            call()
-            del call  # else it holds the item until the next one comes
-
-
-def _settle(future: Future[R], call: Callable[..., R], *arguments: Any) -> None:
-    if future.set_running_or_notify_cancel():
-        try:
-            future.set_result(call(*arguments))
-        except BaseException as error:
-            future.set_exception(error)
+    def run(self) -> None:
+        while entry := self._calls.get():
+            future, call = entry
+            if future.set_running_or_notify_cancel():
+                try:
+                    future.set_result(call())
+                except BaseException as error:
+                    future.set_exception(error)
+            del entry, future, call  # otherwise they hold an item until the next one comes
 
 
 def _result(future: Future[R], timeout: float | None) -> R:
@@ -86,18 +84,16 @@ def prefetch(
     seconds, `StalledError` is raised.
     """
     iterator = iter(items)
-    ahead: deque[Future[list[T]]] = deque()
-
-    def take_one() -> list[T]:
-        return list(islice(iterator, 1))
+    ahead: deque[Future[Any]] = deque()
+    take_one = partial(next, iterator, _END)
 
     with _Thread("vdet-prefetch") as thread:
         ahead.extend(thread.submit(take_one) for _ in range(depth))
 
         def taken() -> Iterator[T]:
-            while item := _result(ahead.popleft(), timeout):
+            while (item := _result(ahead.popleft(), timeout)) is not _END:
                 ahead.append(thread.submit(take_one))
-                yield item.pop()
+                yield item
 
         try:
             yield taken()

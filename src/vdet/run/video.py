@@ -87,11 +87,6 @@ class VideoJob:
         """Whether an output shows the frame at `at`."""
         return any(sink_kind(output.sink).one_frame for output in self.outputs)
 
-    @property
-    def needs_only_at(self) -> bool:
-        """Whether no output needs another frame."""
-        return self.shows_at and all(sink_kind(each.sink).one_frame for each in self.outputs)
-
 
 @dataclass(frozen=True, slots=True)
 class RunTotals:
@@ -144,12 +139,11 @@ def open_video(
     timeout = job.timeout + float(job.start or 0)
     reading = _reader_and_frames(job, settings)
     try:
-        with (
-            named_errors(job.source, VideoError),
-            prefetch(reading, timeout=timeout) as read,
-        ):
+        with named_errors(job.source, VideoError), prefetch(reading, timeout=timeout) as read:
             reader: VideoReader = next(read)
-            _check_times(job, reader.length)
+            latest = max(job.start or Fraction(0), job.at if job.shows_at else Fraction(0))
+            if reader.length is not None and latest >= reader.length:
+                raise _no_frame(job, f"{float(latest):.2f} s is beyond its end", reader.length)
             images, frames = peek(read)
             make = partial(
                 build, settings=settings, video=reader.info, images=images, lanes=job.lanes
@@ -173,11 +167,7 @@ def open_video(
 def _reader_and_frames(job: VideoJob, settings: Settings) -> Generator[Any]:
     """Yield the reader, and then its frames; the thread that reads them opens and closes it."""
     with VideoReader(
-        job.source,
-        start=job.start,
-        end=job.end,
-        frames=job.frames,
-        settings=settings.input,
+        job.source, start=job.start, end=job.end, frames=job.frames, settings=settings.input
     ) as reader:
         yield reader
         yield from reader
@@ -215,7 +205,7 @@ def run_video(
     No output is left after an error.
     """
     began = time.perf_counter()
-    only_at = job.needs_only_at
+    only_at = job.shows_at and all(sink_kind(each.sink).one_frame for each in job.outputs)
     if only_at and job.frames is None:
         job = replace(job, start=max(job.at - LEAD, job.start or Fraction(0)))
     with (
@@ -238,7 +228,9 @@ def run_video(
                 last = result.frame.time - info.start
                 if only_at and last >= job.at:
                     break
-        _check_seen(job, last, video.reader.length)
+        if last is None or (job.shows_at and last < job.at):
+            when = "in the times given" if last is None else f"at {float(job.at):.2f} s or later"
+            raise _no_frame(job, f"no frame is read {when}", video.reader.length)
     seconds = time.perf_counter() - began
     log.info(
         "%s: finding the vehicles took %.1f s, drawing and writing them %.1f s",
@@ -263,23 +255,7 @@ def _context(
     )
 
 
-def _check_times(job: VideoJob, length: Fraction | None) -> None:
-    """Refuse times that lie beyond the end, where the file declares its length."""
-    latest = max(job.start or Fraction(0), job.at if job.shows_at else Fraction(0))
-    if length is not None and latest >= length:
-        raise VideoError(f"{job.source}: {float(latest):.2f} s is beyond its end{_at_end(length)}")
-
-
-def _check_seen(job: VideoJob, last: Fraction | None, length: Fraction | None) -> None:
-    """Refuse times at which there was no frame; `last` is the time of the last frame read."""
-    if last is None:
-        missing = "lies in the times given"
-    elif job.shows_at and last < job.at:
-        missing = f"is read at {float(job.at):.2f} s or later"
-    else:
-        return
-    raise VideoError(f"{job.source}: no frame {missing}{_at_end(length)}")
-
-
-def _at_end(length: Fraction | None) -> str:
-    return "; check them" if length is None else f"; it ends at {float(length):.2f} s"
+def _no_frame(job: VideoJob, words: str, length: Fraction | None) -> VideoError:
+    """Return the error of a time at which there is no frame."""
+    end = "check them" if length is None else f"it ends at {float(length):.2f} s"
+    return VideoError(f"{job.source}: {words}; {end}")

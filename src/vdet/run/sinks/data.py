@@ -14,13 +14,7 @@ from vdet.files import print_now
 from vdet.labels.formats import SourceVideo, TrackWriter, format_for, track_suffixes
 from vdet.labels.records import JSON_LINES, track_record
 from vdet.run.result import FrameResult
-from vdet.run.sinks.protocol import (
-    STANDARD_OUTPUT,
-    BaseSink,
-    BatchTotal,
-    SinkContext,
-    SinkKind,
-)
+from vdet.run.sinks.protocol import STANDARD_OUTPUT, BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import join_counts, write_counts
 from vdet.traffic.records import VehicleRecords, join_records, write_records

@@ -36,7 +36,6 @@ from vdet.run.threads import write_async
 from vdet.track.track import Track
 from vdet.traffic.counter import VehicleCounter
 
-VIDEO_LABEL = ("id",)
 PICTURE_LABEL = ("score",)
 FINISH_RATE = 5_000_000
 """Bytes a second. At its end an .mp4 is written once more, with its index in front."""
@@ -54,7 +53,7 @@ class Overlay:
     def __init__(self, settings: Settings, video: VideoInfo | None) -> None:
         self._settings, self._draw = settings, settings.draw
         self._start = video.start if video else None
-        automatic = VIDEO_LABEL if video else PICTURE_LABEL
+        automatic = ("id",) if video else PICTURE_LABEL
         self._label = automatic if self._draw.label is None else self._draw.label
         self._trails: dict[int, list[tuple[float, Point]]] = {}  # with the time in seconds
 
@@ -64,7 +63,12 @@ class Overlay:
         If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
         are drawn where they lie in it.
         """
-        shown, surface = self._shown(result), self._surface(result)
+        shown, road = self._shown(result), result.road
+        surface: Surface = result.frame.picture.pixels.copy()
+        if road:
+            surface = image = road.image.copy()
+            if road.lane:
+                draw_lane(image, road.lane)
         colors = {track.id: self._color(track) for track in shown}
         shown = _placed(shown, result.road, surface)
         self._draw_trails(surface, shown, colors, float(result.frame.time))
@@ -75,15 +79,6 @@ class Overlay:
         if result.counter and self._settings.counts.drawn:
             draw_running_counts(surface, result.counter, result.road)
         return surface
-
-    def _surface(self, result: FrameResult) -> Surface:
-        """Return what is drawn into: a copy of the frame, or of the road with its lane."""
-        if result.road is None:
-            return result.frame.picture.pixels.copy()
-        image = result.road.image.copy()
-        if result.road.lane:
-            draw_lane(image, result.road.lane)
-        return image
 
     def _shown(self, result: FrameResult) -> list[Track]:
         """Return the vehicles to draw, with the boxes to draw, the farthest first."""
@@ -132,12 +127,9 @@ class Overlay:
 
 def label_text(track: Track, parts: Sequence[str]) -> str:
     """Return the text of a label: those of its parts that are known of the vehicle."""
-    texts: Mapping[str, str | None] = {
-        "id": f"#{track.id}",
-        "class": track.class_name,
-        "score": f"{track.score:.2f}",
-        "distance": None if track.distance is None else f"{track.distance:.0f} m",
-    }
+    distance = None if track.distance is None else f"{track.distance:.0f} m"
+    texts = {"id": f"#{track.id}", "class": track.class_name, "score": f"{track.score:.2f}"}
+    texts["distance"] = distance
     return " ".join(text for part in parts if (text := texts[part]))
 
 

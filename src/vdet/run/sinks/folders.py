@@ -1,19 +1,29 @@
-"""The sinks that fill a folder with pictures: `stages` of one frame, and `crops` of vehicles."""
+"""The sinks that fill a folder: `stages` of one frame, `crops` of vehicles, and the `page`."""
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
+from vdet.config.rendering import render
 from vdet.draw.boxes import WHITE, color_of, draw_box, draw_label, draw_regions
 from vdet.lanes.drawing import stage_pictures
-from vdet.media.images import Image, encode_image
-from vdet.regions import Regions
+from vdet.media import Picture
+from vdet.media.images import Image, encode_image, is_picture_name
+from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, write_page
+from vdet.pages.video import Player, VideoPage, write_index
+from vdet.regions import lay_regions
 from vdet.run.result import FrameResult
-from vdet.run.sinks.drawn import PICTURE_LABEL, VIDEO_LABEL, label_text
-from vdet.run.sinks.protocol import BaseSink, SinkContext, SinkKind
-from vdet.traffic.overview import BestCrops, Crop
+from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
+from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
+from vdet.traffic.counter import VehicleCounter
+from vdet.traffic.counts import MinuteCount
+from vdet.traffic.overview import BestCrops, Crop, HeatMap, Levels
+from vdet.traffic.records import VehicleRecords
 
 _BOXES = "boxes"
-_CROP_NAME = re.compile(r"vehicle-\d{4,}-at-\d+\.\d{3}s\.(jpg|png)")
+_CROP_NAME = re.compile(r"vehicle-\d{4,}-at--?\d+\.\d{3}s\.(jpg|png)")
+_THUMBNAIL = 200  # longer side of the picture of a vehicle, pixels
 
 
 class StagesSink(BaseSink):
@@ -21,8 +31,7 @@ class StagesSink(BaseSink):
 
     def __init__(self, path: Path, context: SinkContext) -> None:
         super().__init__(path, context)
-        start = context.video.start if context.video else 0
-        self._time = start + context.at
+        self._time = context.at + (context.video.start if context.video else 0)
         self._is_done = False
 
     def write(self, result: FrameResult) -> None:
@@ -31,11 +40,10 @@ class StagesSink(BaseSink):
             return
         self._is_done = True
         pictures = self.context.stage_pictures(result.frame.image, result.detections)
-        if settings := self.context.settings.regions:
-            height, width = result.frame.image.shape[:2]
-            regions = Regions(settings, width, height)
+        height, width = result.frame.image.shape[:2]
+        if regions := lay_regions(self.context.settings.regions, width, height):
             pictures["regions"] = draw_regions(result.frame.image, regions)
-        pictures[_BOXES] = _with_boxes(result, is_still=self.context.video is None)
+        pictures[_BOXES] = _with_boxes(result)
         if result.road:
             pictures |= stage_pictures(result.road)
         folder = self.context.files.stage_folder(self.path)
@@ -44,7 +52,7 @@ class StagesSink(BaseSink):
             path.write_bytes(encode_image(picture, path))
 
 
-def _with_boxes(result: FrameResult, *, is_still: bool) -> Image:
+def _with_boxes(result: FrameResult) -> Image:
     """Draw the detections in white with their scores, and the shown vehicles over them."""
     picture = result.frame.image.copy()
     detections = result.detections
@@ -52,7 +60,7 @@ def _with_boxes(result: FrameResult, *, is_still: bool) -> Image:
         draw_box(picture, each.box, WHITE)
         draw_label(picture, f"{each.score:.2f}", (each.box.x1, each.box.y2), WHITE)
     for track in result.tracks:
-        text = label_text(track, PICTURE_LABEL if is_still else (*VIDEO_LABEL, *PICTURE_LABEL))
+        text = label_text(track, PICTURE_LABEL)
         draw_box(picture, track.box, color_of(track.id), text, dashed=track.state == "lost")
     return picture
 
@@ -87,3 +95,87 @@ class CropSink(BaseSink):
 
 
 CROPS = SinkKind(CropSink, what="pictures of vehicles", marker="vehicle-*-at-*s.*", takes="videos")
+
+
+class PageSink(BaseSink):
+    """Collects what the page shows, and writes it at the end."""
+
+    def __init__(self, path: Path, context: SinkContext) -> None:
+        super().__init__(path, context)
+        self._file = context.files.stage_folder(path) / PAGE_NAME
+        video = self.video
+        self._records = VehicleRecords(video.width)
+        self._crops = BestCrops()
+        self._heat = HeatMap(video.width, video.height)
+        self._levels = Levels()
+        self._thumbnails: dict[int, tuple[float, str]] = {}
+        self._counter: VehicleCounter | None = None
+        self._fullest: Picture | None = None
+        self._frames = 0
+        self._start = self._last = float(video.start)
+
+    def finish(self) -> None:
+        """Write the page."""
+        self._keep(self._crops.end())
+        write_page(self._page().html(), self._file)
+
+    def write(self, result: FrameResult) -> None:
+        """Add a frame."""
+        frame, picture = result.frame_tracks, result.frame.picture
+        if not self._frames:
+            self._start = frame.time
+        self._frames += 1
+        self._last = frame.time
+        if self._fullest is None or len(frame.tracks) > self._levels.most:
+            self._fullest = picture
+        self._records.add(frame)
+        self._levels.add(frame)
+        self._heat.add(frame)
+        self._counter = result.counter
+        self._keep(self._crops.add(frame, picture))
+
+    def _keep(self, crops: list[Crop]) -> None:
+        for crop in crops:
+            self._thumbnails[crop.id] = crop.time, jpeg_uri(crop.image, _THUMBNAIL)
+
+    def _page(self) -> VideoPage:
+        return VideoPage(
+            video=self.video,
+            frames=self._frames,
+            start=self._start,
+            end=self._last + float(1 / self.video.rate),
+            records=self._records.end(),
+            thumbnails=self._thumbnails,
+            levels=self._levels,
+            still=self._heat.over(self._fullest.image) if self._fullest else None,
+            player=self._player(),
+            settings=render(self.context.settings),
+            counts=_by_minute(self._counter.counts().minutes) if self._counter else {},
+        )
+
+    def _player(self) -> Player | None:
+        """Return the video that this run writes; else the source, if it is a video file."""
+        source = self.video.path
+        drawn = [each.path for each in self.context.outputs if each.sink == "video"]
+        if not drawn and (not source.is_file() or is_picture_name(source)):
+            return None
+        path, start = (drawn[0], self._start) if drawn else (source, float(self.video.start))
+        return Player(path.name, link_to(path, self.path), bool(drawn), start)
+
+
+def _by_minute(counts: Sequence[MinuteCount]) -> dict[str, Counter[int]]:
+    """Return the counts of each line or zone and direction by minute."""
+    minutes: dict[str, Counter[int]] = {}
+    for each in counts:
+        name = f"{each.name}: {each.direction}"
+        minutes.setdefault(name, Counter())[each.minute] = each.count
+    return minutes
+
+
+PAGE = SinkKind(
+    PageSink,
+    what="pages",
+    marker=PAGE_NAME,
+    takes="videos",
+    total=BatchTotal("index", write_index, suffix=".html"),
+)

@@ -11,13 +11,7 @@ from typing import Any, Literal, Protocol, Self
 from vdet.config.schema import Settings
 from vdet.detect.protocol import StagePictures
 from vdet.errors import OutputError
-from vdet.files import (
-    MayReplace,
-    OutputFiles,
-    any_file,
-    check_output,
-    output_errors,
-)
+from vdet.files import MayReplace, OutputFiles, any_file, check_output, output_errors
 from vdet.media import VideoInfo
 from vdet.plugins import SINKS, load_plugin
 from vdet.run.result import FrameResult
