@@ -1,7 +1,7 @@
-"""Classes of vehicles: their names in all outputs, and the words that others use for them."""
+"""Classes of vehicles: their names in all outputs, and the words that mean them elsewhere."""
 
 OUR_NAMES = ("car", "truck", "bus", "motorcycle", "vehicle")
-"""The classes in all outputs; `vehicle` is one whose class is not known more exactly."""
+"""The classes in all outputs; `vehicle` is a vehicle of unknown class."""
 
 WORDS = {
     "car": ("car", "van", "suv", "taxi"),
@@ -27,10 +27,10 @@ def our_name(label: str) -> str | None:
 
 
 class ClassScores(dict[str, float]):
-    """The sum of the scores with which a vehicle was taken for each class."""
+    """For each class, the sum of the scores of a vehicle's detections."""
 
     def add(self, name: str | None, score: float) -> None:
-        """Add the class in one frame; None is ignored."""
+        """Add the class and score of one detection; a class of None is ignored."""
         if name is not None:
             self[name] = self.get(name, 0.0) + score
 

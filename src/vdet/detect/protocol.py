@@ -24,8 +24,8 @@ class VideoDetector(Protocol):
         picture
             The frame; its `image` is BGR, its `planes` are those of the decoder, if there are any.
         index
-            Number of the frame in its video, from 0; None for a still picture. With a `stride`
-            in the settings, only every `stride`-th frame is searched.
+            Number of the frame in its video, from 0; None for a still picture. The settings
+            `searches` and `stride` say which frames are searched.
         """
 
     def detect(self, candidates: Any) -> Boxes:

@@ -3,13 +3,13 @@
 import cv2
 import numpy as np
 
-from vdet.learn.net.sources import Sample, Source
+from vdet.learn.net.sources import NetSample, NetSource
 
 RED, BLUE = 0, 1
 _COLORS = {RED: (30, 30, 220), BLUE: (220, 40, 30)}
 
 
-def block_picture(seed: int, width: int = 256, height: int = 128) -> Sample:
+def block_picture(seed: int, width: int = 256, height: int = 128) -> NetSample:
     """Return a noisy picture with one to three blocks that do not overlap; red 0, blue 1."""
     rng = np.random.default_rng(seed)
     image = rng.normal(120, 8, (height, width, 3)).clip(0, 255).astype(np.uint8)
@@ -23,7 +23,7 @@ def block_picture(seed: int, width: int = 256, height: int = 128) -> Sample:
         cv2.rectangle(image, (x, y), (x + side - 1, y + side - 1), _COLORS[kind], -1)
         boxes.append((x, y, x + side, y + side))
         classes.append(kind)
-    return Sample(
+    return NetSample(
         image,
         np.array(boxes, np.float32),
         np.array(classes, np.int64),
@@ -31,5 +31,5 @@ def block_picture(seed: int, width: int = 256, height: int = 128) -> Sample:
     )
 
 
-def block_source(count: int = 60) -> Source:
-    return Source("blocks", [block_picture(seed) for seed in range(count)])
+def block_source(count: int = 60) -> NetSource:
+    return NetSource("blocks", [block_picture(seed) for seed in range(count)])

@@ -6,7 +6,7 @@ import pytest
 from learn.net.blocks import block_picture, block_source
 from vdet.config.train import NetworkTrainingSettings
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
-from vdet.learn.net.sources import MAX_PIXELS, Sample, Source
+from vdet.learn.net.sources import MAX_PIXELS, NetSample, NetSource
 from vdet.learn.net.weather import with_weather
 
 PLAIN = Drawing(width=256, height=128, magnified=1.0, mosaics=0.0)
@@ -14,17 +14,17 @@ MOSAIC = Drawing(width=256, height=128, magnified=1.0, mosaics=1.0)
 SETTINGS = NetworkTrainingSettings()
 
 
-def draw(seed: int, drawing: Drawing, source: Source | None = None) -> Sample:
+def draw(seed: int, drawing: Drawing, source: NetSource | None = None) -> NetSample:
     drawer = SampleDrawer([source or block_source(8)], SETTINGS)
     return drawer.draw(np.random.default_rng(seed), drawing)
 
 
-def black_on_white() -> Source:
+def black_on_white() -> NetSource:
     """Return a source of one picture: a black block in the middle of white."""
     image = np.full((128, 256, 3), 255, np.uint8)
     image[48:80, 96:160] = 0
     boxes = np.array([[96, 48, 160, 80]], np.float32)
-    return Source("block", [Sample(image, boxes, np.array([0]), np.array([False]))])
+    return NetSource("block", [NetSample(image, boxes, np.array([0]), np.array([False]))])
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -62,7 +62,7 @@ def test_the_same_seed_draws_the_same_picture() -> None:
 def test_a_vehicle_of_which_little_is_left_is_ignored() -> None:
     image = np.zeros((128, 256, 3), np.uint8)
     wide = np.array([[0, 0, 256, 128]], np.float32)
-    source = Source("wide", [Sample(image, wide, np.array([0]), np.array([False]))])
+    source = NetSource("wide", [NetSample(image, wide, np.array([0]), np.array([False]))])
     drawing = Drawing(width=256, height=128, magnified=4.0, mosaics=0.0)
     assert all(draw(seed, drawing, source).ignored.all() for seed in range(5))
 
@@ -76,10 +76,12 @@ def test_large_pictures_are_held_smaller_with_their_boxes() -> None:
 
 
 def test_small_sources_are_drawn_more_often_than_their_share() -> None:
-    small = Source("small", [block_picture(0)])
+    small = NetSource("small", [block_picture(0)])
     white = np.full((128, 256, 3), 255, np.uint8)
-    none = Sample(white, np.zeros((0, 4), np.float32), np.zeros(0, np.int64), np.zeros(0, np.bool_))
-    large = Source("large", [none] * 9)
+    none = NetSample(
+        white, np.zeros((0, 4), np.float32), np.zeros(0, np.int64), np.zeros(0, np.bool_)
+    )
+    large = NetSource("large", [none] * 9)
     drawer = SampleDrawer([small, large], SETTINGS)
     drawn = [drawer.draw(np.random.default_rng(seed), PLAIN) for seed in range(200)]
     with_blocks = sum(len(sample.boxes) > 0 for sample in drawn)
@@ -87,7 +89,10 @@ def test_small_sources_are_drawn_more_often_than_their_share() -> None:
 
 
 def test_a_weight_makes_a_source_come_more_often() -> None:
-    one, other = Source("one", [block_picture(0)]), Source("other", [black_on_white().samples[0]])
+    one, other = (
+        NetSource("one", [block_picture(0)]),
+        NetSource("other", [black_on_white().samples[0]]),
+    )
     settings = NetworkTrainingSettings(weights={"other": 3})
     drawer = SampleDrawer([one, other], settings)
     picks = [drawer._pick(np.random.default_rng(seed)) for seed in range(200)]

@@ -26,7 +26,7 @@ from vdet.learn.net.architecture import (  # noqa: E402
 from vdet.learn.net.assignment import Vehicles, assign  # noqa: E402
 from vdet.learn.net.export import export_network  # noqa: E402
 from vdet.learn.net.losses import giou, paired_iou  # noqa: E402
-from vdet.learn.net.sources import CLASSES, Source  # noqa: E402
+from vdet.learn.net.sources import CLASSES, NetSource  # noqa: E402
 from vdet.learn.net.training import train_network  # noqa: E402
 from vdet.media import Picture  # noqa: E402
 from vdet.testing import check_detector  # noqa: E402
@@ -207,7 +207,7 @@ def test_pictures_without_a_vehicle_are_refused(tmp_path: Path) -> None:
     empty = block_picture(0)
     empty = type(empty)(empty.image, empty.boxes[:0], empty.classes[:0], empty.ignored[:0])
     with pytest.raises(DataError, match="no picture has a vehicle"):
-        train_network([Source("empty", [empty])], QUICK, tmp_path / "net.ckpt")
+        train_network([NetSource("empty", [empty])], QUICK, tmp_path / "net.ckpt")
 
 
 def test_a_weight_for_a_source_that_is_not_there_is_refused(tmp_path: Path) -> None:

@@ -54,10 +54,10 @@ class NetworkModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetworkDetector:
-    """Finds vehicles in frames of one size: a `VideoDetector`; it remembers nothing.
+    """Finds vehicles in frames of one size: a `VideoDetector` without state.
 
-    `numbers` has for each class of the network its number in `detector.classes`, -1 for others,
-    and ends with another -1.
+    `numbers` has the index of each class of the network in `detector.classes`, -1 for those that
+    are not wanted; its last entry, -1, stands for unknown classes.
     """
 
     network: Recognized
@@ -88,7 +88,7 @@ class NetworkDetector:
         )
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return what the network sees, and its boxes before suppression."""
+        """Return the network's input as a picture, and the boxes before suppression."""
         boxes = image.copy()
         raw: RawBoxes = detections.trace
         for box, score in zip(raw.boxes.round().astype(int).tolist(), raw.scores, strict=True):
@@ -97,13 +97,13 @@ class NetworkDetector:
 
 
 def our_classes(names: Sequence[str], wanted: Sequence[str]) -> list[int]:
-    """Return for each class of a network its number in `wanted`, -1 where it is not wanted."""
+    """Return the index of each class of a network in `wanted`, -1 if it is not wanted."""
     numbers = {name: number for number, name in enumerate(wanted)}
     return [numbers.get(our_name(name) or name.strip().lower(), -1) for name in names]
 
 
 def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64Array:
-    """Return the rows of the boxes that stay, the best first.
+    """Return the rows of the boxes that are kept, the best first.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def suppress(boxes: Float32Array, scores: Float32Array, overlap: float) -> Int64
     scores
         float32 `(n,)`.
     overlap
-        A box with more intersection over union with a better one is removed.
+        A box is removed if its intersection over union with a better one exceeds this.
     """
     near, far = boxes[:, :2], boxes[:, 2:]
     places = np.concatenate([near, far - near], axis=1, dtype=np.float64)

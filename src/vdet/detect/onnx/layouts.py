@@ -1,4 +1,4 @@
-"""The forms in which networks give boxes: each turns the outputs into boxes, scores and classes."""
+"""Layouts of outputs: functions that turn the outputs of networks into boxes."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,15 +14,15 @@ STRIDES = (8, 16, 32)
 """Pixels of the input between the cells of each level, of our networks and of YOLOX."""
 
 Cells = tuple[Float32Array, Float32Array]
-"""The middle `(cells, 2)`, x and y in pixels of the input, and the stride `(cells,)` of cells."""
+"""Middles `(cells, 2)`, x and y in pixels of the input, and strides `(cells,)` of all cells."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawBoxes:
-    """What a network finds in its input, before suppression.
+    """Boxes before suppression.
 
-    `boxes` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input; `scores` float32 `(n,)`, 0 to 1;
-    `classes` int32 `(n,)`: numbers as the network counts them.
+    `boxes` float32 `(n, 4)`: x1, y1, x2, y2, pixels of the input or of the frame; `scores` float32
+    `(n,)`, 0 to 1; `classes` int32 `(n,)`: indices in the names of the network or of the settings.
     """
 
     boxes: Float32Array
@@ -30,8 +30,8 @@ class RawBoxes:
     classes: Int32Array
 
 
-Layout = Callable[[Sequence[Array], float], RawBoxes]
-"""One form of outputs: returns the boxes whose scores are at least a number."""
+OutputLayout = Callable[[Sequence[Array], float], RawBoxes]
+"""Turns outputs into boxes in pixels of the input; leaves out scores below a limit."""
 
 
 def our_cells(

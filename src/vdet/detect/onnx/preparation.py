@@ -13,7 +13,7 @@ from vdet.media.images import Image
 
 _MULTIPLE = 32  # of pixels: the stride of the coarsest cells
 GREY = 114
-"""Value of the input beyond the frame."""
+"""Value of pixels of the input beyond the frame."""
 
 Fit = Literal["stretch", "center", "corner"]
 
@@ -27,8 +27,8 @@ class InputForm:
     width, height
         Size of the input, pixels.
     fit
-        stretch: the frame fills the input; center and corner: it keeps its shape and lies in the
-        middle or at the top left, with grey around it.
+        stretch: the frame fills the input. center, corner: it keeps its aspect ratio and lies in
+        the middle or at the top left, with grey around it.
     is_rgb
         The channels are red, green, blue; else blue, green, red.
     factor
@@ -96,7 +96,7 @@ class Placement(NamedTuple):
 def scaled_to(image: Image, width: int, height: int) -> Image:
     """Return the image in another size; it is halved first while it is more than twice as large.
 
-    That keeps every pixel's share, as an area average would, in a fraction of its time.
+    Thus every pixel counts, as in an area average, in a fraction of its time.
     """
     while image.shape[1] >= 2 * width and image.shape[0] >= 2 * height:
         half = max(width, image.shape[1] // 2), max(height, image.shape[0] // 2)

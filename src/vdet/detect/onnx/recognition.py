@@ -1,4 +1,4 @@
-"""Finds the form of a network in an ONNX file, by its metadata, then its names, then its shapes."""
+"""Recognises the form of a network by its metadata, its names and its shapes."""
 
 import ast
 import math
@@ -14,7 +14,7 @@ from pydantic import Field, ValidationError
 from vdet.config.section import Section
 from vdet.config.train import NetworkScoreSettings
 from vdet.detect.onnx import layouts
-from vdet.detect.onnx.layouts import Layout, RawBoxes, cell_centers
+from vdet.detect.onnx.layouts import OutputLayout, RawBoxes, cell_centers
 from vdet.detect.onnx.preparation import GREY, InputForm, size_of_area
 from vdet.detect.onnx.session import TYPES, Array, Session
 from vdet.errors import ModelError
@@ -34,7 +34,7 @@ HEADER_KEY = "vdet"
 
 
 class Header(Section):
-    """What an ONNX file says of a network of ours."""
+    """The header of our networks, JSON in the metadata of the ONNX file."""
 
     format: Literal[1] = 1
     classes: tuple[str, ...] = Field(min_length=1, max_length=1000)
@@ -54,9 +54,9 @@ class Recognized:
     session
         The network.
     name
-        Name of the form, for people.
+        Name of the form, for messages.
     reasons
-        Why it has this form, in words.
+        How the form was recognised, in words.
     names
         Names of the classes, in the network's order.
     form
@@ -72,11 +72,11 @@ class Recognized:
     reasons: tuple[str, ...]
     names: tuple[str, ...]
     form: InputForm
-    layout: Layout
+    layout: OutputLayout
     header: Header | None = None
 
     def for_frames(self, width: int, height: int) -> "Recognized":
-        """Return the network for frames of one size; the input of our own is fitted to it."""
+        """Return the network for frames of one size; the input of our networks depends on it."""
         return _ours(self.session, self.header, width, height) if self.header else self
 
     def find(self, picture: Picture, least: float) -> RawBoxes:
@@ -123,12 +123,12 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
     Parameters
     ----------
     names
-        Names of its classes, where the file does not have them.
+        Names of its classes, instead of those in the file.
 
     Raises
     ------
     ModelError
-        The network is of no known form; the message says what was seen.
+        The network is of no known form; the message says how it differs.
     """
     header = read_header(session)
     if header is not None:
@@ -145,7 +145,7 @@ def recognize(session: Session, names: Sequence[str] = ()) -> Recognized:
 
 
 def read_header(session: Session) -> Header | None:
-    """Return the header of a network of ours, None of another one. Raises `ModelError`."""
+    """Return the header of a network of ours, None for another one. Raises `ModelError`."""
     if HEADER_KEY not in session.metadata:
         return None
     try:
@@ -197,7 +197,7 @@ def _by_shape(session: Session, names: Sequence[str]) -> Recognized:
     return _as_yolox(found) if name == "YOLOX" else found
 
 
-_Rule = tuple[str, str, int | None, Layout]
+_Rule = tuple[str, str, int | None, OutputLayout]
 """A form of output: its name, the reason for it, its number of classes (None: any), its layout."""
 
 

@@ -1,4 +1,4 @@
-"""Which cells of the network are to find which vehicle.
+"""Assignment of vehicles to the cells of the network that are to find them.
 
 The cost of a cell for a vehicle is low where the cell's box and score already fit and its middle
 is close. Each vehicle gets its cheapest cells: as many as the sum of its best overlaps.

@@ -10,12 +10,12 @@ import numpy.typing as npt
 from vdet.boxes import Float32Array
 from vdet.config.train import NetworkTrainingSettings
 from vdet.detect.onnx.preparation import GREY
-from vdet.learn.net.sources import Sample, Source, join
+from vdet.learn.net.sources import NetSample, NetSource, join
 from vdet.learn.net.weather import with_weather
 from vdet.media.images import Image
 
 LEAST_SIDE = 8.0
-"""Vehicles whose longer side is shorter are ignored, pixels."""
+"""Least longer side of a vehicle, pixels; smaller vehicles are ignored."""
 _SCALES = 0.5, 2.0
 """Least and largest scale of a picture; at 1 its width fits."""
 _MOSAIC_SCALES = 0.5, 1.5
@@ -40,7 +40,9 @@ class Drawing:
 
 
 class SampleDrawer:
-    """Draws training pictures from sources, each as often as the root of its size times its weight.
+    """Draws training pictures from sources.
+
+    The probability of a source is proportional to its weight and to the square root of its size.
 
     Parameters
     ----------
@@ -48,14 +50,14 @@ class SampleDrawer:
         Each with at least one sample.
     """
 
-    def __init__(self, sources: Sequence[Source], settings: NetworkTrainingSettings) -> None:
+    def __init__(self, sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
         self._sources = sources
         counts = [len(source.samples) for source in sources]
         weights = np.sqrt(counts) * [settings.weights.get(source.name, 1.0) for source in sources]
         self._shares = weights / weights.sum()
 
-    def draw(self, rng: np.random.Generator, drawing: Drawing) -> Sample:
-        """Return one training picture with the vehicles that are left in it."""
+    def draw(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
+        """Return one training picture with the vehicles in it."""
         if rng.random() < drawing.mosaics:
             sample = self._mosaic(rng, drawing)
         else:
@@ -67,11 +69,11 @@ class SampleDrawer:
         image = with_weather(rng, _recolored(rng, sample.image), visible)
         return _without_small(replace(sample, image=_with_noise(rng, image)))
 
-    def _pick(self, rng: np.random.Generator) -> Sample:
+    def _pick(self, rng: np.random.Generator) -> NetSample:
         source = self._sources[int(rng.choice(len(self._sources), p=self._shares))]
         return source.samples[int(rng.integers(len(source.samples)))]
 
-    def _mosaic(self, rng: np.random.Generator, drawing: Drawing) -> Sample:
+    def _mosaic(self, rng: np.random.Generator, drawing: Drawing) -> NetSample:
         """Return four pictures that meet in a random point."""
         width, height = drawing.width, drawing.height
         x = round(width * rng.uniform(0.3, 0.7))
@@ -93,7 +95,9 @@ def _scale(rng: np.random.Generator, limits: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(*np.log(limits))))
 
 
-def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scale: float) -> Sample:
+def _place(
+    rng: np.random.Generator, sample: NetSample, size: tuple[int, int], scale: float
+) -> NetSample:
     """Return a part of a picture of `size`; at scale 1 its width fits."""
     width, height = size
     rows, columns = sample.image.shape[:2]
@@ -117,7 +121,7 @@ def _place(rng: np.random.Generator, sample: Sample, size: tuple[int, int], scal
     factors = np.array([x_factor, y_factor] * 2, np.float32)
     offset = np.array([left, top] * 2, np.float32)
     boxes = _turned(sample.boxes * factors + offset, turn)
-    return _cropped(Sample(_image(warped), boxes, sample.classes, sample.ignored))
+    return _cropped(NetSample(_image(warped), boxes, sample.classes, sample.ignored))
 
 
 def _turned(boxes: Float32Array, turn: npt.ArrayLike) -> Float32Array:
@@ -128,7 +132,7 @@ def _turned(boxes: Float32Array, turn: npt.ArrayLike) -> Float32Array:
     return np.concatenate([middles - halves, middles + halves], axis=1).astype(np.float32)
 
 
-def _cropped(sample: Sample) -> Sample:
+def _cropped(sample: NetSample) -> NetSample:
     """Cut boxes at the sides of the picture; vehicles of which little is left are ignored."""
     height, width = sample.image.shape[:2]
     limits = np.array([width, height, width, height], np.float32)
@@ -136,17 +140,17 @@ def _cropped(sample: Sample) -> Sample:
     left = _areas(cut) / np.maximum(_areas(sample.boxes), 1e-6)
     ignored = sample.ignored | (left < _LEAST_VISIBLE)
     keep = _areas(cut) > 0
-    return Sample(sample.image, cut[keep], sample.classes[keep], ignored[keep])
+    return NetSample(sample.image, cut[keep], sample.classes[keep], ignored[keep])
 
 
-def _without_small(sample: Sample) -> Sample:
+def _without_small(sample: NetSample) -> NetSample:
     """Ignore vehicles that are too small to be found."""
     sides = sample.boxes[:, 2:] - sample.boxes[:, :2]
     small = (sides.max(1, initial=0) < LEAST_SIDE) | (sides.min(1, initial=1e9) < LEAST_SIDE / 2)
     return replace(sample, ignored=sample.ignored | small)
 
 
-def _mirrored(sample: Sample) -> Sample:
+def _mirrored(sample: NetSample) -> NetSample:
     width = sample.image.shape[1]
     boxes = sample.boxes.copy()
     boxes[:, [0, 2]] = width - sample.boxes[:, [2, 0]]

@@ -12,7 +12,7 @@ from vdet.detect.onnx.session import Session
 from vdet.files import write_json
 from vdet.learn.net.export import export_network
 from vdet.learn.net.sources import CLASSES, SourceReport, clip_source, image_source
-from vdet.learn.net.training import Progress, train_network
+from vdet.learn.net.training import StepProgress, train_network
 from vdet.version import __version__
 
 _AVERAGED = 100  # last steps whose mean loss is reported
@@ -52,7 +52,7 @@ class NetworkJob:
 class NetworkMetrics:
     """The metrics of a training: its sources, its duration, and the mean loss of its last steps.
 
-    `seconds` are those since the training was started or went on.
+    `seconds` count from the last start of the training; `loss` is None if no step was left.
     """
 
     sources: tuple[SourceReport, ...]
@@ -70,7 +70,7 @@ class NetworkMetrics:
         yield f"{self.parameters:,} parameters after {duration}{loss}"
 
 
-def train_to_file(job: NetworkJob, settings: Settings, *, progress: Progress) -> NetworkMetrics:
+def train_to_file(job: NetworkJob, settings: Settings, *, progress: StepProgress) -> NetworkMetrics:
     """Train a network, write it with its metrics, and remove the checkpoint.
 
     Raises

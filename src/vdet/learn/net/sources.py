@@ -29,7 +29,7 @@ EVERY = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sample:
+class NetSample:
     """A picture with its vehicles.
 
     Attributes
@@ -49,7 +49,7 @@ class Sample:
     classes: Int64Array
     ignored: BoolArray
 
-    def shrunk(self) -> "Sample":
+    def shrunk(self) -> "NetSample":
         """Return the sample with at most `MAX_PIXELS` pixels."""
         height, width = self.image.shape[:2]
         factor = (MAX_PIXELS / (height * width)) ** 0.5
@@ -58,7 +58,7 @@ class Sample:
         size = round(width * factor), round(height * factor)
         image = np.asarray(cv2.resize(self.image, size, interpolation=cv2.INTER_AREA), np.uint8)
         scale = np.array([size[0] / width, size[1] / height] * 2, np.float32)
-        return Sample(image, self.boxes * scale, self.classes, self.ignored)
+        return NetSample(image, self.boxes * scale, self.classes, self.ignored)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +72,11 @@ class SourceReport:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class NetSource:
     """The samples of one camera or collection; metrics and settings use its `name`."""
 
     name: str
-    samples: Sequence[Sample]
+    samples: Sequence[NetSample]
 
     def report(self) -> SourceReport:
         """Count pictures and vehicles, and compute the SHA-256."""
@@ -88,7 +88,7 @@ class Source:
         return SourceReport(self.name, len(self.samples), vehicles, digest.hexdigest())
 
 
-def image_source(path: Path, settings: Settings) -> Source:
+def image_source(path: Path, settings: Settings) -> NetSource:
     """Read a set of labelled pictures into memory; `settings` has the roles of labels.
 
     Raises
@@ -102,10 +102,10 @@ def image_source(path: Path, settings: Settings) -> Source:
     samples = [
         _sample(each.read(), each.boxes, each.classes, each.ignored) for each in labelled.pictures
     ]
-    return Source(Path(labelled.name).resolve().name, samples)
+    return NetSource(Path(labelled.name).resolve().name, samples)
 
 
-def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
+def clip_source(video: Path, truth_file: Path, settings: Settings) -> NetSource:
     """Read every `EVERY`-th frame of a labelled video into memory; all its vehicles are cars.
 
     `settings` has the roles of labels, and how much damage is tolerated.
@@ -124,18 +124,20 @@ def clip_source(video: Path, truth_file: Path, settings: Settings) -> Source:
             if number % EVERY == 0:
                 rows = truth.frame(number)
                 samples.append(_sample(frame.image, rows.boxes, ["car"] * len(rows), rows.ignored))
-    return Source(video.name, samples)
+    return NetSource(video.name, samples)
 
 
-def _sample(image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray) -> Sample:
+def _sample(
+    image: Image, boxes: Float64Array, names: Sequence[str], ignored: BoolArray
+) -> NetSample:
     classes = [CLASSES.index(name) if name in CLASSES else UNKNOWN for name in names]
     ignored = ignored | np.array([name not in (*CLASSES, "vehicle") for name in names], np.bool_)
-    return Sample(image, boxes.astype(np.float32), np.array(classes, np.int64), ignored).shrunk()
+    return NetSample(image, boxes.astype(np.float32), np.array(classes, np.int64), ignored).shrunk()
 
 
-def join(samples: Sequence[Sample], image: Image) -> Sample:
+def join(samples: Sequence[NetSample], image: Image) -> NetSample:
     """Return a sample that shows `image` with the boxes of all `samples`."""
-    return Sample(
+    return NetSample(
         image,
         np.concatenate([sample.boxes for sample in samples]),
         np.concatenate([sample.classes for sample in samples]),

@@ -21,7 +21,7 @@ from vdet.learn.net.assignment import Vehicles, assign
 from vdet.learn.net.augmentation import Drawing, SampleDrawer
 from vdet.learn.net.export import start_from
 from vdet.learn.net.losses import BOX_WEIGHT, CLASS_WEIGHT, giou, quality_focal_loss
-from vdet.learn.net.sources import CLASSES, UNKNOWN, Sample, Source, join
+from vdet.learn.net.sources import CLASSES, UNKNOWN, NetSample, NetSource, join
 from vdet.run.threads import prefetch
 
 CHECKPOINT = 500
@@ -29,9 +29,9 @@ CHECKPOINT = 500
 _SEED = 0
 """Seed of the weights and the pictures."""
 _SMALL = 0.35
-"""Share of the steps, the first ones, with pictures of half the size."""
+"""Share of the steps, at the start, with pictures of half the size."""
 _PLAIN = 0.12
-"""Share of the steps, the last ones, without mosaics."""
+"""Share of the steps, at the end, without mosaics."""
 _MOSAICS = 0.35
 """Share of pictures put together of four."""
 _WARM_UP = 200
@@ -45,7 +45,7 @@ _AVERAGE = 0.998
 _MAGNIFIED = 1.4  # scale of the small pictures, whose vehicles would be too small
 
 
-Progress = Callable[[int, float], object]
+StepProgress = Callable[[int, float], object]
 """Called after each step, with the number of steps so far and the loss."""
 
 
@@ -53,22 +53,16 @@ Progress = Callable[[int, float], object]
 class Batch:
     """Training pictures of one step.
 
-    `pictures` is uint8 `(B, H, W, 3)`, BGR. `ignored` are the ignore regions, as `Vehicles`.
+    `pictures` are the inputs of the network; `ignored` are the ignore regions, as `Vehicles`.
     """
 
     pictures: Tensor
     vehicles: Vehicles
     ignored: Vehicles
 
-    @property
-    def inputs(self) -> Tensor:
-        """The pictures as the network takes them."""
-        pictures = self.pictures.permute(0, 3, 1, 2).float()
-        return pictures.contiguous(memory_format=torch.channels_last)
-
 
 def _batches(
-    sources: Sequence[Source], settings: NetworkTrainingSettings, first: int
+    sources: Sequence[NetSource], settings: NetworkTrainingSettings, first: int
 ) -> Iterator[Batch]:
     """Yield the batches from step `first` on; each depends on the step and the seed alone."""
     drawer = SampleDrawer(sources, settings)
@@ -88,17 +82,17 @@ def _drawing(settings: NetworkTrainingSettings, step: int) -> Drawing:
 
 
 def train_network(
-    sources: Sequence[Source],
+    sources: Sequence[NetSource],
     settings: NetworkTrainingSettings,
     checkpoint: Path,
     *,
     base: Path | None = None,
-    progress: Progress = lambda *_: None,
+    progress: StepProgress = lambda *_: None,
 ) -> Network:
     """Train a network and return it with the moving average of its weights.
 
-    The same seed gives the same network on the same machine. A training that was stopped goes on
-    from its last checkpoint.
+    The same sources and settings give the same network on the same machine. A training that was
+    stopped resumes from its last checkpoint.
 
     Parameters
     ----------
@@ -136,7 +130,7 @@ def train_network(
     return run.averaged.eval()
 
 
-def _check(sources: Sequence[Source], settings: NetworkTrainingSettings) -> None:
+def _check(sources: Sequence[NetSource], settings: NetworkTrainingSettings) -> None:
     if not any((~sample.ignored).any() for each in sources for sample in each.samples):
         raise DataError("no picture has a vehicle; give labelled pictures")
     names = {each.name for each in sources}
@@ -182,7 +176,7 @@ class _Run:
 
     def start_from(self, path: Path, batch: Batch) -> None:
         """Take the first weights from an exported network. Raises `DataError`."""
-        start_from(self._network, path, batch.inputs)
+        start_from(self._network, path, batch.pictures)
         self.averaged.load_state_dict(self._network.state_dict())
 
     @property
@@ -224,7 +218,7 @@ class _Run:
             torch.save({"settings": self._learnt_with, "step": self.step, **parts}, temporary)
 
     def restore(self, path: Path) -> None:
-        """Go on from a file that `save` has written. Raises `DataError`."""
+        """Resume from a file that `save` has written. Raises `DataError`."""
         try:
             state: dict[str, Any] = torch.load(path, weights_only=True)
             same = state["settings"] == self._learnt_with
@@ -239,9 +233,9 @@ class _Run:
 
 
 def _loss(network: Network, batch: Batch) -> Tensor:
-    height, width = batch.pictures.shape[1:3]
+    height, width = batch.pictures.shape[2:]
     centers, strides = cell_centers(height, width)
-    raw = flatten(network(batch.inputs))
+    raw = flatten(network(batch.pictures))
     scores, boxes = raw[..., 0], decode(raw[..., 1:5], centers, strides)
     row, cell, iou = assign(scores, boxes, batch.vehicles, centers, strides)
     cells = batch.vehicles.picture[row], cell
@@ -266,7 +260,7 @@ def _inside(ignored: Vehicles, centers: Tensor) -> tuple[Tensor, Tensor]:
     return ignored.picture[row], cell
 
 
-def _to_batch(samples: Sequence[Sample]) -> Batch:
+def _to_batch(samples: Sequence[NetSample]) -> Batch:
     joined = join(samples, samples[0].image)
     counts = [len(sample.boxes) for sample in samples]
     picture = torch.repeat_interleave(torch.arange(len(samples)), torch.tensor(counts))
@@ -276,4 +270,4 @@ def _to_batch(samples: Sequence[Sample]) -> Batch:
         for rows in map(torch.from_numpy, (~joined.ignored, joined.ignored))
     )
     pictures = torch.from_numpy(np.stack([sample.image for sample in samples]))
-    return Batch(pictures, vehicles, ignored)
+    return Batch(pictures.permute(0, 3, 1, 2).float(), vehicles, ignored)
