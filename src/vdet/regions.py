@@ -87,5 +87,4 @@ def _read_mask(path: str, width: int, height: int) -> BoolArray:
             f"{width}×{height}; draw it over such a frame"
         ) from error
     grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-    scaled = cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST)
-    return np.asarray(scaled >= _WHITE)
+    return np.asarray(cv2.resize(grey, (width, height), interpolation=cv2.INTER_NEAREST) >= _WHITE)

@@ -80,21 +80,16 @@ class SearchRate:
             since = 0.0 if is_searched else since
             yield frame, is_searched
 
-    def _is_due(self, position: int, since: float, steps: Iterable[float]) -> bool:
+    def _is_due(self, position: int, since: float, steps: Sequence[float]) -> bool:
         if self.stride is not None:
             return position % self.stride == 0
         if self.searches is None or not position:
             return True
-        longest, usual = 1 / self.searches, _usual(steps)
+        ordered, quarter = sorted(steps), len(steps) // 4
+        usual = fmean(ordered[quarter : len(steps) - quarter])  # a few odd steps do not change it
+        longest = 1 / self.searches
         apart = max(1, int(longest / usual + _SLACK))  # frames
         return since >= min((apart - 0.5) * usual, longest)
-
-
-def _usual(steps: Iterable[float]) -> float:
-    """Return the mean of the middle half, which a few odd steps do not change."""
-    ordered = sorted(steps)
-    quarter = len(ordered) // 4
-    return fmean(ordered[quarter : len(ordered) - quarter])
 
 
 EVERY_FRAME = SearchRate()

@@ -1,7 +1,7 @@
 """The sinks `video` and `picture`: frames with what the section `draw` asks for drawn in."""
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -63,21 +63,21 @@ class Overlay:
         If lanes are searched for, it is a copy of the undistorted frame with the lane, and vehicles
         are drawn where they lie in it.
         """
-        shown, road = self._shown(result), result.road
-        surface: Surface = result.frame.picture.pixels.copy()
-        if road:
+        road = result.road
+        if road is None:
+            surface: Surface = result.frame.picture.pixels.copy()
+        else:
             surface = image = road.image.copy()
             if road.lane:
                 draw_lane(image, road.lane)
-        colors = {track.id: self._color(track) for track in shown}
-        shown = _placed(shown, result.road, surface)
-        self._draw_trails(surface, shown, colors, float(result.frame.time))
-        self._draw_vehicles(surface, shown, colors)
+        shown = _placed(self._shown(result), road, surface)
+        self._draw_trails(surface, shown, float(result.frame.time))
+        self._draw_vehicles(surface, shown)
         if self._draw.time and self._start is not None:
             time = time_text(result.frame.time - self._start)
             draw_label(surface, time, (0, surface.shape[0]), BLACK)
         if result.counter and self._settings.counts.drawn:
-            draw_running_counts(surface, result.counter, result.road)
+            draw_running_counts(surface, result.counter, road)
         return surface
 
     def _shown(self, result: FrameResult) -> list[Track]:
@@ -86,9 +86,7 @@ class Overlay:
         tracks = [track for track in result.tracks if not (hides and track.state == "lost")]
         return sorted(tracks, key=lambda track: track.box.y2)
 
-    def _draw_trails(
-        self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color], now: float
-    ) -> None:
+    def _draw_trails(self, surface: Surface, shown: Sequence[Track], now: float) -> None:
         longest = self._draw.trails
         if self._start is None or not longest:
             return
@@ -101,18 +99,16 @@ class Overlay:
         width = line_width(surface, self._draw.thickness)
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
-            draw_trail(surface, path, colors[track.id], width)
+            draw_trail(surface, path, self._color(track), width)
 
-    def _draw_vehicles(
-        self, surface: Surface, shown: Sequence[Track], colors: Mapping[int, Color]
-    ) -> None:
+    def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
         for track in shown if self._draw.boxes else ():
             dashed = self._draw.lost == "dashed" and track.state == "lost"
-            color, thickness = colors[track.id], self._draw.thickness
+            color, thickness = self._color(track), self._draw.thickness
             draw_box(surface, track.box, color, dashed=dashed, thickness=thickness)
         for track in shown:
             if text := label_text(track, self._label):
-                draw_label(surface, text, (track.box.x1, track.box.y1), colors[track.id])
+                draw_label(surface, text, (track.box.x1, track.box.y1), self._color(track))
 
     def _color(self, track: Track) -> Color:
         match self._draw.colors:

@@ -167,8 +167,7 @@ def _by_minute(counts: Sequence[MinuteCount]) -> dict[str, Counter[int]]:
     """Return the counts of each line or zone and direction by minute."""
     minutes: dict[str, Counter[int]] = {}
     for each in counts:
-        name = f"{each.name}: {each.direction}"
-        minutes.setdefault(name, Counter())[each.minute] = each.count
+        minutes.setdefault(f"{each.name}: {each.direction}", Counter())[each.minute] = each.count
     return minutes
 
 
