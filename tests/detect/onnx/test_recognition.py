@@ -190,7 +190,7 @@ def test_what_is_not_known_is_refused_with_what_was_seen(
 def test_a_file_that_is_no_network_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "net.onnx"
     path.write_bytes(b"no network")
-    with pytest.raises(ModelError, match=r"net\.onnx: cannot be loaded by onnxruntime"):
+    with pytest.raises(ModelError, match=r"net\.onnx: onnxruntime cannot load it"):
         NetworkModel(path, NetworkSettings())
     with pytest.raises(ModelError, match=r"none\.onnx"):
         NetworkModel(tmp_path / "none.onnx", NetworkSettings())

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from vdet.config.loading import find_config, load_settings
 from vdet.config.schema import NetworkSettings
-from vdet.detect.factory import load_detector, model_file
+from vdet.detect.factory import load_detector
 from vdet.detect.onnx.detector import SHIPPED
 from vdet.testing import check_detector
 
@@ -15,11 +14,6 @@ SIZES = [(1280, 720), (640, 480), (1242, 375), (270, 480), (64, 64)]
 
 def test_it_is_small() -> None:
     assert SHIPPED.stat().st_size <= MOST_BYTES
-
-
-def test_the_config_net_loads_it() -> None:
-    settings = load_settings(find_config("net"))
-    assert model_file(settings.detector) == SHIPPED
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)

@@ -69,12 +69,10 @@ class Session:
             self.inputs = self._session.get_inputs()
             self.output_names = [each.name for each in self._session.get_outputs()]
         except Exception as error:  # onnxruntime raises kinds of its own, and plain ones
-            message = f"cannot be loaded by onnxruntime: {_in_words(error)}"
-            raise ModelError(f"{path}: {message}") from error
+            raise ModelError(f"{path}: onnxruntime cannot load it: {_in_words(error)}") from error
         for each in self.inputs:
             if each.type not in TYPES:
-                message = f"its input {each.name} is a {each.type}; give a detector"
-                raise ModelError(f"{path}: {message}")
+                raise ModelError(f"{path}: its input {each.name:.40} is a {each.type}, no picture")
         if any(len(value) > _MAX_METADATA for value in self.metadata.values()):
             raise ModelError(f"{path}: has metadata of more than {_MAX_METADATA:,} characters")
         self._running: set[Any] = set()
