@@ -151,5 +151,4 @@ def _names(folder: Path, named: Path) -> list[str]:
     try:
         return [entry.name for entry in folder.iterdir()]
     except OSError as error:
-        what = "its folder" if folder != named else "it"
-        raise VideoError(f"{named}: {what} cannot be read: {error.strerror}") from error
+        raise VideoError(f"{named}: {folder} cannot be read: {error.strerror}") from error

@@ -234,8 +234,7 @@ class VideoWriter:
         self._info = info
         self._whole_sound = whole_sound
         self._period = 1 / info.rate
-        is_fine = info.time_base.denominator > _FINEST
-        self._time_base = Fraction(1, _FINEST) if is_fine else info.time_base
+        self._time_base = max(info.time_base, Fraction(1, _FINEST))
         self._origin: Fraction | None = None  # time of the first frame
         self._last = -1
         self._sound: SoundCopy | None = None
