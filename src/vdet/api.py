@@ -22,8 +22,7 @@ from os import PathLike
 from pathlib import Path
 
 from vdet.boxes import Box, Boxes
-from vdet.config.kinds import kind_of_model
-from vdet.config.loading import find_config
+from vdet.config.loading import find_config, kind_of_model
 from vdet.config.loading import load_settings as load_layers
 from vdet.config.schema import DetectorSettings, Settings, TrackerSettings
 from vdet.detect.factory import DetectorKind, DetectorObject, as_model, load_detector

@@ -128,10 +128,10 @@ def test_an_address_is_refused() -> None:
 @pytest.mark.parametrize(
     ("clip", "words"),
     [
-        ("none.mp4", "none.mp4: there is no such file"),
-        ("none/", "none: there is no such file"),
-        ("empty", "empty: there is no video in this folder"),
-        ("*.mkv", r"\*.mkv: no video matches this pattern"),
+        ("none.mp4", "none.mp4: no video is found there"),
+        ("none/", "none: no video is found there"),
+        ("empty", "empty: no video is found there"),
+        ("*.mkv", r"\*.mkv: no video is found there"),
     ],
 )
 def test_a_clip_that_gives_no_video_is_named(clip: str, words: str) -> None:

@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import pytest
 
-from running import write_drive
 from vdet.batch.manifest import Record, open_manifest
 from vdet.batch.plan import OutputSuffix, Plan, make_plan
 from vdet.batch.task import result_digest
@@ -148,20 +147,6 @@ class TestJobs:
         os.utime("clips/a.mp4", (0, 0))
         with pytest.raises(BatchError, match=r"^out/a\.csv: vdet did not write it, or it was"):
             self.tracks_alone()
-
-    def test_after_a_kill_the_outputs_beside_a_video_of_vdet_are_replaced(self) -> None:
-        """The kill may come after the outputs have appeared, and before their record."""
-        record("clips/b.MKV", "out/b.mp4")
-        write_drive(Path("out/a.mp4"), 2)
-        os.utime("out/a.mp4", (100, 100))
-        for seconds, replaced in ((99, True), (100, True), (200, False)):
-            Path("out/a.csv").write_bytes(b"result")
-            os.utime("out/a.csv", (seconds, seconds))
-            if replaced:
-                assert plan("clips/a.mp4", tracks=".csv", skip_existing=True).jobs[0].overwrite
-            else:
-                with pytest.raises(BatchError, match=r"^out/a\.csv: vdet did not write it"):
-                    plan("clips/a.mp4", tracks=".csv", skip_existing=True)
 
     def tracks_alone(self) -> Plan:
         return plan_outputs("clips/a.mp4", suffixes={"tracks": ".csv"}, skip_existing=True)

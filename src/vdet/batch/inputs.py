@@ -57,7 +57,7 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
     for clip in clips:
         sources = sorted(_videos_of(clip), key=lambda source: source.place)
         if not sources:
-            raise BatchError(f"{clip}: {_reason(clip)}")
+            raise BatchError(f"{clip}: no video is found there; check the name")
         for source in sources:
             found.setdefault((source.path.resolve(), source.place), source)
     return list(found.values())
@@ -131,12 +131,3 @@ def _is_video(path: Path) -> bool:
 
 def _refuse_unreadable(error: OSError) -> None:
     raise BatchError(f"{error.filename}: cannot be read: {error.strerror}; leave it out") from error
-
-
-def _reason(clip: Path) -> str:
-    """Say why a clip gives no video."""
-    if clip.is_dir():
-        return "there is no video in this folder or below it; name the files"
-    if glob.has_magic(str(clip)):
-        return "no video matches this pattern; check it"
-    return "there is no such file; check the name"

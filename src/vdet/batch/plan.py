@@ -12,13 +12,10 @@ from vdet.batch.manifest import Written, check_manifest, read_written
 from vdet.batch.task import result_digest
 from vdet.errors import BatchError, OutputError
 from vdet.files import check_output
-from vdet.media.writer import may_replace_video
 from vdet.run.sinks.protocol import BatchTotal, Output, check_sinks, output_state, sink_kind
 from vdet.run.video import VideoJob
 
 MANIFEST = "manifest.jsonl"
-
-_TOGETHER = 1_000_000_000  # nanoseconds between the last writes to the outputs of one video
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +104,7 @@ def make_plan(
     if digest is not None:
         written, replaces = read_written(manifest), manifest.exists()
         skipped = [job for job in jobs if _is_done(job, digest, written)]
-        jobs = [_replacing_ours(job, written, manifest) for job in jobs if job not in skipped]
+        jobs = [_replacing_ours(job, written) for job in jobs if job not in skipped]
     for job in jobs:
         try:
             check_sinks(job.outputs, overwrite=job.overwrite, makes_folder=True)
@@ -163,29 +160,17 @@ def _is_done(job: VideoJob, digest: str, written: Mapping[str, Written]) -> bool
     return True
 
 
-def _replacing_ours(job: VideoJob, written: Mapping[str, Written], manifest: Path) -> VideoJob:
+def _replacing_ours(job: VideoJob, written: Mapping[str, Written]) -> VideoJob:
     """Return a job that replaces its outputs, where vdet wrote all of them that are there.
-
-    They have the sizes and times that the manifest says; or the batch was killed after it had
-    written them, and before the manifest: then there is a video of vdet, and none is newer.
 
     Raises
     ------
     BatchError
-        One is there that vdet did not write, or that was changed since.
+        One is there that has another size or time than the manifest says, and is not empty.
     """
-    unknown = {}
     for output in job.outputs:
         state = output_state(output)
         if state and state[0] and written.get(os.path.realpath(output.path), ())[1:] != state:
-            unknown[output] = state[1]
-    videos = [
-        changed
-        for output, changed in unknown.items()
-        if output.sink == "video" and manifest.exists() and may_replace_video(output.path)
-    ]
-    for output, changed in unknown.items():
-        if not videos or changed > max(videos) + _TOGETHER:
             raise BatchError(
                 f"{output.path}: vdet did not write it, or it was changed since; move it away, or "
                 "give --overwrite in place of --skip-existing"

@@ -181,8 +181,7 @@ class SettingsChoice:
         The model file decides which detector runs; without one it is `detector`, or the default
         where that is None. Raises `ConfigError`.
         """
-        from vdet.config.kinds import kind_of_model
-        from vdet.config.loading import find_config, load_settings
+        from vdet.config.loading import find_config, kind_of_model, load_settings
 
         if self.model_path is not None:
             detector = kind_of_model(self.model_path) or detector

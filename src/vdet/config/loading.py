@@ -10,6 +10,7 @@ from typing import Any, get_args
 from pydantic import ValidationError, create_model
 from pydantic_core import ErrorDetails
 
+from vdet.config.detector import NetworkSettings
 from vdet.config.document import (
     Document,
     Key,
@@ -18,9 +19,11 @@ from vdet.config.document import (
     parse_assignment,
     read_document,
 )
-from vdet.config.kinds import GROUPS, kind_names, kind_of, kind_settings
 from vdet.config.schema import Section, Settings
+from vdet.config.svm import SvmSettings
+from vdet.config.tracker import MotionTrackerSettings, RulesTrackerSettings
 from vdet.errors import ConfigError
+from vdet.plugins import DETECTORS, TRACKERS, load_plugin, plugin_names
 
 _PACKAGE = Path(__file__).parents[1]
 # In a wheel the configs lie in the package; in a work tree beside `src`.
@@ -30,6 +33,54 @@ _ALIASES = {"net": "default"}
 """Other names of shipped configs."""
 
 _YAML_SUFFIXES = (".yaml", ".yml")
+
+
+GROUPS = {"detector": DETECTORS, "tracker": TRACKERS}
+"""The sections with kinds, and the groups of entry points in which other packages register theirs.
+
+The key `kind` of such a section names its kind.
+"""
+
+_BUILT_IN: dict[str, dict[str, type[Section]]] = {
+    "detector": {"svm": SvmSettings, "net": NetworkSettings},
+    "tracker": {"motion": MotionTrackerSettings, "rules": RulesTrackerSettings},
+}
+
+
+def kind_names(section: str) -> list[str]:
+    """Return the names of all kinds of a section, those of vdet first."""
+    return plugin_names(GROUPS[section])
+
+
+def kind_settings(section: str, name: str) -> type[Section]:
+    """Return the class of the settings of a kind.
+
+    Raises
+    ------
+    ConfigError
+        There is no such kind, it cannot be loaded, or it has no settings of this name.
+    """
+    if own := _BUILT_IN[section].get(name):
+        return own
+    settings = getattr(load_plugin(GROUPS[section], name), "settings", None)
+    if isinstance(settings, type) and issubclass(settings, Section) and kind_of(settings) == name:
+        return settings
+    raise ConfigError(
+        f'{name}: its settings are no section with kind = "{name}"; repair or reinstall that '
+        "package"
+    )
+
+
+def kind_of(settings: type[Section]) -> object:
+    """Return the kind that a class of settings is for; None for one without kinds."""
+    field = settings.model_fields.get("kind")
+    return field and field.default
+
+
+def kind_of_model(path: Path) -> str | None:
+    """Return the kind of detector that a model file is for; None where its ending does not say."""
+    kinds = {SvmSettings.model_suffix: "svm", NetworkSettings.model_suffix: "net"}
+    return kinds.get(path.suffix.lower())
 
 
 def find_config(name: str) -> Path:

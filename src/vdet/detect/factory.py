@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vdet.boxes import Boxes
-from vdet.config.kinds import kind_of_model
+from vdet.config.loading import kind_of_model
 from vdet.config.schema import DetectorSettings
 from vdet.detect.protocol import DetectorModel, VideoDetector
 from vdet.errors import ConfigError
