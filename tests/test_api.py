@@ -310,3 +310,13 @@ def test_follow_may_be_left_while_a_frame_is_read(
     results.close()
     goes_on.set()
     assert closed.wait(10), "the file stays open"
+
+
+@pytest.mark.parametrize("time", [0.5, 0.4, float("nan"), float("inf")])
+def test_a_tracker_refuses_times_that_do_not_increase(time: float) -> None:
+    tracker = vdet.Tracker(640, 360)
+    tracker.update(vdet.Boxes([], []), 0.5)
+    with pytest.raises(
+        ValueError, match=r"^time: .* s is not after the 0\.5 s of"
+    ):
+        tracker.update(vdet.Boxes([], []), time)

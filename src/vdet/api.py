@@ -15,6 +15,7 @@ A detector or a tracker of your own is an object, which is used as it is:
 A name is that of a kind of detector or tracker, also of another package.
 """
 
+import math
 import os
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from fractions import Fraction
@@ -128,6 +129,7 @@ class Tracker:
 
     def __init__(self, width: int, height: int, settings: Settings | None = None) -> None:
         self._tracker = make_tracker(settings or Settings(), width, height)
+        self._time = -math.inf
 
     def update(
         self, detections: Boxes, time: float, image: Image | Picture | None = None
@@ -142,8 +144,17 @@ class Tracker:
             When the frame is shown, seconds; it increases from frame to frame.
         image
             The frame; only the tracker `rules` needs it.
+
+        Raises
+        ------
+        ValueError
+            The time is not a finite number, or does not increase.
         """
-        return self._tracker.update(detections, time, _picture(image))
+        if not self._time < time < math.inf:
+            raise ValueError(f"time: {time} s is not after the {self._time} s of the frame before")
+        tracks = self._tracker.update(detections, time, _picture(image))
+        self._time = time
+        return tracks
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles at another time, for a frame in which no detector looked for them.
