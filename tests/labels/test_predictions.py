@@ -64,7 +64,7 @@ def test_an_empty_file_is_a_video_without_boxes(tmp_path: Path, suffix: str, con
 
 
 def test_times_may_be_those_of_a_wall_clock(tmp_path: Path) -> None:
-    rows = "".join(f"{n},{1.7e9 + n / 25:.6f},1,1,1,9,9,0\n" for n in range(3))
+    rows = "".join(f"{n},{1.7e9 + n / 25:.6f},1,1,1,9,9,seen\n" for n in range(3))
     assert read(tmp_path, "csv", HEADER + rows).rate == pytest.approx(25, abs=1e-3)
 
 
@@ -101,7 +101,7 @@ def record(**changes: object) -> str:
             ":5: frame 4 is at 0.11 s; times must",
         ),
         ("jsonl", JSONL + record(time=1e12), ":5: frame 4 is at 1e+12 s; times must"),
-        ("csv", CSV + "1,0.09,2,1,1,9,9,0\n", ":3: frame 2 is at 0.08 s; times must"),
+        ("csv", CSV + "1,0.09,2,1,1,9,9,seen\n", ":3: frame 2 is at 0.08 s; times must"),
         ("jsonl", JSONL + record(tracks=[{}]), ":5: tracks.0.id: Field required"),
         ("jsonl", JSONL + record(tracks=None), ":5: tracks: Input should be a valid"),
     ],
