@@ -79,22 +79,21 @@ class Drive:
         camera = self.scene.camera
         nearest = camera.focal * camera.above_ground / (0.97 * camera.height - camera.horizon)
         view = lane_view(camera, near=max(6.0, nearest), far=42.0)
-        settings = view
-        return RoadFinder(LaneRequest(), settings, camera.width, camera.height)
+        return RoadFinder(LaneRequest(), view, camera.width, camera.height)
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A vehicle in a frame, and what was told of it."""
+    """A vehicle in a frame, and the track that was reported."""
 
     truth: TruePlace
-    told: Track
+    reported: Track
 
     @property
     def error(self) -> float:
-        """Of the distance, share of it."""
-        assert self.told.distance is not None
-        return self.told.distance / self.truth.distance - 1
+        """Relative error of the distance."""
+        assert self.reported.distance is not None
+        return self.reported.distance / self.truth.distance - 1
 
 
 Step = Callable[[Drive], Iterator[Sample]]
@@ -210,7 +209,7 @@ def _matched(scene: Scene, index: int, tracks: Sequence[Track]) -> Iterator[Samp
 
 
 def _right(samples: Sequence[Sample]) -> float:
-    known = [s for s in samples if s.told.distance is not None and s.truth.distance <= MOST]
+    known = [s for s in samples if s.reported.distance is not None and s.truth.distance <= MOST]
     return float(np.mean([abs(sample.error) <= RIGHT for sample in known])) if known else 1.0
 
 
@@ -220,10 +219,10 @@ def print_table(name: str, samples: Sequence[Sample]) -> None:
     print("|---|---|---|---|---|---|---|---|")
     for low, high in (*pairwise(EDGES), (0, MOST)):
         inside = [sample for sample in samples if low < sample.truth.distance <= high]
-        known = [sample for sample in inside if sample.told.distance is not None]
+        known = [sample for sample in inside if sample.reported.distance is not None]
         if known:
             errors = np.array([sample.error for sample in known])
-            lanes = np.mean([sample.told.lane == sample.truth.lane for sample in known])
+            lanes = np.mean([sample.reported.lane == sample.truth.lane for sample in known])
             print(
                 f"| {low}–{high} | {len(inside)} | {1 - len(known) / len(inside):.0%} | "
                 f"{errors.mean():+.1%} | {np.median(abs(errors)):.1%} | "

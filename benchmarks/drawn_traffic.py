@@ -9,7 +9,7 @@ import numpy as np
 from vdet.config.schema import LaneSettings
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.random_scenes import LANE_WIDTH, empty_road, random_body, random_paint
-from vdet.synthetic.scene import Light, Line, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import LaneLine, Light, Scene, SceneVehicle, Waypoint
 from vdet.synthetic.vehicle import STANDS
 
 
@@ -92,7 +92,7 @@ def true_places(scene: Scene, index: int) -> tuple[TruePlace, ...]:
     return tuple(sorted(places, key=lambda place: place.id))
 
 
-def _lane(lateral: float, lines: Iterable[Line]) -> int:
+def _lane(lateral: float, lines: Iterable[LaneLine]) -> int:
     """Count the lines between the camera and a point to its side; to the left they are negative."""
     to_right = sum(0 < line.lateral < lateral for line in lines)
     return to_right or -sum(lateral < line.lateral < 0 for line in lines)

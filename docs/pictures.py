@@ -42,9 +42,8 @@ def motorway() -> Scene:
         SceneVehicle(id=number, path=_steady(ahead, lateral), color=color, body=body)
         for number, (body, ahead, lateral, color) in enumerate(_VEHICLES, start=1)
     )
-    plants = tuple(each for each in road.roadside if each.kind != "box")
     light = replace(road.light, gain=1.1, noise=1.0, sun=0.5)
-    return replace(road, vehicles=vehicles, roadside=plants, light=light, frames=22)
+    return replace(road, vehicles=vehicles, light=light, frames=22)
 
 
 def _steady(ahead: float, lateral: float) -> tuple[Waypoint, Waypoint]:

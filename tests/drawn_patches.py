@@ -84,7 +84,7 @@ def _vehicle_samples(rng: np.random.Generator) -> Iterator[_Sample]:
     for image, vehicles, _ in _labelled_frames(rng):
         for vehicle in vehicles * 2:
             window = _around(vehicle.box, rng)
-            if vehicle.visibility > 0.9 and _fits(window, image):
+            if vehicle.hidden < 0.1 and _fits(window, image):
                 group = "far" if window.width < _FAR else "near"
                 yield group, _cut(image, window, rng)
 

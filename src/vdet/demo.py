@@ -1,7 +1,7 @@
 """The demo: a drawn road, both detectors on it, and what they find against the truth."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,7 +11,8 @@ from vdet.config.loading import load_settings
 from vdet.config.schema import Settings
 from vdet.detect.factory import load_detector
 from vdet.detect.svm.model import save_model
-from vdet.evaluate.scores import Scores, score
+from vdet.evaluate.output import table
+from vdet.evaluate.scores import score
 from vdet.files import any_file, check_output, make_folder, staged
 from vdet.labels.reading import read_predictions, read_truth
 from vdet.learn.svm.choosing import Most
@@ -31,7 +32,7 @@ ROADS = 6
 """Drawn roads that the linear model learns from."""
 
 SEED = 5
-"""Of what is drawn where no other seed is given."""
+"""Default seed of what is drawn."""
 
 ROAD, TRUTH, LINE = "road.mp4", "truth.txt", "lines.yaml"
 """The drawn video, its true boxes, and the line at which vehicles are counted."""
@@ -48,35 +49,6 @@ drawn: true
 _BY_NETWORK = {"video": "found.mp4", "tracks": "found.csv", "counts": "counts.csv", "page": "page"}
 _MOST = Most(per_vehicle=2, false_alarms=6, parts=3)  # drawn vehicles are alike: few suffice
 _BY_MODEL = {"tracks": "model.csv", "stages": "stages"}
-
-
-@dataclass(frozen=True, slots=True)
-class DemoRow:
-    """What a detector found: its scores, and the number of vehicles that it counted."""
-
-    detector: str
-    scores: Scores
-    counted: int
-
-
-@dataclass(frozen=True, slots=True)
-class DemoResult:
-    """What the demo measured; `crossings` is the true number of vehicles at the line."""
-
-    rows: tuple[DemoRow, ...]
-    crossings: int
-
-    def lines(self) -> Iterator[str]:
-        """Yield the result as lines of text."""
-        width = max(len(row.detector) for row in self.rows)
-        yield f"{'':{width}}  precision  recall    F1  IDF1  id switches  counted at the line"
-        for row in self.rows:
-            scores = row.scores
-            yield (
-                f"{row.detector:{width}}  {scores.precision:9.2f}  {scores.recall:6.2f}  "
-                f"{scores.f1:.2f}  {scores.idf1:.2f}  {scores.id_switches:11d}  "
-                f"{row.counted} of {self.crossings}"
-            )
 
 
 def check_demo(folder: Path, *, overwrite: bool) -> None:
@@ -103,7 +75,7 @@ def run_demo(
     overwrite: bool = False,
     announce: Callable[[str], object] = lambda _: None,
     steps: Steps = no_steps,
-) -> DemoResult:
+) -> list[str]:
     """Draw a road, find its vehicles with both detectors, and compare them with the truth.
 
     The linear model is first trained on patches that are mined from other drawn roads.
@@ -111,13 +83,18 @@ def run_demo(
     Parameters
     ----------
     seed
-        Of everything that is drawn; the same seed gives the same data.
+        Seed of everything that is drawn; the same seed gives the same data.
     overwrite
         Replace the files of an earlier demo.
     announce
-        Called with a line before each step.
+        Called with a line of text before each part.
     steps
         Called at the start of each longer step.
+
+    Returns
+    -------
+    The comparison as lines of text: the scores of each detector, and how many vehicles it counted
+    at the line, of how many that crossed it.
     """
     check_demo(folder, overwrite=overwrite)
     scene = demo_scene(seed)
@@ -134,13 +111,19 @@ def run_demo(
     def count(tracks: Path) -> int:
         return len(count_file(tracks, settings.counts, size, rate).events)
 
-    def find(name: str, outputs: dict[str, str], settings: Settings, model: Path | None) -> DemoRow:
-        job = _job(folder, outputs, overwrite=overwrite)
-        job = replace(job, at=scene.frames / scene.rate / 2)
+    crossings = count(folder / TRUTH)
+
+    def find(
+        name: str, outputs: dict[str, str], settings: Settings, model: Path | None
+    ) -> list[str]:
+        job = replace(_job(folder, outputs, overwrite=overwrite), at=scene.frames / scene.rate / 2)
         detector = load_detector(settings.detector, model)
         run_video(job, detector, settings, progress=partial(steps, "frames"))
         tracks = folder / outputs["tracks"]
-        return DemoRow(name, score(read_predictions(tracks), truth, rate=rate), count(tracks))
+        found = score(read_predictions(tracks), truth, rate=rate)
+        ratios = (found.precision, found.recall, found.f1, found.idf1)
+        counted = f"{count(tracks)} of {crossings}"
+        return [name, *(f"{ratio:.2f}" for ratio in ratios), str(found.id_switches), counted]
 
     announce("2/4 finding the vehicles with the network …")
     by_network = find("network", _BY_NETWORK, settings, None)
@@ -158,7 +141,10 @@ def run_demo(
     metrics.write(folder / METRICS, overwrite=overwrite)
     announce("4/4 finding the vehicles with the linear model …")
     by_model = find(f"linear model {MODEL}", _BY_MODEL, linear, folder / MODEL)
-    return DemoResult((by_network, by_model), count(folder / TRUTH))
+    return table(
+        ("", "precision", "recall", "F1", "IDF1", "id switches", "counted at the line"),
+        [by_network, by_model],
+    )
 
 
 def _roads_to_learn(folder: Path) -> tuple[VideoSource, ...]:

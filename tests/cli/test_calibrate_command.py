@@ -8,7 +8,7 @@ import pytest
 from conftest import Run
 from lanes.chessboards import photographs
 from vdet.lanes.camera import CalibratedCamera, load_camera
-from vdet.media.images import read_image, write_image
+from vdet.media.images import write_image
 
 
 @pytest.fixture(scope="session")
@@ -36,26 +36,8 @@ def test_makes_a_camera_of_a_folder_and_names_what_it_skipped(
     assert "6 of 7 photographs used" in result.out
 
 
-def test_previews_show_each_photograph_beside_its_undistorted_form(
-    run: Run, boards: Path, tmp_path: Path
-) -> None:
-    preview = tmp_path / "preview"
-    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml", "--preview", preview)
-    assert result.code == 0, result.err
-    assert sorted(p.name for p in preview.iterdir()) == [f"board{n}.jpg" for n in range(6)]
-    assert read_image(preview / "board0.jpg").shape == (480, 1280, 3)
-
-
 @pytest.mark.parametrize("pattern", ["9", "9x", "9x6x3", "2x6", "ninexsix", "-9x6"])
 def test_a_wrong_pattern_is_wrong_usage(run: Run, tmp_path: Path, pattern: str) -> None:
     result = run("calibrate", tmp_path, "-o", tmp_path / "c.yaml", f"--pattern={pattern}")
     assert result.code == 2
     assert "--pattern" in result.err
-
-
-def test_earlier_previews_are_not_lost(run: Run, boards: Path, tmp_path: Path) -> None:
-    (tmp_path / "board3.jpg").write_text("precious")
-    result = run("calibrate", boards, "-o", tmp_path / "camera.yaml", "--preview", tmp_path)
-    assert result.code == 1
-    assert "board3.jpg: is there already" in result.err
-    assert not (tmp_path / "camera.yaml").exists()

@@ -115,6 +115,12 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
         (["t.csv", "--lines", "l.yaml", "--counts", "t.csv"], 1, "is the input itself"),
         (["t.txt", "--lines", "l.yaml"], 1, "has no times; give the frames per second"),
         (["none.csv", "--lines", "l.yaml"], 1, "none.csv"),
+        (
+            ["t.csv", "--lines", "short.yaml"],
+            1,
+            "short.yaml:1:1: counts: gate: is shorter than 1 %",
+        ),
+        (["back.csv", "--lines", "l.yaml"], 1, "its time is 0.04 s, after 0.08 s; give times"),
     ],
 )
 def test_mistakes_are_refused(
@@ -129,10 +135,14 @@ def test_mistakes_are_refused(
     write_tracks(Path("t.csv"))
     Path("t.txt").write_text("1,1,1,1,40,40,1,-1,-1,-1\n")
     Path("l.yaml").write_text(LINES)
+    Path("short.yaml").write_text("lines: [{name: gate, start: [1, 0.5], end: [0.999, 0.5]}]")
+    columns = "frame,time,id,x,y,width,height"
+    Path("back.csv").write_text(f"{columns}\n0,0.08,1,1,1,40,40\n1,0.04,1,1,1,40,40\n")
+    before = sorted(tmp_path.iterdir())
     result = run("count", *arguments)
     assert result.code == code
     assert message in result.err
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["l.yaml", "t.csv", "t.txt"]
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_each_video_of_a_batch_has_its_counts_and_all_have_a_total(

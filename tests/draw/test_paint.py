@@ -18,7 +18,6 @@ from vdet.draw.paint import (
     blend,
     draw_arrow,
     draw_lines,
-    draw_trail,
     fill,
     write_text,
 )
@@ -71,7 +70,7 @@ STROKES: dict[str, Draw] = {
     ),
     "box": lambda surface: draw_box(surface, Box.sized(51, 61, 101, 83), RED, "#1 0.9"),
     "label": lambda surface: draw_label(surface, "0:01:02.500", (0, HEIGHT), RED),
-    "trail": lambda surface: draw_trail(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
+    "lines": lambda surface: draw_lines(surface, [(20 + 5 * n, 60 + n) for n in range(40)], RED, 6),
     "zone": lambda surface: draw_zone(surface, [(-20, 20), (150, 30), (90, 120)], "z: 4"),
     "counts": lambda surface: draw_line(surface, (20, 200), (300, 180), ("a in: 3", "a out: 2")),
 }
@@ -143,34 +142,7 @@ class TestFill:
             np.testing.assert_array_equal(layer, np.where(halved(inside), 128, old))
 
 
-STRAIGHT = [(20.0 + 5 * n, 60.0) for n in range(40)]
-
-
-def trail(points: list[tuple[float, float]], width: int = 6) -> Image:
+def test_points_of_a_line_may_lie_far_outside_the_picture() -> None:
     image = np.full((120, 240, 3), 255, np.uint8)
-    draw_trail(image, points, BLACK, width)
-    return image
-
-
-def heights(image: Image) -> list[int]:
-    """Return how many rows are dark in each column."""
-    dark: list[int] = (image.max(axis=2) < 128).sum(axis=0).tolist()
-    return dark
-
-
-def test_a_trail_goes_through_its_points_without_a_gap() -> None:
-    rows = heights(trail(STRAIGHT))
-    assert all(rows[20:215])
-    assert not any(rows[:15] + rows[222:])
-
-
-def test_points_that_tremble_give_a_smooth_line() -> None:
-    shaken = [(x, y + 8 * (-1) ** number) for number, (x, y) in enumerate(STRAIGHT)]
-    middle = trail(shaken, width=2)[:, 60:180].max(axis=2) < 128
-    rows = np.nonzero(middle)[0]
-    assert max(abs(rows - 60)) <= 3
-
-
-def test_points_may_lie_far_outside_the_picture() -> None:
-    image = trail([(-1e9, 60.0), (120.0, 60.0), (1e9, 60.0)])
-    assert all(heights(image)[130:230])
+    draw_lines(image, [(-1e9, 60.0), (120.0, 60.0), (1e9, 60.0)], BLACK, 6)
+    assert (image.min(axis=(0, 2)) == 0).all()

@@ -10,7 +10,7 @@ from vdet.lanes.camera import CalibratedCamera
 from vdet.lanes.road import Lane, LaneRequest, RoadFinder
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import Renderer
-from vdet.synthetic.scene import Carriageway, Light, Line, Scene
+from vdet.synthetic.scene import Carriageway, LaneLine, Light, Scene
 
 YELLOW = (60, 180, 225)
 NEAR, FAR = 6.0, 42.0
@@ -33,7 +33,7 @@ def make_road() -> Callable[..., Scene]:
     def make(
         *,
         curvature: float = 0.0,
-        lines: tuple[Line, ...] = (Line(-1.85, YELLOW), Line(1.85, dash=3.0)),
+        lines: tuple[LaneLine, ...] = (LaneLine(-1.85, YELLOW), LaneLine(1.85, dash=3.0)),
         asphalt: tuple[int, int, int] = (88, 84, 82),
         light: Light | None = None,
         size: tuple[int, int] = (1280, 720),

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vdet.boxes import Box
-from vdet.errors import ConfigError, OutputError
+from vdet.errors import ConfigError
 from vdet.lanes.camera import CalibratedCamera, Undistorter, load_camera, save_camera
 
 MATRIX = ((560.0, 0.0, 322.0), (0.0, 558.0, 236.0), (0.0, 0.0, 1.0))
@@ -159,8 +159,6 @@ def test_all_mistakes_are_named_at_once(path: Path) -> None:
     assert "1:1: matrix: is missing; `vdet calibrate`" in refusal(path, {"width": 640})
 
 
-def test_files_that_cannot_be_read_or_written_are_named(path: Path) -> None:
+def test_a_file_that_cannot_be_read_is_named(path: Path) -> None:
     with pytest.raises(ConfigError, match=r"camera\.yaml: cannot be read"):
         load_camera(path)
-    with pytest.raises(OutputError, match="cannot be written"):
-        save_camera(CAMERA, path.parent / "none" / "camera.yaml")

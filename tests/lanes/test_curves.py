@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 from vdet.config.schema import LaneSettings
 from vdet.lanes.curves import (
+    Equations,
     LaneCurves,
-    NormalEquations,
+    add_earlier,
     fit_near,
     fit_new,
     normal_equations,
@@ -35,7 +36,7 @@ any_lane = st.builds(
 )
 
 
-def equations_of(curves: LaneCurves, right: slice = ALL, noise: float = 0.0) -> NormalEquations:
+def equations_of(curves: LaneCurves, right: slice = ALL, noise: float = 0.0) -> Equations:
     left_x, right_x = curves.at(Z) + np.random.default_rng(0).normal(0, noise, (2, len(Z)))
     return normal_equations(LinePaint(Z, left_x), LinePaint(Z[right], right_x[right]), curves)
 
@@ -63,7 +64,7 @@ def test_the_fit_to_the_paint_of_a_lane_is_that_lane(curves: LaneCurves) -> None
 
 def test_the_pitch_of_earlier_frames_is_ignored() -> None:
     nodding, level = (LaneCurves(0, 0, -1.85, 1.85, pitch) for pitch in (0.005, 0.0))
-    both = equations_of(level).plus_earlier(equations_of(nodding), 0.9)
+    both = add_earlier(equations_of(level), equations_of(nodding), 0.9)
     assert solve(both, 3.7).pitch == pytest.approx(0, abs=2e-4)
 
 

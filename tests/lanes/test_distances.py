@@ -31,14 +31,14 @@ class Placed:
     """A vehicle up to 40 m ahead that is whole in the frame, and where it was found."""
 
     error: float | None
-    """Of the distance, share of it."""
+    """Relative error of the distance."""
     lane_is_right: bool
 
 
 def scene_of(camera: PinholeCamera, radius: float, lane: int) -> Scene:
     """Draw a near and a far car in each of three lanes; they drive off."""
     camera = replace(camera, curvature=1 / radius)
-    scene = traffic_scene(camera, lane=lane, lanes=3, frames=FRAMES, seed=lane + 5)
+    scene = traffic_scene(camera, lane=lane, lanes=3, frames=FRAMES, seed=8)
     return replace(scene, vehicles=tuple(driving_off(vehicle) for vehicle in scene.vehicles))
 
 

@@ -14,7 +14,7 @@ from vdet.lanes.road import CARRY, Lane, LaneRequest, RoadFinder
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import render
-from vdet.synthetic.scene import Light, Line, Scene, Shadow
+from vdet.synthetic.scene import LaneLine, Light, Scene, Shadow
 
 MakeRoad = Callable[..., Scene]
 Drive = Callable[..., list[Lane | None]]
@@ -62,7 +62,7 @@ def test_finds_straight_roads_and_bends_to_both_sides(
 
 LIGHT = Light(noise=3.0, shadows=SHADOWS)
 DASHED, WORN = (
-    (Line(-1.85, dash=dash, strength=strength), Line(1.85, dash=3.0, strength=strength))
+    (LaneLine(-1.85, dash=dash, strength=strength), LaneLine(1.85, dash=3.0, strength=strength))
     for dash, strength in ((3.0, 1.0), (None, 0.3))
 )
 
@@ -91,7 +91,7 @@ def test_finds_lanes_of_all_kinds(
 def test_no_lane_is_found_if_one_line_was_never_seen(
     make_road: MakeRoad, drive: Drive, missing: float
 ) -> None:
-    scene = make_road(lines=(Line(-missing),))
+    scene = make_road(lines=(LaneLine(-missing),))
     assert drive(scene) == [None] * scene.frames
 
 
@@ -100,7 +100,8 @@ def test_a_line_that_ends_is_kept_for_a_while_and_then_the_lane_is_lost_until_it
     make_road: MakeRoad, drive: Drive, missing: float
 ) -> None:
     whole = make_road(curvature=1 / 900, size=(640, 360))
-    half = make_road(curvature=1 / 900, size=(640, 360), lines=(Line(-missing),), frames=CARRY + 3)
+    one = (LaneLine(-missing),)
+    half = make_road(curvature=1 / 900, size=(640, 360), lines=one, frames=CARRY + 3)
     lanes = drive(whole, half, whole)
     seen = whole.frames + half.frames
     check(lanes[seen - 4], whole.camera)
@@ -112,7 +113,7 @@ def test_a_lane_change_ends_in_the_other_lane(make_road: MakeRoad, drive: Drive)
     moves = np.arange(0, 3.75, 0.15)  # metres a frame; a quick change at ten frames a second
     scenes = []
     for moved in moves.tolist():
-        lines = tuple(Line(lateral - moved) for lateral in (-1.85, 1.85, 5.55))
+        lines = tuple(LaneLine(lateral - moved) for lateral in (-1.85, 1.85, 5.55))
         scenes.append(make_road(lines=lines, size=(640, 360), frames=1))
     offsets = np.array([lane.offset for lane in drive(*scenes) if lane])
     lag = np.mod(moves - offsets + 1.85, 3.7) - 1.85

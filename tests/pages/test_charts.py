@@ -37,17 +37,25 @@ def test_axes_have_round_numbers() -> None:
 
 
 def test_a_level_has_a_bar_for_each_step_in_which_something_is_shown() -> None:
-    plot = level_plot([0, 2, 4], 0, 9, "levels")
-    assert [(bar.left, bar.low, bar.high) for bar in plot.bars] == [(3, 0, 2), (6, 0, 4)]
-    assert plot.y.high == 4
+    plot = level_plot([(40, 160), (80, 160), (90, 99)], 0, 160, "levels")
+    heights = {round(bar.left): bar.high for bar in plot.bars}
+    assert [heights.get(second, 0) for second in (39, 40, 80, 90, 99)] == [0, 1, 2, 3, 2]
+    assert plot.y.high == 3
+    assert level_plot([], 0, 0, "nothing").bars == []
 
 
 def test_the_series_of_a_minute_are_stacked_and_named_with_their_sums() -> None:
     series = {"in": Counter({1: 3, 2: 1}), "out": Counter({2: 2})}
-    plot = minute_plot(series, range(1, 4), "counts")
+    plot = minute_plot(series, time_axis(60, 240), "counts")
     assert [(bar.low, bar.high) for bar in plot.bars] == [(0, 3), (0, 1), (1, 3)]
     assert plot.bars[0].color == plot.bars[1].color != plot.bars[2].color
     assert [name for name, _ in plot.legend] == ["in: 4", "out: 2"]
+
+
+def test_a_jump_of_the_clock_costs_nothing() -> None:
+    late = 10**12  # minutes
+    plot = minute_plot({"in": Counter({1: 3, late: 1})}, time_axis(0, 60 * late), "counts")
+    assert len(plot.bars) == 2
 
 
 @given(

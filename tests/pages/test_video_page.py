@@ -12,14 +12,13 @@ import pytest
 
 from pages.html import Elements
 from run.red_runs import video_info
-from traffic.passing import HEIGHT, WIDTH, frame, passing, track
+from traffic.passing import HEIGHT, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
 from vdet.pages.render import jpeg_uri, link_to
 from vdet.pages.video import Player, VideoPage, read_facts, write_index
 from vdet.track.track import FrameTracks
-from vdet.traffic.overview import Levels
-from vdet.traffic.records import VehicleRecord, summarize
+from vdet.traffic.records import VehicleRecord
 
 NASTY = "<img src=x onerror=alert(1)>&lt;\"'#?%41 javascript:.mp4"
 STILL = np.full((HEIGHT, WIDTH, 3), 90, np.uint8)
@@ -38,9 +37,6 @@ TWO = records(*passing(50), frame(50, TRUCK), frame(51, TRUCK))
 def page(
     *, source: Path = Path("clips/a.mp4"), player: Player | None = VIDEO, end: float = 2.08
 ) -> VideoPage:
-    levels = Levels()
-    for each in passing(50):
-        levels.add(each)
     return VideoPage(
         video=replace(video_info(WIDTH, HEIGHT), path=source),
         frames=52,
@@ -48,7 +44,7 @@ def page(
         end=end,
         records=TWO,
         thumbnails={1: (1.25, jpeg_uri(STILL))},
-        levels=levels,
+        poster=STILL,
         still=STILL,
         player=player,
         settings="output:\n  crf: 25\n",
@@ -73,8 +69,15 @@ class TestVideoPage:
     def test_it_says_what_was_found(self) -> None:
         text = seen(page()).text
         for words in ("Vehicles in a.mp4", "52 frames", "320 × 240 pixels", "2vehicles", "1truck",
-                      "most at once", "crf: 25", "Python 3"):  # fmt: skip
+                      "most at once", "crf: 25"):  # fmt: skip
             assert words in text
+
+    def test_the_folders_of_the_clip_are_nobodys_business(self) -> None:
+        assert "clips" not in page(player=None).html()
+
+    def test_the_player_shows_a_picture_until_it_plays(self) -> None:
+        (video,) = seen(page()).all("video")
+        assert (video["poster"] or "").startswith("data:image/jpeg;base64,")
 
     def test_a_picture_leads_to_its_moment_in_the_video(self) -> None:
         (link,) = seen(page()).all("a", **{"data-time": "1.250"})
@@ -108,7 +111,7 @@ class TestVideoPage:
         assert f"{NASTY}: 1" in made.text
 
     def test_a_video_without_vehicles_has_a_page_too(self) -> None:
-        empty = replace(page(), records=(), levels=Levels(), thumbnails={}, still=None)
+        empty = replace(page(), records=(), thumbnails={}, poster=None, still=None)
         made = seen(empty)
         assert "No vehicle was shown." in made.text
         assert "0vehicles" in made.text

@@ -19,7 +19,7 @@ from vdet.run.result import FrameResult
 from vdet.run.steps import with_positions
 from vdet.synthetic.camera import PinholeCamera
 from vdet.synthetic.render import frames, render
-from vdet.synthetic.scene import Carriageway, Light, Line, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import Carriageway, LaneLine, Light, Scene, SceneVehicle, Waypoint
 from vdet.synthetic.truth import true_boxes
 from vdet.track.track import Track
 
@@ -32,7 +32,7 @@ SETTINGS = Settings(
 )
 SCENE = Scene(
     camera=CAMERA,
-    road=Carriageway(-7, 7, tuple(Line(x) for x in (-5.55, -1.85, 1.85, 5.55))),
+    road=Carriageway(-7, 7, tuple(LaneLine(x) for x in (-5.55, -1.85, 1.85, 5.55))),
     light=Light(noise=0),
     vehicles=tuple(
         SceneVehicle(number, (Waypoint(0, AHEAD, x), Waypoint(9, AHEAD, x)), color=(40, 30, 200))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from vdet.synthetic.camera import PinholeCamera
-from vdet.synthetic.scene import Carriageway, Light, Line, Scene, SceneVehicle, Waypoint
+from vdet.synthetic.scene import Carriageway, LaneLine, Light, Scene, SceneVehicle, Waypoint
 
 
 @pytest.fixture
@@ -18,9 +18,10 @@ def make_scene() -> Callable[..., Scene]:
         curvature: float = 0.0,
         frames: int = 1,
     ) -> Scene:
+        lines = (LaneLine(-1.85), LaneLine(1.85, dash=3.0))
         return Scene(
             camera=PinholeCamera.dashboard(*size, curvature=curvature),
-            road=Carriageway(left=-6.0, right=6.0, lines=(Line(-1.85), Line(1.85, dash=3.0))),
+            road=Carriageway(left=-6.0, right=6.0, lines=lines),
             light=Light(noise=0.0),
             vehicles=vehicles,
             speed=10.0,

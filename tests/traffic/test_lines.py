@@ -72,6 +72,9 @@ class TestEnds:
         path = through((0, 1100, 300), (2, WIDTH + 40, 440))
         assert ways(events(frames(path), to_the_edge)) == ["right"]
 
+    def test_a_line_in_a_small_frame_stays_a_line(self) -> None:
+        assert events(feet((1, 1), (2, 2)), line((0, 0), (0, 8)), size=(128, 72)) == ()
+
 
 class TestJumps:
     def test_a_jump_over_the_line_in_one_frame(self) -> None:

@@ -1,4 +1,4 @@
-"""A video in pictures: the best one of each vehicle, where vehicles were, how many at once."""
+"""A video in pictures: the best one of each vehicle, and where vehicles were."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from vdet.boxes import Box
 from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.track.track import Track
-from vdet.traffic.overview import BestCrops, Crop, HeatMap, Levels
+from vdet.traffic.overview import BestCrops, Crop, GroundHeat
 
 ROAD = np.arange(HEIGHT * WIDTH * 3, dtype=np.uint64).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
 PICTURE = Picture(ROAD)
@@ -64,7 +64,7 @@ PLACE = Box.sized(200, 100, 60, 80)
 
 
 def heat(*boxes: Box, still: Image = STILL) -> Image:
-    made = HeatMap(WIDTH, HEIGHT)
+    made = GroundHeat(WIDTH, HEIGHT)
     for index, box in enumerate(boxes):
         made.add(frame(index, track(1, box)))
     return made.over(still)
@@ -80,18 +80,3 @@ def test_the_ground_under_a_vehicle_has_colour_and_nothing_else() -> None:
     assert seen[PLACE.pixels[3] - 10, 230] > 60
     assert seen[PLACE.pixels[1] + 20, 230] < 10, "the roof is not where it stands"
     assert seen[:, :180].max() < 10
-
-
-def levels(*counts: int, rate: float = 25) -> Levels:
-    made = Levels()
-    for index, count in enumerate(counts):
-        tracks = [track(number, Box.sized(9 * number, 5, 8, 8)) for number in range(1, count + 1)]
-        made.add(frame(index, *tracks, rate=rate))
-    return made
-
-
-def test_each_step_has_the_most_vehicles_that_are_shown_in_it() -> None:
-    made = levels(0, 0, 0, 0, 2, 2, 2, 2, 1, 3, 1, 1, 0)
-    assert made.most == 3
-    assert list(made.steps(3)) == [0, 2, 3]
-    assert list(made.steps(12)) == [0, 0, 0, 0, 2, 2, 2, 2, 1, 3, 1, 1]

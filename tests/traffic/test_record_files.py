@@ -6,16 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from traffic.passing import WIDTH, frame, passing, track
+from traffic.passing import WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.errors import OutputError
 from vdet.track.track import FrameTracks
-from vdet.traffic.records import join_records, summarize, write_records
+from vdet.traffic.records import join_records, write_records
 
 HEADING = (
     "id,class,first,last,seconds,seen,between,lost,mean_score,best_score,"
     "start_x,start_y,end_x,end_y,length,length_share,x,y,width,height\n"
 )
+BOX = Box.sized(-30, 5, 30, 30)
 FIRST = "1,,0.0,1.0,1.04,26,0,0,0.9,0.9,30.0,130.0,80.0,130.0,50.0,0.1562,10,100,40,30\n"
 
 
@@ -66,6 +67,16 @@ class TestJoined:
         assert text.startswith(f"video,{HEADING}a,{FIRST}a,2,bus,")
         rows = list(csv.DictReader(text.splitlines(keepends=True)))
         assert [row["video"] for row in rows] == [name for name in self.NAMES for _ in range(2)]
+
+    def test_no_cell_is_a_formula(self, tmp_path: Path) -> None:
+        names = ("=cmd|' /C calc'!A1", "+1+cmd", "-2+3", "@SUM(A1)", "\t=1+1")
+        tracks = (track(number, BOX, class_name=name) for number, name in enumerate(names))
+        written(tmp_path / "a.csv", frame(0, *tracks))
+        join_records({"=1+1": tmp_path / "a.csv"}, tmp_path / "all.csv")
+        rows = list(csv.DictReader((tmp_path / "all.csv").read_text().splitlines()))
+        assert [row["class"] for row in rows] == [f"'{name}" for name in names]
+        assert {row["video"] for row in rows} == {"'=1+1"}
+        assert {row["start_x"] for row in rows} == {"-15.0"}, "numbers stay numbers"
 
     @pytest.mark.parametrize("suffix", [".csv", ".json"])
     @pytest.mark.parametrize("text", ["junk", "", "[1]", "id,class\n1,car\n", "\xff"])

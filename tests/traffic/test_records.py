@@ -2,10 +2,10 @@
 
 import pytest
 
-from traffic.passing import RATE, WIDTH, frame, passing, track
+from traffic.passing import RATE, WIDTH, frame, passing, summarize, track
 from vdet.boxes import Box
 from vdet.track.track import FrameTracks
-from vdet.traffic.records import PATH_STEP, VehicleRecord, summarize
+from vdet.traffic.records import PATH_STEP, VehicleRecord
 
 PLACE = Box.sized(100, 100, 40, 30)
 

@@ -1,10 +1,16 @@
 """Which vehicles count, with which class, and what becomes of them when their id changes."""
 
+import math
 from dataclasses import replace
 
-from traffic.scenes import events, feet, frames, joined, numbered, through, track, ways
+import pytest
+
+from traffic.scenes import counts, events, feet, frames, joined, numbered, through, track, ways
 from vdet.config.places import LineSettings
+from vdet.errors import TruthError
+from vdet.polygons import Point
 from vdet.track.track import FrameTracks
+from vdet.traffic import counter
 
 DOWN = through((0, 600, 300), (4, 600, 500))
 
@@ -54,6 +60,33 @@ class TestNewIds:
             y = 320 + 2 * index if index < 38 else rocks if index < 420 else 403 + 3 * (index - 420)
             video += [FrameTracks(index, index / 25, (track((600, y), 1 + index // 25),))]
         assert ways(events(video)) == ["here"]
+
+    def test_each_goes_on_where_it_was_without_a_comparison_of_all_with_all(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        asked: list[float] = []
+        expected = counter._Vehicle.expected
+
+        def ask(vehicle: counter._Vehicle, now: float) -> Point:
+            asked.append(now)
+            return expected(vehicle, now)
+
+        monkeypatch.setattr(counter._Vehicle, "expected", ask)
+        there = [(number, 30.0 + 40 * number) for number in range(30)]
+        video = [
+            FrameTracks(n, n / 25, tuple(track((x, y), first + number) for number, x in there))
+            for n, (y, first) in enumerate([(395.0, 0)] * 5 + [(440.0, 100)] * 5)
+        ]
+        line = LineSettings(name="line", start=(0, 418), end=(1280, 418))
+        assert [event.id for event in events(video, line)] == [100 + n for n, _ in there]
+        assert len(asked) == len(there)
+
+
+@pytest.mark.parametrize("times", [(0.0, math.nan), (0.0, math.inf), (1.0, 0.5)])
+def test_times_that_no_video_has_are_refused(times: tuple[float, float]) -> None:
+    video = [FrameTracks(n, time, (track((600, 300)),)) for n, time in enumerate(times)]
+    with pytest.raises(TruthError, match=r"frame \d: its time is .* s; give times in seconds"):
+        counts(video, LineSettings(name="line", start=(0, 450), end=(1280, 450)))
 
 
 class TestClasses:

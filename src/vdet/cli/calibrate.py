@@ -14,10 +14,7 @@ from vdet.files import check_output
 log = logging.getLogger("vdet")
 
 
-@command(
-    "vdet calibrate chessboards/ -o camera.yaml",
-    "vdet calibrate chessboards/ -o camera.yaml --pattern 9x6 --preview previews",
-)
+@command("vdet calibrate chessboards/ -o camera.yaml --pattern 9x6")
 @click.argument("photos", nargs=-1, required=True, type=options.PATH, metavar="PHOTO...")
 @options.output_file_option("Camera file to write, .yaml.")
 @option(
@@ -26,21 +23,16 @@ log = logging.getLogger("vdet")
     options.parse_pair,
     default="9x6",
 )
-@option("--preview DIR", "Write every photograph into DIR, with its corners, and undistorted.")
 @options.overwrite_option
 def calibrate(
-    photos: tuple[Path, ...],
-    output: Path,
-    pattern: tuple[int, int],
-    preview: Path | None,
-    overwrite: bool,
+    photos: tuple[Path, ...], output: Path, pattern: tuple[int, int], overwrite: bool
 ) -> None:
     """Measure a camera with photographs of a chessboard.
 
     Its focal length and lens distortion are computed. Each PHOTO is a file, or a folder of files.
     Take ten or more, of the whole flat board, from different sides.
     """
-    from vdet.lanes import calibration
+    from vdet.lanes.calibration import calibrate as fit
     from vdet.lanes.camera import save_camera
     from vdet.run.pictures import find_images
 
@@ -49,16 +41,12 @@ def calibrate(
     options.check_suffix(output, ".yaml", ".yml", what="cameras")
     found = find_images(photos)
     check_output(output, overwrite=overwrite, inputs=found)
-    if preview:
-        calibration.check_previews(preview, found, overwrite=overwrite)
     with progress_steps("") as steps:
         steps(f"searching {counted(len(found), 'photograph')}", None)
-        result = calibration.calibrate(found, pattern)
+        result = fit(found, pattern)
     for path, reason in result.skipped.items():
         log.warning("%s: not used: %s", path, reason)
     save_camera(result.camera, output, overwrite=overwrite)
-    if preview:
-        calibration.write_previews(preview, result, pattern, overwrite=overwrite)
     camera = result.camera
     print_lines(
         f"{output}: {camera.width}×{camera.height}, focal length {camera.matrix[0][0]:.0f} px, "

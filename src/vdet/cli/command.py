@@ -15,7 +15,7 @@ _OTHERS = "What is processed"
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Outputs": (
         *("--output", "--no-video", "--tracks", "--counts", "--vehicles", "--crops", "--json"),
-        *("--page", "--preview", "--stages", "--at", "--sink", "--overwrite"),
+        *("--page", "--stages", "--at", "--sink", "--overwrite"),
     ),
     _OTHERS: (),
     "Several videos": ("--directory", "--skip-existing", "--dry-run"),

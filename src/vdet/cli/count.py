@@ -58,7 +58,7 @@ def count(
     if not settings.counts:
         raise click.UsageError("there is nothing to count at; give --lines FILE")
     from vdet.traffic.counter import count_file
-    from vdet.traffic.counts import write_counts, write_counts_of_all
+    from vdet.traffic.counts import write_counts
     from vdet.traffic.tables import SUFFIXES
 
     if target is not None:
@@ -73,29 +73,22 @@ def count(
             advance(1)
     if target is not None:
         with staged(target, overwrite=overwrite) as temporary:
-            if len(tracks) == 1:
-                write_counts(temporary, *videos.values())
-            else:
-                write_counts_of_all(temporary, videos)
+            write_counts(temporary, videos if len(videos) > 1 else videos[str(tracks[0])])
     print_lines(*_table(videos))
 
 
 def _table(videos: "Mapping[str, Counts]") -> list[str]:
     """Return the totals of each file, and of all where there are several."""
     from vdet.evaluate.output import table
+    from vdet.pages.render import counted
     from vdet.traffic.counts import sum_totals
 
     totals = {name: counts.totals for name, counts in videos.items()}
     if len(videos) > 1:
-        totals["all files"] = sum_totals(
-            each for counts in videos.values() for each in counts.totals
-        )
-    rows = [
-        (
-            *(name, total.name, total.direction, str(total.count)),
-            ", ".join(f"{kind} {number}" for kind, number in total.classes.items()),
-        )
-        for name, each in totals.items()
-        for total in each
-    ]
+        totals["all files"] = sum_totals(each for some in totals.values() for each in some)
+    rows = []
+    for name, each in totals.items():
+        for total in each:
+            classes = ", ".join(counted(number, kind) for kind, number in total.classes.items())
+            rows.append((name, total.name, total.direction, str(total.count), classes))
     return table(("file", "name", "direction", "count", "classes"), rows)

@@ -9,10 +9,7 @@ from vdet.cli.messages import is_quiet, print_lines, print_message, progress_ste
 from vdet.cli.options import PATH, option, overwrite_option
 
 
-@command(
-    "vdet demo",
-    "vdet demo folder --seed 2 --overwrite",
-)
+@command("vdet demo", "vdet demo folder --seed 2 --overwrite")
 @click.argument("folder", default=Path("demo"), type=PATH, metavar="[DIR]")
 @option("--seed N", "Seed of everything that is drawn.", click.IntRange(min=0), default=5)
 @overwrite_option
@@ -34,7 +31,7 @@ def demo(folder: Path, seed: int, overwrite: bool) -> None:
             steps=steps,
         )
     print_lines(
-        *result.lines(),
+        *result,
         "",
         "Look at",
         f"  {folder / 'found.mp4'}  the road with the vehicles that the network found",

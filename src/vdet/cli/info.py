@@ -32,14 +32,8 @@ def info(path: Path, results: Results) -> None:
     if describe is None:
         describe = _picture if is_picture_name(path) and "%" not in path.name else _video
     facts = {"file": str(path)} | describe(path)
-    results.print(
-        [
-            f"{name.replace('_', ' ')}: {_text(facts[name])}"
-            for name in facts
-            if name != "provenance"
-        ],
-        facts,
-    )
+    shown = {name.replace("_", " "): facts[name] for name in facts if name != "provenance"}
+    results.print([f"{name}: {_text(value)}" for name, value in shown.items()], facts)
 
 
 def _text(value: Any) -> str:

@@ -19,6 +19,8 @@ Name = Annotated[str, Field(min_length=1, max_length=80)]
 
 MOST_CORNERS = 100
 MOST_SHAPES = 100
+SHORTEST_LINE = 0.01
+"""Length of the shortest line, as a share of the frame's width or height."""
 _SAME_ASPECT = 0.01
 """Largest relative difference of the aspect ratios of a frame and of the reference size."""
 
@@ -163,4 +165,8 @@ class CountSettings(PlacedSection):
     def _lie_in_the_frame(self) -> "CountSettings":
         lines = [(line.name, (line.start, line.end)) for line in self.lines]
         self.check_places([*lines, *((zone.name, zone.points) for zone in self.zones)])
+        for line in self.lines:
+            sides = zip(line.start, line.end, self.size or (1, 1), strict=True)
+            if all(abs(start - end) < SHORTEST_LINE * side for start, end, side in sides):
+                raise ValueError(f"{line.name}: is shorter than 1 % of the frame; make it longer")
         return self

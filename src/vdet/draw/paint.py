@@ -1,17 +1,16 @@
-"""What all drawings are made of: rectangles, lines, text and shades, on BGR images or on planes.
+"""The elements of all drawings: rectangles, lines, text and shades, on BGR images or on planes.
 
 On planes, colours are drawn at half the resolution, as 4:2:0 has it.
 """
 
 from collections.abc import Iterator, Sequence
 from functools import cache
-from itertools import pairwise
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box
 from vdet.media.coding import Coding
 from vdet.media.frame import Planes
 from vdet.media.images import Image
@@ -24,10 +23,6 @@ Surface = Image | Planes
 """An image, BGR uint8 `(H, W, 3)`, or planes of their own; drawing changes it."""
 
 _FONT = cv2.FONT_HERSHEY_DUPLEX
-_TRAIL_PARTS = 4
-"""Pieces of a trail, each of one width."""
-_TRAIL_REACH = 1 / 8
-"""Share of a trail, on both sides of a point, over which the point is averaged."""
 _SHIFT = 4
 """Bits of the fraction of a pixel that OpenCV draws with."""
 _FARTHEST = 2**15
@@ -64,35 +59,6 @@ def draw_arrow(
     for layer, value, halved in _layers(surface, color):
         thickness = max(1, round(width / 2**halved))
         cv2.arrowedLine(layer, first, last, value, thickness, cv2.LINE_AA, halved, tip)
-
-
-def draw_trail(surface: Surface, points: Sequence[Point], color: Color, width: int) -> None:
-    """Draw a smooth line along points, the oldest first; it ends at the newest.
-
-    Parameters
-    ----------
-    points
-        x, y in pixels; they may lie outside the surface.
-    width
-        Width of the newest part of the line, pixels. The oldest part is the thinnest.
-    """
-    if len(points) < 2:
-        return
-    line = _smoothed(np.asarray(points, np.float64))
-    ends = np.linspace(0, len(line) - 1, _TRAIL_PARTS + 1).round().astype(int).tolist()
-    for part, (first, last) in enumerate(pairwise(ends), start=1):
-        if last > first:
-            thickness = max(1, round(width * part / _TRAIL_PARTS))
-            draw_lines(surface, line[first : last + 1], color, thickness)
-
-
-def _smoothed(points: Float64Array) -> Float64Array:
-    """Average each point `(n, 2)` with as many before it as behind it, fewer near the ends."""
-    numbers = np.arange(len(points))
-    reach = np.minimum(numbers, numbers[::-1]).clip(max=round(_TRAIL_REACH * len(points)))
-    sums = np.concatenate([np.zeros((1, 2)), points.cumsum(axis=0)])
-    totals = sums[numbers + reach + 1] - sums[numbers - reach]
-    return np.asarray(totals / (2 * reach + 1)[:, np.newaxis])
 
 
 def write_text(

@@ -1,8 +1,4 @@
-"""Chessboard photographs → a camera (Zhang 2000, in OpenCV's implementation).
-
-`calibrate` fits the camera. `write_previews` makes pictures to judge the fit by: the corners that
-were found, and whether straight lines become straight.
-"""
+"""Chessboard photographs → a camera (Zhang 2000, in OpenCV's implementation)."""
 
 import math
 from collections import Counter
@@ -16,10 +12,9 @@ import numpy as np
 from pydantic import ValidationError
 
 from vdet.boxes import Float32Array
-from vdet.errors import ImageError, OutputError
-from vdet.files import check_output, make_folder
-from vdet.lanes.camera import CalibratedCamera, Undistorter
-from vdet.media.images import Image, read_image, write_image
+from vdet.errors import ImageError
+from vdet.lanes.camera import CalibratedCamera
+from vdet.media.images import Image, read_image
 
 MIN_PHOTOS = 5
 SIZE_TOLERANCE = 2
@@ -75,11 +70,19 @@ def calibrate(paths: Iterable[Path], pattern: Pattern) -> Calibration:
     photos = [board for board in boards.values() if isinstance(board, BoardPhoto)]
     sizes = Counter(photo.size for photo in photos)
     size = max(sizes, key=sizes.__getitem__, default=(0, 0))
-    skipped |= _of_other_sizes(photos, size)
+    for photo in photos:
+        if np.abs(np.subtract(photo.size, size)).max() > SIZE_TOLERANCE:
+            skipped[photo.path] = f"is {_text(photo.size)}, the others are {_text(size)}"
     photos = _without(skipped, photos, pattern)
     camera, errors = _fit(photos, pattern, size)
-    if outliers := _outliers(photos, errors):
-        skipped |= outliers
+    median = float(np.median(errors))
+    if max(errors) > OUTLIER_RATIO * median:
+        for photo, error in zip(photos, errors, strict=True):
+            if error > OUTLIER_RATIO * median:
+                skipped[photo.path] = (
+                    f"is an outlier: error {error:.2f} px, more than {OUTLIER_RATIO:g} times the "
+                    f"median of {median:.2f} px"
+                )
         photos = _without(skipped, photos, pattern)
         camera, _ = _fit(photos, pattern, size)
     if camera is None:
@@ -109,32 +112,6 @@ def find_corners(image: Image, pattern: Pattern) -> Float32Array | None:
     return np.asarray(refined, np.float32).reshape(-1, 2)
 
 
-def check_previews(folder: Path, paths: Sequence[Path], *, overwrite: bool) -> None:
-    """Make the folder, and refuse pictures that could not be written. Raises `OutputError`."""
-    make_folder(folder)
-    pictures = [_preview_of(path, folder) for path in paths]
-    for picture in pictures:
-        if pictures.count(picture) > 1:
-            raise OutputError(f"{picture}: wanted by two photographs of one name; rename one")
-        check_output(picture, overwrite=overwrite, inputs=paths)
-
-
-def write_previews(
-    folder: Path, calibration: Calibration, pattern: Pattern, *, overwrite: bool = False
-) -> None:
-    """Write each used photograph with its corners, as it is and undistorted, side by side."""
-    for photo in calibration.photos:
-        image = read_image(photo.path)
-        undistorter = Undistorter(calibration.camera, *photo.size)
-        cv2.drawChessboardCorners(image, pattern, photo.corners[:, None], True)
-        both = np.hstack([image, undistorter.image(image)])
-        write_image(_preview_of(photo.path, folder), both, overwrite=overwrite)
-
-
-def _preview_of(path: Path, folder: Path) -> Path:
-    return folder / f"{path.stem}.jpg"
-
-
 def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
     """Search the board in a photograph; return the reason if the photograph cannot be used."""
     try:
@@ -145,14 +122,6 @@ def _find_board(path: Path, pattern: Pattern) -> BoardPhoto | str:
     if corners is None:
         return f"no board of {_text(pattern)} inner corners is seen"
     return BoardPhoto(path, (image.shape[1], image.shape[0]), corners)
-
-
-def _of_other_sizes(photos: Sequence[BoardPhoto], common: tuple[int, int]) -> dict[Path, str]:
-    return {
-        photo.path: f"is {_text(photo.size)}, the others are {_text(common)}"
-        for photo in photos
-        if np.abs(np.subtract(photo.size, common)).max() > SIZE_TOLERANCE
-    }
 
 
 def _without(
@@ -190,16 +159,6 @@ def _fit(
         with suppress(ValidationError):  # no real camera has such values
             camera = CalibratedCamera(*size, matrix.tolist(), (k1, k2, p1, p2, k3), rms)
     return camera, np.ravel(errors).tolist()
-
-
-def _outliers(photos: Sequence[BoardPhoto], errors: Sequence[float]) -> dict[Path, str]:
-    median = float(np.median(errors))
-    return {
-        photo.path: f"is an outlier: error {error:.2f} px, more than {OUTLIER_RATIO:g} times the "
-        f"median of {median:.2f} px"
-        for photo, error in zip(photos, errors, strict=True)
-        if error > OUTLIER_RATIO * median
-    }
 
 
 def _text(size: Iterable[int]) -> str:

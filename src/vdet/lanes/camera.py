@@ -1,10 +1,12 @@
 """A calibrated camera and its file, and frames and boxes without its lens distortion."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import cv2
 import numpy as np
+import yaml
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core.core_schema import ValidationInfo
@@ -16,13 +18,13 @@ from vdet.files import staged
 from vdet.media.images import Image
 
 _ASPECT_TOLERANCE = 0.005  # accepts 854×480 for 1280×720
-_OUTLINE_POINTS = 16  # on each side of a box
+_GRID_POINTS = 16  # along each side of a box
 
 _MISTAKES = {
     "missing": "is missing; `vdet calibrate` writes camera files",
     "unexpected_keyword_argument": "is not a key of camera files",
 }
-"""What is said of a camera file, by pydantic's type of the mistake."""
+"""Messages on camera files, by pydantic's type of the mistake."""
 
 _Side = Annotated[int, Field(ge=16, le=100_000)]
 _Coefficient = Annotated[float, Field(ge=-1000, le=1000)]
@@ -126,37 +128,20 @@ class Undistorter:
         """
         if not self._camera:
             return box
-        outline = self.points(_outline(box))
-        left, top = np.rint(outline.min(axis=0) + 0.5).astype(int).tolist()
-        right, bottom = np.rint(outline.max(axis=0) + 0.5).astype(int).tolist()
+        x = np.linspace(box.x1 - 0.5, box.x2 - 0.5, _GRID_POINTS)
+        y = np.linspace(box.y1 - 0.5, box.y2 - 0.5, _GRID_POINTS)
+        moved = self.points(np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 2))
+        left, top = np.rint(moved.min(axis=0) + 0.5).astype(int).tolist()
+        right, bottom = np.rint(moved.max(axis=0) + 0.5).astype(int).tolist()
         return Box(left, top, right, bottom).clipped(*self._size)
-
-
-def _outline(box: Box) -> Float64Array:
-    """Return points on the outline of a box, half a pixel outside its outer pixel centres."""
-    x = np.linspace(box.x1 - 0.5, box.x2 - 0.5, _OUTLINE_POINTS)
-    y = np.linspace(box.y1 - 0.5, box.y2 - 0.5, _OUTLINE_POINTS)
-    grid = np.stack(np.meshgrid(x, y), axis=2)
-    return np.concatenate([grid[0], grid[-1], grid[:, 0], grid[:, -1]])
 
 
 def save_camera(camera: CalibratedCamera, path: Path, *, overwrite: bool = False) -> None:
     """Write a camera as YAML. Raises `OutputError`."""
-    rows = "\n".join(f"  - {list(row)}" for row in camera.matrix)
-    text = f"""\
-# A camera, written by `vdet calibrate`.
-
-# frame size, pixels
-width: {camera.width}
-height: {camera.height}
-# focal lengths and principal point, pixels: [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]
-matrix:
-{rows}
-# lens distortion (OpenCV's model): [k1, k2, p1, p2, k3]
-distortion: {list(camera.distortion)}
-# root mean square error of the chessboard corners, pixels
-rms: {camera.rms!r}
-"""
+    text = yaml.safe_dump(asdict(camera), sort_keys=False)
+    text = (
+        f"# A camera, written by `vdet calibrate`; lengths are pixels of its photographs.\n{text}"
+    )
     with staged(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 

@@ -94,35 +94,32 @@ def pitch_scale(z: Float64Array, pitch: float) -> Float64Array:
     return np.maximum(1 - pitch * z, _MIN_SCALE)
 
 
-@dataclass(frozen=True, slots=True)
-class NormalEquations:
-    """Normal equations of a least-squares fit of `LaneCurves`, `(5, 5)` and `(5,)`."""
-
-    matrix: Float64Array
-    vector: Float64Array
-
-    def plus_earlier(self, earlier: "NormalEquations", memory: float) -> "NormalEquations":
-        """Add the equations of earlier frames, weighted by `memory`, without their pitch.
-
-        The pitch of a vehicle changes from frame to frame; its position and the road do not. The
-        earlier pitch is eliminated (Schur complement).
-        """
-        share = earlier.matrix[:, _PITCH] / (earlier.matrix[_PITCH, _PITCH] + _PITCH_WEIGHT)
-        matrix = earlier.matrix - np.outer(share, earlier.matrix[_PITCH])
-        vector = earlier.vector - share * earlier.vector[_PITCH]
-        matrix[_PITCH] = matrix[:, _PITCH] = vector[_PITCH] = 0
-        return NormalEquations(self.matrix + memory * matrix, self.vector + memory * vector)
+Equations = Float64Array
+"""Normal equations of a least-squares fit of `LaneCurves`, `(5, 6)`: the matrix, and the vector in
+the last column."""
 
 
-def normal_equations(left: LinePaint, right: LinePaint, guess: LaneCurves) -> NormalEquations:
+def add_earlier(equations: Equations, earlier: Equations, memory: float) -> Equations:
+    """Add the equations of earlier frames, weighted by `memory`, without their pitch.
+
+    The pitch of a vehicle changes from frame to frame; its position and the road do not. The
+    earlier pitch is eliminated (Schur complement).
+    """
+    share = earlier[:, _PITCH] / (earlier[_PITCH, _PITCH] + _PITCH_WEIGHT)
+    rest = earlier - np.outer(share, earlier[_PITCH])
+    rest[_PITCH] = rest[:, _PITCH] = 0
+    return equations + memory * rest
+
+
+def normal_equations(left: LinePaint, right: LinePaint, guess: LaneCurves) -> Equations:
     """Return the equations that the paint of both lines gives; `guess` linearizes the pitch."""
     rows = np.concatenate(
         [_rows(left, (1, 0), guess.left, guess), _rows(right, (0, 1), guess.right, guess)]
     )
-    return NormalEquations(rows.T @ rows, rows.T @ np.concatenate([left.x, right.x]))
+    return np.asarray(rows[:, :-1].T @ rows)
 
 
-def solve(equations: NormalEquations, width: float) -> LaneCurves:
+def solve(equations: Equations, width: float) -> LaneCurves:
     """Return the curves that fit best.
 
     With little paint, they are straight and level, and the lane is `width` metres wide.
@@ -130,19 +127,20 @@ def solve(equations: NormalEquations, width: float) -> LaneCurves:
     apart = np.array([0, 0, -1, 1, 0])
     prior = np.diag([_BEND_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _MIN_WEIGHT, _PITCH_WEIGHT])
     prior += _WIDTH_WEIGHT * np.outer(apart, apart)
-    vector = equations.vector + _WIDTH_WEIGHT * width * apart
-    return LaneCurves(*np.linalg.solve(equations.matrix + prior, vector).tolist())
+    vector = equations[:, -1] + _WIDTH_WEIGHT * width * apart
+    return LaneCurves(*np.linalg.solve(equations[:, :-1] + prior, vector).tolist())
 
 
 def _rows(
     paint: LinePaint, side: tuple[int, int], position: float, guess: LaneCurves
 ) -> Float64Array:
-    """Return the coefficients of the five parameters at each painted row of a line, `(n, 5)`."""
-    rows = np.empty((len(paint.z), 5))
+    """Return the coefficients of the five parameters at each painted row, and its x, `(n, 6)`."""
+    rows = np.empty((len(paint.z), 6))
     rows[:, 0] = paint.z**2 / pitch_scale(paint.z, guess.pitch)
     rows[:, 1] = paint.z
     rows[:, 2:4] = side
     rows[:, _PITCH] = -position * paint.z
+    rows[:, -1] = paint.x
     return rows
 
 
@@ -151,7 +149,7 @@ class FrameFit:
     """Curves fitted to the paint of one frame."""
 
     curves: LaneCurves
-    equations: NormalEquations
+    equations: Equations
     seen: tuple[bool, bool]
     """Whether the left and the right line were seen, rather than derived from the other one."""
 

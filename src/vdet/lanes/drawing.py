@@ -5,14 +5,13 @@ import numpy as np
 
 from vdet.boxes import Float64Array
 from vdet.draw.boxes import draw_label, line_width
-from vdet.draw.paint import Color, draw_lines
+from vdet.draw.paint import Color, draw_lines, shade
 from vdet.lanes.road import Lane, Road
 from vdet.media.images import Image
 
 AREA: Color = (80, 200, 60)
 LINE: Color = (40, 60, 255)
 _OPACITY = 0.3
-_SHIFT = 4  # fractional bits of the coordinates given to OpenCV
 _SCALE = 2  # top views are small, so their pictures are enlarged
 
 
@@ -41,7 +40,7 @@ def stage_pictures(road: Road) -> dict[str, Image]:
     `road` is the undistorted frame with the outline of the top view, `above` the top view, `mask`
     its paint (what vehicles hide is grey), and `fit` the top view with the lane.
     """
-    frame = road.image.copy()
+    frame = road.view.image.copy()
     draw_lines(frame, road.top_view.outline, LINE, line_width(frame), closed=True)
     above, fit = _enlarge(road.view.top), _enlarge(road.view.top)
     if lane := road.lane:
@@ -53,15 +52,7 @@ def stage_pictures(road: Road) -> dict[str, Image]:
 
 def _draw_area(image: Image, left: Float64Array, right: Float64Array) -> None:
     """Tint the area between two lines, pixels `(n, 2)`, and draw the lines."""
-    area = np.concatenate([left, right[::-1]])
-    height, width = image.shape[:2]
-    x0, y0 = np.clip(area.min(axis=0), 0, (width, height)).astype(int)
-    x1, y1 = np.clip(area.max(axis=0) + 2, 0, (width, height)).astype(int)
-    around = image[y0:y1, x0:x1]  # blend only the part that changes
-    tinted = around.copy()
-    corners = np.rint((area - (x0, y0)) * 2**_SHIFT).astype(np.int32)
-    cv2.fillPoly(tinted, [corners], AREA, cv2.LINE_8, _SHIFT)
-    around[:] = cv2.addWeighted(tinted, _OPACITY, around, 1 - _OPACITY, 0)
+    shade(image, [(x, y) for x, y in [*left.tolist(), *right[::-1].tolist()]], AREA, _OPACITY)
     for line in (left, right):
         draw_lines(image, line, LINE, line_width(image))
 

@@ -14,7 +14,7 @@ import numpy as np
 from vdet.boxes import Box, Float64Array
 from vdet.config.schema import LaneSettings
 from vdet.lanes.camera import CalibratedCamera, Undistorter
-from vdet.lanes.curves import FrameFit, LaneCurves, NormalEquations, fit_near, fit_new, solve
+from vdet.lanes.curves import Equations, FrameFit, LaneCurves, add_earlier, fit_near, fit_new, solve
 from vdet.lanes.paint import hide, paint_mask
 from vdet.lanes.top_view import TopView
 from vdet.media.images import Image
@@ -74,8 +74,7 @@ def lane_record(lane: Lane | None) -> dict[str, Any] | None:
         return None
     record: dict[str, Any] = {"radius": lane.radius and round(lane.radius, 3)}
     record |= {"offset": round(lane.offset, 3), "width": round(lane.width, 3)}
-    for side, line in (("left", lane.left), ("right", lane.right)):
-        record[side] = [[round(x, 1), round(y, 1)] for x, y in line.tolist()]
+    record |= {"left": np.round(lane.left, 1).tolist(), "right": np.round(lane.right, 1).tolist()}
     return record
 
 
@@ -141,16 +140,11 @@ class Road:
     """The lines of `lane` on the ground; None if there is no lane."""
     top_view: TopView
     undistorter: Undistorter
-    """Moves boxes and points of the original frame to `image`."""
-
-    @property
-    def image(self) -> Image:
-        """The undistorted frame, BGR uint8 `(H, W, 3)`; the frame itself if there is no camera."""
-        return self.view.image
+    """Moves boxes and points of the original frame to `view.image`."""
 
     def cuts(self, box: Box) -> bool:
         """Tell whether the original frame's left, right or lower edge cuts a box in that frame."""
-        height, width = self.image.shape[:2]
+        height, width = self.view.image.shape[:2]
         beside = box.x1 <= _EDGE * width or box.x2 >= (1 - _EDGE) * width
         return bool(beside or box.y2 >= (1 - _EDGE) * height)
 
@@ -171,7 +165,7 @@ class _LaneState:
     """What the frames so far say about the lane."""
 
     curves: LaneCurves
-    equations: NormalEquations
+    equations: Equations
     unseen: tuple[int, int]
     """Number of frames since the left and the right line were last seen."""
     curvature: float
@@ -244,7 +238,7 @@ def _advance(state: _LaneState, fit: FrameFit | None) -> _LaneState | None:
     left, right = (0 if now else before + 1 for now, before in zip(seen, state.unseen, strict=True))
     curves, equations, curvature = state.curves, state.equations, state.curvature
     if fit:
-        equations = fit.equations.plus_earlier(equations, _MEMORY)
+        equations = add_earlier(fit.equations, equations, _MEMORY)
         curves = solve(equations, curves.width)
         curvature += (1 - _CURVE_MEMORY) * (2 * curves.bend - curvature)
     if max(left, right) > CARRY or not curves.contain_camera:

@@ -16,12 +16,13 @@ from vdet.boxes import Float64Array
 from vdet.draw.boxes import color_of, text_color
 
 FILL, BAD, SOFT = "var(--fill)", "var(--bad)", "var(--soft)"
-"""Colours of the style: of what is right, of what is wrong, and of what is less important."""
+"""Colours of the style: what is right, what is wrong, and what is less important."""
 
 _COLORS = ("#0f9d8a", "#d97706", "#6366f1", "#db2777", "#65a30d", "#0284c7", "#b45309", "#9333ea")
 _TICKS = 5  # most parts of an axis
 _TIMES = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 21600, 43200)
 _MOST_POINTS = 400  # of a curve
+_STEPS = 160  # of a number over time
 _NOTHING = 1e-9  # length of an axis whose ends are equal
 
 
@@ -168,21 +169,25 @@ def curve(xs: Float64Array, ys: Float64Array, color: str) -> Line:
     return Line(list(zip(xs[rows].tolist(), ys[rows].tolist(), strict=True)), color)
 
 
-def level_plot(levels: Sequence[int], start: float, end: float, title: str) -> Plot:
-    """Return a number over time; `levels` are of equal steps from `start` to `end`."""
-    step = (end - start) / max(1, len(levels))
+def level_plot(spans: Sequence[tuple[float, float]], start: float, end: float, title: str) -> Plot:
+    """Return how many of the spans, each from its first to its last time, there are at once."""
+    edges = np.linspace(start, end, _STEPS + 1)
+    middles = (edges[:-1] + edges[1:]) / 2
+    firsts, lasts = np.sort(np.array(spans, np.float64).reshape(-1, 2), axis=0).T
+    levels = np.searchsorted(firsts, middles, "right") - np.searchsorted(lasts, middles)
+    width = 1.2 * (end - start) / _STEPS  # gaps would show as thin lines
     bars = [
-        Bar(start + n * step, start + (n + 1.2) * step, 0, level)  # gaps would show as thin lines
-        for n, level in enumerate(levels)
+        Bar(at, at + width, 0, level)
+        for at, level in zip(edges.tolist(), levels.tolist(), strict=False)
         if level
     ]
-    return Plot(title, time_axis(start, end), _counts(max(levels, default=0)), bars)
+    return Plot(title, time_axis(start, end), _counts(levels.max()), bars)
 
 
-def minute_plot(series: Minutes, minutes: range, title: str) -> Plot:
-    """Return a bar for each minute, in which the series are stacked, with a legend."""
+def minute_plot(series: Minutes, x: Axis, title: str) -> Plot:
+    """Return a bar for each minute with an event, in which the series are stacked; and a legend."""
     bars = []
-    for minute in minutes:
+    for minute in sorted(set().union(*series.values())):
         below = 0
         for number, (name, counts) in enumerate(series.items()):
             if count := counts[minute]:
@@ -192,7 +197,6 @@ def minute_plot(series: Minutes, minutes: range, title: str) -> Plot:
                 below += count
     sums = [f"{name}: {counts.total()}" for name, counts in series.items()]
     legend = [(text, color(number)) for number, text in enumerate(sums)]
-    x = time_axis(60 * minutes.start, 60 * minutes.stop)
     most = max((bar.high for bar in bars), default=0)
     return Plot(title, x, _counts(most), bars, legend=legend)
 

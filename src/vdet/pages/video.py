@@ -1,16 +1,12 @@
 """The page of a video: when vehicles were there, where, what they looked like; and an index."""
 
 import math
-import platform
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import av
-import cv2
-import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from vdet.errors import OutputError
@@ -19,17 +15,15 @@ from vdet.media.images import Image
 from vdet.pages import charts
 from vdet.pages.charts import Minutes, Plot, Span, Timeline, clock
 from vdet.pages.render import PAGE_NAME, jpeg_uri, link_to, named, render, write_page
-from vdet.traffic.overview import Levels
 from vdet.traffic.records import VehicleRecord
 
 _MOST_VEHICLES = 300  # that are shown one by one
-_STEPS = 160  # of the chart of levels
 _SMALL = 200  # columns of the still in the pages over many videos
 _NO_PICTURE = "data:image/jpeg;base64,"
 _BLOCK = re.compile(r'<script type="application/json" id="vdet">(.*?)</script>', re.DOTALL)
 
 
-class Facts(BaseModel):
+class VideoFacts(BaseModel):
     """A video in numbers, as data in its page: pages over many videos are made from it.
 
     `seconds` is how much of the video was searched, `most` how many vehicles were shown at once.
@@ -81,10 +75,10 @@ class VideoPage:
     thumbnails
         By id, the time of a frame in seconds, and the picture of the vehicle as a data URI. A
         vehicle may have none.
-    still
-        A frame with the heat over it, BGR uint8; None if there was no frame.
+    poster, still
+        A frame, and the same with the heat over it, BGR uint8; None if there was no frame.
     settings
-        As YAML.
+        The settings of the run as YAML.
     counts
         Crossings and entries by minute, where lines or zones are counted.
     """
@@ -95,7 +89,7 @@ class VideoPage:
     end: float
     records: Sequence[VehicleRecord]
     thumbnails: Mapping[int, tuple[float, str]]
-    levels: Levels
+    poster: Image | None
     still: Image | None
     player: Player | None
     settings: str
@@ -103,24 +97,30 @@ class VideoPage:
 
     def html(self) -> str:
         """Return the page; it loads nothing but the video."""
-        versions = (
-            f"Python {platform.python_version()}, OpenCV {cv2.__version__}, "
-            f"NumPy {np.__version__}, PyAV {av.__version__}"
-        )
-        facts = Facts(
+        facts = VideoFacts(
             seconds=max(0.0, self.seconds),
             frames=self.frames,
             vehicles=len(self.records),
-            most=self.levels.most,
+            most=self.most,
             still=_NO_PICTURE if self.still is None else jpeg_uri(self.still, _SMALL),
             counts={name: minutes.total() for name, minutes in self.counts.items()},
         )
-        return render("video.html", page=self, facts=facts.model_dump(), versions=versions)
+        return render("video.html", page=self, facts=facts.model_dump())
 
     @property
     def seconds(self) -> float:
         """How much of the video was searched."""
         return self.end - self.start
+
+    @property
+    def spans(self) -> list[tuple[float, float]]:
+        """When each vehicle is first and last shown, in the order of their first times."""
+        return sorted((record.first, record.last) for record in self.records)
+
+    @property
+    def most(self) -> int:
+        """The most vehicles at once."""
+        return 1 + max(charts.pack(self.spans), default=-1)
 
     @property
     def figures(self) -> list[tuple[str, str]]:
@@ -131,7 +131,7 @@ class VideoPage:
         return [
             (named(count, "vehicle"), str(count)),
             *((named(n, name), str(n)) for name, n in classes.most_common(4)),
-            ("most at once", str(self.levels.most)),
+            ("most at once", str(self.most)),
             ("mean seconds shown", f"{shown:.1f}"),
             *((name, str(minutes.total())) for name, minutes in self.counts.items()),
         ]
@@ -145,8 +145,8 @@ class VideoPage:
     @property
     def level_plot(self) -> Plot:
         """How many vehicles are shown at once."""
-        levels = self.levels.steps(_STEPS)
-        return charts.level_plot(levels, self.start, self.end, "Number of vehicles at once")
+        title = "Number of vehicles at once"
+        return charts.level_plot(self.spans, self.start, self.end, title)
 
     @property
     def timeline(self) -> Timeline:
@@ -157,19 +157,12 @@ class VideoPage:
         return Timeline("When each vehicle is shown", charts.time_axis(self.start, self.end), spans)
 
     @property
-    def minutes(self) -> range:
-        """The minutes of the video that were searched."""
-        first = int(self.start // 60)
-        return range(first, max(first + 1, math.ceil(self.end / 60)))
-
-    @property
     def minute_plots(self) -> list[Plot]:
         """Vehicles, and the counts of lines and zones, by minute."""
         came = Counter(int(record.first // 60) for record in self.records)
         series = {"First seen": {"vehicles": came}, "At lines and zones": self.counts}
-        return [
-            charts.minute_plot(some, self.minutes, title) for title, some in series.items() if some
-        ]
+        x = charts.time_axis(60 * (self.start // 60), 60 * math.ceil(self.end / 60))
+        return [charts.minute_plot(some, x, title) for title, some in series.items() if some]
 
 
 def _span(record: VehicleRecord, row: int) -> Span:
@@ -180,11 +173,11 @@ def _span(record: VehicleRecord, row: int) -> Span:
     return Span(row, record.first, record.last, title, fill, ink, label, record.first)
 
 
-def read_facts(page: Path) -> Facts:
+def read_facts(page: Path) -> VideoFacts:
     """Return what a page knows. Raises `OutputError` if it is no page of a video."""
     try:
         found = _BLOCK.search(page.read_text(encoding="utf-8"))
-        return Facts.model_validate_json(found.group(1) if found else "")
+        return VideoFacts.model_validate_json(found.group(1) if found else "")
     except (UnicodeDecodeError, ValidationError) as error:
         message = f"{page}: is no page of vdet on a video; remove it, and run again"
         raise OutputError(message) from error

@@ -10,13 +10,12 @@ from vdet.synthetic.scene import (
     PERIOD,
     Body,
     Carriageway,
+    LaneLine,
     Light,
-    Line,
-    RoadsideObject,
+    Plant,
     Scene,
     SceneVehicle,
     Shadow,
-    Wall,
     Waypoint,
 )
 
@@ -36,7 +35,6 @@ _SHAPES: tuple[Body, ...] = (
     Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12),
     Body(width=1.82, length=4.8, boot=0.1, slope=0.7, height=1.46),
 )
-_BOXES = ((2.4, 2.6), (1.2, 1.3), (2.4, 2.0), (0.8, 1.1))  # width and height, metres
 
 
 def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
@@ -44,8 +42,7 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
 
     The camera drives in the left lane. Vehicle 1 drives far ahead in the same lane, vehicle 2 two
     lanes to the right. The camera overtakes vehicle 3, which leaves at the right edge. Vehicle 4
-    enters at the right edge, overtakes, and hides vehicle 2 for about two seconds. There are no
-    boxes beside the road: they look like drawn vehicles.
+    enters at the right edge, overtakes, and hides vehicle 2 for about two seconds.
     """
     rng = np.random.default_rng(seed)
     scene = empty_road(rng, PinholeCamera.dashboard(width, height), lane=0, lanes=3, seed=seed)
@@ -61,8 +58,7 @@ def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     for number, path in enumerate(paths, start=1):
         points = tuple(Waypoint(*point) for point in path)
         vehicles.append(SceneVehicle(number, points, _PAINTS[paints[number]], random_body(rng)))
-    roadside = tuple(each for each in scene.roadside if each.kind != "box")
-    return replace(scene, roadside=roadside, vehicles=tuple(vehicles), frames=250)
+    return replace(scene, vehicles=tuple(vehicles), frames=250)
 
 
 def busy_road(rng: np.random.Generator) -> Scene:
@@ -98,15 +94,16 @@ def empty_road(
     """
     left = -(lane + 0.5) * LANE_WIDTH
     right = left + lanes * LANE_WIDTH
-    dashed = [Line(left + number * LANE_WIDTH, dash=3.0, gap=9.0) for number in range(1, lanes)]
-    lines = (Line(left, _YELLOW), *dashed, Line(right))
+    dashed = [LaneLine(left + number * LANE_WIDTH, dash=3.0) for number in range(1, lanes)]
+    lines = (LaneLine(left, _YELLOW), *dashed, LaneLine(right))
     grey = int(rng.integers(58, 120))
     asphalt = (grey + 4, grey, grey - 3)
-    walls = _random_walls(rng, left - 1.8, right + 2.6)
     verge = _VERGES[rng.integers(len(_VERGES))]
-    road = Carriageway(left - 1.5, right + 2.0, lines, walls, asphalt, verge)
+    road = Carriageway(left - 1.5, right + 2.0, lines, asphalt, verge)
     light = _random_light(rng)
-    return Scene(camera, road, light, _random_roadside(rng, left - 3, right + 4), seed=seed)
+    sides = ((-1, left - 3), (1, right + 4)) * 28
+    plants = tuple(_random_plant(rng, side, edge) for side, edge in sides)
+    return Scene(camera, road, light, plants, seed=seed)
 
 
 def random_body(rng: np.random.Generator) -> Body:
@@ -133,21 +130,7 @@ def _random_light(rng: np.random.Generator) -> Light:
     return Light(gain, noise, sun, shadows)
 
 
-def _random_walls(rng: np.random.Generator, left: float, right: float) -> tuple[Wall, ...]:
-    grey = int(rng.integers(60, 150))
-    concrete = Wall(left, 0.0, 0.85, (grey, grey + 3, grey + 5), spacing=6.0)
-    rail = Wall(right, 0.45, 0.75, (150, 152, 152), spacing=4.0)
-    return (concrete, rail) if rng.random() < 0.7 else (concrete,)
-
-
-def _random_roadside(
-    rng: np.random.Generator, left: float, right: float
-) -> tuple[RoadsideObject, ...]:
-    plants = [_random_plant(rng, side, edge) for side, edge in ((-1, left), (1, right)) * 28]
-    return (*plants, *(_random_box(rng, right) for _ in range(14)))
-
-
-def _random_plant(rng: np.random.Generator, side: int, edge: float) -> RoadsideObject:
+def _random_plant(rng: np.random.Generator, side: int, edge: float) -> Plant:
     """Return a tree or a bush."""
     tall = rng.random() < 0.6
     height = rng.uniform(4, 9) if tall else rng.uniform(1.0, 2.0)
@@ -156,11 +139,4 @@ def _random_plant(rng: np.random.Generator, side: int, edge: float) -> RoadsideO
     lateral = edge + side * (rng.uniform(6, 28) if tall else rng.uniform(1, 12))
     width = height * (rng.uniform(0.6, 1.1) if tall else rng.uniform(1.0, 1.8))
     color = (green - int(rng.integers(10, 40)), green, green - int(rng.integers(-10, 30)))
-    return RoadsideObject("plant", station, lateral, width, height, color)
-
-
-def _random_box(rng: np.random.Generator, edge: float) -> RoadsideObject:
-    width, height = _BOXES[rng.integers(len(_BOXES))]
-    station, lateral = rng.uniform(0, PERIOD), edge + width + rng.uniform(0, 7)
-    color = ((60, 96, 40), (110, 60, 30), (80, 84, 88), (70, 110, 130))[rng.integers(4)]
-    return RoadsideObject("box", station, lateral, width, height, color)
+    return Plant(station, lateral, width, height, color)

@@ -1,4 +1,8 @@
-"""Rendering: from scenes to frames, and to a video file."""
+"""Rendering: from scenes to frames, and to a video file.
+
+Sky, colours of the ground and solid lines are painted once a scene. Dashes, the texture of the
+ground, plants and vehicles are drawn in each frame.
+"""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -8,18 +12,30 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from vdet.boxes import Float32Array
 from vdet.config.schema import OutputSettings
-from vdet.draw.paint import Color
 from vdet.files import staged
 from vdet.media import Frame, Picture, VideoInfo, VideoWriter
 from vdet.media.images import Image
 from vdet.media.writer import may_replace_video
-from vdet.synthetic.road import Ground, Roadside
-from vdet.synthetic.scene import Scene
+from vdet.synthetic.camera import NEAR, distances, mixed, shaded
+from vdet.synthetic.scene import LINE_WIDTH, PERIOD, Carriageway, LaneLine, Scene
 from vdet.synthetic.vehicle import draw_vehicle
 
 _CRF = 20  # of the video; it is material to be searched, so it is finer than what is shown
 _SHIFT = 61  # pixels by which the noise image is larger than a frame
+_TEXEL = 0.1  # metres a pixel of the finest texture
+_HALF_WIDTH = 30.0  # metres of texture to either side of the camera
+_NEUTRAL = 128  # texture value that does not change the colour
+_DASHES = 12.0  # metres from the start of a dash to the start of the next one
+_FAR = 100.0  # metres; dashes end here
+_NEAREST, _FARTHEST = 3.0, 140.0  # metres; plants nearer or farther are not drawn
+_CROWN = ((1.0, 0.85), (0.7, 0.95))
+"""Size and brightness of the parts of a plant. With more contrast it would look like a vehicle."""
+
+_Level = tuple[Image, float, Float32Array, Float32Array]
+"""A texture, the metres of ground that a pixel of it covers, and the columns and rows in it of
+image rows at station 0."""
 
 
 class Renderer:
@@ -28,23 +44,46 @@ class Renderer:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         camera = scene.camera
-        self._ground = Ground(scene)
-        self._roadside = Roadside(scene)
+        self._noise = _sensor_noise(scene)
+        self._top = int(camera.horizon) + 2
+        rows = np.arange(self._top, camera.height, dtype=np.float32)
+        self._distance = camera.focal * camera.above_ground / (rows - np.float32(camera.horizon))
+        columns = np.arange(camera.width, dtype=np.float32) - camera.width / 2
+        distance = self._distance[:, None]
+        bend = camera.curvature * distance**2 / 2
+        self._lateral = (columns[None, :] * distance / camera.focal - bend).astype(np.float32)
+        self._levels = list(self._textures())
         self._background: Image = np.zeros((camera.height, camera.width, 3), np.uint8)
         _paint_sky(self._background, scene)
-        self._ground.paint_base(self._background)
-        self._noise = _sensor_noise(scene)
+        self._background[self._top :] = _colors(scene.road, self._lateral, distance / camera.focal)
+        for line in scene.road.lines:
+            if line.dash is None:
+                _draw_stripe(self._background, scene, line, NEAR, 6 * _FAR)
 
     def image(self, index: int) -> Image:
         """Return frame `index`, BGR uint8 `(H, W, 3)`."""
-        station = self._scene.station(index)
+        scene = self._scene
+        station, time = scene.station(index), scene.time(index)
         image = self._background.copy()
-        self._ground.draw(image, station)
-        self._roadside.draw(image, station)
-        time = self._scene.time(index)
-        for _, vehicle in reversed(self._scene.nearest_first(time)):
-            draw_vehicle(image, vehicle, self._scene, time)
+        self._draw_ground(image, station)
+        _draw_plants(image, scene, station)
+        for _, vehicle in reversed(scene.nearest_first(time)):
+            draw_vehicle(image, vehicle, scene, time)
         return self._expose(image, index)
+
+    def _draw_ground(self, image: Image, station: float) -> None:
+        """Draw dashes and texture over the base, as seen from a station of the camera."""
+        for line in self._scene.road.lines:
+            if line.dash is not None:
+                for start in np.arange(-(station % _DASHES), _FAR, _DASHES).tolist():
+                    if (end := start + line.dash) > NEAR:
+                        _draw_stripe(image, self._scene, line, max(NEAR, start), end)
+        parts = []
+        for texture, texel, x, y in self._levels:
+            rows = y + np.float32(station % PERIOD / texel)
+            parts.append(cv2.remap(texture, x, rows, cv2.INTER_LINEAR, None, cv2.BORDER_WRAP))
+        gain, ground = np.concatenate(parts), image[self._top :]
+        cv2.multiply(ground, cv2.merge([gain, gain, gain]), dst=ground, scale=1 / _NEUTRAL)
 
     def _expose(self, image: Image, index: int) -> Image:
         """Return the image with the blur of a lens, and the exposure and noise of a sensor."""
@@ -57,6 +96,27 @@ class Renderer:
         height, width = image.shape[:2]
         noise = self._noise[y : y + height, x : x + width]
         return np.asarray(cv2.add(exposed, noise, dtype=cv2.CV_8U), dtype=np.uint8)
+
+    def _textures(self) -> Iterator[_Level]:
+        """Yield the levels of the texture that rows of the image show, the farthest rows first.
+
+        A row has the level at which it skips no texels; those of a level are four times as large
+        as those of the level before.
+        """
+        levels = [_texture(self._scene)]
+        for _ in range(2):
+            size = levels[-1].shape[1] // 4, levels[-1].shape[0] // 4
+            smaller = cv2.resize(levels[-1], size, interpolation=cv2.INTER_AREA)
+            levels.append(np.asarray(smaller, np.uint8))
+        camera = self._scene.camera
+        step = self._distance**2 / (camera.focal * camera.above_ground)  # of a row, metres
+        coarse, fine = np.searchsorted(-step, [-16 * _TEXEL, -4 * _TEXEL]).tolist()
+        for level, start, end in ((2, 0, coarse), (1, coarse, fine), (0, fine, len(step))):
+            if start < end:
+                texel = _TEXEL * 4**level
+                x = np.asarray((self._lateral[start:end] + _HALF_WIDTH) / texel, np.float32)
+                y = np.repeat(self._distance[start:end, None] / texel, x.shape[1], axis=1)
+                yield levels[level], texel, x, np.asarray(y, np.float32)
 
 
 def render(scene: Scene, index: int) -> Image:
@@ -98,35 +158,83 @@ def _sensor_noise(scene: Scene) -> npt.NDArray[np.int16]:
 
 
 def _paint_sky(image: Image, scene: Scene) -> None:
-    """Paint everything above the horizon, and down to the first rows of the ground."""
+    """Paint sky, clouds and hills above the horizon, and down to the first rows of the ground."""
     rng = np.random.default_rng([scene.seed, 3])
-    rows = int(scene.camera.horizon) + 3
-    sky = image[:rows]
-    up = np.linspace(1, 0, rows)[:, None, None]
-    sky[:] = np.clip(up * np.array([168, 118, 78]) + (1 - up) * np.array([206, 186, 165]), 0, 255)
-    _paint_clouds(sky, rng)
-    unit = scene.camera.height / 720
-    for mean, variation, color in ((88, 30, (94, 80, 66)), (34, 26, (44, 62, 60))):
-        _paint_range(sky, rng, scene.camera.horizon - mean * unit, variation * unit, color)
+
+    def noise(rows: int, columns: int) -> npt.NDArray[np.float64]:
+        coarse = rng.standard_normal((rows, columns))
+        return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC))
+
+    horizon, width, unit = scene.camera.horizon, scene.camera.width, scene.camera.height / 720
+    height = int(horizon) + 3
+    up = np.linspace(1, 0, height)[:, None, None]
+    sky = up * np.array([168, 118, 78]) + (1 - up) * np.array([206, 186, 165])
+    clouds = 0.25 * (noise(6, 10) + 0.4 * noise(18, 40) - rng.uniform(-0.5, 1.5))
+    clouds = np.clip(clouds, 0, 0.7)[..., None]
+    sky = (1 - clouds) * sky + clouds * 225
+    for high, rough, color in ((88, 30, (94, 80, 66)), (34, 26, (44, 62, 60))):
+        skyline = horizon - unit * (high + rough * (0.5 * noise(1, 8) + 0.22 * noise(1, 90)))
+        hills = np.clip(np.arange(height)[:, None] - skyline, 0, 1)[..., None]
+        grain = 1 + 0.16 * noise(height // 4, width // 4)[..., None]
+        sky = (1 - hills) * sky + hills * grain * color
+    image[:height] = np.clip(sky, 0, 255)
 
 
-def _paint_clouds(sky: Image, rng: np.random.Generator) -> None:
-    height, width = sky.shape[:2]
-    noise = cv2.resize(rng.standard_normal((6, 10)), (width, height), interpolation=cv2.INTER_CUBIC)
-    noise = noise + 0.4 * cv2.resize(rng.standard_normal((18, 40)), (width, height))
-    share = np.clip(0.25 * (noise - rng.uniform(-0.5, 1.5)), 0, 0.7)[..., None]
-    sky[:] = (1 - share) * sky + share * 225
+def _texture(scene: Scene) -> Image:
+    """Return the brightness of the ground, uint8, 128 is neutral; `PERIOD` × 60 m at 10 cm a pixel.
+
+    Rows are stations, columns run from 30 m left to 30 m right of the camera.
+    """
+    rng = np.random.default_rng([scene.seed, 1])
+    rows, columns = int(PERIOD / _TEXEL), int(2 * _HALF_WIDTH / _TEXEL)
+    grain = _noise(rng, rows, columns, 1)
+    patches = _noise(rng, rows, columns, 12)
+    tracks = cv2.resize(_noise(rng, 1, columns, 6), (columns, rows))
+    lateral = np.linspace(-_HALF_WIDTH, _HALF_WIDTH, columns)
+    paved = (lateral > scene.road.left) & (lateral < scene.road.right)
+    gain = 1 + np.where(paved, 0.04, 0.12) * grain + np.where(paved, 0.04, 0.14) * patches
+    gain += np.where(paved, 0.03, 0.0) * tracks
+    for shadow in scene.light.shadows:
+        start, end = (int(s / _TEXEL) for s in (shadow.station, shadow.station + shadow.length))
+        dark = patches[start:end] > 0 if shadow.dappled else np.True_
+        gain[start:end] *= np.where(dark, 1 - shadow.strength, 1.0)
+    return np.clip(gain * _NEUTRAL, 0, 255).astype(np.uint8)
 
 
-def _paint_range(
-    sky: Image, rng: np.random.Generator, mean: float, variation: float, color: Color
-) -> None:
-    """Paint the part of the sky below a skyline; `mean` is the mean of its rows."""
-    height, width = sky.shape[:2]
-    smooth = cv2.resize(rng.standard_normal((1, 8)), (width, 1), interpolation=cv2.INTER_CUBIC)
-    rough = cv2.resize(rng.standard_normal((1, 90)), (width, 1))
-    skyline = mean - variation * (0.5 * smooth[0] + 0.22 * rough[0])
-    rows = np.arange(height)[:, None]
-    share = np.clip(rows - skyline[None, :], 0, 1)[..., None]
-    grain = 1 + 0.16 * cv2.resize(rng.standard_normal((height // 4, width // 4)), (width, height))
-    sky[:] = np.clip((1 - share) * sky + share * np.array(color) * grain[..., None], 0, 255)
+def _noise(rng: np.random.Generator, rows: int, columns: int, grain: int) -> Float32Array:
+    """Return smooth noise, mean 0 and deviation about 1, `(rows, columns)`."""
+    shape = (max(1, rows // grain), max(1, columns // grain))
+    noise = rng.standard_normal(shape, dtype=np.float32)
+    return np.asarray(cv2.resize(noise, (columns, rows), interpolation=cv2.INTER_CUBIC))
+
+
+def _colors(road: Carriageway, lateral: Float32Array, pixel: Float32Array) -> Float32Array:
+    """Return the colour at each lateral position; `pixel` is a pixel's width in metres."""
+    inside = np.minimum(lateral - road.left, road.right - lateral) / pixel + 0.5
+    paved = np.clip(inside, 0, 1)[..., None]
+    asphalt, verge = (np.array(color, np.float32) for color in (road.asphalt, road.verge))
+    return np.asarray(paved * asphalt + (1 - paved) * verge, np.float32)
+
+
+def _draw_stripe(image: Image, scene: Scene, line: LaneLine, start: float, end: float) -> None:
+    """Draw a lane line from `start` to `end`, metres ahead."""
+    z = distances(start, end)
+    x = line.lateral + np.repeat([-0.5, 0.5], len(z)) * LINE_WIDTH
+    z = np.concatenate([z, z[::-1]])
+    stripe = np.stack([x, np.zeros_like(z), z], axis=1)
+    scene.camera.draw(image, stripe, mixed(scene.road.asphalt, line.color, line.strength))
+
+
+def _draw_plants(image: Image, scene: Scene, station: float) -> None:
+    """Draw the plants beside the road as seen from a station of the camera."""
+    placed = [((plant.station - station) % PERIOD, plant) for plant in scene.roadside]
+    angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    for ahead, plant in sorted(placed, key=lambda pair: -pair[0]):
+        if not _NEAREST < ahead < _FARTHEST:
+            continue
+        ragged = 1 + 0.12 * np.sin(7 * angles + plant.station) + 0.08 * np.sin(11 * angles)
+        for size, brightness in _CROWN:
+            x = plant.lateral + size * ragged * np.cos(angles) * plant.width / 2
+            y = np.maximum(0, plant.height * (1 + size * ragged * np.sin(angles)) / 2)
+            crown = np.stack([x, y, np.full_like(x, ahead)], axis=1)
+            scene.camera.draw(image, crown, shaded(plant.color, brightness))

@@ -2,12 +2,11 @@
 
 The same scene always gives the same images and the same truth. Lateral positions are metres to
 the right of the camera. A `station` is metres along the road from where the clip begins. The road's
-surface and the objects beside it repeat every `PERIOD` metres, so a clip may have any length.
+surface and the plants beside it repeat every `PERIOD` metres, so a clip may have any length.
 """
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Literal
 
 import numpy as np
 
@@ -15,42 +14,29 @@ from vdet.draw.paint import Color
 from vdet.synthetic.camera import PinholeCamera
 
 PERIOD = 200.0
-"""Metres after which roadside and surface repeat."""
+"""Metres after which plants and surface repeat."""
+LINE_WIDTH = 0.15
+"""Metres."""
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LaneLine:
     """A lane line along the road, solid or dashed; a worn line has a `strength` below 1."""
 
     lateral: float
     color: Color = (225, 230, 230)
-    width: float = 0.15
     dash: float | None = None
-    """Length of a dash; None for a solid line."""
-    gap: float = 9.0
+    """Length of a dash, which begins every 12 m; None for a solid line."""
     strength: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Wall:
-    """A concrete barrier (`bottom` 0) or a guard rail (`bottom` above 0) along the road."""
-
-    lateral: float
-    bottom: float
-    top: float
-    color: Color
-    spacing: float
-    """Metres between joints or posts."""
-
-
-@dataclass(frozen=True, slots=True)
 class Carriageway:
-    """The paved road from `left` to `right`, its lines, and the walls along it."""
+    """The paved road from `left` to `right`, and its lines."""
 
     left: float
     right: float
-    lines: tuple[Line, ...]
-    walls: tuple[Wall, ...] = ()
+    lines: tuple[LaneLine, ...]
     asphalt: Color = (88, 84, 82)
     verge: Color = (92, 132, 150)
 
@@ -79,10 +65,9 @@ class Light:
 
 
 @dataclass(frozen=True, slots=True)
-class RoadsideObject:
-    """An object beside the road; a `box` looks a little like a vehicle."""
+class Plant:
+    """A tree or a bush beside the road."""
 
-    kind: Literal["plant", "box"]
     station: float
     lateral: float
     width: float
@@ -140,7 +125,7 @@ class Scene:
     camera: PinholeCamera
     road: Carriageway
     light: Light = Light()
-    roadside: tuple[RoadsideObject, ...] = ()
+    roadside: tuple[Plant, ...] = ()
     vehicles: tuple[SceneVehicle, ...] = ()
     speed: float = 25.0
     rate: Fraction = Fraction(25)

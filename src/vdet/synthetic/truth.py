@@ -6,9 +6,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from vdet.boxes import Box, Float64Array
+from vdet.boxes import Box
 from vdet.files import staged
-from vdet.media.images import Image
 from vdet.synthetic.camera import fill_mask
 from vdet.synthetic.scene import Scene
 from vdet.synthetic.vehicle import outlines
@@ -17,21 +16,18 @@ SMALLEST = (40, 24)
 """Least width and height, in pixels of a 720-row frame, of a vehicle that must be found."""
 
 _CAR = 3  # class number in MOTChallenge
-_RASTER = 256  # pixels along the longer side of the image in which a whole outline is measured
 
 
 @dataclass(frozen=True, slots=True)
 class TrueBox:
     """The place of a vehicle in a frame, without its shadow on the ground.
 
-    `box` bounds the part inside the frame, also where nearer vehicles hide it.
-    `visibility` is the share of its outline that is inside the frame and not hidden; `hidden` is
-    the share of the part inside the frame that nearer vehicles hide. Both are 0 to 1.
+    `box` bounds the part inside the frame, also where nearer vehicles hide it. `hidden` is the
+    share of this part that they hide, 0 to 1.
     """
 
     id: int
     box: Box
-    visibility: float
     hidden: float
 
 
@@ -41,10 +37,12 @@ def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
     covered = np.zeros((camera.height, camera.width), np.uint8)
     found = []
     for _, vehicle in scene.nearest_first(time):
-        parts = [outline for outline, _color in outlines(vehicle, camera, time)]
-        mask = _mask(parts, covered.shape)
-        if mask.any():
-            found.append(_true_box(vehicle.id, mask, covered, _area(parts)))
+        mask = np.zeros_like(covered)
+        for outline, _color in outlines(vehicle, camera, time):
+            fill_mask(mask, outline)
+        if inside := cv2.countNonZero(mask):
+            hidden = cv2.countNonZero(mask & covered) / inside
+            found.append(TrueBox(vehicle.id, Box.sized(*cv2.boundingRect(mask)), hidden))
         covered |= mask
     return tuple(sorted(found, key=lambda box: box.id))
 
@@ -60,56 +58,25 @@ def must_be_found(vehicle: TrueBox, frame_height: int) -> bool:
     return large and vehicle.hidden <= 0.5
 
 
-def _true_box(number: int, mask: Image, covered: Image, whole: float) -> TrueBox:
-    inside = cv2.countNonZero(mask)
-    free = cv2.countNonZero(mask & ~covered)
-    box = Box.sized(*cv2.boundingRect(mask))
-    return TrueBox(number, box, visibility=min(1.0, free / whole), hidden=1 - free / inside)
-
-
-def _mask(parts: list[Float64Array], shape: tuple[int, ...]) -> Image:
-    mask = np.zeros(shape, np.uint8)
-    for part in parts:
-        fill_mask(mask, part)
-    return mask
-
-
-def _area(parts: list[Float64Array]) -> float:
-    """Return the pixels that the union of outlines covers, wherever it lies.
-
-    A vehicle beside the camera reaches thousands of pixels beyond the frame, so it is measured in
-    a small image of its own.
-    """
-    points = np.concatenate(parts)
-    low = points.min(axis=0)
-    scale = (_RASTER - 1) / max(1.0, float((points.max(axis=0) - low).max()))
-    mask = _mask([(part - low) * scale for part in parts], (_RASTER, _RASTER))
-    return cv2.countNonZero(mask) / scale**2
-
-
 def write_truth(path: Path, scene: Scene, *, overwrite: bool = False) -> None:
     """Write the true box of each vehicle, in the columns of MOTChallenge ground truth.
 
     One line per box: `frame, id, left, top, width, height, flag, class, visibility`; frames and
-    pixels count from 1, the class is 3 (car). The flag is 1 for a vehicle that must be
-    found and 0 for an ignore region (`must_be_found`).
+    pixels count from 1, the class is 3 (car), the visibility is 1 - `hidden`. The flag is 1 for a
+    vehicle that must be found and 0 for an ignore region (`must_be_found`).
 
     Raises
     ------
     OutputError
         The file cannot be written.
     """
-    lines = [
-        _line(index + 1, box, scene.camera.height)
-        for index in range(scene.frames)
-        for box in true_boxes(scene, index)
-    ]
+    lines = []
+    for index in range(scene.frames):
+        for vehicle in true_boxes(scene, index):
+            x, y, width, height = vehicle.box.xywh
+            place = f"{x + 1},{y + 1},{width},{height}"
+            flag = int(must_be_found(vehicle, scene.camera.height))
+            last = f"{flag},{_CAR},{1 - vehicle.hidden:.3f}\n"
+            lines.append(f"{index + 1},{vehicle.id},{place},{last}")
     with staged(path, overwrite=overwrite) as temporary:
         temporary.write_text("".join(lines), encoding="ascii", newline="\n")
-
-
-def _line(number: int, vehicle: TrueBox, frame_height: int) -> str:
-    x, y, width, height = vehicle.box.xywh
-    flag = int(must_be_found(vehicle, frame_height))
-    place = f"{x + 1},{y + 1},{width},{height}"
-    return f"{number},{vehicle.id},{place},{flag},{_CAR},{vehicle.visibility:.3f}\n"

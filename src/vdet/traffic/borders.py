@@ -1,4 +1,4 @@
-"""Lines and zones in pixels of the frames of one video, and what one vehicle does at each."""
+"""Lines and zones in pixels of the frames of one video, and the state of a vehicle at each."""
 
 import math
 from collections.abc import Sequence
@@ -21,6 +21,8 @@ LEAST_BAND = 0.003
 """Smallest such distance, as a share of the frame's height."""
 _AT_EDGE = 0.002
 """A point within this share of the frame's side (or one pixel) of the frame's edge lies on it."""
+_MOST_AT_EDGE = 0.005
+"""Limit of that one pixel in small frames, as a share; lines are longer (`SHORTEST_LINE`)."""
 _INSIDE = 0.01
 """Pixels from the edge of the frame to which points outside are moved."""
 
@@ -28,7 +30,7 @@ _Size = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class PlacedLine:
     """A line; its positive side is the left of someone who looks from `start` to `end`.
 
     `directions` are the names of the left and of the right. `start` and `end` are those that are
@@ -85,13 +87,13 @@ class Zone:
         return x, y
 
 
-Border = Line | Zone
+Border = PlacedLine | Zone
 """The first of its directions leads to its positive side, the second to its negative side."""
 
 
 def place(
     settings: CountSettings, width: int, height: int
-) -> tuple[tuple[Line, ...], tuple[Zone, ...]]:
+) -> tuple[tuple[PlacedLine, ...], tuple[Zone, ...]]:
     """Place lines and zones in frames of `width` × `height` pixels.
 
     Raises
@@ -106,48 +108,47 @@ def place(
         return _snapped(point[0] * across, width), _snapped(point[1] * down, height)
 
     lines = tuple(
-        _line(each.name, (each.left, each.right), placed(each.start), placed(each.end), size)
+        PlacedLine(each.name, (each.left, each.right), start, end, _reach(start, end, size))
         for each in settings.lines
+        for start, end in [(placed(each.start), placed(each.end))]
     )
-    zones = tuple(_zone(each.name, [*map(placed, each.points)], size) for each in settings.zones)
+    zones = tuple(
+        Zone(each.name, corners, _inner_sides(corners, size), size)
+        for each in settings.zones
+        for corners in [tuple(map(placed, each.points))]
+    )
     return lines, zones
 
 
-def _line(name: str, directions: tuple[str, str], start: Point, end: Point, size: _Size) -> Line:
-    """Make a line; an end at the frame's edge goes on beyond it, where feet may be too."""
+def _reach(start: Point, end: Point, size: _Size) -> Segment:
+    """Lengthen a line beyond the edge of the frame where it ends there: feet may be there too."""
     factor = sum(size) / math.dist(start, end)
     dx, dy = factor * (end[0] - start[0]), factor * (end[1] - start[1])
-    first = (start[0] - dx, start[1] - dy) if _at_edge(start, size) else start
-    last = (end[0] + dx, end[1] + dy) if _at_edge(end, size) else end
-    return Line(name, directions, start, end, (first, last))
+    at_edge = [
+        any(value in (0, length) for value, length in zip(point, size, strict=True))
+        for point in (start, end)
+    ]
+    return (
+        (start[0] - dx, start[1] - dy) if at_edge[0] else start,
+        (end[0] + dx, end[1] + dy) if at_edge[1] else end,
+    )
 
 
-def _zone(name: str, corners: Sequence[Point], size: _Size) -> Zone:
-    return Zone(
-        name,
-        tuple(corners),
-        tuple(side for side in sides(corners) if not _runs_along_edge(side, size)),
-        size,
+def _inner_sides(corners: Sequence[Point], size: _Size) -> tuple[Segment, ...]:
+    """Return the sides of a polygon that do not run along the edge of the frame."""
+    return tuple(
+        side
+        for side in sides(corners)
+        if not any(a == b and a in (0, length) for a, b, length in zip(*side, size, strict=True))
     )
 
 
 def _snapped(value: float, length: float) -> float:
     """Return a coordinate, moved onto the frame's edge where it is very near to it."""
-    near = max(1.0, _AT_EDGE * length)
+    near = max(min(1.0, _MOST_AT_EDGE * length), _AT_EDGE * length)
     if value <= near:
         return 0.0
     return float(length) if length - value <= near else value
-
-
-def _at_edge(point: Point, size: _Size) -> bool:
-    return any(value in (0, length) for value, length in zip(point, size, strict=True))
-
-
-def _runs_along_edge(side: Segment, size: _Size) -> bool:
-    return any(
-        start == end and start in (0, length)
-        for start, end, length in zip(*side, size, strict=True)
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +160,7 @@ class Sighting:
     point: Point
     height: float
     score: float
+    stitched: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,7 +181,7 @@ class Change:
 
 @dataclass(slots=True)
 class BorderState:
-    """What is remembered of a vehicle at a border.
+    """The state of a vehicle at a border.
 
     Attributes
     ----------
@@ -203,7 +205,7 @@ class BorderState:
     _crossed: Point | None = None  # where it last crossed and was counted
 
     def see(self, sighting: Sighting, before: Sighting, band: float) -> Change | None:
-        """Take in the next sighting; return the change of the settled side, if there is one.
+        """Add the next sighting; return the change of the settled side, if there is one.
 
         `before` is the last sighting, or the same one at first. The first side that is settled is
         no change.

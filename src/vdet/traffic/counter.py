@@ -1,10 +1,12 @@
-"""From the tracks of each frame to events; `vdet.traffic` explains the rule."""
+"""The counter: from the tracks of each frame to events. `vdet.traffic` explains the rule."""
 
 import math
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+import numpy as np
 
 from vdet.boxes import Box
 from vdet.config.places import CountSettings
@@ -41,50 +43,82 @@ _MOST_GROWTH = 2.0
 
 @dataclass(slots=True)
 class _Vehicle:
-    """What is remembered of a track. `events` lack their class, which is known at the end."""
+    """The state of a track; `events` are those that wait for it to be confirmed."""
 
     id: int
     first: Sighting
     last: Sighting
     states: list[BorderState]
     shown: float = 0.0  # when it was last shown, also by prediction
-    outward: Point = (0.0, 0.0)  # sides of the frame that its last box touches: x, y, -1, 0 or 1
-    velocity: Point = (0.0, 0.0)
+    outward: complex = 0j  # sides of the frame that its last box touches: x and y of -1, 0 or 1
+    velocity: complex = 0j  # x and y, pixels a second
     classes: ClassScores = field(default_factory=ClassScores)
     events: list[Event] = field(default_factory=list)
-    tallied: int = 0
 
     @property
     def is_leaving(self) -> bool:
         """Whether it moves out at the edge of the frame: then its end is no loss of the tracker."""
-        outward = sum(v * side for v, side in zip(self.velocity, self.outward, strict=True))
-        return outward > _LEAVES * self.last.height
+        return (self.velocity * self.outward.conjugate()).real > _LEAVES * self.last.height
 
     def expected(self, time: float) -> Point:
-        """Return where it would be, had it gone on."""
-        seconds = time - self.last.time
-        x, y = (a + v * seconds for a, v in zip(self.last.point, self.velocity, strict=True))
-        return x, y
+        """Return where it would be now if it had moved on."""
+        place = complex(*self.last.point) + self.velocity * (time - self.last.time)
+        return place.real, place.imag
 
     def move(self, sighting: Sighting) -> None:
-        """Take in the place of the next sighting."""
+        """Move to the place of the next sighting."""
         seconds = sighting.time - self.last.time
         if seconds > 0:
             share = 1.0 if self.last is self.first else 0.5
-            ways = zip(self.velocity, self.last.point, sighting.point, strict=True)
-            x, y = (v + share * ((b - a) / seconds - v) for v, a, b in ways)
-            self.velocity = x, y
+            way = complex(*sighting.point) - complex(*self.last.point)
+            self.velocity += share * (way / seconds - self.velocity)
         self.last = sighting
 
     def add(
         self, name: str, direction: str, at: Sighting | Change, seconds: float | None = None
     ) -> None:
-        """Note an event."""
-        stitched = isinstance(at, Change) and at.stitched
+        """Add an event."""
         time, score = round(at.time, 3), round(at.score, 4)
         stay = None if seconds is None else round(seconds, 3)
-        event = Event(time, at.frame, name, direction, self.id, None, score, stitched, stay)
+        event = Event(time, at.frame, name, direction, self.id, None, score, at.stitched, stay)
         self.events.append(event)
+
+
+class _Ended:
+    """Vehicles that may go on under a new id: those that have just ended inside the frame.
+
+    Each has two rows, for the place where it was last and for that where it would be now. They are
+    ordered by x, so that a new vehicle is compared only with those near it.
+    """
+
+    def __init__(self, vehicles: list[_Vehicle], now: float) -> None:
+        rows = [(at, each) for each in vehicles for at in (each.last.point, each.expected(now))]
+        rows.sort(key=lambda row: row[0])
+        self._vehicles = [each for _, each in rows]
+        self._places = np.array([at for at, _ in rows], np.float64).reshape(-1, 2)
+        self._heights = np.array([each.last.height for each in self._vehicles])
+        self._taken: set[int] = set()
+
+    def take(self, sighting: Sighting) -> _Vehicle | None:
+        """Return the nearest vehicle that goes on at a place, each only once; None if none does."""
+        reach = 1 + _MOST_GROWTH * sighting.height
+        first, last = np.searchsorted(
+            self._places[:, 0], sighting.point[0] + np.array([-reach, reach])
+        )
+        heights = self._heights[first:last]
+        larger, smaller = np.maximum(heights, sighting.height), np.minimum(heights, sighting.height)
+        distances = np.hypot(*(self._places[first:last] - sighting.point).T)
+        fits = np.flatnonzero((larger <= _MOST_GROWTH * smaller) & (distances <= larger))
+        near: list[tuple[float, int, int]] = [
+            (distances[row], number, first + row)
+            for row in fits.tolist()
+            if (number := self._vehicles[first + row].id) not in self._taken
+        ]
+        if not near:
+            return None
+        _, number, nearest = min(near)
+        self._taken.add(number)
+        return self._vehicles[nearest]
 
 
 class VehicleCounter:
@@ -107,27 +141,33 @@ class VehicleCounter:
         self._borders: tuple[Border, ...] = (*self.lines, *self.zones)
         self._size = width, height
         self._vehicles: dict[int, _Vehicle] = {}
-        self._events: list[Event] = []
+        self._counted: list[tuple[Event, ClassScores]] = []  # the class is known at the end
         self._tally: Counter[tuple[str, str]] = Counter()
         self._now = -math.inf
 
     def update(self, frame: FrameTracks) -> None:
-        """Take in the tracks of the next frame."""
+        """Add the tracks of the next frame."""
         self._now = round(frame.time, 6)  # as files hold it
         for vehicle in list(self._vehicles.values()):
             if self._now - vehicle.shown > REMEMBERED:
                 self._close(vehicle)
-        shown = {track.id for track in frame.tracks}
+        ended = None
+        if any(track.id not in self._vehicles for track in frame.tracks):
+            ended = self._ended({track.id for track in frame.tracks})
         for track in frame.tracks:
             if track.id in self._vehicles:
                 self._vehicles[track.id].shown = self._now
-            self._see(track, self._sighting(track, frame.index), shown)
+            # As exactly as files of tracks hold them, so that both count alike.
+            x, y = (round(value, 2) for value in track.foot)
+            height, score = float(track.box.xywh[3]), round(track.score, 4)
+            self._see(track, Sighting(self._now, frame.index, (x, y), height, score), ended)
 
     def counts(self) -> Counts:
         """Return all results; the video has ended."""
         for vehicle in list(self._vehicles.values()):
             self._close(vehicle)
-        events = sorted(self._events, key=lambda e: (e.time, e.frame, e.id, e.name))
+        events = [replace(event, class_name=scores.best) for event, scores in self._counted]
+        events.sort(key=lambda e: (e.time, e.frame, e.id, e.name))
         keys = [(each.name, way) for each in self._borders for way in each.directions]
         return Counts.of(events, keys, [zone.name for zone in self.zones])
 
@@ -144,14 +184,8 @@ class VehicleCounter:
             for state in each.states
         )
 
-    def _sighting(self, track: Track, frame: int) -> Sighting:
-        """Return where a track is as exactly as files of tracks hold it, so both count alike."""
-        x, y = track.foot
-        point, height = (round(x, 2), round(y, 2)), float(track.box.xywh[3])
-        return Sighting(self._now, frame, point, height, round(track.score, 4))
-
-    def _see(self, track: Track, sighting: Sighting, shown: set[int]) -> None:
-        vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, shown)
+    def _see(self, track: Track, sighting: Sighting, ended: _Ended | None) -> None:
+        vehicle = self._vehicles.get(track.id) or self._begin(track.id, sighting, ended)
         vehicle.classes.add(track.class_name, track.score)
         vehicle.outward = _touched_sides(track.box, self._size)
         band = max(BAND * sighting.height, LEAST_BAND * self._size[1])
@@ -166,9 +200,9 @@ class VehicleCounter:
         vehicle.move(sighting)
         self._confirm(vehicle)
 
-    def _begin(self, number: int, sighting: Sighting, shown: set[int]) -> _Vehicle:
+    def _begin(self, number: int, sighting: Sighting, ended: _Ended | None) -> _Vehicle:
         """Remember a new vehicle, which may go on from another that has ended."""
-        before = self._before(sighting, shown)
+        before = ended.take(sighting) if ended else None
         if before is None:
             states = [BorderState(border) for border in self._borders]
             vehicle = _Vehicle(number, sighting, sighting, states, self._now)
@@ -180,26 +214,21 @@ class VehicleCounter:
                 shown=self._now,
                 classes=ClassScores(before.classes),
                 events=[],
-                tallied=0,
             )
-            self._forget(before)
+            del self._vehicles[before.id]
         self._vehicles[number] = vehicle
         return vehicle
 
-    def _before(self, sighting: Sighting, shown: set[int]) -> _Vehicle | None:
-        """Return the vehicle that has ended where a new one begins."""
-        near = []
-        for vehicle in self._vehicles.values():
-            if vehicle.id in shown or vehicle.is_leaving:
-                continue
-            heights = vehicle.last.height, sighting.height
-            if sighting.time - vehicle.shown > _GAP or max(heights) > _MOST_GROWTH * min(heights):
-                continue
-            places = vehicle.last.point, vehicle.expected(sighting.time)
-            distance = min(math.dist(place, sighting.point) for place in places)
-            if distance <= max(heights):
-                near.append((distance, vehicle.id))
-        return self._vehicles[min(near)[1]] if near else None
+    def _ended(self, shown: set[int]) -> _Ended:
+        """Return the vehicles that have just ended; those with an id in `shown` go on."""
+        vehicles = [
+            vehicle
+            for vehicle in self._vehicles.values()
+            if self._now - vehicle.shown <= _GAP
+            and vehicle.id not in shown
+            and not vehicle.is_leaving
+        ]
+        return _Ended(vehicles, self._now)
 
     def _is_confirmed(self, vehicle: _Vehicle) -> bool:
         seen = round(vehicle.last.time - vehicle.first.time, TIME_DIGITS)
@@ -207,23 +236,22 @@ class VehicleCounter:
 
     def _confirm(self, vehicle: _Vehicle) -> None:
         """Count the vehicle's new events, if it is confirmed."""
-        if not self._is_confirmed(vehicle):
-            return
-        for event in vehicle.events[vehicle.tallied :]:
-            self._tally[event.name, event.direction] += 1
-        vehicle.tallied = len(vehicle.events)
+        if self._is_confirmed(vehicle):
+            for event in vehicle.events:
+                self._tally[event.name, event.direction] += 1
+                self._counted.append((event, vehicle.classes))
+            vehicle.events.clear()
 
     def _close(self, vehicle: _Vehicle) -> None:
         """End a vehicle that is not shown any more."""
-        _end(vehicle)
+        for state in vehicle.states:
+            if (change := state.end(vehicle.last)) is not None:
+                _note(vehicle, state, change)
+            if state.entered is not None:
+                stay = vehicle.last.time - state.entered
+                vehicle.add(state.border.name, VANISH, vehicle.last, stay)
         self._confirm(vehicle)
-        self._forget(vehicle)
-
-    def _forget(self, vehicle: _Vehicle) -> None:
-        """Keep only the events of a vehicle."""
         del self._vehicles[vehicle.id]
-        for event in vehicle.events[: vehicle.tallied]:
-            self._events.append(replace(event, class_name=vehicle.classes.best))
 
 
 def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
@@ -238,20 +266,10 @@ def _note(vehicle: _Vehicle, state: BorderState, change: Change) -> None:
     vehicle.add(border.name, border.directions[change.side < 0], change, seconds)
 
 
-def _end(vehicle: _Vehicle) -> None:
-    """Note the events of a vehicle that is not seen again."""
-    for state in vehicle.states:
-        if (change := state.end(vehicle.last)) is not None:
-            _note(vehicle, state, change)
-        if state.entered is not None:
-            stay = vehicle.last.time - state.entered
-            vehicle.add(state.border.name, VANISH, vehicle.last, stay)
-
-
-def _touched_sides(box: Box, size: tuple[int, int]) -> Point:
+def _touched_sides(box: Box, size: tuple[int, int]) -> complex:
     """Return at which sides of the frame a box is: -1 left or top, 1 right or bottom, 0 neither."""
     x1, y1, x2, y2 = box.pixels
-    return (x2 >= size[0] - 1) - (x1 <= 1), (y2 >= size[1] - 1) - (y1 <= 1)
+    return complex((x2 >= size[0] - 1) - (x1 <= 1), (y2 >= size[1] - 1) - (y1 <= 1))
 
 
 def count_file(
@@ -272,7 +290,7 @@ def count_file(
     Raises
     ------
     TruthError
-        The file cannot be used, or has no times.
+        The file cannot be used, or its times are missing or wrong.
     ConfigError
         The lines do not fit the frames, or the size of the frames is not known.
     """
@@ -291,7 +309,13 @@ def count_frames(
         raise ConfigError("there is nothing to count at; give lines or zones")
     if size is None:
         raise ConfigError("the lines are shares of the frame; give --size, as in 1280x720")
-    counter = VehicleCounter(settings, *size)
+    counter, latest = VehicleCounter(settings, *size), -math.inf
     for frame in frames:
+        if not latest <= frame.time < math.inf:
+            raise TruthError(
+                f"frame {frame.index}: its time is {frame.time:g} s, after {latest:g} s; give "
+                "times in seconds that never run backwards"
+            )
+        latest = frame.time
         counter.update(frame)
     return counter.counts()

@@ -1,4 +1,4 @@
-"""Events and what follows from them: totals, counts of each minute, stays in zones; as files too.
+"""Events, and the totals, counts by minute and stays in zones that follow from them; their files.
 
 A `.csv` has the events, a `.json` the events and all totals. A file over several videos has the
 same columns with `video` before them, or the counts of each video and the sum of all totals.
@@ -19,8 +19,7 @@ Key = tuple[str, str]
 
 _IN = (ENTER, APPEAR)
 _COLUMNS = ("time", "frame", "name", "direction", "id", "class", "score", "stitched", "seconds")
-"""Of `.csv`: the fields of an event in their order."""
-_FORMS = {"time": ".3f", "score": ".4f", "stitched": "d", "seconds": ".3f"}
+"""Columns of a `.csv`: the fields of an event in their order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,19 +33,18 @@ class Event:
     frame
         Number of the first frame at or after it, from 0.
     name
-        Of the line or zone.
+        Name of the line or zone.
     direction
-        As the user named it; of a zone enter, exit, appear (it is first seen inside) or vanish (it
-        is last seen inside).
+        Direction of a line, as the user named it; for a zone enter, exit, appear (the vehicle is
+        first seen inside) or vanish (it is last seen inside).
     id
-        Of the track.
+        Id of the track.
     class_name
         Class of the vehicle; None if the detector has no classes.
     score
-        0 to 1: that of the track in `frame`.
+        Score of the track in `frame`, 0 to 1.
     stitched
-        Whether the vehicle was followed as another track before, so that this one's id alone would
-        not show it.
+        Whether the vehicle had another id before, without which this event would not be known.
     seconds
         How long the vehicle was in the zone, for exit and vanish; else None.
     """
@@ -63,7 +61,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Total:
+class DirectionTotal:
     """How many vehicles were counted in a direction, and how many of them of each class."""
 
     name: str
@@ -86,7 +84,7 @@ class MinuteCount:
 class Stay:
     """Vehicles in a zone: most at once, and how long they were there, seconds.
 
-    The times are None where no vehicle has left or vanished.
+    `mean` and `longest` are None where no vehicle has left or vanished.
     """
 
     name: str
@@ -100,23 +98,28 @@ class Counts:
     """All results of one video."""
 
     events: tuple[Event, ...]
-    totals: tuple[Total, ...]
+    totals: tuple[DirectionTotal, ...]
     minutes: tuple[MinuteCount, ...]
+    """Those with an event."""
     zones: tuple[Stay, ...]
 
     @staticmethod
     def of(events: Sequence[Event], keys: Iterable[Key], zones: Iterable[str]) -> "Counts":
         """Sum up events; `keys` get a total even where nothing happened, `zones` are names."""
-        nothing = (Total(*key, 0, {}) for key in keys)
-        ones = (
-            Total(each.name, each.direction, 1, {each.class_name: 1} if each.class_name else {})
-            for each in events
+        totals = [DirectionTotal(*key, 0, {}) for key in keys]
+        for each in events:
+            classes = {each.class_name: 1} if each.class_name else {}
+            totals.append(DirectionTotal(each.name, each.direction, 1, classes))
+        minutes = Counter((int(e.time // 60), e.name, e.direction) for e in events)
+        return Counts(
+            tuple(events),
+            sum_totals(totals),
+            tuple(MinuteCount(*key, count) for key, count in sorted(minutes.items())),
+            tuple(_stay(name, [event for event in events if event.name == name]) for name in zones),
         )
-        totals = sum_totals([*nothing, *ones])
-        return Counts(tuple(events), totals, _by_minute(events), _stays(events, zones))
 
 
-def sum_totals(totals: Iterable[Total]) -> tuple[Total, ...]:
+def sum_totals(totals: Iterable[DirectionTotal]) -> tuple[DirectionTotal, ...]:
     """Return the sum of the totals of each name and direction, in the order of their first."""
     counts: Counter[Key] = Counter()
     classes: dict[Key, Counter[str]] = {}
@@ -125,46 +128,34 @@ def sum_totals(totals: Iterable[Total]) -> tuple[Total, ...]:
         counts[key] += each.count
         classes[key] = classes.get(key, Counter()) + Counter(each.classes)
     return tuple(
-        Total(*key, counts[key], dict(sorted(of_key.items()))) for key, of_key in classes.items()
+        DirectionTotal(*key, count, dict(sorted(classes[key].items())))
+        for key, count in counts.items()
     )
 
 
-def _by_minute(events: Iterable[Event]) -> tuple[MinuteCount, ...]:
-    """Return the counts of each minute; minutes without an event are left out."""
-    counts = Counter((int(e.time // 60), e.name, e.direction) for e in events)
-    return tuple(MinuteCount(*key, count) for key, count in sorted(counts.items()))
-
-
-def _stays(events: Iterable[Event], zones: Iterable[str]) -> tuple[Stay, ...]:
-    """Return the stays in each of the zones of these names."""
-    ordered = sorted(events, key=lambda event: (event.time, event.direction in _IN))
-    return tuple(_stay(name, [event for event in ordered if event.name == name]) for name in zones)
-
-
 def _stay(name: str, events: Sequence[Event]) -> Stay:
-    steps = [1 if event.direction in _IN else -1 for event in events]
+    """Return the stays in the zone of these events; who leaves makes room for who enters then."""
+    ordered = sorted(events, key=lambda event: (event.time, event.direction in _IN))
+    most = max(accumulate(1 if each.direction in _IN else -1 for each in ordered), default=0)
     seconds = [event.seconds for event in events if event.seconds is not None]
-    most = max(accumulate(steps), default=0)
-    if not seconds:
-        return Stay(name, most, None, None)
-    return Stay(name, most, round(sum(seconds) / len(seconds), 3), max(seconds))
+    mean = round(sum(seconds) / len(seconds), 3) if seconds else None
+    return Stay(name, most, mean, max(seconds, default=None))
 
 
-def write_counts(path: Path, counts: Counts) -> None:
-    """Write the counts of one video."""
-    if is_json(path):
-        write_json(path, _plain(counts))
+def write_counts(path: Path, counts: Counts | Mapping[str, Counts]) -> None:
+    """Write the counts of one video, or of several by their names."""
+    if isinstance(counts, Counts):
+        value: Any = _plain(counts)
+        columns: tuple[str, ...] = _COLUMNS
+        rows = list(map(_cells, counts.events))
     else:
-        write_table(path, _COLUMNS, map(_cells, counts.events))
-
-
-def write_counts_of_all(path: Path, videos: Mapping[str, Counts]) -> None:
-    """Write the counts of several videos, by their names."""
+        value = _joined({name: _plain(each) for name, each in counts.items()})
+        columns = (VIDEO, *_COLUMNS)
+        rows = [[name, *_cells(event)] for name, each in counts.items() for event in each.events]
     if is_json(path):
-        write_json(path, _joined({name: _plain(counts) for name, counts in videos.items()}))
+        write_json(path, value)
     else:
-        rows = ((name, *_cells(event)) for name, each in videos.items() for event in each.events)
-        write_table(path, (VIDEO, *_COLUMNS), rows)
+        write_table(path, columns, rows)
 
 
 def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
@@ -176,8 +167,8 @@ def join_counts(outputs: Mapping[str, Path], path: Path) -> None:
 
 
 def _joined(videos: Mapping[str, Any]) -> dict[str, Any]:
-    totals = sum_totals(Total(**total) for each in videos.values() for total in each["totals"])
-    return {"totals": [asdict(each) for each in totals], "videos": videos}
+    totals = [DirectionTotal(**total) for each in videos.values() for total in each["totals"]]
+    return {"totals": [asdict(each) for each in sum_totals(totals)], "videos": videos}
 
 
 def _plain(counts: Counts) -> dict[str, Any]:
@@ -185,8 +176,5 @@ def _plain(counts: Counts) -> dict[str, Any]:
     return asdict(counts) | {"events": list(events)}
 
 
-def _cells(event: Event) -> list[str]:
-    return [
-        "" if value is None else format(value, _FORMS.get(column, ""))
-        for column, value in zip(_COLUMNS, astuple(event), strict=True)
-    ]
+def _cells(event: Event) -> list[Any]:
+    return [int(value) if isinstance(value, bool) else value for value in astuple(event)]

@@ -1,9 +1,6 @@
-"""A whole video in pictures: the best of each vehicle, where vehicles were, how many at once."""
+"""A whole video in pictures: the best one of each vehicle, and where vehicles were."""
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -20,8 +17,6 @@ _COLUMNS = 320  # of the heat map, at most
 _FOOT = 0.25  # lower share of a box that is taken for the ground under the vehicle
 _BLUR = 1.5  # of the heat map, standard deviation in its cells
 _CLEAREST = 0.7  # share of colour where it is hottest
-
-_ROUNDING = 1e-6  # of a step of the levels
 
 _Merit = tuple[bool, float]
 """Whether the vehicle is whole in the frame; its area in pixels times its score."""
@@ -51,12 +46,12 @@ class BestCrops:
         self._merits: dict[int, _Merit] = {}
 
     def add(self, frame: FrameTracks, picture: Picture) -> list[Crop]:
-        """Look at the next frame.
+        """Add the next frame.
 
         Returns
         -------
-        The best pictures so far of the vehicles that this frame no longer shows. A vehicle that
-        comes back is returned again if it gets a better one.
+        The best pictures so far of the vehicles that this frame no longer shows. If a vehicle comes
+        back and gets a better picture, it is returned again.
         """
         shown = {track.id for track in frame.tracks}
         gone = [self._best.pop(number) for number in sorted(self._best.keys() - shown)]
@@ -88,13 +83,13 @@ def _cut(box: Box, picture: Picture) -> Image:
     return Box(box.x1 - x, box.y1 - y, box.x2 + x, box.y2 + y).cut(picture.image).copy()
 
 
-class HeatMap:
+class GroundHeat:
     """Adds up where vehicles stand, frame by frame.
 
     Parameters
     ----------
     width, height
-        Of the frames, pixels.
+        Size of the frames, pixels.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -126,39 +121,3 @@ class HeatMap:
         color = cv2.applyColorMap((80 + 175 * heat).astype(np.uint8), cv2.COLORMAP_PLASMA)
         share = _CLEAREST * np.clip(4 * heat, 0, 1)[..., np.newaxis]
         return np.asarray(grey * (1 - share) + color * share, np.uint8)
-
-
-class Levels:
-    """How many vehicles are shown at once: the moments at which that changes."""
-
-    def __init__(self) -> None:
-        self._changes: list[tuple[float, int]] = []
-        self._last = 0.0
-
-    def add(self, frame: FrameTracks) -> None:
-        """Add the next frame."""
-        self._last = frame.time
-        if not self._changes or self._changes[-1][1] != len(frame.tracks):
-            self._changes.append((frame.time, len(frame.tracks)))
-
-    @property
-    def most(self) -> int:
-        """The most vehicles at once."""
-        return max((count for _, count in self._changes), default=0)
-
-    def steps(self, number: int) -> Sequence[int]:
-        """Cut the time from the first to the last frame into equal steps.
-
-        Returns
-        -------
-        The most vehicles at once in each of the `number` steps.
-        """
-        levels = [0] * number
-        start = self._changes[0][0] if self._changes else 0.0
-        step = (self._last - start) / number or 1.0
-        for (begin, count), (end, _) in pairwise([*self._changes, (self._last, 0)]):
-            first = min(number - 1, int((begin - start) / step + _ROUNDING))
-            last = math.ceil((end - start) / step - _ROUNDING)
-            for index in range(first, max(first + 1, last)):
-                levels[index] = max(levels[index], count)
-        return levels

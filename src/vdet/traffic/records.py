@@ -1,4 +1,4 @@
-"""A record of each vehicle, from the tracks of each frame; records as files, of many videos too."""
+"""A record of each vehicle, made from the tracks of each frame; files of records."""
 
 import math
 from collections import Counter
@@ -19,14 +19,13 @@ PATH_STEP = 0.01
 Shorter moves are jitter of the boxes.
 """
 
-_PLACE = ("x", "y", "width", "height")
 _COLUMNS = (
     *("id", "class", "first", "last", "seconds", "seen", "between", "lost"),
     *("mean_score", "best_score"),
     *("start_x", "start_y", "end_x", "end_y", "length", "length_share"),
-    *_PLACE,
+    *("x", "y", "width", "height"),
 )
-"""Of `.csv`; x, y, width and height are those of the largest box."""
+"""Columns of a `.csv`; x, y, width and height are those of the largest box."""
 
 
 @dataclass(slots=True)
@@ -49,7 +48,7 @@ class VehicleRecord:
     best_score, sum_of_scores
         Over these frames; a score is 0 to 1.
     classes
-        Sums of scores over these frames, by class.
+        Sum of the scores over these frames, by class.
     path
         Where it stood (`Track.foot`): the first point, a point after each step, and the last point.
         Frames in which it was lost do not count, unless it was in all.
@@ -115,7 +114,7 @@ class VehicleRecords:
     Parameters
     ----------
     width
-        Of the frames, pixels.
+        Width of the frames, pixels.
     """
 
     def __init__(self, width: int) -> None:
@@ -129,7 +128,7 @@ class VehicleRecords:
         if self._latest:
             frames = max(1, frame.index - self._latest.index)
             self._period = (frame.time - self._latest.time) / frames
-            self._show(self._latest)
+            self._show()
         for track in frame.tracks:
             if track.id not in self._vehicles:
                 first = VehicleRecord(track.id, self._width, frame.time, frame.time, track.box)
@@ -137,31 +136,23 @@ class VehicleRecords:
             self._vehicles[track.id].add(track, frame.time)
         self._latest = frame
 
-    def _show(self, frame: FrameTracks) -> None:
-        for track in frame.tracks:
-            self._vehicles[track.id].seconds += self._period
-
     def end(self) -> tuple[VehicleRecord, ...]:
         """Return the records by id; call it once, after the last frame."""
-        if self._latest:
-            self._show(self._latest)
+        self._show()
         return tuple(record for _, record in sorted(self._vehicles.items()))
 
-
-def summarize(frames: Iterable[FrameTracks], width: int) -> tuple[VehicleRecord, ...]:
-    """Return a record of each vehicle, by id; `width` is that of the frames in pixels."""
-    records = VehicleRecords(width)
-    for frame in frames:
-        records.add(frame)
-    return records.end()
+    def _show(self) -> None:
+        for track in self._latest.tracks if self._latest else ():
+            self._vehicles[track.id].seconds += self._period
 
 
 def write_records(records: Iterable[VehicleRecord], path: Path) -> None:
     """Write the records; the suffix of `path` chooses the format."""
+    rows = list(map(_row, records))
     if is_json(path):
-        write_json(path, [_item(record) for record in records])
+        write_json(path, [_item(*row) for row in rows])
     else:
-        write_table(path, _COLUMNS, (_cells(_item(record)) for record in records))
+        write_table(path, _COLUMNS, rows)
 
 
 def join_records(outputs: Mapping[str, Path], target: Path) -> None:
@@ -176,28 +167,20 @@ def _with_videos(videos: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [{VIDEO: name, **item} for name, items in videos.items() for item in items]
 
 
-def _item(record: VehicleRecord) -> dict[str, Any]:
-    return {
-        "id": record.id,
-        "class": record.class_name,
-        "first": round(record.first, 6),
-        "last": round(record.last, 6),
-        "seconds": round(record.seconds, 3),
-        **{state: record.states[state] for state in get_args(State)},
-        "mean_score": round(record.mean_score, 4),
-        "best_score": round(record.best_score, 4),
-        "path": {
-            "start": [round(value, 1) for value in record.path[0]],
-            "end": [round(value, 1) for value in record.path[-1]],
-            "length": round(record.length, 1),
-            "length_share": round(record.share, 4),
-        },
-        "largest": dict(zip(_PLACE, record.largest.xywh, strict=True)),
-    }
+def _row(record: VehicleRecord) -> list[Any]:
+    """Return the values of a record in the order of `_COLUMNS`."""
+    times = round(record.first, 6), round(record.last, 6), round(record.seconds, 3)
+    scores = round(record.mean_score, 4), round(record.best_score, 4)
+    ends = [round(value, 1) for point in (record.path[0], record.path[-1]) for value in point]
+    lengths = round(record.length, 1), round(record.share, 4)
+    states = [record.states[state] for state in get_args(State)]
+    known = record.id, record.class_name, *times, *states, *scores
+    return [*known, *ends, *lengths, *record.largest.xywh]
 
 
-def _cells(item: Mapping[str, Any]) -> list[Any]:
-    """Return the values of an item in the order of `_COLUMNS`."""
-    *values, path, largest = item.values()
-    (start, end, *lengths) = path.values()
-    return [*values, *start, *end, *lengths, *largest.values()]
+def _item(*row: Any) -> dict[str, Any]:
+    """Return a row as values for JSON."""
+    *ends, length, share = row[10:16]
+    path = {"start": ends[:2], "end": ends[2:], "length": length, "length_share": share}
+    largest = dict(zip(_COLUMNS[16:], row[16:], strict=True))
+    return {**dict(zip(_COLUMNS[:10], row, strict=False)), "path": path, "largest": largest}

@@ -1,7 +1,8 @@
-"""Tables and JSON as files, of one video and of many; in those of many, the video comes first."""
+"""Tables and JSON files of one video and of many; in those of many, the video comes first."""
 
 import csv
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,18 +16,29 @@ VIDEO = "video"
 """The column that has the name of the video."""
 
 
+_FORMULA = re.compile(r"[=+@\t\r-](?!\d*\.?\d*(e-?\d+)?$)")
+"""How a text begins that a spreadsheet takes for a formula; a number is none."""
+
+
 def is_json(path: Path) -> bool:
     """Tell whether a file is JSON by its name; else it is a table."""
     return path.suffix.lower() == ".json"
 
 
 def write_table(path: Path, columns: Iterable[str], rows: Iterable[Iterable[Any]]) -> None:
-    """Write a table with a heading."""
+    """Write a table with a heading.
+
+    A text that a spreadsheet would take for a formula gets an apostrophe in front.
+    """
     # The name of a video may be no valid text.
     with path.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(columns)
-        table.writerows(rows)
+        table.writerows([_plain_text(cell) for cell in row] for row in rows)
+
+
+def _plain_text(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell
 
 
 def write_json(path: Path, value: Any) -> None:
@@ -41,14 +53,14 @@ def join(
     columns: tuple[str, ...],
     joined: Callable[[Mapping[str, Any]], Any],
 ) -> None:
-    """Write one file over those of many videos, by their names, which have the same form.
+    """Join the files of many videos, given by the names of the videos, into one of the same form.
 
-    `joined` makes the JSON over all videos from that of each.
+    `joined` makes the JSON of all videos from that of each.
 
     Raises
     ------
     OutputError
-        One of `outputs` is no such file.
+        One of `outputs` has another content.
     """
     if not is_json(path):
         write_table(path, (VIDEO, *columns), _rows(outputs, columns))

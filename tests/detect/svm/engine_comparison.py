@@ -124,7 +124,7 @@ def _patches() -> tuple[list[Image], Float32Array]:
 @functools.cache
 def road(width: int = 1280, height: int = 720) -> Image:
     """Return a frame of the demo's clip: cars of a 17th, an 11th and an 8th of its width."""
-    return render(demo_scene(1, width=width, height=height), 200)
+    return render(demo_scene(7, width=width, height=height), 200)
 
 
 def cars() -> Image:

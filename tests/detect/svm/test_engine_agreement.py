@@ -103,7 +103,7 @@ def test_the_engines_agree_for_any_features(name: str) -> None:
 def test_the_engines_agree_on_planes(name: str, coding: Coding) -> None:
     model = fitted(FEATURES.get(name, FeatureSettings()))
     grids = lay_grids(SvmSettings(), model.features, 1280, 720, horizon=HORIZON)
-    assert_agree(compare(model, grids, Planes.of_image(road(), coding)))
+    assert_agree(compare(model, grids, Planes.of_image(road(), coding)), correlation=0.98)
 
 
 def _a_car_cut_off(side: str) -> Image:

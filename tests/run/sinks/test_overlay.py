@@ -79,7 +79,7 @@ def test_lost_vehicles_are_drawn_dashed() -> None:
 def test_with_lanes_vehicles_are_drawn_where_undistortion_puts_them() -> None:
     undistorted = road_seen(LENS)
     assert undistorted.undistorter.box(CAR) != CAR
-    expected = undistorted.image.copy()
+    expected = undistorted.view.image.copy()
     draw_box(expected, undistorted.undistorter.box(CAR), color_of(1), "#1")
     drawn = drawn_on(result_of(CAR, found=undistorted))
     np.testing.assert_array_equal(drawn, expected)

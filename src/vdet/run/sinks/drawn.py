@@ -22,7 +22,7 @@ from vdet.draw.boxes import (
     draw_zone,
     line_width,
 )
-from vdet.draw.paint import Color, Surface, draw_trail
+from vdet.draw.paint import Color, Surface, draw_lines
 from vdet.errors import OutputError
 from vdet.lanes.drawing import draw_lane
 from vdet.lanes.road import Road
@@ -67,17 +67,17 @@ class Overlay:
         if road is None:
             surface: Surface = result.frame.picture.pixels.copy()
         else:
-            surface = image = road.image.copy()
+            surface = image = road.view.image.copy()
             if road.lane:
                 draw_lane(image, road.lane)
         shown = _placed(self._shown(result), road, surface)
+        if result.counter and self._settings.counts.drawn:
+            draw_running_counts(surface, result.counter, road)
         self._draw_trails(surface, shown, float(result.frame.time))
         self._draw_vehicles(surface, shown)
         if self._draw.time and self._start is not None:
             time = time_text(result.frame.time - self._start)
             draw_label(surface, time, (0, surface.shape[0]), BLACK)
-        if result.counter and self._settings.counts.drawn:
-            draw_running_counts(surface, result.counter, road)
         return surface
 
     def _shown(self, result: FrameResult) -> list[Track]:
@@ -99,7 +99,7 @@ class Overlay:
         width = line_width(surface, self._draw.thickness)
         for track in shown:
             path = [point for _, point in self._trails[track.id]]
-            draw_trail(surface, path, self._color(track), width)
+            draw_lines(surface, path, self._color(track), width)
 
     def _draw_vehicles(self, surface: Surface, shown: Sequence[Track]) -> None:
         for track in shown if self._draw.boxes else ():
@@ -158,7 +158,7 @@ def _placed(tracks: Sequence[Track], road: Road | None, surface: Surface) -> lis
 
 
 def draw_running_counts(surface: Surface, counter: VehicleCounter, road: Road | None) -> None:
-    """Draw the lines and zones, and what is counted so far.
+    """Draw the lines and zones, and what is counted so far; vehicles are drawn over them.
 
     In an undistorted picture they lie on the same places of the road.
     """

@@ -18,7 +18,7 @@ from vdet.run.sinks.drawn import PICTURE_LABEL, label_text
 from vdet.run.sinks.protocol import BaseSink, BatchTotal, SinkContext, SinkKind
 from vdet.traffic.counter import VehicleCounter
 from vdet.traffic.counts import MinuteCount
-from vdet.traffic.overview import BestCrops, Crop, HeatMap, Levels
+from vdet.traffic.overview import BestCrops, Crop, GroundHeat
 from vdet.traffic.records import VehicleRecords
 
 _BOXES = "boxes"
@@ -106,11 +106,11 @@ class PageSink(BaseSink):
         video = self.video
         self._records = VehicleRecords(video.width)
         self._crops = BestCrops()
-        self._heat = HeatMap(video.width, video.height)
-        self._levels = Levels()
+        self._heat = GroundHeat(video.width, video.height)
         self._thumbnails: dict[int, tuple[float, str]] = {}
         self._counter: VehicleCounter | None = None
         self._fullest: Picture | None = None
+        self._most = 0
         self._frames = 0
         self._start = self._last = float(video.start)
 
@@ -126,10 +126,9 @@ class PageSink(BaseSink):
             self._start = frame.time
         self._frames += 1
         self._last = frame.time
-        if self._fullest is None or len(frame.tracks) > self._levels.most:
-            self._fullest = picture
+        if self._fullest is None or len(frame.tracks) > self._most:
+            self._fullest, self._most = picture, len(frame.tracks)
         self._records.add(frame)
-        self._levels.add(frame)
         self._heat.add(frame)
         self._counter = result.counter
         self._keep(self._crops.add(frame, picture))
@@ -146,7 +145,7 @@ class PageSink(BaseSink):
             end=self._last + float(1 / self.video.rate),
             records=self._records.end(),
             thumbnails=self._thumbnails,
-            levels=self._levels,
+            poster=self._fullest.image if self._fullest else None,
             still=self._heat.over(self._fullest.image) if self._fullest else None,
             player=self._player(),
             settings=render(self.context.settings),
