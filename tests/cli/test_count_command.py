@@ -120,7 +120,7 @@ def test_shares_need_the_size_of_the_frames(run: Run, tmp_path: Path) -> None:
             1,
             "short.yaml:1:1: counts: gate: is shorter than 1 %",
         ),
-        (["back.csv", "--lines", "l.yaml"], 1, "its time is 0.04 s, after 0.08 s; give times"),
+        (["back.csv", "--lines", "l.yaml"], 1, "back.csv:3: frame 1 is at 0.04 s; times must be"),
     ],
 )
 def test_mistakes_are_refused(
