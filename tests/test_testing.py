@@ -11,6 +11,7 @@ import pytest
 
 from boxing import rounded
 from red_cars import PERSPECTIVE, SETTINGS, drive, red_finder
+from vdet.api import Tracker
 from vdet.boxes import Boxes
 from vdet.config.schema import MotionTrackerSettings, Settings
 from vdet.config.tracker import RulesTrackerSettings
@@ -19,7 +20,6 @@ from vdet.media import Picture
 from vdet.media.images import Image
 from vdet.run.sinks.protocol import SinkContext, SinkKind, sink_kind
 from vdet.testing import check_detector, check_sink, check_tracker
-from vdet.track.factory import make_tracker
 from vdet.track.track import Track
 
 IMAGES = [frame.image for frame in drive(6)]
@@ -34,7 +34,7 @@ def test_the_linear_model_passes(settings: Settings) -> None:
     "settings", [MotionTrackerSettings(), RulesTrackerSettings()], ids=["motion", "rules"]
 )
 def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettings) -> None:
-    check_tracker(lambda *size: make_tracker(Settings(tracker=settings), *size))
+    check_tracker(lambda *size: Tracker(*size, settings=Settings(tracker=settings)))
 
 
 @pytest.mark.parametrize(

@@ -150,16 +150,20 @@ class Tracker:
         ValueError
             The time is not a finite number, or does not increase.
         """
+        self.observe(detections, time, image)
+        return self.at(time)
+
+    def observe(self, detections: Boxes, time: float, image: Image | Picture | None = None) -> None:
+        """Follow the vehicles into the next frame; arguments and errors as of `update`."""
         if not self._time < time < math.inf:
             raise ValueError(f"time: {time} s is not after the {self._time} s of the frame before")
-        tracks = self._tracker.update(detections, time, _picture(image))
         self._time = time
-        return tracks
+        self._tracker.observe(detections, time, _picture(image))
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles at another time, for a frame in which no detector looked for them.
 
-        Times may not decrease from call to call. At a time before the latest `update`, at most
+        Times may not decrease from call to call. At a time before the latest frame, at most
         `tracker.look_ahead` seconds before it, what came later is known.
         """
         return self._tracker.at(time)

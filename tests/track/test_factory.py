@@ -47,8 +47,8 @@ class SeesOne:
 
 def test_between_two_searched_frames_vehicles_move_straight() -> None:
     tracker = InterpolatingTracker(SeesOne())
-    tracker.update(NO_BOXES, 1.0)
-    tracker.update(NO_BOXES, 1.4)
+    tracker.observe(NO_BOXES, 1.0)
+    tracker.observe(NO_BOXES, 1.4)
     for time, x, state in ((1.0, 200, "seen"), (1.1, 210, "between"), (1.4, 240, "seen")):
         (track,) = tracker.at(time)
         assert (track.box, track.state) == (moved_to(CAR, x, 100), state)
@@ -56,7 +56,8 @@ def test_between_two_searched_frames_vehicles_move_straight() -> None:
 
 def test_after_the_latest_searched_frame_vehicles_stay_where_they_were() -> None:
     tracker = InterpolatingTracker(SeesOne())
-    (seen,) = tracker.update(NO_BOXES, 1.0)
+    tracker.observe(NO_BOXES, 1.0)
+    (seen,) = tracker.at(1.0)
     for time in (1.1, 1.2):
         (held,) = tracker.at(time)
         assert (held.id, held.box, held.score) == (seen.id, seen.box, seen.score)

@@ -22,7 +22,7 @@ from vdet.run.result import FrameResult
 from vdet.run.steps import ParallelStep, Step, StepContext, make_steps
 from vdet.run.threads import map_ordered
 from vdet.track.factory import make_tracker, timed
-from vdet.track.track import Track, VideoTracker
+from vdet.track.track import TimedTracker, Track, VideoTracker
 
 FIRST_FRAMES = 5
 """Number of frames that `DetectorModel.for_video` gets."""
@@ -112,7 +112,7 @@ class Pipeline:
     """
 
     detector: VideoDetector
-    tracker: VideoTracker
+    tracker: TimedTracker
     steps: Sequence[Step] = ()
     rate: SearchRate = EVERY_FRAME
     look_ahead: Fraction = Fraction(0)
@@ -135,17 +135,16 @@ class Pipeline:
         ValueError
             The times of the frames do not increase.
         """
-        tracker = timed(self.tracker)
-        with closing(self._searched(frames, source, threads, tracker)) as results:
+        with closing(self._searched(frames, source, threads)) as results:
             for result in _delayed(results, self.look_ahead):
-                shown = tuple(tracker.at(float(result.frame.time)))
+                shown = tuple(self.tracker.at(float(result.frame.time)))
                 complete = replace(result, tracks=shown)
                 for step in self.steps:
                     complete = step.apply(complete)
                 yield complete
 
     def _searched(
-        self, frames: Iterable[Frame], source: Path, threads: int, tracker: VideoTracker
+        self, frames: Iterable[Frame], source: Path, threads: int
     ) -> Generator[FrameResult]:
         """Search the frames and update the tracker; yield the results, without tracks."""
         detector = self.detector
@@ -164,7 +163,7 @@ class Pipeline:
             for (frame, searched), candidates in results:
                 detections = detector.detect(candidates) if searched else NO_BOXES
                 if searched:
-                    tracker.update(detections, float(frame.time), frame.picture)
+                    self.tracker.observe(detections, float(frame.time), frame.picture)
                 yield FrameResult(source, frame, detections, (), searched=searched)
 
 
@@ -217,10 +216,10 @@ def build(
     detector = model.for_video(width, height, images)
     made = make_steps(StepContext(settings, width, height, video, lanes), steps)
     if video is None:
-        return Pipeline(detector, StillTracker(), made, is_still=True)
-    tracker = tracker or make_tracker(settings, width, height)
+        return Pipeline(detector, timed(StillTracker()), made, is_still=True)
+    followed_by = timed(tracker) if tracker else make_tracker(settings, width, height)
     rate = SearchRate(settings.detector.searches, settings.detector.stride)
-    return Pipeline(detector, tracker, made, rate, Fraction(settings.tracker.look_ahead))
+    return Pipeline(detector, followed_by, made, rate, Fraction(settings.tracker.look_ahead))
 
 
 def peek(frames: Iterable[Frame]) -> tuple[list[Image], Iterable[Frame]]:

@@ -65,10 +65,9 @@ class InterpolatingTracker:
         self.tracker = tracker
         self._searched: list[tuple[float, list[Track]]] = []
 
-    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
-        """Follow the vehicles into a frame that was searched; as `VideoTracker.update`."""
+    def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:
+        """Follow the vehicles into the next frame; as `TimedTracker.observe`."""
         self._searched.append((time, self.tracker.update(detections, time, picture)))
-        return self._searched[-1][1]
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""

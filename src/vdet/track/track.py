@@ -107,11 +107,14 @@ class VideoTracker(Protocol):
 
 
 @runtime_checkable
-class TimedTracker(VideoTracker, Protocol):
+class TimedTracker(Protocol):
     """A tracker that knows where its vehicles are at any time, also between searched frames.
 
-    `vdet.track.factory.make_tracker` makes one of a tracker without `at`.
+    `vdet.track.factory.timed` makes one of a `VideoTracker`.
     """
+
+    def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:
+        """Follow the vehicles into the next frame; parameters as of `VideoTracker.update`."""
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time, by id.
@@ -119,7 +122,7 @@ class TimedTracker(VideoTracker, Protocol):
         Parameters
         ----------
         time
-            Seconds; not earlier than in the call before. Before the time of the latest `update`,
+            Seconds; not earlier than in the call before. Before the time of the latest `observe`,
             what came after it is known: nothing earlier than `tracker.look_ahead` before that.
             Later than it, the vehicles move on.
         """

@@ -1,6 +1,5 @@
 """The same scene at any frame rate gives about the same tracks."""
 
-import math
 from functools import cache
 
 import numpy as np
@@ -86,14 +85,6 @@ def test_a_vehicle_keeps_its_id_through_a_short_gap_in_the_video(gap: float, id_
     for n in range(20):
         tracks = tracker.update(detections([CAR]), 0.8 + gap + n / 25)
     assert [track.id for track in tracks] == [id_]
-
-
-@pytest.mark.parametrize("time", [0.96, 0.5, -1.0, math.nan])
-def test_a_time_that_does_not_come_after_the_last_one_is_refused(time: float) -> None:
-    tracker = MotionTracker(DEFAULTS, WIDTH, 720)
-    tracker.update(detections([CAR]), 0.96)
-    with pytest.raises(ValueError, match=r"does not come after 0\.96 s"):
-        tracker.update(detections([CAR]), time)
 
 
 # Traffic

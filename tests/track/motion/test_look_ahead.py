@@ -28,7 +28,7 @@ def shown_later(
     frames = list(clip)
     for number in range(len(frames) + AHEAD):
         if number < len(frames) and number % stride == 0:
-            tracker.update(detections(frames[number]), number / RATE)
+            tracker.observe(detections(frames[number]), number / RATE)
         if number >= AHEAD:
             shown.append(tracker.at((number - AHEAD) / RATE))
     return shown

@@ -149,7 +149,7 @@ def take_over_ids(vehicles: Sequence[Vehicle]) -> list[Vehicle]:
     """
     left = list(vehicles)
     for new in vehicles:
-        if not new.confirmed or new.unseen:
+        if not new.confirmed or new.unseen or new.id is not None:
             continue
         lost = [v for v in left if v.confirmed and v.unseen and _may_be(v, new)]
         if lost:
@@ -201,8 +201,7 @@ def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
     """Tell whether a vehicle that is seen again may be the lost one: later, and near by."""
-    is_later = lost.history.last_seen < new.history.first_seen
-    return is_later and _distance(lost, new) < _REACH
+    return lost.history.last_seen < new.begin and _distance(lost, new) < _REACH
 
 
 def _distance(one: Vehicle, other: Vehicle) -> float:

@@ -78,11 +78,6 @@ class History:
         self._smoothed: list[Float64Array] | None = None
 
     @property
-    def first_seen(self) -> float:
-        """Time of the first detection that is kept."""
-        return next(each.time for each in self._moments if each.score is not None)
-
-    @property
     def last_seen(self) -> float:
         """Time of the latest detection."""
         return next(each.time for each in reversed(self._moments) if each.score is not None)
@@ -103,7 +98,7 @@ class History:
 
     def join(self, earlier: "History") -> None:
         """Put the moments of the same vehicle's earlier track before its own."""
-        begin = self.first_seen
+        begin = self._moments[0].time
         before = [each for each in earlier._moments if each.time < begin]
         self._moments = before + [each for each in self._moments if each.time >= begin]
         self._smoothed = None

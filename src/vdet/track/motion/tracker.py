@@ -46,22 +46,17 @@ class MotionTracker:
         self._time: float | None = None
         self._gone: list[Vehicle] = []  # not followed any more, but shown at earlier times
 
-    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:  # noqa: ARG002
-        """Follow the vehicles into the next frame; as `VideoTracker.update`.
+    def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
+        """Follow the vehicles into the next frame, and show them at once; as `VideoTracker.update`."""
+        self.observe(detections, time, picture)
+        return self.at(time)
+
+    def observe(self, detections: Boxes, time: float, picture: Picture | None = None) -> None:  # noqa: ARG002
+        """Follow the vehicles into the next frame; as `TimedTracker.observe`.
 
         The part of a detection outside the frame does not count.
-
-        Raises
-        ------
-        ValueError
-            The time is not later than that of the frame before.
         """
         observations = self._observations(detections)
-        if self._time is not None and not time > self._time:
-            raise ValueError(
-                f"time {time:g} s does not come after {self._time:g} s; "
-                "make a tracker for each video"
-            )
         seconds = FIRST_STEP if self._time is None else time - self._time
         self._time, look = time, Look(time, seconds, self._size)
         self._predict(seconds)
@@ -78,7 +73,6 @@ class MotionTracker:
         for vehicle, hidden in zip(self._vehicles, self._hidden(self._boxes()), strict=True):
             vehicle.hidden += seconds * (bool(hidden) and vehicle.unseen > 0)
         self._forget(time - 2 * self._settings.look_ahead)
-        return self.at(time)
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""

@@ -112,12 +112,15 @@ class Vehicle:
         The classes of its detections.
     history
         Where it was in the latest frames.
+    begin
+        Time of its first detection, seconds.
     """
 
     def __init__(self, first: Observation, look: Look, settings: MotionTrackerSettings) -> None:
         self._settings = settings
         self.state = MotionState.at_rest(first.box, first.noise, _VELOCITY)
         entering = side_cut(first.box, look.size)
+        self.begin = look.time
         self.history = History([Moment(look.time, self.state, first.score, entering=entering)])
         self._gain: Float64Array | None = None
         self.evidence = self.unseen = self.hidden = 0.0
@@ -171,6 +174,7 @@ class Vehicle:
         """Go on with the id and the history of another track of the same vehicle."""
         ids = [each.id for each in (self, other) if each.id is not None]
         self.id = min(ids, default=None)
+        self.begin = min(self.begin, other.begin)
         self.history.join(other.history)
 
     def _add(self, observation: Observation, seconds: float) -> None:
