@@ -34,7 +34,7 @@ def test_the_linear_model_passes(settings: Settings) -> None:
     "settings", [MotionTrackerSettings(), RulesTrackerSettings()], ids=["motion", "rules"]
 )
 def test_both_trackers_pass(settings: MotionTrackerSettings | RulesTrackerSettings) -> None:
-    check_tracker(lambda *size: Tracker(*size, settings=Settings(tracker=settings)))
+    check_tracker(lambda width, height: Tracker(width, height, Settings(tracker=settings)))
 
 
 @pytest.mark.parametrize(

@@ -47,7 +47,7 @@ class MotionTracker:
         self._gone: list[Vehicle] = []  # not followed any more, but shown at earlier times
 
     def update(self, detections: Boxes, time: float, picture: Picture | None = None) -> list[Track]:
-        """Follow the vehicles into the next frame, and show them at once; as `VideoTracker.update`."""
+        """Follow the vehicles into the next frame and show them; as `VideoTracker.update`."""
         self.observe(detections, time, picture)
         return self.at(time)
 
