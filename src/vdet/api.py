@@ -157,8 +157,8 @@ class Tracker:
         """Follow the vehicles into the next frame; arguments and errors as of `update`."""
         if not self._time < time < math.inf:
             raise ValueError(f"time: {time} s is not after the {self._time} s of the frame before")
-        self._time = time
         self._tracker.observe(detections, time, _picture(image))
+        self._time = time
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles at another time, for a frame in which no detector looked for them.
