@@ -75,7 +75,7 @@ def test_the_shipped_model_classifies_the_last_patches_of_every_folder(
     real_data: Path, shipped: Shipped
 ) -> None:
     files = find_patches([real_data / "vehicles.zip", real_data / "non-vehicles.zip"])
-    held = hold_out(np.array([file.group for file in files]), "tail", 0.2, seed=0)
+    held = hold_out(np.array([file.group for file in files]), "tail", seed=0)
     chosen = [files[i] for i in np.flatnonzero(held)[::10]]
     extractor = FeatureExtractor(shipped.model.features)
     side = shipped.model.features.patch

@@ -1,6 +1,6 @@
 """Where a vehicle's sides are, from the HOG of a window around it: linear ridge regression."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -28,9 +28,6 @@ PENALTY = 1.0
 _LEAST_SPREAD = 0.05
 """Added to each feature's spread, share of the mean spread: limits the weights of features that
 hardly vary."""
-
-_BLOCK = 1024
-"""Rows that are scaled at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,8 +98,6 @@ def fit_split_boxes(
 ) -> tuple[BoxRegression | None, float | None]:
     """Fit on the patches that are not held out and measure the error on the others.
 
-    Samples with assumed sides have less weight.
-
     Parameters
     ----------
     hold_out
@@ -116,20 +111,28 @@ def fit_split_boxes(
     length = Layout.of(settings.svm.features).hog_length
     sets = data, patches.boxed
     learnt = [_with_sides(each, ~hold_out(each)) for each in sets]
-    count = sum(int(np.isfinite(each.sides).any(axis=1).sum()) for each in learnt)
-    if not count:
+    weights = [np.ones(len(each.sides)) for each in learnt]
+    known = sum(map(len, weights))
+    if not known:
         return None, None
-    rows = [BoxRows(each.vectors[:, :length], each.sides) for each in learnt]
     if patches.assumed.files:
-        assumed = patches.assumed.of(~hold_out(patches.assumed))
-        weight = ASSUMED * count / len(assumed.sides)
-        rows.append(BoxRows(assumed.vectors[:, :length], assumed.sides, weight))
-    regression = fit_sides(rows, PENALTY)
-    errors = []
-    for each in sets:
-        tested = _with_sides(each, hold_out(each))
-        hogs = tested.vectors[: len(tested.files), :length]
-        errors.append(abs(regression.sides(hogs) - tested.sides[: len(hogs)]))
+        learnt.append(patches.assumed.of(~hold_out(patches.assumed)))
+        count = len(learnt[-1].sides)
+        weights.append(np.full(count, ASSUMED * known / count))
+    regression = fit_sides(
+        np.concatenate([each.vectors[:, :length] for each in learnt]),
+        np.concatenate([each.sides for each in learnt]),
+        np.concatenate(weights),
+        PENALTY,
+    )
+    tested = [_with_sides(each, hold_out(each)) for each in sets]
+    errors = [
+        abs(
+            regression.sides(each.vectors[: len(each.files), :length])
+            - each.sides[: len(each.files)]
+        )
+        for each in tested
+    ]
     together = np.concatenate(errors)
     return regression, round(float(np.nanmean(together)), 4) if len(together) else None
 
@@ -139,95 +142,34 @@ def _with_sides(data: LabelledVectors, kept: BoolArray) -> LabelledVectors:
     return data.of(kept & np.isfinite(data.sides[: len(kept)]).any(axis=1))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BoxRows:
-    """Rows to fit the sides of boxes to.
-
-    Attributes
-    ----------
-    hogs
-        float32 `(n, h)`.
-    sides
-        float32 `(n, 4)`: left, top, right, bottom from the window's centre, in widths and heights
-        of the window; NaN for unknown ones.
-    weight
-        How much each row counts.
-    """
-
-    hogs: Float32Array
-    sides: Float32Array
-    weight: float = 1.0
-
-
-def fit_sides(parts: Sequence[BoxRows], penalty: float) -> BoxRegression:
+def fit_sides(
+    hogs: Float32Array, sides: Float32Array, weights: Float64Array, penalty: float
+) -> BoxRegression:
     """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
-
-    The rows are taken in blocks, so that they are not copied as a whole.
 
     Parameters
     ----------
+    hogs
+        float32 `(n, h)`; they are overwritten, which saves memory.
+    sides
+        float32 `(n, 4)`: left, top, right, bottom from the window's centre, in widths and heights
+        of the window; NaN for unknown ones.
+    weights
+        How much each row counts, float64 `(n,)`.
     penalty
         Ridge penalty of the weights of scaled features, for each row of weight 1.
     """
-    slopes = np.zeros((4, parts[0].hogs.shape[1]), np.float32)
-    biases = np.zeros(4, np.float32)
-    known = ~np.isnan(np.concatenate([part.sides for part in parts]))
-    for pattern in np.unique(known[:, known.any(axis=0)], axis=1).T:
-        columns = np.flatnonzero((known == pattern[:, np.newaxis]).all(axis=0)).tolist()
-        slopes[columns], biases[columns] = _fit_columns(parts, columns, penalty)
-    return BoxRegression(slopes, biases)
+    from sklearn.linear_model import Ridge
 
-
-def _fit_columns(
-    parts: Sequence[BoxRows], columns: Sequence[int], penalty: float
-) -> tuple[Float64Array, Float64Array]:
-    """Fit sides that are known in the same rows, by the normal equations of scaled features.
-
-    Returns
-    -------
-    Weights `(columns, h)` and biases `(columns,)` for features as they are.
-    """
-    from scipy.linalg import solve  # type: ignore[import-untyped]
-    from sklearn.preprocessing import StandardScaler
-
-    features, weighted = StandardScaler(), StandardScaler()
-    for block in _blocks(parts, columns):
-        features.partial_fit(block.hogs)
-        weights = np.full(len(block.hogs), block.weight)
-        weighted.partial_fit(np.hstack([block.hogs, block.sides]), sample_weight=weights)
-    width = parts[0].hogs.shape[1]
-    mean, target = np.split(weighted.mean_, [width])
-    spread = np.sqrt(features.var_)
+    spread = hogs.std(axis=0)
     spread += _LEAST_SPREAD * spread.mean() + np.finfo(np.float32).tiny
-
-    def scaled() -> Iterator[tuple[Float32Array, Float64Array]]:
-        """Yield the rows block by block, both centred, the HOG scaled too."""
-        for block in _blocks(parts, columns):
-            root = block.weight**0.5
-            hogs = (block.hogs - mean) / spread * root
-            yield hogs.astype(np.float32), (block.sides - target) * root
-
-    ridge = penalty * float(np.max(weighted.n_samples_seen_))
-    count = int(np.max(features.n_samples_seen_))
-    if count < width:  # the products of the rows are fewer
-        hogs, sides = (np.concatenate(each) for each in zip(*scaled(), strict=True))
-        products = (hogs @ hogs.T).astype(np.float64) + ridge * np.identity(count)
-        found = hogs.T @ solve(products, sides, assume_a="pos", overwrite_a=True)
-    else:
-        gram = ridge * np.identity(width)
-        product = np.zeros((width, len(columns)))
-        for hogs, sides in scaled():
-            gram += hogs.T @ hogs
-            product += hogs.T @ sides
-        found = solve(gram, product, assume_a="pos", overwrite_a=True)
-    slopes = found.T / spread
-    return slopes, target - slopes @ mean
-
-
-def _blocks(parts: Sequence[BoxRows], columns: Sequence[int]) -> Iterator[BoxRows]:
-    """Yield the rows in which these sides are known, block by block, with these sides only."""
-    for part in parts:
-        rows = np.flatnonzero(~np.isnan(part.sides[:, columns[0]]))
-        for start in range(0, len(rows), _BLOCK):
-            some = rows[start : start + _BLOCK]
-            yield BoxRows(part.hogs[some], part.sides[some][:, columns], part.weight)
+    hogs /= spread
+    slopes = np.zeros((4, hogs.shape[1]), np.float32)
+    biases = np.zeros(4, np.float32)
+    for side in range(4):
+        known = ~np.isnan(sides[:, side])
+        if known.any():
+            ridge = Ridge(penalty * float(weights[known].sum()), copy_X=False)
+            ridge.fit(hogs[known], sides[known, side], weights[known])
+            slopes[side], biases[side] = ridge.coef_ / spread, ridge.intercept_
+    return BoxRegression(slopes, biases)

@@ -2,11 +2,11 @@
 
 import hashlib
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,9 @@ CHUNK = 128
 """Patches that a process describes at a time."""
 MAX_NAMED = 10
 """At most this many broken patches are named in warnings."""
+
+TEST_SHARE = 0.2
+"""Share of the patches that is held out for the test."""
 
 RowNumbers = npt.NDArray[np.intp]
 SplitName = Literal["random", "tail"]
@@ -126,7 +129,7 @@ def extract(
             "fewer --jobs"
         ) from error
     checksums = [each for number in range(len(parts)) for each in chunks[number][1]]
-    data = _joined([chunks.pop(number)[0] for number in range(len(parts))])
+    data = _joined([chunks[number][0] for number in range(len(parts))])
     _check_broken(files, set(data.files), training.max_broken)
     return replace(data, digest=_digest(files, checksums))
 
@@ -160,28 +163,22 @@ def _describe(
     return data, [patch.checksum for patch in patches]
 
 
-def _joined(chunks: list[LabelledVectors]) -> LabelledVectors:
-    """Join all rows, patches first; empty `chunks` on the way: the vectors are in memory once."""
-    files = [file for chunk in chunks for file in chunk.files]
-    total, width = sum(len(chunk.origins) for chunk in chunks), chunks[0].vectors.shape[1]
-    joined = LabelledVectors(
-        np.empty((total, width), np.float32),
-        np.empty(total, bool),
-        np.empty((total, 4), np.float32),
-        np.arange(total),
-        files,
+def _joined(chunks: Sequence[LabelledVectors]) -> LabelledVectors:
+    """Join all rows: those of all patches, followed by those of all samples."""
+    counts = [len(chunk.files) for chunk in chunks]
+    firsts = np.cumsum([0, *counts])
+
+    def joined(columns: Iterable[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        parts = [np.split(column, [count]) for column, count in zip(columns, counts, strict=True)]
+        return np.concatenate([patches for patches, _ in parts] + [samples for _, samples in parts])
+
+    return LabelledVectors(
+        joined(chunk.vectors for chunk in chunks),
+        joined(chunk.vehicle for chunk in chunks),
+        joined(chunk.sides for chunk in chunks),
+        joined(chunk.origins + first for chunk, first in zip(chunks, firsts, strict=False)),
+        [file for chunk in chunks for file in chunk.files],
     )
-    patch, sample = len(files), total  # behind the last row of either kind
-    while chunks:
-        chunk = chunks.pop()
-        patches, samples = len(chunk.files), len(chunk.origins) - len(chunk.files)
-        patch, sample = patch - patches, sample - samples
-        rows = np.r_[patch : patch + patches, sample : sample + samples]
-        joined.vectors[rows] = chunk.vectors
-        joined.vehicle[rows] = chunk.vehicle
-        joined.sides[rows] = chunk.sides
-        joined.origins[rows] = rows[chunk.origins]
-    return joined
 
 
 def _check_broken(files: Sequence[PatchFile], good: set[PatchFile], max_broken: float) -> None:
@@ -206,14 +203,8 @@ def _digest(files: Sequence[PatchFile], checksums: Sequence[int]) -> str:
     return digest.hexdigest()
 
 
-TEST_SHARE = 0.2
-"""Share of the patches that is held out for the test."""
-
-
-def hold_out(
-    groups: npt.NDArray[np.str_], name: SplitName, fraction: float, seed: int
-) -> BoolArray:
-    """Choose the test patches.
+def hold_out(groups: npt.NDArray[np.str_], name: SplitName, seed: int) -> BoolArray:
+    """Choose the test patches: `TEST_SHARE` of them, at least one and never all of a part.
 
     Parameters
     ----------
@@ -222,23 +213,16 @@ def hold_out(
     name
         `random`: any patches, as in the original system. `tail`: the last ones of each group, so
         that consecutive video frames are on the same side, except where the two parts meet.
-    fraction
-        Share of patches to hold out, 0 to 1; at least one patch and never all of a part.
 
     Returns
     -------
     bool `(n,)`: True for the patches of the test.
     """
     held = np.zeros(len(groups), bool)
-    if name == "random":
-        order = np.random.default_rng(seed).permutation(len(groups))
-        held[order[: _count(len(groups), fraction)]] = True
-    else:
-        for group in np.unique(groups):
-            (rows,) = np.nonzero(groups == group)
-            held[rows[len(rows) - _count(len(rows), fraction) :]] = True
+    parts = [np.random.default_rng(seed).permutation(len(groups))[::-1]]
+    if name == "tail":
+        parts = [np.flatnonzero(groups == group) for group in np.unique(groups)]
+    for rows in parts:
+        count = min(max(1, round(len(rows) * TEST_SHARE)), len(rows) - 1)
+        held[rows[len(rows) - count :]] = True
     return held
-
-
-def _count(total: int, fraction: float) -> int:
-    return min(max(1, round(total * fraction)), total - 1)

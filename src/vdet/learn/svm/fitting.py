@@ -1,32 +1,27 @@
-"""Scale, fit and calibrate with scikit-learn; return a `LinearModel` that does not need it.
+"""Scale, fit and calibrate: feature vectors → a `LinearModel`.
 
 The classifier is that of scikit-learn's `LinearSVC`: squared hinge loss, L2 penalty on weights and
 bias. liblinear, which `LinearSVC` calls, copies float32 data to six times their size; L-BFGS needs
 only products of the data with a vector.
-Source of the solver: Liu and Nocedal, "On the Limited Memory BFGS Method for Large Scale
-Optimization", 1989.
+Sources: of the solver, Liu and Nocedal, "On the Limited Memory BFGS Method for Large Scale
+Optimization", 1989; of the calibration, Platt, "Probabilistic outputs for support vector machines",
+1999.
 """
 
 import logging
-import warnings
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize  # type: ignore[import-untyped]
-from sklearn.base import BaseEstimator, ClassifierMixin
-from sklearn.calibration import CalibratedClassifierCV
-from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import LogisticRegression
 from sklearn.model_selection import StratifiedKFold
 from sklearn.preprocessing import StandardScaler
 
 from vdet.boxes import BoolArray, Float32Array, Float64Array
 from vdet.config.schema import Settings
-from vdet.config.svm import FeatureSettings
-from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
-from vdet.learn.svm.extraction import LabelledVectors, RowNumbers
+from vdet.learn.svm.extraction import LabelledVectors
 
 log = logging.getLogger("vdet")
 
@@ -34,16 +29,16 @@ FOLDS = 3
 """Folds of the cross-validation that calibrates."""
 MAX_ITERATIONS = 1000
 """Most iterations of the solver."""
-_BLOCK = 1024  # rows that are scaled or scored at a time
+_BLOCK = 1024  # rows that are scaled at a time
 _CORRECTIONS = 20  # of L-BFGS
 _TOLERANCE = 1e-9  # of the loss, relative to that of zero weights
 
 
 def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
-    """Fit StandardScaler → LinearSvm → CalibratedClassifierCV on raw feature vectors.
+    """Scale the features, fit one or several linear SVMs, and calibrate each by a sigmoid.
 
-    The sigmoid is fitted on the patches alone, each scored by an SVM that was fitted without it and
-    without the samples made of it.
+    The sigmoid is fitted to the patches alone, each scored by an SVM that was fitted without it and
+    without the samples made of it. The scaling becomes part of the weights.
 
     Parameters
     ----------
@@ -55,8 +50,8 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     DataError
         A class has fewer patches than there are calibration folds.
     """
-    training = settings.train.svm
-    fewest = min(np.count_nonzero(rows.labels), np.count_nonzero(~rows.labels))
+    training, labels = settings.train.svm, rows.labels
+    fewest = min(np.count_nonzero(labels), np.count_nonzero(~labels))
     if fewest < FOLDS:
         raise DataError(
             f"a class has {fewest} training patches, calibration needs {FOLDS}; give more patches"
@@ -64,102 +59,64 @@ def fit(rows: LabelledVectors, settings: Settings) -> LinearModel:
     scaler = StandardScaler(copy=False)
     for start in range(0, len(rows.vectors), _BLOCK):  # as a whole, it needs twice their memory
         scaler.partial_fit(rows.vectors[start : start + _BLOCK])
-    calibrated = CalibratedClassifierCV(
-        LinearSvm(scaler.transform(rows.vectors), C=training.C, max_iter=MAX_ITERATIONS),
-        method="sigmoid",
-        cv=list(_folds(rows, training)),
-        ensemble=training.ensemble,
-    )
-    numbers = np.arange(len(rows.vehicle))
-    weights = (rows.origins == numbers).astype(float)  # samples do not count for the sigmoid
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.filterwarnings("ignore", "Since .* does not appear to accept sample_weight")
-        warnings.simplefilter("always", ConvergenceWarning)
-        calibrated.fit(numbers, rows.vehicle, weights)
-    if any(issubclass(warning.category, ConvergenceWarning) for warning in caught):
+    vectors = scaler.transform(rows.vectors)
+    svms, sigmoids, scores = [], [], np.zeros(len(labels))
+    folds = StratifiedKFold(FOLDS, shuffle=True, random_state=training.seed)
+    for _, tested in folds.split(labels, labels):
+        svm = _fit_svm(vectors, rows.vehicle, ~np.isin(rows.origins, tested), training.C)
+        scores[tested] = vectors[tested] @ svm.x[:-1].astype(np.float32) + svm.x[-1]
+        svms.append(svm)
+        sigmoids.append(_fit_sigmoid(scores[tested], labels[tested]))
+    if not training.ensemble:
+        everything = np.ones(len(vectors), bool)
+        svms = [_fit_svm(vectors, rows.vehicle, everything, training.C)]
+        sigmoids = [_fit_sigmoid(scores, labels)]
+    if any(svm.status == 1 for svm in svms):  # the iterations are used up
         log.warning("the SVM has not converged; lower train.svm.C")
-    return _to_model(calibrated.calibrated_classifiers_, scaler, settings.svm.features)
-
-
-def _folds(
-    rows: LabelledVectors, training: SvmTrainingSettings
-) -> Iterator[tuple[RowNumbers, RowNumbers]]:
-    """Yield the rows to fit on and those to calibrate on."""
-    splitter = StratifiedKFold(FOLDS, shuffle=True, random_state=training.seed)
-    for _, tested in splitter.split(rows.labels, rows.labels):
-        inside = np.isin(rows.origins, tested)
-        yield np.flatnonzero(~inside), np.flatnonzero(inside)
-
-
-def _to_model(members: list[Any], scaler: Any, features: FeatureSettings) -> LinearModel:
-    """Fold the scaler into the weights: w·(x - μ)/σ + b = (w/σ)·x + (b - (w/σ)·μ)."""
-    weights = np.concatenate([member.estimator.coef_ for member in members]) / scaler.scale_
-    biases = np.concatenate([member.estimator.intercept_ for member in members])
-    biases = biases - weights @ scaler.mean_
-    sigmoids = [member.calibrators[0] for member in members]
+    # w·(x - μ)/σ + b = (w/σ)·x + (b - (w/σ)·μ)
+    weights = np.array([svm.x[:-1] for svm in svms]) / scaler.scale_
+    biases = np.array([svm.x[-1] for svm in svms]) - weights @ scaler.mean_
+    slopes, offsets = np.array(sigmoids, np.float32).T
     return LinearModel(
-        features,
+        settings.svm.features,
         weights.astype(np.float32),
         biases.astype(np.float32),
-        np.array([sigmoid.a_ for sigmoid in sigmoids], np.float32),
-        np.array([sigmoid.b_ for sigmoid in sigmoids], np.float32),
+        slopes,
+        offsets,
     )
 
 
-class LinearSvm(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # scikit-learn has no types
-    """A two-class linear SVM as a scikit-learn estimator, fitted in the memory of its data.
+def _fit_svm(vectors: Float32Array, vehicle: BoolArray, used: BoolArray, penalty: float) -> Any:
+    """Fit a linear SVM to the used rows; `x` of the result has the weights, and the bias last."""
+    # All vectors take part in the products: a copy of some would take their memory again.
+    signs = np.where(vehicle, used, -1.0 * used).astype(np.float32)
+    scale = 1 / (penalty * np.count_nonzero(used))  # the loss of zero weights becomes 1
 
-    `vectors` is float32 `(n, features)`. The methods take numbers of its rows, each once,
-    so that a cross-validation copies no vectors. `C` is the penalty of the errors, `max_iter` the
-    most iterations of the solver. `fit` warns with `ConvergenceWarning` if they are not enough. It
-    takes no sample weights.
+    def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
+        weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
+        errors = np.maximum(0, used - signs * (vectors @ weights + bias))
+        slopes = -2 * penalty * (errors * signs)
+        gradient = parameters + np.append(slopes @ vectors, slopes.sum())
+        squares = float(np.square(errors, dtype=np.float64).sum())
+        value = 0.5 * float(parameters @ parameters) + penalty * squares
+        return scale * value, scale * gradient
+
+    limits = {"maxiter": MAX_ITERATIONS, "maxfun": 10 * MAX_ITERATIONS}
+    options = {**limits, "maxcor": _CORRECTIONS, "ftol": _TOLERANCE, "gtol": 0}
+    zeros = np.zeros(vectors.shape[1] + 1)
+    return minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
+
+
+def _fit_sigmoid(scores: Float64Array, vehicle: BoolArray) -> tuple[float, float]:
+    """Return slope and offset of the sigmoid 1 / (1 + exp(slope · score + offset)).
+
+    The targets are Platt's: not quite 1 and 0, and the less so the fewer patches there are.
     """
-
-    def __init__(self, vectors: Float32Array, C: float = 1.0, max_iter: int = 1000) -> None:
-        self.vectors = vectors
-        self.C = C
-        self.max_iter = max_iter
-
-    def __sklearn_clone__(self) -> "LinearSvm":  # scikit-learn would copy the vectors
-        return LinearSvm(self.vectors, self.C, self.max_iter)
-
-    def fit(self, rows: RowNumbers, y: BoolArray) -> "LinearSvm":
-        """Fit to some rows, with labels `y`, bool `(m,)`."""
-        x = self.vectors  # all of them: a copy of some would take their memory again
-        signs = np.zeros(len(x), np.float32)
-        signs[rows] = np.where(y, 1, -1)
-        used = abs(signs)
-        scale = 1 / (self.C * len(y))  # the loss of zero weights becomes 1
-
-        def loss(parameters: Float64Array) -> tuple[float, Float64Array]:
-            weights, bias = parameters[:-1].astype(np.float32), np.float32(parameters[-1])
-            errors = np.maximum(0, used - signs * (x @ weights + bias))
-            slopes = -2 * self.C * (errors * signs)
-            gradient = parameters + np.append(slopes @ x, slopes.sum())
-            squares = float(np.square(errors, dtype=np.float64).sum())
-            value = 0.5 * float(parameters @ parameters) + self.C * squares
-            return scale * value, scale * gradient
-
-        limits = {"maxiter": self.max_iter, "maxfun": 10 * self.max_iter}
-        options = {**limits, "maxcor": _CORRECTIONS, "ftol": _TOLERANCE, "gtol": 0}
-        zeros = np.zeros(x.shape[1] + 1)
-        found = minimize(loss, zeros, jac=True, method="L-BFGS-B", options=options)
-        if found.status == 1:  # the iterations are used up
-            warnings.warn("the solver has not converged", ConvergenceWarning, stacklevel=2)
-        self.classes_ = np.array([False, True])
-        self.coef_ = found.x[np.newaxis, :-1]
-        self.intercept_ = found.x[-1:]
-        return self
-
-    def decision_function(self, rows: RowNumbers) -> Float32Array:
-        """Return the signed distances, float32 `(m,)`: positive for the second class."""
-        weights = self.coef_[0].astype(np.float32)
-        distances = np.empty(len(rows), np.float32)
-        for start in range(0, len(rows), _BLOCK):
-            block = slice(start, start + _BLOCK)
-            distances[block] = self.vectors[rows[block]] @ weights
-        return distances + np.float32(self.intercept_[0])
-
-    def predict(self, rows: RowNumbers) -> BoolArray:
-        """Return the classes, bool `(m,)`; scikit-learn asks for it."""
-        return self.decision_function(rows) > 0
+    positives, negatives = np.count_nonzero(vehicle), np.count_nonzero(~vehicle)
+    targets = np.where(vehicle, (positives + 1) / (positives + 2), 1 / (negatives + 2))
+    found = LogisticRegression(C=np.inf, tol=1e-8).fit(
+        np.tile(scores, 2)[:, np.newaxis],
+        np.repeat([True, False], len(scores)),
+        np.concatenate([targets, 1 - targets]),
+    )
+    return -found.coef_[0, 0], -found.intercept_[0]

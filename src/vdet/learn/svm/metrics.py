@@ -1,6 +1,6 @@
 """How well a linear model classifies patches: the metrics of `vdet train`, printed and as JSON."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -16,10 +16,10 @@ CONFUSION_HEADINGS = ("", "predicted vehicle", "predicted non-vehicle")
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """A share of patches, with its 95 % interval; None of no patches.
+    """A share of patches, with its 95 % interval; None where there are no patches.
 
-    Source of the interval: Wilson, "Probable inference", 1927. Patches are taken for independent;
-    with near-duplicates in the test the true interval is wider.
+    Source of the interval: Wilson, "Probable inference", 1927. It takes the patches for
+    independent; with near-duplicates in the test the true interval is wider.
     """
 
     value: float | None
@@ -50,8 +50,7 @@ class Classification:
     Attributes
     ----------
     confusion
-        Number of patches: found vehicles, missed vehicles; false alarms, other things that were
-        classified as such.
+        Number of patches: found vehicles, missed vehicles; false alarms, other non-vehicles.
     groups
         Accuracy of each group.
     """
@@ -95,15 +94,37 @@ class Classification:
         yield from table(("accuracy by group", "95 % interval"), self.group_rows())
 
 
-@dataclass(frozen=True, slots=True)
-class SplitMetrics:
-    """A model fitted on one part of the patches and tested on the other.
+_SPLITS = {
+    "random": "random split (near-duplicates on both sides; vdet eval patches leaks nothing)",
+    "tail": "tail split (leak-free: the last patches of each folder)",
+}
 
-    `train_augmented` is the number of samples made of the training patches. `box_error` is the mean
-    absolute error of the regression on known sides of tested patches, as a share of the patch's
-    side; None if no sides are known.
+
+@dataclass(frozen=True, slots=True)
+class TrainingMetrics:
+    """The metrics of a training run: fitted on a part of the patches, tested on the others.
+
+    Attributes
+    ----------
+    boxed
+        Number of patches with a known box, including those of neither class.
+    broken
+        Number of unreadable patches.
+    groups
+        Number of patches of each group.
+    train_augmented
+        Number of samples made of the training patches.
+    box_error
+        Mean absolute error of the regression on known sides of tested patches, as a share of the
+        patch's side; None if no sides are known.
     """
 
+    vehicles: int
+    non_vehicles: int
+    boxed: int
+    broken: int
+    groups: dict[str, int]
+    features: int
     split: str
     train_patches: int
     train_augmented: int
@@ -113,6 +134,13 @@ class SplitMetrics:
 
     def lines(self) -> Iterator[str]:
         """Yield the metrics as lines of text."""
+        broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
+        yield (
+            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}, "
+            f"{self.boxed} with the box of their vehicle; {self.features} features each"
+        )
+        yield from (f"  {group:<28}{count:6d} patches" for group, count in self.groups.items())
+        yield ""
         yield _SPLITS[self.split]
         more = f" + {self.train_augmented} augmented" if self.train_augmented else ""
         yield (
@@ -122,41 +150,6 @@ class SplitMetrics:
         yield from self.test.lines()
         if self.box_error is not None:
             yield f"sides of vehicles' boxes: mean error {self.box_error:.3f} of a patch's side"
-
-
-_SPLITS = {
-    "random": "random split (near-duplicates on both sides)",
-    "tail": "tail split (leak-free: the last patches of each folder)",
-}
-
-
-@dataclass(frozen=True, slots=True)
-class TrainingMetrics:
-    """The metrics of a training run; the saved model is that of the first split.
-
-    `boxed` is the number of patches with a known box, including those of neither class; `groups`
-    has the number of patches of each group.
-    """
-
-    vehicles: int
-    non_vehicles: int
-    boxed: int
-    broken: int
-    groups: dict[str, int]
-    features: int
-    splits: Sequence[SplitMetrics]
-
-    def lines(self) -> Iterator[str]:
-        """Yield the metrics as lines of text."""
-        broken = f" ({self.broken} broken ones skipped)" if self.broken else ""
-        yield (
-            f"patches: {self.vehicles} vehicles, {self.non_vehicles} non-vehicles{broken}, "
-            f"{self.boxed} with the box of their vehicle; {self.features} features each"
-        )
-        yield from (f"  {group:<28}{count:6d} patches" for group, count in self.groups.items())
-        for split in self.splits:
-            yield ""
-            yield from split.lines()
         if not self.boxed:
             yield ""
             yield (

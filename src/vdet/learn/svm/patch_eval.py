@@ -19,7 +19,7 @@ from vdet.evaluate.output import RunName, share, table
 from vdet.evaluate.tiles import Tile
 from vdet.learn.svm.augmentation import augment
 from vdet.learn.svm.dataset import PatchFile, read_patches
-from vdet.learn.svm.extraction import TEST_SHARE, extract, hold_out
+from vdet.learn.svm.extraction import extract, hold_out
 from vdet.learn.svm.fitting import fit
 from vdet.learn.svm.metrics import CONFUSION_HEADINGS, Classification, Rate
 from vdet.pages.charts import FILL, Axis, Plot, curve, number_axis
@@ -39,7 +39,7 @@ _OTHER = "if the model was trained on some of these patches too, the scores are 
 
 
 @dataclass(frozen=True, slots=True)
-class Mistake:
+class WrongPatch:
     """A patch that is classified wrongly, and its probability of being a vehicle."""
 
     file: PatchFile
@@ -69,7 +69,7 @@ class PatchScores:
     roc_auc: float | None
     log_loss: float | None
     roc: tuple[Float64Array, Float64Array]
-    mistakes: tuple[Mistake, ...]
+    mistakes: tuple[WrongPatch, ...]
 
 
 def evaluate_patches(
@@ -109,7 +109,7 @@ def evaluate_patches(
         meaning = _SAME if model.provenance.get("data_sha256") == data.digest else _OTHER
     else:
         steps("fitting the model", None)
-        tested = hold_out(data.groups, "tail", TEST_SHARE, training.seed)
+        tested = hold_out(data.groups, "tail", training.seed)
         if not tested.any():
             raise DataError("nothing can be held out; give more patches")
         model, meaning = fit(data.of(~tested), settings), _SPLIT
@@ -138,7 +138,8 @@ def score_patches(
         log_loss=float(metrics.log_loss(vehicle, probabilities)) if both else None,
         roc=roc,
         mistakes=tuple(
-            Mistake(files[row], float(probabilities[row])) for row in _worst(vehicle, probabilities)
+            WrongPatch(files[row], float(probabilities[row]))
+            for row in _worst(vehicle, probabilities)
         ),
     )
 

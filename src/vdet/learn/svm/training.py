@@ -12,11 +12,11 @@ from vdet.config.schema import Settings
 from vdet.detect.svm.model import LinearModel
 from vdet.errors import DataError
 from vdet.learn.svm.augmentation import augment
-from vdet.learn.svm.box_regression import BoxPatches, extract_box_patches, fit_split_boxes
+from vdet.learn.svm.box_regression import extract_box_patches, fit_split_boxes
 from vdet.learn.svm.dataset import PatchFile
-from vdet.learn.svm.extraction import TEST_SHARE, LabelledVectors, SplitName, extract, hold_out
+from vdet.learn.svm.extraction import LabelledVectors, extract, hold_out
 from vdet.learn.svm.fitting import fit
-from vdet.learn.svm.metrics import Classification, SplitMetrics, TrainingMetrics
+from vdet.learn.svm.metrics import Classification, TrainingMetrics
 from vdet.progress import Steps, no_steps
 from vdet.version import __version__
 from vdet.workers import make_workers
@@ -30,14 +30,14 @@ def train(
     scheduler: str | None = None,
     steps: Steps = no_steps,
 ) -> tuple[LinearModel, TrainingMetrics]:
-    """Describe the patches, fit on the configured split, and on the other one for comparison.
+    """Describe the patches, fit a model on a part of them, and test it on the others.
 
     Parameters
     ----------
     files
         If some have known sides, the model learns to find the sides of vehicles.
     jobs
-        Number of processes; None for one per core.
+        Processes, as joblib counts them: -1 for one per core.
     scheduler
         Address of a Dask scheduler whose workers describe the patches instead.
     steps
@@ -45,8 +45,8 @@ def train(
 
     Returns
     -------
-    The model fitted on the training part of `train.svm.split`, with its provenance, and the metrics
-    of both splits, this one first.
+    The model fitted on the training part of `train.svm.split`, with its provenance, and its
+    metrics.
 
     Raises
     ------
@@ -68,57 +68,40 @@ def train(
         progress=steps("describing patches", len(of_classes)),
     )
     boxes = extract_box_patches(of_classes, boxed, settings, workers=workers, steps=steps)
-    names: list[SplitName] = ["random", "tail"]
-    names.sort(key=lambda name: name != training.split)
-    fitted = [_fit_split(data, boxes, settings, name, steps) for name in names]
-    model = fitted[0][0]
-    report = TrainingMetrics(
+
+    def held_of(some: LabelledVectors) -> BoolArray:
+        return hold_out(some.groups, training.split, training.seed)
+
+    held = held_of(data)
+    if not held.any():
+        raise DataError("no folder has two patches, of which one could be held out; give more")
+    steps("fitting the classifier", None)
+    model = fit(data.of(~held), settings)
+    regression, box_error = None, None
+    if boxes is not None:
+        steps("fitting the sides of boxes", None)
+        regression, box_error = fit_split_boxes(data, boxes, held_of, settings)
+    predicted = model.probabilities(data.vectors[: len(held)]) >= 0.5
+    metrics = TrainingMetrics(
         vehicles=int(np.count_nonzero(data.labels)),
         non_vehicles=int(np.count_nonzero(~data.labels)),
         boxed=sum(file.sides is not None for file in files),
         broken=len(files) - len(data.files) - (len(boxes.boxed.files) if boxes else len(boxed)),
         groups=dict(Counter(file.group for file in (*of_classes, *boxed))),
         features=data.vectors.shape[1],
-        splits=tuple(split for _, split in fitted),
+        split=training.split,
+        train_patches=int(np.count_nonzero(~held)),
+        train_augmented=int(np.count_nonzero(~held[data.origins[len(held) :]])),
+        train_accuracy=float((predicted == data.labels)[~held].mean()),
+        test=Classification.of(data.labels[held], predicted[held], data.groups[held]),
+        box_error=box_error,
     )
     provenance = {
         "program": f"vdet {__version__}",
         "data_sha256": data.digest,
         "training": training.model_dump(mode="json"),
-        "report": asdict(report),
+        "report": asdict(metrics),
     }
     if boxes and boxed:
         provenance["boxes_sha256"] = boxes.boxed.digest
-    return replace(model, provenance=provenance), report
-
-
-def _fit_split(
-    data: LabelledVectors,
-    boxes: BoxPatches | None,
-    settings: Settings,
-    name: SplitName,
-    steps: Steps,
-) -> tuple[LinearModel, SplitMetrics]:
-    training = settings.train.svm
-
-    def held_of(some: LabelledVectors) -> BoolArray:
-        return hold_out(some.groups, name, TEST_SHARE, training.seed)
-
-    held = held_of(data)
-    if not held.any():
-        raise DataError("no folder has two patches, of which one could be held out; give more")
-    steps(f"fitting the classifier, {name} split", None)
-    model = fit(data.of(~held), settings)
-    regression, error = None, None
-    if boxes is not None:
-        steps(f"fitting the sides of boxes, {name} split", None)
-        regression, error = fit_split_boxes(data, boxes, held_of, settings)
-    predicted = model.probabilities(data.vectors[: len(held)]) >= 0.5
-    return replace(model, box_regression=regression), SplitMetrics(
-        split=name,
-        train_patches=int(np.count_nonzero(~held)),
-        train_augmented=int(np.count_nonzero(~held[data.origins[len(held) :]])),
-        train_accuracy=float((predicted == data.labels)[~held].mean()),
-        test=Classification.of(data.labels[held], predicted[held], data.groups[held]),
-        box_error=error,
-    )
+    return replace(model, provenance=provenance, box_regression=regression), metrics
