@@ -1,4 +1,4 @@
-"""A picture of each stage of the detection, as in the report of the original."""
+"""A picture of each stage of the detection."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -19,7 +19,7 @@ from vdet.detect.svm.heat import HotRegion
 from vdet.detect.svm.windows import Windows
 
 MAX_VOTES = 400
-"""In a region: the time grows with the square of their number, so of more the best are kept."""
+"""Most votes in a group of regions: the time grows with the square of their number."""
 
 _MAX_PROBABILITY = 1 - 2**-24
 """Higher ones are lowered to it, because the position weight of 1 is infinite."""
@@ -74,7 +74,7 @@ class Votes:
     def within(self, boxes: Iterable[Box]) -> "Votes":
         """Return the votes whose centre lies in one of `boxes`, each once.
 
-        Of too many, those of highest `position` are returned.
+        Of more than `MAX_VOTES`, those of highest `position` are returned.
         """
         x, y = ((self.boxes[:, :2] + self.boxes[:, 2:]) / 2).T
         inside = np.zeros(len(x), np.bool_)
@@ -88,10 +88,7 @@ class Votes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _VotedBox:
-    """A box `(4,)` that votes agree on, and the sums of their weights.
-
-    A vote counts by its overlap with the box.
-    """
+    """A box `(4,)` that votes agree on, and the sums of their weights, times their overlaps."""
 
     box: Float64Array
     position: float
@@ -106,9 +103,9 @@ class _VotedBox:
 def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
 
-    Regions whose boxes overlap are split as one, so that no vote counts twice. A box in another one
-    is left if it is far stronger: the tracker, or `SvmDetector` in a still picture, shows one.
-    `least` is the least weight of the votes that agree on a vehicle.
+    Regions whose boxes overlap are split as one, so that no vote counts twice. A box inside a
+    larger one is kept only if it is far stronger; the tracker, or `SvmDetector` in a still picture,
+    shows one of the two. `least` is the least weight of the votes that agree on a vehicle.
     """
     found = [
         vehicle

@@ -1,7 +1,7 @@
 """Augmentation: further samples made of a patch.
 
-Roads may be mirrored, the sides of the frame cut vehicles off, and a part of a vehicle must not be
-taken for a vehicle.
+A mirrored road is a road too, the sides of the frame cut vehicles off, and a part of a vehicle must
+not be taken for a vehicle.
 """
 
 from collections.abc import Callable, Iterator

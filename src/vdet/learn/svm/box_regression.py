@@ -109,32 +109,38 @@ def fit_split_boxes(
     a share of the patch's side. Either is None if it has no patches.
     """
     length = Layout.of(settings.svm.features).hog_length
-    sets = data, patches.boxed
-    learnt = [_with_sides(each, ~hold_out(each)) for each in sets]
-    weights = [np.ones(len(each.sides)) for each in learnt]
-    known = sum(map(len, weights))
-    if not known:
+    rows = _training_rows(data, patches, hold_out, length)
+    if rows is None:
         return None, None
-    if patches.assumed.files:
-        learnt.append(patches.assumed.of(~hold_out(patches.assumed)))
-        count = len(learnt[-1].sides)
-        weights.append(np.full(count, ASSUMED * known / count))
-    regression = fit_sides(
-        np.concatenate([each.vectors[:, :length] for each in learnt]),
-        np.concatenate([each.sides for each in learnt]),
-        np.concatenate(weights),
-        PENALTY,
-    )
-    tested = [_with_sides(each, hold_out(each)) for each in sets]
-    errors = [
-        abs(
-            regression.sides(each.vectors[: len(each.files), :length])
-            - each.sides[: len(each.files)]
-        )
-        for each in tested
-    ]
+    regression = fit_sides(*rows, PENALTY)
+    errors = []
+    for each in (data, patches.boxed):
+        tested = _with_sides(each, hold_out(each))
+        count = len(tested.files)
+        found = regression.sides(tested.vectors[:count, :length])
+        errors.append(abs(found - tested.sides[:count]))
     together = np.concatenate(errors)
     return regression, round(float(np.nanmean(together)), 4) if len(together) else None
+
+
+def _training_rows(
+    data: LabelledVectors,
+    patches: BoxPatches,
+    hold_out: Callable[[LabelledVectors], BoolArray],
+    length: int,
+) -> tuple[Float32Array, Float32Array, Float64Array] | None:
+    """Return HOG, sides and weights of the rows to fit to; None where no side is known."""
+    sets = [_with_sides(each, ~hold_out(each)) for each in (data, patches.boxed)]
+    weights = [np.ones(len(each.sides)) for each in sets]
+    known = sum(map(len, weights))
+    if not known:
+        return None
+    if patches.assumed.files:
+        sets.append(patches.assumed.of(~hold_out(patches.assumed)))
+        count = len(sets[-1].sides)
+        weights.append(np.full(count, ASSUMED * known / count))
+    hogs = np.concatenate([each.vectors[:, :length] for each in sets])
+    return hogs, np.concatenate([each.sides for each in sets]), np.concatenate(weights)
 
 
 def _with_sides(data: LabelledVectors, kept: BoolArray) -> LabelledVectors:

@@ -1,8 +1,8 @@
 """Which windows of a labelled frame become patches.
 
 Each window is compared with each vehicle. Lengths are in sides of the window, from its centre. A
-vehicle that the left or right side of the frame cuts off is located by its one visible side; where
-the other side would be is unknown.
+vehicle that the left or right side of the frame cuts off is located by its visible side; the place
+of its other side is unknown.
 """
 
 from collections.abc import Iterator
@@ -23,11 +23,11 @@ shows only a part of one."""
 
 @dataclass(frozen=True, slots=True)
 class Most:
-    """Most windows that are chosen.
+    """Most windows that are chosen in a frame.
 
-    `per_vehicle` windows that fit a vehicle and as many others that show it; of the frame,
-    `false_alarms` where no vehicle is and `parts` that show only a part of one: with many parts,
-    fewer vehicles are found as a whole.
+    For each vehicle, at most `per_vehicle` windows that fit it, and as many others that show it. In
+    the whole frame, at most `false_alarms` windows where no vehicle is, and `parts` that show only
+    a part of one: with many parts, fewer vehicles are found as a whole.
     """
 
     per_vehicle: int = 16
@@ -74,7 +74,7 @@ def choose_windows(
     frame_width
         Width of the frame, pixels.
     probability
-        Least one of a false alarm or a part.
+        Least probability of a false alarm or a part.
     """
     _, first = np.unique(windows.boxes, axis=0, return_index=True)
     boxes, vehicles = from_sizes(windows.boxes[first]), labelled[~ignored]

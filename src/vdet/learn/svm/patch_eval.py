@@ -53,13 +53,13 @@ class PatchScores:
     Attributes
     ----------
     meaning
-        How the tested patches are related to those of the training.
+        Whether the model was trained on the tested patches.
     roc_auc, log_loss
         None if all tested patches are of one class.
     roc
         Shares of false alarms and of found vehicles at each threshold, float64 `(n,)` each.
     mistakes
-        The worst ones of either kind, the worst first.
+        The worst missed vehicles and the worst false alarms, the worst first.
     """
 
     meaning: str
