@@ -18,7 +18,7 @@ from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 FOLDER = Path(__file__).parent
 COUNTED_FRAME = 172  # of the demo: a vehicle has overtaken on the right
-STAGES = ("2-windows", "3-hits", "4-heat", "5-boxes")
+STAGES = ("1-windows", "2-hits", "3-heat", "4-boxes")
 
 _SEED = 11
 _VAN = Body(width=1.9, length=4.9, boot=0.06, slope=0.12, height=1.92, belt=1.12)

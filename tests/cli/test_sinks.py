@@ -137,7 +137,7 @@ class TestTogether:
         again = run(*command)
         assert again.code == 0, again.err
         stages = [f"stages/{number}-{name}.png" for number, name in enumerate(
-            ("patches", "windows", "hits", "heat", "boxes"), start=1)]  # fmt: skip
+            ("windows", "hits", "heat", "boxes"), start=1)]  # fmt: skip
         assert names(out) == ["a.csv", "a.mp4", "b.txt", *stages]
 
     def test_no_output_is_there_before_the_end(

@@ -17,9 +17,8 @@ from vdet.draw.boxes import GREEN, color_of, draw_box, draw_label
 from vdet.media import Picture
 from vdet.media.images import Image
 
-NAMES = ["patches", "windows", "hits", "heat"]
+NAMES = ["windows", "hits", "heat"]
 ROWS = SETTINGS.svm
-HOG = red_finder().features
 SMALLER_SET = scale_lengths(WindowSettings(size=24, overlap=0.5, top=100, bottom=160), SCALE)
 
 
@@ -36,10 +35,10 @@ def with_windows(*sets: WindowSettings) -> SvmSettings:
 
 
 @pytest.mark.parametrize("image", [road(CAR), road()], ids=["a car", "nothing found"])
-def test_there_are_four_pictures_in_the_order_of_the_stages(image: Image) -> None:
+def test_there_are_three_pictures_in_the_order_of_the_stages(image: Image) -> None:
     pictures = pictures_of(image)
     assert list(pictures) == NAMES
-    for name in NAMES[1:]:
+    for name in NAMES:
         assert pictures[name].shape == image.shape
         assert pictures[name].dtype == np.uint8
 
@@ -48,12 +47,6 @@ def test_the_frame_itself_is_not_drawn_on() -> None:
     image = road(CAR)
     pictures_of(image)
     np.testing.assert_array_equal(image, road(CAR))
-
-
-def test_the_patches_are_the_likeliest_and_the_unlikeliest_window() -> None:
-    likely, unlikely = np.vsplit(pictures_of(road(CAR))["patches"], 2)
-    assert (likely[100:150, 50:100] == (0, 0, 255)).all()
-    assert (unlikely[100:150, 50:100] == 90).all()
 
 
 def test_hits_are_drawn_around_the_car_alone() -> None:
@@ -67,9 +60,8 @@ def test_labels_of_hits_do_not_cover_one_another() -> None:
     boxes = np.array([[40, 60, 60, 60], [44, 62, 60, 60], [160, 60, 60, 60]], np.int32)
     probabilities = np.array([0.6, 0.9, 0.7], np.float32)
     hits = Windows(boxes, probabilities, np.ones(3, np.float32), boxes.astype(np.float32))
-    drawn = stage_pictures(
-        road(), Trace(hits, hits, Heat(np.zeros((HEIGHT, WIDTH), np.float32)), ()), HOG
-    )
+    heat = Heat(np.zeros((HEIGHT, WIDTH), np.float32))
+    drawn = stage_pictures(road(), Trace(hits, heat, ()))
     expected = road()
     for box in boxes.tolist():
         draw_box(expected, Box.sized(*box), GREEN)
@@ -110,19 +102,11 @@ def test_windows_beyond_the_sides_are_drawn_as_far_as_they_are_visible(
     image = road(moved_to(CAR, x, CAR.y1).clipped(WIDTH, HEIGHT))
     pictures = pictures_of(image, beyond(share))
     assert list(pictures) == NAMES
-    for name in NAMES[1:]:
+    for name in NAMES:
         assert pictures[name].shape == image.shape
     for number in (0, 1):
         rows = (pictures["windows"] == color_of(number)).all(axis=2).any(axis=1)
         assert rows.sum() > 6, "a row of points for each row of windows"
-
-
-def test_the_likeliest_window_is_shown_with_the_columns_that_it_repeats() -> None:
-    edge = road(Box.sized(0, 110, 8, 60))  # beyond the frame, its window repeats these red columns
-    likely = np.vsplit(pictures_of(edge, beyond(0.75))["patches"], 2)[0]
-    patch = likely[28:220, 4:196]
-    red = (patch[..., 2].astype(int) - patch[..., 0]) > 100
-    assert red.mean() > 0.85
 
 
 def flat(value: float) -> Heat:

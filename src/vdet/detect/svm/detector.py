@@ -110,7 +110,6 @@ class SvmDetector:
     ) -> None:
         self._check = check
         self._search = FrameSearch(model, settings, width, height, horizon=horizon)
-        self._features = model.features
         self._size = width, height
         self._settings = settings
         self._heat = scale_lengths(settings.heat, height / REFERENCE_HEIGHT)
@@ -131,7 +130,7 @@ class SvmDetector:
         for _ in range(self._heat.frames if candidates.is_still else 1):
             heat = self._history.update(hits)
             self._recent.append(hits)
-        trace = Trace(candidates.windows, hits, heat, self._search.grids)
+        trace = Trace(hits, heat, self._search.grids)
         detections = self._detections(self._regions(heat), trace)
         if candidates.is_still:
             detections = self._shown_in_still(detections)
@@ -140,8 +139,8 @@ class SvmDetector:
         return detections
 
     def stage_pictures(self, image: Image, detections: Boxes) -> dict[str, Image]:
-        """Return pictures of patches and their features, the windows, the hits and the heat."""
-        return stage_pictures(image, detections.trace, self._features)
+        """Return pictures of the windows, the hits and the heat."""
+        return stage_pictures(image, detections.trace)
 
     def _regions(self, heat: Heat) -> list[HotRegion]:
         regions = find_regions(heat, self._heat.threshold)

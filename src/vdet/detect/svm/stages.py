@@ -7,10 +7,7 @@ import cv2
 import numpy as np
 
 from vdet.boxes import Box
-from vdet.config.svm import FeatureSettings
-from vdet.detect.svm.features import cut_window
 from vdet.detect.svm.heat import Heat
-from vdet.detect.svm.patch_sheet import patch_sheet
 from vdet.detect.svm.windows import WindowGrid, Windows
 from vdet.draw.boxes import GREEN, WHITE, color_of, draw_box, draw_label, label_tag
 from vdet.media.images import Image
@@ -20,42 +17,22 @@ from vdet.media.images import Image
 class Trace:
     """What the stage pictures of a frame need.
 
-    `windows` are all that were searched, `hits` those of at least `detector.search.probability`,
-    `heat` is the heatmap of the last frames, `grids` are the window sets.
+    `hits` are the windows of at least `detector.search.probability`, `heat` is the heatmap of the
+    last frames, `grids` are the window sets.
     """
 
-    windows: Windows
     hits: Windows
     heat: Heat
     grids: tuple[WindowGrid, ...]
 
 
-def stage_pictures(image: Image, trace: Trace, features: FeatureSettings) -> dict[str, Image]:
-    """Return four pictures by name: patches and their features, windows, hits, heat.
-
-    Parameters
-    ----------
-    image
-        The searched frame, BGR uint8 `(H, W, 3)`.
-    features
-        The features of the model.
-    """
+def stage_pictures(image: Image, trace: Trace) -> dict[str, Image]:
+    """Return three pictures of a frame, BGR uint8 `(H, W, 3)`, by name: windows, hits, heat."""
     return {
-        "patches": patch_sheet(_examples(image, trace.windows), features),
         "windows": _draw_window_sets(image, trace.grids),
         "hits": _draw_hits(image, trace.hits),
         "heat": _draw_heat(image, trace.heat),
     }
-
-
-def _examples(image: Image, windows: Windows) -> dict[str, Image]:
-    """Return the most and the least probable window of the frame, by caption."""
-    best, worst = int(windows.probabilities.argmax()), int(windows.probabilities.argmin())
-    examples = {}
-    for name, i in (("car", best), ("not car", worst)):
-        caption = f"{name}? p = {windows.probabilities[i]:.2f}"
-        examples[caption] = cut_window(image, *windows.boxes[i].tolist())
-    return examples
 
 
 def _draw_window_sets(image: Image, grids: Sequence[WindowGrid]) -> Image:
