@@ -71,9 +71,11 @@ def mine(
     ]
     model = load_svm(settings.svm, choice.model_path)
     with progress_steps(" frames") as steps:
-        mined = mining.mine(labelled, output, settings, model, overwrite=overwrite, steps=steps)
+        frames, counts = mining.mine(
+            labelled, output, settings, model, overwrite=overwrite, steps=steps
+        )
     print_lines(
-        f"{output}: {mined.vehicles} patches of vehicles, {mined.boxes} more for their boxes, "
-        f"{mined.false_alarms} false alarms, {mined.parts} more on parts of vehicles; "
-        f"from {counted(mined.frames, 'frame')}"
+        f"{output}: {counts['vehicle']} patches of vehicles, {counts['box']} more for their boxes, "
+        f"{counts['false alarm']} false alarms, {counts['part']} more on parts of vehicles; "
+        f"from {counted(frames, 'frame')}"
     )

@@ -2,20 +2,20 @@ import numpy as np
 import pytest
 
 from vdet.config.train import AugmentationSettings
-from vdet.learn.svm.augmentation import Sample, augment, cut_off, mirrored, zoom_in
+from vdet.learn.svm.augmentation import PatchSample, augment, cut_off, mirrored, zoom_in
 
 NOISE = np.random.default_rng(0).integers(0, 256, (64, 64, 3), dtype=np.uint8)
 OFF = AugmentationSettings(mirror=False, cut=0, parts=0)
 ALL = AugmentationSettings(mirror=True, cut=1, parts=1)
 
 
-def patch(*sides: float, vehicle: bool = True) -> Sample:
-    return Sample(NOISE, vehicle, np.array(sides or (np.nan,) * 4, np.float32))
+def patch(*sides: float, vehicle: bool = True) -> PatchSample:
+    return PatchSample(NOISE, vehicle, np.array(sides or (np.nan,) * 4, np.float32))
 
 
 def augmented(
-    settings: AugmentationSettings, sample: Sample | None = None, seed: int = 0
-) -> list[Sample]:
+    settings: AugmentationSettings, sample: PatchSample | None = None, seed: int = 0
+) -> list[PatchSample]:
     return list(augment(sample or patch(), (seed,), settings))
 
 
@@ -93,7 +93,7 @@ def test_zoomed_in_a_box_moves_and_grows_with_its_vehicle() -> None:
     image[20:40, 24:44] = 255
     box = (np.array([24, 20, 44, 40]) / 64 - 0.5).astype(np.float32)
     for seed in range(20):
-        (sample,) = zoom_in(Sample(image, True, box), (seed,))
+        (sample,) = zoom_in(PatchSample(image, True, box), (seed,))
         side = len(sample.image)
         assert 38 <= side <= 64
         rows, columns = (np.flatnonzero(sample.image[:, :, 0].any(axis=axis)) for axis in (1, 0))

@@ -68,14 +68,14 @@ def test_windows_on_the_truth_are_vehicles_and_others_false_alarms(
     video: VideoSource, tmp_path: Path
 ) -> None:
     archive = tmp_path / "mined.zip"
-    result = mine([video], archive, Settings())
-    assert result.frames == 3
+    frames, counts = mine([video], archive, Settings())
+    assert frames == 3
     for box in boxes_of(archive, "vehicles/mined_road"):
         assert box.iou(CAR) > 0.35
     for box in boxes_of(archive, "non-vehicles/mined_road"):
         assert box.iou(CAR) < 0.5
     vehicles = [file for file in find_patches([archive]) if file.group == "vehicles/mined_road"]
-    assert len(vehicles) == result.vehicles > 0
+    assert len(vehicles) == counts["vehicle"] > 0
     for patch in read_patches(vehicles):
         assert patch.image is not None
         _, green, red = patch.image[32, 32].tolist()
@@ -122,7 +122,7 @@ class TestPictures:
     ) -> None:
         sources = (PictureSource(folder), replace(video, last=1))
         output = tmp_path / "mined.zip"
-        assert mine(sources, output, Settings()).frames == 2
+        assert mine(sources, output, Settings())[0] == 2
         vehicles = boxes_of(output, "vehicles/mined_city")
         assert vehicles == boxes_of(output, "vehicles/mined_road") != []
         alarms = boxes_of(output, "non-vehicles/mined_city")

@@ -3,7 +3,6 @@
 import json
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,19 +83,11 @@ def test_a_new_model_is_tested_on_the_last_patches_of_each_folder(bright_and_dar
         assert words in page.text
 
 
-@pytest.mark.parametrize(
-    ("digest", "words"),
-    [(None, "was trained on most of these very patches"), ("other", "if the model was trained")],
-)
-def test_the_scores_say_what_a_ready_model_was_trained_on(
-    bright_and_dark: Path, digest: str | None, words: str
-) -> None:
+def test_a_ready_model_is_tested_on_all_patches(bright_and_dark: Path) -> None:
     files = find_patches([bright_and_dark])
     model, _ = train(files, SETTINGS, jobs=1)
-    if digest is not None:
-        model = replace(model, provenance={"data_sha256": digest})
     scores = evaluate_patches(files, SETTINGS, model, jobs=1)
-    assert words in scores.meaning
+    assert "if the model was trained on some of these patches" in scores.meaning
     assert scores.test.patches == 48
 
 

@@ -6,7 +6,7 @@ and gradients.
 """
 
 from fractions import Fraction
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class DenseSearch:
         features = model.features
         pixels = grid.step * features.patch / grid.size  # from window to window, of the patch
         n = (pixels / features.hog.cell).denominator
-        part: type[_AlignedPart | _LocatedPart] = _AlignedPart
+        part: type[_Part] = _AlignedPart
         if n > MAX_PHASES:
             part = _LocatedPart
             n = (pixels / max(map(features.shrink, range(3)))).denominator
@@ -73,18 +73,8 @@ class DenseSearch:
         return hogs
 
 
-class _Part(Protocol):
-    """The search of `n` windows on one strip, by a model with `m` members."""
-
-    def search(self, frame: FramePyramid) -> tuple[Float32Array, Any]:
-        """Return the decision values, `(n, m)`, and what `hogs` needs of the frame."""
-
-    def hogs(self, described: Any, places: IndexArray) -> Float32Array:
-        """Return the HOG features of some of the windows, by their indices."""
-
-
 class _AlignedPart:
-    """Windows that are whole cells apart, across and down."""
+    """Searches `n` windows that are whole cells apart, by a model with `m` members."""
 
     def __init__(self, model: LinearModel, grid: WindowGrid) -> None:
         self._model = model
@@ -97,6 +87,7 @@ class _AlignedPart:
         self._y = np.arange(grid.rows)[np.newaxis] * self._cells * cell
 
     def search(self, frame: FramePyramid) -> tuple[Float32Array, Float32Array]:
+        """Return the decision values, `(n, m)`, and the HOG blocks of the strip."""
         features = self._model.features
         strip = self._strip.cut(frame)
         blocks = describe_blocks(strip, features)
@@ -106,13 +97,14 @@ class _AlignedPart:
         return by_row + self._model.biases, blocks
 
     def hogs(self, described: Float32Array, places: IndexArray) -> Float32Array:
+        """Return the HOG features of some of the windows, by their indices."""
         rows, columns = np.divmod(places, self._columns)
         across, down = columns * self._cells, rows * self._cells
         return window_blocks(described, across, down, self._model.features)
 
 
 class _LocatedPart:
-    """Windows that are whole pixels apart, in each channel of a patch.
+    """Searches `n` windows that are whole pixels apart, in each channel of a patch.
 
     The gradients of the strip are computed once (`HOGDescriptor.compute` with locations).
     """
@@ -127,6 +119,7 @@ class _LocatedPart:
         self._descriptors = patch_descriptors(model.features)
 
     def search(self, frame: FramePyramid) -> tuple[Float32Array, Channels]:
+        """Return the decision values, `(n, m)`, and the strip."""
         strip = self._strip.cut(frame)
         sums = table_sums(strip, self._tables, self._model.features, self._x, self._y)
         values = sums.T + self._model.biases
@@ -137,6 +130,7 @@ class _LocatedPart:
         return values, strip
 
     def hogs(self, described: Channels, places: IndexArray) -> Float32Array:
+        """Return the HOG features of some of the windows, by their indices."""
         parts = [np.zeros((len(places), 0), np.float32)]  # all there is without HOG
         for number, hog in self._descriptors.items():
             shrink = self._model.features.shrink(number)
@@ -145,3 +139,6 @@ class _LocatedPart:
             vectors = hog.compute(described[number], locations=locations)
             parts.append(np.reshape(vectors, (len(places), -1)))
         return np.concatenate(parts, axis=1, dtype=np.float32)
+
+
+_Part = _AlignedPart | _LocatedPart

@@ -15,16 +15,6 @@ from vdet.boxes import Float32Array
 from vdet.config.svm import FeatureSettings
 from vdet.media.images import Image, split_channels
 
-_CONVERSIONS = {
-    "YCrCb": cv2.COLOR_BGR2YCrCb,
-    "HSV": cv2.COLOR_BGR2HSV,
-    "LUV": cv2.COLOR_BGR2LUV,
-    "HLS": cv2.COLOR_BGR2HLS,
-    "YUV": cv2.COLOR_BGR2YUV,
-    "RGB": cv2.COLOR_BGR2RGB,
-}
-
-
 Channels = tuple[Image, Image, Image]
 """The channels of a colour space, uint8 `(H, W)` each; of those in `halved`, `(H / 2, W / 2)`."""
 
@@ -99,7 +89,8 @@ class FeatureExtractor:
 
 def split(image: Image, settings: FeatureSettings) -> Channels:
     """Return the channels of the settings' colour space of an image, BGR uint8 `(H, W, 3)`."""
-    channels = split_channels(np.asarray(cv2.cvtColor(image, _CONVERSIONS[settings.color_space])))
+    conversion = getattr(cv2, f"COLOR_BGR2{settings.color_space}")
+    channels = split_channels(np.asarray(cv2.cvtColor(image, conversion)))
     first, second, third = (
         halve(channel) if number in settings.halved else channel
         for number, channel in enumerate(channels)

@@ -5,7 +5,6 @@ vanishing point. Line segments vote for it (von Gioi et al., "LSD: a Line Segmen
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -24,15 +23,6 @@ _MAX_SINE = 0.05  # of the angle between a segment and the direction to the poin
 _MIN_SEGMENTS = 8  # on each side
 _ROWS = np.arange(0.30, 0.75, 0.01)
 _COLUMNS = np.arange(0.25, 0.76, 0.02)
-
-
-@dataclass(frozen=True, slots=True)
-class _Segments:
-    """Line segments: middle `(n, 2)`, normal `(n, 2)` and length `(n,)`, in widths of the frame."""
-
-    middles: Float64Array
-    normals: Float64Array
-    lengths: Float64Array
 
 
 def find_horizon(images: Sequence[Image]) -> float | None:
@@ -55,8 +45,8 @@ def find_horizon(images: Sequence[Image]) -> float | None:
     ends = np.concatenate([_segment_ends(image) for image in images])
     directions = ends[:, 2:] - ends[:, :2]
     falling = directions[:, 0] * directions[:, 1] > 0
-    sides = [_segments(ends[side]) for side in (falling, ~falling)]
-    if min(len(side.lengths) for side in sides) < _MIN_SEGMENTS:
+    sides = ends[falling], ends[~falling]
+    if min(map(len, sides)) < _MIN_SEGMENTS:
         return None
     left, right = (_sum_votes(side, height / width) for side in sides)
     both = np.minimum(left, right)  # a vanishing point has lines on both sides
@@ -81,19 +71,18 @@ def _segment_ends(image: Image) -> Float64Array:
     return np.asarray(ends[usable])
 
 
-def _segments(ends: Float64Array) -> _Segments:
+def _sum_votes(ends: Float64Array, aspect: float) -> Float64Array:
+    """Sum the votes of segments, `(n, 4)`, for each point, `(rows, columns)`.
+
+    A segment votes for points above its middle, by its length.
+    """
     directions = ends[:, 2:] - ends[:, :2]
     lengths = np.hypot(directions[:, 0], directions[:, 1])
     normals = np.stack([-directions[:, 1], directions[:, 0]], axis=1) / lengths[:, np.newaxis]
-    return _Segments((ends[:, :2] + ends[:, 2:]) / 2, normals, lengths)
-
-
-def _sum_votes(segments: _Segments, aspect: float) -> Float64Array:
-    """Sum the votes for each point, `(rows, columns)`; a segment votes for points above it."""
+    middles = (ends[:, :2] + ends[:, 2:]) / 2
     x, y = np.meshgrid(_COLUMNS, _ROWS * aspect)
-    dx = x[..., np.newaxis] - segments.middles[:, 0]
-    dy = y[..., np.newaxis] - segments.middles[:, 1]
-    offsets = abs(dx * segments.normals[:, 0] + dy * segments.normals[:, 1])
-    sines = offsets / (np.hypot(dx, dy) + 1e-9)
-    votes = segments.lengths * np.maximum(0, 1 - (sines / _MAX_SINE) ** 2) * (dy < 0)
+    dx = x[..., np.newaxis] - middles[:, 0]
+    dy = y[..., np.newaxis] - middles[:, 1]
+    sines = abs(dx * normals[:, 0] + dy * normals[:, 1]) / (np.hypot(dx, dy) + 1e-9)
+    votes = lengths * np.maximum(0, 1 - (sines / _MAX_SINE) ** 2) * (dy < 0)
     return np.asarray(votes.sum(axis=-1))

@@ -94,11 +94,6 @@ class _VotedBox:
     position: float
     presence: float
 
-    @property
-    def area(self) -> float:
-        """Square pixels."""
-        return float(area(self.box))
-
 
 def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> list[HotRegion]:
     """Return the vehicles that the votes in the regions agree on, strongest first in each region.
@@ -112,7 +107,14 @@ def split_regions(regions: Sequence[HotRegion], votes: Votes, least: float) -> l
         for group in _overlapping([region.box for region in regions])
         for vehicle in _vehicles(votes.within(group), least)
     ]
-    return [_region(each) for each in found if not _is_part(each, found)]
+    boxes = np.reshape([each.box for each in found], (-1, 4))
+    position = np.array([each.position for each in found])
+    parts = coverage(boxes, boxes) > _INSIDE
+    parts &= area(boxes) > area(boxes)[:, np.newaxis]
+    parts &= _FAR_STRONGER * position > position[:, np.newaxis]
+    kept = [found[row] for row in np.flatnonzero(~parts.any(axis=1)).tolist()]
+    pairs = [(Box(*each.box.tolist()), each.presence) for each in kept]
+    return [HotRegion(box.rounded, box.center, presence) for box, presence in pairs]
 
 
 def _overlapping(boxes: Iterable[Box]) -> list[list[Box]]:
@@ -157,18 +159,3 @@ def _average(boxes: Float64Array, weights: Float64Array, overlaps: Float64Array)
     if not total:
         return np.asarray(boxes[int(overlaps.argmax())])
     return np.asarray(shares @ boxes / total)
-
-
-def _is_part(vehicle: _VotedBox, others: Sequence[_VotedBox]) -> bool:
-    """Return whether it lies in a larger box that has enough of its `position` weight."""
-    return any(
-        other.area > vehicle.area
-        and coverage(vehicle.box[np.newaxis], other.box[np.newaxis])[0, 0] > _INSIDE
-        and _FAR_STRONGER * other.position > vehicle.position
-        for other in others
-    )
-
-
-def _region(vehicle: _VotedBox) -> HotRegion:
-    box = Box(*vehicle.box.tolist())
-    return HotRegion(box.rounded, box.center, vehicle.presence)

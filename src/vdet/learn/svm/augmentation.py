@@ -22,7 +22,7 @@ _ZOOM_SHARES = (0.6, 1.0)  # of its width and height
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sample:
+class PatchSample:
     """A picture to learn from.
 
     `image` is BGR uint8 `(H, W, 3)`. `sides` is float32 `(4,)`: left, top, right and bottom of the
@@ -34,13 +34,13 @@ class Sample:
     sides: Float32Array
 
 
-Augmenter = Callable[[Sample, tuple[int, ...]], Iterator[Sample]]
+Augmenter = Callable[[PatchSample, tuple[int, ...]], Iterator[PatchSample]]
 """Makes further samples of a sample and a seed."""
 
 
 def augment(
-    sample: Sample, seed: tuple[int, ...], settings: AugmentationSettings
-) -> Iterator[Sample]:
+    sample: PatchSample, seed: tuple[int, ...], settings: AugmentationSettings
+) -> Iterator[PatchSample]:
     """Yield the samples made of a patch, without the patch itself.
 
     They depend on the settings and the seed alone. Switching one kind on does not change the
@@ -60,14 +60,14 @@ def augment(
             yield replace(_crop(each, _PART_SHARES, parts), vehicle=False, sides=unknown)
 
 
-def mirrored(sample: Sample) -> Sample:
+def mirrored(sample: PatchSample) -> PatchSample:
     """Return the mirror image."""
     left, top, right, bottom = sample.sides
     sides = np.array([-right, top, -left, bottom], np.float32)
-    return Sample(np.asarray(cv2.flip(sample.image, 1), np.uint8), sample.vehicle, sides)
+    return PatchSample(np.asarray(cv2.flip(sample.image, 1), np.uint8), sample.vehicle, sides)
 
 
-def cut_off(sample: Sample, share: float, *, left: bool) -> Sample:
+def cut_off(sample: PatchSample, share: float, *, left: bool) -> PatchSample:
     """Return a sample cut off by the side of a frame; its outermost column is repeated beyond.
 
     Parameters
@@ -89,12 +89,14 @@ def cut_off(sample: Sample, share: float, *, left: bool) -> Sample:
     return replace(sample, image=np.asarray(image, np.uint8), sides=sides)
 
 
-def zoom_in(sample: Sample, seed: tuple[int, ...]) -> Iterator[Sample]:
+def zoom_in(sample: PatchSample, seed: tuple[int, ...]) -> Iterator[PatchSample]:
     """Yield one crop of most of a sample, in which its box is displaced and larger."""
     yield _crop(sample, _ZOOM_SHARES, np.random.default_rng(seed))
 
 
-def _crop(sample: Sample, shares: tuple[float, float], rng: np.random.Generator) -> Sample:
+def _crop(
+    sample: PatchSample, shares: tuple[float, float], rng: np.random.Generator
+) -> PatchSample:
     """Return a random crop with a share of width and height between the two `shares`."""
     whole = np.array(sample.image.shape[1::-1])
     size = np.maximum(1, np.rint(rng.uniform(*shares) * whole)).astype(int)
@@ -103,4 +105,4 @@ def _crop(sample: Sample, shares: tuple[float, float], rng: np.random.Generator)
     shift = (corner + size / 2) / whole - 0.5
     sides = (sample.sides - np.tile(shift, 2)) * np.tile(whole / size, 2)
     image = np.ascontiguousarray(sample.image[y:bottom, x:right])
-    return Sample(image, sample.vehicle, sides.astype(np.float32))
+    return PatchSample(image, sample.vehicle, sides.astype(np.float32))

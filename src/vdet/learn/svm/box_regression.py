@@ -10,7 +10,7 @@ from vdet.boxes import BoolArray, Float32Array, Float64Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
-from vdet.learn.svm.augmentation import Augmenter, augment, zoom_in
+from vdet.learn.svm.augmentation import augment, zoom_in
 from vdet.learn.svm.dataset import PatchFile, Sides
 from vdet.learn.svm.extraction import LabelledVectors, extract
 from vdet.progress import Steps, no_steps
@@ -66,17 +66,7 @@ def extract_box_patches(
     if not with_boxes or not settings.svm.features.hog.channels:
         return None
     training = settings.train.svm
-
-    def describe(some: Sequence[PatchFile], augmenter: Augmenter, step: str) -> LabelledVectors:
-        return extract(
-            some,
-            settings.svm.features,
-            training,
-            augmenter=augmenter,
-            workers=workers,
-            progress=(steps if some else no_steps)(step, len(some)),
-        )
-
+    describe = partial(extract, features=settings.svm.features, training=training, workers=workers)
     without_parts = training.augmentation.model_copy(update={"parts": 0.0})  # parts have no box
     assumed = [
         replace(file, sides=_ASSUMED_SIDES)
@@ -84,10 +74,12 @@ def extract_box_patches(
         if file.vehicle and file.source not in with_boxes
     ]
     augmenter = partial(augment, settings=without_parts)
-    return BoxPatches(
-        describe(boxed, augmenter, "describing patches with boxes"),
-        describe(assumed, zoom_in, "describing vehicles again"),
-    )
+    start = steps if boxed else no_steps
+    progress = start("describing patches with boxes", len(boxed))
+    of_boxed = describe(boxed, augmenter=augmenter, progress=progress)
+    start = steps if assumed else no_steps
+    progress = start("describing vehicles again", len(assumed))
+    return BoxPatches(of_boxed, describe(assumed, augmenter=zoom_in, progress=progress))
 
 
 def fit_split_boxes(

@@ -16,7 +16,7 @@ from vdet.config.svm import FeatureSettings
 from vdet.config.train import SvmTrainingSettings
 from vdet.detect.svm.features import FeatureExtractor, to_patch
 from vdet.errors import DataError
-from vdet.learn.svm.augmentation import UNKNOWN_SIDES, Augmenter, Sample
+from vdet.learn.svm.augmentation import UNKNOWN_SIDES, Augmenter, PatchSample
 from vdet.learn.svm.dataset import PatchFile, read_patches
 from vdet.workers import WorkerKilledError, Workers
 
@@ -143,7 +143,7 @@ def _describe(
     for patch in patches:
         if patch.image is not None:
             sides = np.array(patch.file.sides or UNKNOWN_SIDES, np.float32)
-            samples.append(Sample(patch.image, patch.file.vehicle, sides))
+            samples.append(PatchSample(patch.image, patch.file.vehicle, sides))
             good.append(patch)
     origins = list(range(len(good)))
     if augmenter is not None:

@@ -30,7 +30,7 @@ from vdet.learn.svm.dataset import patch_archive
 from vdet.media import Picture, VideoReader
 from vdet.media.images import Image
 from vdet.progress import Progress, Steps, no_steps
-from vdet.run.loop import peek
+from vdet.run.loop import named_errors, peek
 
 PATCH = 64
 """Side of the patches, pixels, as in the Udacity set."""
@@ -87,15 +87,17 @@ class VideoSource:
         """
         roles = Roles.from_settings(settings)
         truth = read_truth(self.truth, roles)
-        last = self._last(truth)
+        last = min(self.last or truth.last_frame, truth.last_frame)
+        if last < self.first:
+            raise TruthError(
+                f"{self.truth}: covers the frames up to {truth.last_frame}; mine some of these"
+            )
         number = 0
         with VideoReader(self.path, frames=last, settings=settings.input) as reader:
             info, advance = reader.info, progress(last)
             images, frames = peek(reader)
-            try:
+            with named_errors(self.path, VideoError):
                 search = search_windows(model, info.width, info.height, images)
-            except ImageError as error:
-                raise VideoError(f"{self.path}: {error}") from error
             for frame in frames:
                 number = frame.index + 1
                 labels = truth.frame(number)
@@ -105,14 +107,6 @@ class VideoSource:
                 advance(1)
         if number < last:
             truth.check_end(self.truth, number)
-
-    def _last(self, truth: LabelledVideo) -> int:
-        last = min(self.last or truth.last_frame, truth.last_frame)
-        if last < self.first:
-            raise TruthError(
-                f"{self.truth}: covers the frames up to {truth.last_frame}; mine some of these"
-            )
-        return last
 
     def _uses(self, number: int, labels: LabelledVideo, width: int) -> bool:
         """Return whether a frame is used: every n-th, and those that cut a vehicle off."""
@@ -144,23 +138,10 @@ class PictureSource:
         for number, labelled in enumerate(pictures):
             image = labelled.read()
             height, width = image.shape[:2]
-            try:
+            with named_errors(labelled.path, ImageError):
                 windows = search_windows(model, width, height, [image])(image)
-            except ImageError as error:
-                raise ImageError(f"{labelled.path}: {error}") from error
             yield LabelledFrame(f"picture{number + 1:06}", number, image, windows, labelled)
             advance(1)
-
-
-@dataclass(frozen=True, slots=True)
-class MiningResult:
-    """Number of frames searched, and of patches of each kind."""
-
-    frames: int
-    vehicles: int
-    boxes: int
-    false_alarms: int
-    parts: int
 
 
 def mine(
@@ -172,7 +153,7 @@ def mine(
     most: Most = MOST,
     overwrite: bool = False,
     steps: Steps = no_steps,
-) -> MiningResult:
+) -> tuple[int, Counter[PatchKind]]:
     """Search the labelled frames and write patches for the training.
 
     The patches of `video.mp4` lie in the groups `mined_video` of `vehicles/`, `boxes/` and
@@ -190,6 +171,10 @@ def mine(
         Most patches of each kind in a frame.
     steps
         Called for each source with its name and its number of frames.
+
+    Returns
+    -------
+    The number of frames searched, and of the patches of each kind.
 
     Raises
     ------
@@ -232,7 +217,7 @@ def mine(
         if not counts:
             shown = ", ".join(str(source.path) for source in sources)
             raise DataError(f"{shown}: no window fits a vehicle or is a false alarm; try others")
-    return MiningResult(searched, *(counts[kind] for kind in _FOLDERS))
+    return searched, counts
 
 
 def search_windows(
