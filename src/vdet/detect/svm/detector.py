@@ -36,32 +36,27 @@ class Candidates:
     is_still: bool
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class SvmModel:
     """A linear model with its settings: a `DetectorModel`.
 
-    Parameters
-    ----------
-    check
-        Warns of a road that the model does not know; None for no warning.
+    `check` warns of a road that the model does not know; None for no warning.
     """
 
-    def __init__(
-        self, model: LinearModel, settings: SvmSettings, *, check: RoadCheck | None = None
-    ) -> None:
-        self._model = model
-        self._settings = settings
-        self._check = check
+    model: LinearModel
+    settings: SvmSettings
+    check: RoadCheck | None = None
 
     def for_video(self, width: int, height: int, images: Sequence[Image]) -> "SvmDetector":
         """Return a detector for frames of one size; `images` show where the horizon is."""
         horizon = self._horizon(images)
         return SvmDetector(
-            self._model, self._settings, width, height, horizon=horizon, check=self._check
+            self.model, self.settings, width, height, horizon=horizon, check=self.check
         )
 
     def _horizon(self, images: Sequence[Image]) -> float:
         """Return the row of the horizon, share of the height, and report it."""
-        perspective = self._settings.search.perspective
+        perspective = self.settings.search.perspective
         if not perspective.sizes:
             return DEFAULT_HORIZON  # no window set depends on it
         horizon = perspective.horizon

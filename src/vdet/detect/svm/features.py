@@ -3,7 +3,6 @@
 Source: Dalal & Triggs, "Histograms of Oriented Gradients for Human Detection", 2005.
 """
 
-import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -32,9 +31,9 @@ class Layout:
         hog = settings.hog
         blocks = settings.patch // hog.cell - hog.block + 1
         length = blocks**2 * hog.block**2 * hog.orientations
-        starts = [i * length for i in range(len(hog.channels) + 1)]
-        histogram = slice(starts[-1], starts[-1] + 3 * (settings.histogram.bins or 0))
-        return Layout(tuple(itertools.starmap(slice, itertools.pairwise(starts))), histogram)
+        parts = [slice(i * length, (i + 1) * length) for i in range(len(hog.channels))]
+        start = length * len(parts)
+        return Layout(tuple(parts), slice(start, start + 3 * (settings.histogram.bins or 0)))
 
     @property
     def hog_length(self) -> int:

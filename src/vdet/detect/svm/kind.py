@@ -1,5 +1,6 @@
 """The linear model as the kind of detector `svm`: its model files, and how it is loaded."""
 
+from functools import cache
 from pathlib import Path
 
 from vdet.config.schema import NetworkSettings, SvmSettings
@@ -44,7 +45,7 @@ def load_svm(settings: SvmSettings, path: Path | None) -> SvmModel:
         The file cannot be used, or the model was trained with other features.
     """
     model = load_model(path or shipped_model(settings), requested_features(settings))
-    check = RoadCheck(_load_network) if path is None else None
+    check = RoadCheck(cache(_load_network)) if path is None else None
     return SvmModel(model, settings, check=check)
 
 

@@ -30,12 +30,11 @@ class RoadCheck:
     Parameters
     ----------
     load_other
-        Loads the other detector; it is called when the first frame is compared.
+        Returns the other detector; it is called for each frame that is compared.
     """
 
     def __init__(self, load_other: Callable[[], DetectorModel]) -> None:
         self._load_other = load_other
-        self._other: DetectorModel | None = None
         self._seen = self._both = self._all = 0
         self._has_warned = False
 
@@ -47,9 +46,7 @@ class RoadCheck:
         number, self._seen = self._seen, self._seen + 1
         if self._has_warned or number & (number - 1):
             return
-        if self._other is None:
-            self._other = self._load_other()
-        other = self._other.for_video(picture.width, picture.height, [picture.image])
+        other = self._load_other().for_video(picture.width, picture.height, [picture.image])
         seen = other.detect(other.search(picture, None))
         ours, theirs = (_compared(each, picture.width) for each in (found, seen))
         overlaps = iou_matrix(ours, theirs) >= _LEAST_IOU

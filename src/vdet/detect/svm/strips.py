@@ -88,13 +88,9 @@ def describe_blocks(strip: Channels, features: FeatureSettings) -> Float32Array:
     columns, rows = (side // hog.cell - hog.block + 1 for side in (width, height))
     # A descriptor whose window is the strip gives each block once, column by column.
     blocks = [np.zeros((columns, rows, 0), np.float32)]  # all there is without HOG
-    blocks += [
-        np.reshape(
-            hog_descriptor(features, (width, height), number).compute(strip[number]),
-            (columns, rows, -1),
-        )
-        for number in hog.channels
-    ]
+    for number in hog.channels:
+        values = hog_descriptor(features, (width, height), number).compute(strip[number])
+        blocks.append(np.reshape(values, (columns, rows, -1)))
     return np.concatenate(blocks, axis=-1, dtype=np.float32)
 
 
