@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vdet.boxes import Float32Array, Float64Array
+from vdet.boxes import Float32Array
 from vdet.detect.svm.model import BoxRegression
 from vdet.learn.svm.box_regression import fit_sides
 
@@ -22,9 +22,9 @@ def fit(
     hogs: Float32Array,
     sides: Float32Array,
     penalty: float,
-    weights: Float64Array | None = None,
+    weights: Float32Array | None = None,
 ) -> BoxRegression:
-    ones = np.ones(len(hogs))
+    ones = np.ones(len(hogs), np.float32)
     return fit_sides(hogs.copy(), sides, ones if weights is None else weights, penalty)
 
 
@@ -57,7 +57,7 @@ def test_the_penalty_is_per_patch_so_that_a_set_given_twice_gives_the_same(count
 def test_a_row_of_weight_two_counts_as_two() -> None:
     hogs, sides = scene(60)
     sides += np.random.default_rng(3).normal(size=sides.shape).astype(np.float32)
-    weighted = fit(hogs, sides, 1e-6, np.repeat([2.0, 1.0], [20, 40]))
+    weighted = fit(hogs, sides, 1e-6, np.repeat(np.array([2, 1], np.float32), [20, 40]))
     repeated = fit(np.concatenate([hogs, hogs[:20]]), np.concatenate([sides, sides[:20]]), 1e-6)
     np.testing.assert_allclose(weighted.weights, repeated.weights, atol=2e-2)
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from vdet.boxes import BoolArray, Float32Array, Float64Array
+from vdet.boxes import BoolArray, Float32Array
 from vdet.config.schema import Settings
 from vdet.detect.svm.features import Layout
 from vdet.detect.svm.model import BoxRegression
@@ -120,17 +120,17 @@ def _training_rows(
     patches: BoxPatches,
     hold_out: Callable[[LabelledVectors], BoolArray],
     length: int,
-) -> tuple[Float32Array, Float32Array, Float64Array] | None:
+) -> tuple[Float32Array, Float32Array, Float32Array] | None:
     """Return HOG, sides and weights of the rows to fit to; None where no side is known."""
     sets = [_with_sides(each, ~hold_out(each)) for each in (data, patches.boxed)]
-    weights = [np.ones(len(each.sides)) for each in sets]
+    weights = [np.ones(len(each.sides), np.float32) for each in sets]
     known = sum(map(len, weights))
     if not known:
         return None
     if patches.assumed.files:
         sets.append(patches.assumed.of(~hold_out(patches.assumed)))
         count = len(sets[-1].sides)
-        weights.append(np.full(count, ASSUMED * known / count))
+        weights.append(np.full(count, ASSUMED * known / count, np.float32))
     hogs = np.concatenate([each.vectors[:, :length] for each in sets])
     return hogs, np.concatenate([each.sides for each in sets]), np.concatenate(weights)
 
@@ -141,7 +141,7 @@ def _with_sides(data: LabelledVectors, kept: BoolArray) -> LabelledVectors:
 
 
 def fit_sides(
-    hogs: Float32Array, sides: Float32Array, weights: Float64Array, penalty: float
+    hogs: Float32Array, sides: Float32Array, weights: Float32Array, penalty: float
 ) -> BoxRegression:
     """Fit the sides of vehicles' boxes to HOG vectors; a side that is never known is always 0.
 
@@ -153,7 +153,7 @@ def fit_sides(
         float32 `(n, 4)`: left, top, right, bottom from the window's centre, in widths and heights
         of the window; NaN for unknown ones.
     weights
-        How much each row counts, float64 `(n,)`.
+        How much each row counts, float32 `(n,)`.
     penalty
         Ridge penalty of the weights of scaled features, for each row of weight 1.
     """
@@ -166,8 +166,14 @@ def fit_sides(
     biases = np.zeros(4, np.float32)
     for side in range(4):
         known = ~np.isnan(sides[:, side])
-        if known.any():
-            ridge = Ridge(penalty * float(weights[known].sum()), copy_X=False)
-            ridge.fit(hogs[known], sides[known, side], weights[known])
-            slopes[side], biases[side] = ridge.coef_ / spread, ridge.intercept_
+        if known.any():  # centred and weighted here, because Ridge copies the rows for each
+            rows, weight, targets = hogs[known], weights[known], sides[known, side]
+            mean, middle = weight @ rows / weight.sum(), weight @ targets / weight.sum()
+            root = np.sqrt(weight)
+            rows -= mean
+            rows *= root[:, np.newaxis]
+            ridge = Ridge(penalty * float(weight.sum()), fit_intercept=False, copy_X=False)
+            ridge.fit(rows, (targets - middle) * root)
+            slopes[side] = ridge.coef_ / spread
+            biases[side] = middle - ridge.coef_ @ mean
     return BoxRegression(slopes, biases)
