@@ -95,7 +95,7 @@ class Searching:
 
 @dataclass(frozen=True)
 class Searched:
-    """A detector of which the search is done already."""
+    """A detector whose frames were searched before."""
 
     detector: SvmDetector
     windows: dict[int, Windows]
@@ -109,7 +109,7 @@ class Searched:
 
 
 def main() -> None:
-    """Train five times, search once, sweep, print a table a threshold."""
+    """Train five models, search once, and print a table for each threshold."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.folds", description=main.__doc__)
     parser.add_argument("video", type=Path)
     parser.add_argument("truth", type=Path)
@@ -186,7 +186,7 @@ def _sweep(
     model: LinearModel,
     truth: LabelledVideo,
 ) -> Iterator[str]:
-    """Give the lines of a table: the F1 of each value, over all blocks and block by block."""
+    """Yield the lines of a table: the F1 of each value, over all blocks and by block."""
     variants = [load_settings(None, [f"{key}={value}"], detector="svm") for value in values]
     found = [_tracks(searched, model, settings) for settings in variants]
     by_block = np.array([_f1_by_block(each, truth) for each in found])
@@ -206,7 +206,7 @@ def _sweep(
 
 
 def _tracks(searched: SearchedVideo, model: LinearModel, settings: Settings) -> LabelledVideo:
-    """Detect and follow vehicles in windows that are searched already; any model will do."""
+    """Detect and follow vehicles in windows that were searched before; any model will do."""
     detector = SvmDetector(model, settings.svm, searched.width, searched.height)
     tracker = make_tracker(settings, searched.width, searched.height)
     unseen = Picture(np.zeros((1, 1, 3), np.uint8))
