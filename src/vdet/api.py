@@ -145,10 +145,7 @@ class Tracker:
         image
             The frame; only the tracker `rules` needs it.
 
-        Raises
-        ------
-        ValueError
-            The time is not a finite number, or does not increase.
+        Raises `ValueError` if the time is not a finite number or does not increase.
         """
         self.observe(detections, time, image)
         return self.at(time)
