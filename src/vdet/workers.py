@@ -265,7 +265,7 @@ def _call_limited(function: Callable[[T], R], item: T) -> R:
 
 
 def is_repeated() -> bool:
-    """Tell whether Dask has begun this task before, with a worker that has ended since.
+    """Return whether Dask has begun this task before, with a worker that has ended since.
 
     The scheduler keeps a note of each task that asks. Outside a Dask worker the answer is False.
     """

@@ -64,7 +64,7 @@ def find_sources(clips: Sequence[Path]) -> list[InputVideo]:
 
 
 def matches_in(clip: Path, folder: Path) -> bool:
-    """Tell whether a clip, a folder or a pattern, can give videos that lie in `folder`."""
+    """Return whether a clip, a folder or a pattern, can give videos that lie in `folder`."""
     if clip.is_dir():
         return folder.resolve().is_relative_to(clip.resolve())
     if clip.exists():

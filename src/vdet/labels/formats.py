@@ -129,7 +129,7 @@ class PictureFormat:
     read: Callable[[Path], Iterable[LabelledPicture]]
 
     def is_in(self, folder: Path) -> bool:
-        """Tell whether a folder holds such a set."""
+        """Return whether a folder holds such a set."""
         return all((folder / name).is_dir() for name in self.folders)
 
 

@@ -143,7 +143,7 @@ class Road:
     """Moves boxes and points of the original frame to `view.image`."""
 
     def cuts(self, box: Box) -> bool:
-        """Tell whether the original frame's left, right or lower edge cuts a box in that frame."""
+        """Return whether the left, right or lower edge of the original frame cuts its box."""
         height, width = self.view.image.shape[:2]
         beside = box.x1 <= _EDGE * width or box.x2 >= (1 - _EDGE) * width
         return bool(beside or box.y2 >= (1 - _EDGE) * height)

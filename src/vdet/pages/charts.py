@@ -91,7 +91,7 @@ class Span:
     time: float | None = None
 
     def fits(self, width: float, pixels: int) -> bool:
-        """Tell whether the label fits into the bar, `width` percent of a chart of `pixels`."""
+        """Return whether the label fits into the bar, `width` percent of a chart of `pixels`."""
         return bool(self.label) and width * pixels >= 100 * (10 + 7.5 * len(self.label))
 
 

@@ -48,7 +48,7 @@ def true_boxes(scene: Scene, index: int) -> tuple[TrueBox, ...]:
 
 
 def must_be_found(vehicle: TrueBox, frame_height: int) -> bool:
-    """Tell whether a vehicle must be found: it is large enough, and at most half of it is hidden.
+    """Return whether a vehicle must be found: it is large enough, and at most half of it is hidden.
 
     The smallest size is `SMALLEST` in a frame of 720 rows and grows with the frame. For a vehicle
     that the frame's edge cuts, the size of the part inside decides.

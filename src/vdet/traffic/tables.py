@@ -21,7 +21,7 @@ _FORMULA = re.compile(r"[=+@\t\r-](?!\d*\.?\d*(e-?\d+)?$)")
 
 
 def is_json(path: Path) -> bool:
-    """Tell whether a file is JSON by its name; else it is a table."""
+    """Return whether a file is JSON by its name; else it is a table."""
     return path.suffix.lower() == ".json"
 
 

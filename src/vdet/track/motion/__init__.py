@@ -8,11 +8,14 @@ For each vehicle a Kalman filter (`state`) estimates where it is in the next fra
 2.  a box that is cut off by the frame's side is measured by its inner edge only (`state`);
 3.  a detection that belongs to no vehicle may be a new one, unless it is a part of one
     (`association`);
-4.  a new vehicle is shown when there is enough evidence for it (`vehicle`);
-5.  a vehicle without a detection is shown by prediction for a short time; not behind another one
-    that covers most of it. It is remembered for longer, and keeps its id;
+4.  a new vehicle is shown if there is enough evidence for it (`vehicle`);
+5.  a vehicle without a detection is remembered for a while, and keeps its id;
 6.  a new vehicle near the expected place of a lost one is the same vehicle; of two tracks of one
-    vehicle the one with the higher score stays, under the older id (`association`).
+    vehicle the one with the higher score stays, under the older id (`association`);
+7.  what a frame shows is known when the frames after it were searched: each vehicle from its first
+    detection to its last, where both what came before and what came after put it (`history`). A
+    gap between two detections is bridged if it is short, and if no other vehicle covers most of
+    this one meanwhile. Where nothing came after a frame yet, a vehicle is shown by prediction.
 
 All times are seconds, so that tracks do not depend on the frame rate.
 """

@@ -51,7 +51,7 @@ CLEAR = 0.8
 
 
 def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
-    """Tell of each box whether another one covers more than half of it and is not farther.
+    """Return for each box whether another one covers more than half of it and is not farther.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def are_hidden(boxes: Float64Array, present: BoolArray) -> BoolArray:
 
 
 def is_same(box: Float64Array, other: Float64Array) -> bool:
-    """Tell whether two boxes, `(4,)`, show the same vehicle."""
+    """Return whether two boxes, `(4,)`, show the same vehicle."""
     one, two = box[np.newaxis], other[np.newaxis]
     height = min(box[3] - box[1], other[3] - other[1])
     is_level = abs(other[3] - box[3]) < _LEVEL * height
@@ -77,7 +77,7 @@ def is_same(box: Float64Array, other: Float64Array) -> bool:
 
 
 def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
-    """Tell of each box, `(n, 4)`, whether most of it lies in one that scores higher.
+    """Return for each box, `(n, 4)`, whether most of it lies in one that scores higher.
 
     A vehicle that comes out from behind another one has nearly the same score, and is no part.
 
@@ -90,7 +90,7 @@ def are_parts(boxes: Float64Array, scores: Float64Array) -> BoolArray:
 
 
 def is_part(box: Float64Array, other: Float64Array) -> bool:
-    """Tell whether most of `box`, `(4,)`, lies in `other`."""
+    """Return whether most of `box`, `(4,)`, lies in `other`."""
     return bool(coverage(box[np.newaxis], other[np.newaxis]) > PART)
 
 
@@ -181,7 +181,7 @@ def without_duplicates(vehicles: Sequence[Vehicle], size: tuple[int, int]) -> li
 def _are_same(
     vehicle: Vehicle, other: Vehicle, hidden: Sequence[Vehicle], size: tuple[int, int]
 ) -> bool:
-    """Tell whether a track shows the same vehicle as another one, higher in rank.
+    """Return whether a track shows the same vehicle as another one, higher in rank.
 
     One that may be a `hidden` vehicle that comes out is no part of the vehicle before it.
     """
@@ -194,13 +194,13 @@ def _are_same(
 
 
 def _comes_out(vehicle: Vehicle, nearer: Vehicle, hidden: Sequence[Vehicle]) -> bool:
-    """Tell whether one of the `hidden` vehicles was near and this one is as clear as the nearer."""
+    """Return whether a `hidden` vehicle was near, and this one is as clear as the nearer."""
     is_clear = vehicle.detection_scores.value > CLEAR * nearer.detection_scores.value
     return is_clear and any(_distance(each, vehicle) < _REACH for each in hidden)
 
 
 def _may_be(lost: Vehicle, new: Vehicle) -> bool:
-    """Tell whether a vehicle that is seen again may be the lost one: later, and near by."""
+    """Return whether a vehicle that is seen again may be the lost one: later, and near by."""
     return lost.history.last_seen < new.begin and _distance(lost, new) < _REACH
 
 

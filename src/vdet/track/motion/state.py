@@ -111,7 +111,7 @@ def side_cut(box: Float64Array, size: tuple[int, int]) -> tuple[int, int] | None
 
 
 def _cuts(box: Float64Array, axis: int, span: int) -> tuple[bool, bool]:
-    """Tell whether the near and the far side of the frame cut a box off."""
+    """Return whether the near and the far side of the frame cut a box off."""
     return bool(box[axis] <= BORDER * span), bool(box[axis + 2] >= span - BORDER * span)
 
 

@@ -167,14 +167,14 @@ class MotionTracker:
         return pair(values, [present, lost, new])
 
     def _adds_evidence(self, observation: Observation) -> bool:
-        """Tell whether such a detection, repeated in each frame, would make a vehicle."""
+        """Return whether such a detection, repeated in each frame, would make a vehicle."""
         return observation.score > self._settings.leak
 
     def _hidden(self, boxes: Float64Array) -> BoolArray:
         return are_hidden(boxes, np.array([each.is_present for each in self._vehicles], bool))
 
     def _is_clear(self, box: Float64Array, score: float) -> bool:
-        """Tell whether a vehicle is wide enough and likely enough to be shown."""
+        """Return whether a vehicle is wide enough and likely enough to be shown."""
         is_wide = bool(box[2] - box[0] >= self._settings.smallest * self._size[0])
         return is_wide and score >= self._settings.least_score
 

@@ -184,6 +184,6 @@ def combine(first: Region, second: Region) -> Region:
 
 
 def any_overlap(boxes: Sequence[Box], pixels: int) -> bool:
-    """Tell whether two of the boxes overlap by more than `pixels`, across and down (rule 4)."""
+    """Return whether two of the boxes overlap by more than `pixels`, across and down (rule 4)."""
     common = (a.intersection(b) for a, b in combinations(boxes, 2))
     return any(box.width > pixels and box.height > pixels for box in common)

@@ -105,12 +105,12 @@ class Car:
         return is_young_and_missed or is_only_matched or self.misses >= self._settings.max_misses
 
     def is_filled_by(self, region: Box) -> bool:
-        """Tell whether a region is wide enough to be all of the car (rules 7 and 8)."""
+        """Return whether a region is wide enough to be all of the car (rules 7 and 8)."""
         least = min(self._settings.wide, self._settings.good_fraction * self.box.width)
         return region.width > least
 
     def is_as_wide_as(self, region: Box) -> bool:
-        """Tell whether two combined regions are about as wide as the car (rules 9 and 10)."""
+        """Return whether two combined regions are about as wide as the car (rules 9 and 10)."""
         width = self.box.width
         return abs(region.width - width) <= self._settings.combined_tolerance * width
 
