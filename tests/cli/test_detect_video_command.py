@@ -91,7 +91,7 @@ def test_a_picture_of_every_stage_of_one_moment(
 ) -> None:
     options = ("--no-video", "--stages", tmp_path / "stages", "--at", "0.2", "--frames", "8")
     assert run("detect-video", clip_path, *options, "--model", model_path, *QUICK_OPTIONS).code == 0
-    assert len(list((tmp_path / "stages").glob("*.png"))) == 5
+    assert len(list((tmp_path / "stages").glob("*.png"))) == 4
     assert read_image(tmp_path / "stages" / "3-heat.png").shape == (180, 320, 3)
 
 

@@ -27,4 +27,4 @@ def test_without_torch_the_message_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, "torch", None)
     result = run("train-net", tmp_path, "-o", tmp_path / "a.onnx")
     assert result.code == 1
-    assert result.err == "vdet: torch or onnx is not installed; pip install torch onnx\n"
+    assert result.err == "vdet: torch is not installed; pip install torch onnx\n"

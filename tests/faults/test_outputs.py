@@ -112,8 +112,8 @@ def test_a_tracker_that_raises(
     def update(*_: object) -> None:
         raise ZeroDivisionError("no\nscale")
 
-    for tracker in (RulesTracker, MotionTracker):
-        monkeypatch.setattr(tracker, "update", update)
+    monkeypatch.setattr(RulesTracker, "update", update)
+    monkeypatch.setattr(MotionTracker, "observe", update)
     record = process_file(job, work=red_work(tmp_path))
     assert record.error is not None
     assert "internal error, please report it (ZeroDivisionError: no scale)" in record.error
