@@ -51,7 +51,7 @@ def test_a_vehicle_that_is_hardly_likely_is_not_shown() -> None:
 
 def test_a_vehicle_is_shown_once_it_is_wide_enough() -> None:
     least = DEFAULTS.smallest * WIDTH
-    places = [Box.sized(600 - n // 2, 400, 20 + n, 14 + n) for n in range(60)]
+    places = [Box.sized(600 - n // 2, 400, 8 + n, 6 + n) for n in range(60)]
     shown = follow([place] for place in places)
     assert ids(shown) == {1}
     assert all(track.box.width >= least - 1 for tracks in shown for track in tracks)
