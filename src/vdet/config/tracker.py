@@ -34,7 +34,7 @@ class MotionTrackerSettings(TrackerSettings):
     of the original system, which count frames.
     """
     look_ahead: LookAhead = 0.6
-    smallest: Share = 0.015
+    smallest: Share = 0.02
     """Least width of a vehicle that is shown, as a share of the frame's."""
     least_score: Share = 0.4
     """Least mean score of the latest detections of a vehicle that is shown."""

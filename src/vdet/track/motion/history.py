@@ -18,6 +18,9 @@ from vdet.track.track import State
 SCORE_TIME = 0.5
 """Seconds over which the scores of detections are averaged."""
 
+_ENTRY = 0.25
+"""Seconds before the first detection in which a vehicle is shown that comes into the frame."""
+
 _ENTERING = 0.2
 """Least speed of a vehicle that comes into the frame, in its sizes a second."""
 
@@ -148,12 +151,14 @@ class History:
     def _entering(self, first: int, time: float) -> Place | None:
         """Return where the vehicle was before its first detection, if it came into the frame."""
         moment, mean = self._moments[first], self._means()[first]
-        if moment.entering is None:
+        if moment.entering is None or moment.time - time > _ENTRY:
             return None
         axis, inward = moment.entering
         if mean[axis, 1] * inward < _ENTERING * math.exp(mean[axis + 2, 0]):
             return None
-        return Place(mean[:, 0] + mean[:, 1] * (time - moment.time), "between")
+        moved = mean[:, 0].copy()
+        moved[:2] += mean[:2, 1] * (time - moment.time)  # its size hardly shows where it is cut off
+        return Place(moved, "between")
 
     def _means(self) -> list[Float64Array]:
         """Return the smoothed means of all moments, each `(4, 2)`."""
