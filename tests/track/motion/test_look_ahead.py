@@ -56,7 +56,7 @@ def test_between_two_searches_a_vehicle_is_on_its_way_from_one_to_the_other() ->
     shown = shown_later([[place] for place in places], stride=3)
     assert states(shown[:37]) == [("between", "seen")[n % 3 == 0] for n in range(37)]
     for place, (track,) in zip(places[6:37], shown[6:37], strict=True):
-        assert track.box.iou(place) > 0.93
+        assert track.box.iou(place) > 0.92
 
 
 @pytest.mark.parametrize(("missed", "state"), [(AHEAD - 2, "between"), (AHEAD + 3, "")])

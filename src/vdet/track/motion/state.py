@@ -92,6 +92,13 @@ class MotionState:
             self.covariance - gain[:, :, np.newaxis] * self.covariance[:, np.newaxis, 0],
         )
 
+    def enlarged(self, box: Float64Array, size: tuple[int, int]) -> "MotionState":
+        """Return the state with the size that a box shows at least; parameters as of `corrected`.
+
+        Of a vehicle that the frame's side cuts off, the inner edge stays where it is.
+        """
+        return replace(self, mean=_measured(self.mean, box, size)[0])
+
     def slowed(self, motion: float, growth: float) -> "MotionState":
         """Multiply the velocity by `motion`, the change of the size by `growth`."""
         factors = np.array([[1, motion], [1, motion], [1, growth], [1, growth]])

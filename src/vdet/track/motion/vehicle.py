@@ -23,10 +23,10 @@ _SLOWING_TIME = 0.8
 _SETTLING_TIME = 0.4
 """The same of the change of its size, from the first miss on: growth soon adds up to a lot."""
 
-_NOISE = 0.1
+_NOISE = 0.12
 """Standard deviation of the sides of a detection with score 1, as a share of the vehicle's size."""
 
-_ACCELERATION = 1.0
+_ACCELERATION = 0.8
 """Standard deviation of the change of velocity in a second, sizes of the vehicle a second."""
 
 _VELOCITY = 2.5
@@ -152,10 +152,11 @@ class Vehicle:
 
     def see(self, observation: Observation, look: Look) -> None:
         """Take in its detection in a frame."""
-        box, score, expected = observation.box, observation.score, self.state.mean
-        self.state = self.state.corrected(box, observation.noise, look.size)
+        box, score = observation.box, observation.score
+        expected = self.state.enlarged(box, look.size)
+        self.state = expected.corrected(box, observation.noise, look.size)
         entering = side_cut(box, look.size)
-        moment = Moment(look.time, self.state, score, expected, self._gain, entering)
+        moment = Moment(look.time, self.state, score, expected.mean, self._gain, entering)
         self.history.add(moment)
         self.unseen = self.hidden = 0.0
         self._add(observation, look.seconds)
