@@ -52,7 +52,7 @@ def test_what_is_never_sure_is_not_shown() -> None:
 
 def test_between_two_searches_a_vehicle_is_on_its_way_from_one_to_the_other() -> None:
     """It brakes: what came before does not tell where it is."""
-    places = [moved_to(CAR, round(100 + 12 * n - 0.15 * n * n), 400) for n in range(40)]
+    places = [moved_to(CAR, round(100 + 12 * n - 0.1 * n * n), 400) for n in range(40)]
     shown = shown_later([[place] for place in places], stride=3)
     assert states(shown[:37]) == [("between", "seen")[n % 3 == 0] for n in range(37)]
     for place, (track,) in zip(places[6:37], shown[6:37], strict=True):
