@@ -14,6 +14,7 @@ from vdet.workers import SINGLE_THREADED
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 CLEANUP_TIMEOUT = 10.0  # seconds between a signal and a forced exit
+_SENT_AGAIN = 20
 _STDOUT, _STDERR = 1, 2
 
 
@@ -91,16 +92,22 @@ def _interrupt(*_: object) -> NoReturn:
 
 
 def _watch_for_signals() -> None:
-    """Exit `CLEANUP_TIMEOUT` after a signal, even if the main thread hangs in a library."""
+    """Exit `CLEANUP_TIMEOUT` after a signal, even if the main thread hangs in a library.
+
+    A signal that comes just before the main thread begins to wait does not end this wait. So it is
+    sent again; once it has been handled, it is ignored.
+    """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     signal.set_wakeup_fd(writer)  # gets the number of a signal at once
-    numbers = _signals()
+    numbers, thread = _signals(), threading.get_ident()
 
     def exit_late() -> None:
-        while os.read(reader, 1)[0] not in numbers:
+        while (number := os.read(reader, 1)[0]) not in numbers:
             pass
-        time.sleep(CLEANUP_TIMEOUT)
+        for _ in range(_SENT_AGAIN):
+            time.sleep(CLEANUP_TIMEOUT / _SENT_AGAIN)
+            signal.pthread_kill(thread, number)
         os._exit(INTERRUPTED)
 
     threading.Thread(target=exit_late, daemon=True).start()
