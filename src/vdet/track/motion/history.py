@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vdet.boxes import Float64Array
-from vdet.track.motion.state import MotionState
+from vdet.track.motion.state import MotionState, whole_box
 from vdet.track.track import State
 
 SCORE_TIME = 0.5
@@ -69,8 +69,7 @@ class Place:
     @property
     def box(self) -> Float64Array:
         """x1, y1, x2, y2 in pixels, `(4,)`, with what lies outside the frame."""
-        half = np.exp(self.mean[2:]) / 2
-        return np.concatenate([self.mean[:2] - half, self.mean[:2] + half])
+        return whole_box(self.mean)
 
 
 class History:

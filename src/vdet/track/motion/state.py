@@ -47,8 +47,7 @@ class MotionState:
     @property
     def box(self) -> Float64Array:
         """The vehicle's x1, y1, x2, y2 in full-frame pixels, float64 `(4,)`; not clipped."""
-        center, half = self.mean[:2, 0], np.exp(self.mean[2:, 0]) / 2
-        return np.concatenate([center - half, center + half])
+        return whole_box(self.mean[:, 0])
 
     @property
     def deviation(self) -> Float64Array:
@@ -103,6 +102,12 @@ class MotionState:
         """Multiply the velocity by `motion`, the change of the size by `growth`."""
         factors = np.array([[1, motion], [1, motion], [1, growth], [1, growth]])
         return replace(self, mean=self.mean * factors)
+
+
+def whole_box(mean: Float64Array) -> Float64Array:
+    """Return x1, y1, x2, y2 in pixels of a centre x and y and log width and height, both `(4,)`."""
+    half = np.exp(mean[2:]) / 2
+    return np.concatenate([mean[:2] - half, mean[:2] + half])
 
 
 def side_cut(box: Float64Array, size: tuple[int, int]) -> tuple[int, int] | None:

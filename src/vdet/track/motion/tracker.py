@@ -76,7 +76,8 @@ class MotionTracker:
 
     def at(self, time: float) -> list[Track]:
         """Return the vehicles shown at a time; as `TimedTracker.at`."""
-        found = [(v, place) for v in self._known() if (place := self._place(v, time)) is not None]
+        known = [*self._gone, *(vehicle for vehicle in self._vehicles if vehicle.confirmed)]
+        found = [(v, place) for v in known if (place := self._place(v, time)) is not None]
         boxes = visible(np.reshape([place.box for _, place in found], (-1, 4)), self._size)
         keep = [row for row, box in enumerate(boxes) if _least_side(box) >= 1]
         found, boxes = [found[row] for row in keep], boxes[keep]
@@ -96,9 +97,6 @@ class MotionTracker:
             if not is_nested
         ]
         return sorted(tracks, key=lambda track: track.id)
-
-    def _known(self) -> list[Vehicle]:
-        return [vehicle for vehicle in (*self._gone, *self._vehicles) if vehicle.confirmed]
 
     def _place(self, vehicle: Vehicle, time: float) -> Place | None:
         """Return where a vehicle is at a time, if it is to be shown then."""
@@ -120,8 +118,8 @@ class MotionTracker:
         self._keep(self._staying())
 
     def _keep(self, vehicles: list[Vehicle]) -> None:
-        """Follow only these vehicles; the others can be shown at earlier times."""
-        self._gone += [vehicle for vehicle in self._vehicles if vehicle not in vehicles]
+        """Follow only these vehicles; those that are confirmed can be shown at earlier times."""
+        self._gone += [v for v in self._vehicles if v.confirmed and v not in vehicles]
         self._vehicles = vehicles
 
     def _forget(self, before: float) -> None:
