@@ -85,10 +85,9 @@ class TruePlace:
 def true_places(scene: Scene, index: int) -> tuple[TruePlace, ...]:
     """Return where the vehicles that exist at frame `index` are, seen or not, ordered by id."""
     places = []
-    for ahead, vehicle in scene.nearest_first(scene.time(index)):
-        _, lateral = vehicle.position(scene.time(index)) or (0.0, 0.0)
-        lane = _lane(lateral, scene.road.lines)
-        places.append(TruePlace(vehicle.id, ahead + STANDS, lateral, lane))
+    for place, vehicle in scene.nearest_first(scene.time(index)):
+        lane = _lane(place.lateral, scene.road.lines)
+        places.append(TruePlace(vehicle.id, place.ahead + STANDS, place.lateral, lane))
     return tuple(sorted(places, key=lambda place: place.id))
 
 

@@ -1,3 +1,4 @@
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -46,6 +47,17 @@ def test_the_true_box_bounds_what_is_drawn(
     [found] = true_boxes(scene, 0)
     assert sides(found.box) == pytest.approx(sides(drawn_box(scene)), abs=2)
     assert found.hidden == 0
+
+
+@pytest.mark.parametrize("heading", [math.pi / 2, math.pi, -2.0])
+def test_a_vehicle_may_drive_in_any_direction(
+    make_scene: MakeScene, parked: Parked, heading: float
+) -> None:
+    turned = replace(parked(1, 15.0, 0.0), path=(Waypoint(0.0, 18.0, -1.0, heading),))
+    [found] = true_boxes(make_scene(turned), 0)
+    assert sides(found.box) == pytest.approx(sides(drawn_box(make_scene(turned))), abs=2)
+    length = abs(math.sin(heading)) * turned.body.length
+    assert found.box.width / found.box.height > 1 + length / 5
 
 
 @pytest.mark.parametrize("ahead", [1.0, 3.0, 4.5])

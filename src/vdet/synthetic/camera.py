@@ -41,6 +41,11 @@ class PinholeCamera:
         """Return a usual dashboard camera: at 720 rows, focal length 1152 and horizon row 410."""
         return cls(width, height, 1.6 * height, 0.57 * height, curvature=curvature)
 
+    @classmethod
+    def pole(cls, width: int, height: int, above_ground: float = 8.0) -> "PinholeCamera":
+        """Return a camera on a pole; it sees the road from 1.2 times its height on."""
+        return cls(width, height, 1.1 * height, 0.08 * height, above_ground)
+
     def project(self, points: Float64Array) -> Float64Array:
         """Return the pixels `(n, 2)` of points `(n, 3)`, all of them ahead of the camera."""
         x, y, z = points.T

@@ -36,6 +36,9 @@ _SHAPES: tuple[Body, ...] = (
     Body(width=1.82, length=4.8, boot=0.1, slope=0.7, height=1.46),
 )
 
+LORRY = Body(width=2.5, length=9.0, height=3.5, belt=3.45, boot=0.05, slope=0.05)
+"""A lorry with a box body."""
+
 
 def demo_scene(seed: int, *, width: int = 960, height: int = 540) -> Scene:
     """Return the scene of the demo: 10 s at 25 frames a second.

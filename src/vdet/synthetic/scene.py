@@ -5,6 +5,7 @@ the right of the camera. A `station` is metres along the road from where the cli
 surface and the plants beside it repeat every `PERIOD` metres, so a clip may have any length.
 """
 
+import math
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -77,7 +78,7 @@ class Plant:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """The shape of a car, in metres; `vdet.synthetic.vehicle` draws its parts."""
+    """The shape of a car or a lorry, in metres; `vdet.synthetic.vehicle` draws its parts."""
 
     width: float = 1.8
     length: float = 4.6
@@ -92,30 +93,36 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """A vehicle's position at a time: its rear is `ahead` of the camera, its middle `lateral`."""
+    """A vehicle's position at a time: the middle of its rear is `ahead` of the camera, `lateral`.
+
+    `heading` is where it drives, radians: 0 away from the camera, positive to the right.
+    """
 
     time: float
     ahead: float
     lateral: float
+    heading: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class SceneVehicle:
-    """A car seen from behind. It exists from its first to its last waypoint, straight between."""
+    """A car or a lorry. It exists from its first to its last waypoint, straight between."""
 
     id: int
     path: tuple[Waypoint, ...]
     color: Color
     body: Body = Body()
 
-    def position(self, time: float) -> tuple[float, float] | None:
-        """Return `(ahead, lateral)` at `time`, or None while the vehicle does not exist."""
+    def position(self, time: float) -> Waypoint | None:
+        """Return where it is at `time`, or None while it does not exist."""
         times = [point.time for point in self.path]
         if not times[0] <= time <= times[-1]:
             return None
-        ahead = np.interp(time, times, [point.ahead for point in self.path])
-        lateral = np.interp(time, times, [point.lateral for point in self.path])
-        return float(ahead), float(lateral)
+        values = [(point.ahead, point.lateral, point.heading) for point in self.path]
+        ahead, lateral, heading = (
+            float(np.interp(time, times, v)) for v in zip(*values, strict=True)
+        )
+        return Waypoint(time, ahead, lateral, heading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +156,12 @@ class Scene:
                 light *= 1 - shadow.strength * (0.5 if shadow.dappled else 1.0)
         return light
 
-    def nearest_first(self, time: float) -> list[tuple[float, SceneVehicle]]:
-        """Return the vehicles that exist at a time, each with its distance, the nearest first."""
-        placed = [(place[0], v) for v in self.vehicles if (place := v.position(time))]
-        return sorted(placed, key=lambda pair: pair[0])
+    def nearest_first(self, time: float) -> list[tuple[Waypoint, SceneVehicle]]:
+        """Return the vehicles that exist at a time, each with its position, the nearest first."""
+        placed = [(place, v) for v in self.vehicles if (place := v.position(time))]
+
+        def nearest(pair: tuple[Waypoint, SceneVehicle]) -> float:
+            place, vehicle = pair
+            return place.ahead + min(0.0, math.cos(place.heading) * vehicle.body.length)
+
+        return sorted(placed, key=nearest)

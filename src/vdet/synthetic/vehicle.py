@@ -1,4 +1,4 @@
-"""A vehicle as a solid of flat facets, and its drawing as seen from behind.
+"""A vehicle as a solid of flat facets, and its drawing.
 
 Coordinates of a vehicle are metres: x to the right of its middle, y up from the ground, z ahead of
 its rear. The lower body is a prism, the cabin a frustum on top of it. Lights, plate, windows and
@@ -15,7 +15,7 @@ from vdet.boxes import Float64Array
 from vdet.draw.paint import Color
 from vdet.media.images import Image
 from vdet.synthetic.camera import PinholeCamera, beyond_near, fill, mixed, shaded
-from vdet.synthetic.scene import Body, Scene, SceneVehicle
+from vdet.synthetic.scene import Body, Scene, SceneVehicle, Waypoint
 
 _SHADOW: Color = (34, 32, 32)
 _GLASS: Color = (62, 52, 46)
@@ -23,11 +23,13 @@ _TYRE: Color = (26, 25, 25)
 _RIM: Color = (150, 148, 146)
 _UNDERSIDE: Color = (20, 19, 19)
 _LIGHT: Color = (38, 26, 165)
+_HEADLIGHT: Color = (215, 222, 222)
 _PLATE: Color = (205, 208, 208)
 
 _SILL = 0.26  # height of the lower edge of the body
 _REAR_AXLE = 0.85
 _WHEEL = 0.31  # radius
+_HIGHEST_LIGHT = 1.15  # upper edge of the lights of a tall vehicle
 
 STANDS = _REAR_AXLE - _WHEEL
 """Metres ahead of its rear at which a vehicle is drawn to stand on the road: its rear tyres."""
@@ -47,11 +49,9 @@ def outlines(
     position = vehicle.position(time)
     if position is None:
         return []
-    ahead, lateral = position
-    offset = np.array([lateral, 0.0, ahead])
     visible = []
     for corners, color in _facets(vehicle.body, vehicle.color):
-        pixels = camera.project(beyond_near(corners + offset))
+        pixels = camera.project(beyond_near(_placed(corners, position)))
         if len(pixels) and cv2.contourArea(pixels.astype(np.float32), oriented=True) > 0:
             visible.append((pixels, color))
     return visible
@@ -59,26 +59,39 @@ def outlines(
 
 def draw_vehicle(image: Image, vehicle: SceneVehicle, scene: Scene, time: float) -> None:
     """Draw a vehicle and the shadow below it onto a frame."""
-    ahead, lateral = vehicle.position(time) or (np.nan, np.nan)
+    position = vehicle.position(time)
+    if position is None:
+        return
     half, front, sun = vehicle.body.width / 2, vehicle.body.length, scene.light.sun
     left, right = min(0.0, sun) - half, max(0.0, sun) + half
     shadow = _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
-    scene.camera.draw(image, shadow + np.array([lateral, 0.0, ahead]), _SHADOW)
-    light = scene.brightness(scene.speed * time + ahead)
+    scene.camera.draw(image, _placed(shadow, position), _SHADOW)
+    light = scene.brightness(scene.speed * time + position.ahead)
     for outline, color in outlines(vehicle, scene.camera, time):
         fill(image, outline, shaded(color, light))
 
 
+def _placed(corners: Float64Array, position: Waypoint) -> Float64Array:
+    """Return corners `(n, 3)` of a vehicle in the coordinates of the camera."""
+    sine, cosine = np.sin(position.heading), np.cos(position.heading)
+    turn = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
+    return np.asarray(corners @ turn + (position.lateral, 0.0, position.ahead))
+
+
 @lru_cache(maxsize=64)
 def _facets(body: Body, color: Color) -> list[_Facet]:
-    """Return the facets of a car in painting order."""
+    """Return the facets of a vehicle in painting order; of two that overlap, one is hidden."""
     lower = _underside(body) + _lower_body(body, color) + _wheels(body, color)
-    return lower + _rear(body, color) + _cabin(body, color)
+    return lower + _rear(body, color) + _front(body, color) + _cabin(body, color)
 
 
 def _underside(body: Body) -> list[_Facet]:
     half, top = body.width / 2, _SILL + 0.05
+    axle = body.length - STANDS
     return [
+        (_upright(half - 0.1, -half + 0.1, 0.1, top, axle), _UNDERSIDE),
+        (_upright(-half + 0.28, -half + 0.04, 0.0, top, axle), _TYRE),
+        (_upright(half - 0.04, half - 0.28, 0.0, top, axle), _TYRE),
         (_upright(-half + 0.1, half - 0.1, 0.1, top, STANDS), _UNDERSIDE),
         (_upright(-half + 0.04, -half + 0.28, 0.0, top, STANDS), _TYRE),
         (_upright(half - 0.28, half - 0.04, 0.0, top, STANDS), _TYRE),
@@ -86,7 +99,7 @@ def _underside(body: Body) -> list[_Facet]:
 
 
 def _lower_body(body: Body, color: Color) -> list[_Facet]:
-    """Extrude the outline of the rear along the car."""
+    """Extrude the outline of the rear along the vehicle."""
     half, belt = body.width / 2, body.belt
     left = [(-half + 0.06, _SILL), (-half, _SILL + 0.14), (-half, belt - 0.2), (-half + 0.1, belt)]
     outline = left + [(-x, y) for x, y in reversed(left)]
@@ -95,7 +108,8 @@ def _lower_body(body: Body, color: Color) -> list[_Facet]:
         corners = _quad((x0, y0, 0), (x0, y0, body.length), (x1, y1, body.length), (x1, y1, 0))
         upward = (x1 - x0) / np.hypot(x1 - x0, y1 - y0)
         parts.append((corners, shaded(color, 0.78 + 0.3 * upward)))
-    return [*parts, (_quad(*((x, y, 0.0) for x, y in outline)), shaded(color, 0.92))]
+    rear, front = (_quad(*((x, y, z) for x, y in outline)) for z in (0.0, body.length))
+    return [*parts, (rear, shaded(color, 0.92)), (front[::-1], shaded(color, 0.98))]
 
 
 def _wheels(body: Body, color: Color) -> list[_Facet]:
@@ -112,7 +126,7 @@ def _wheels(body: Body, color: Color) -> list[_Facet]:
 
 def _rear(body: Body, color: Color) -> list[_Facet]:
     """Paint bumper, boot, plate and lights onto the rear."""
-    half, belt = body.width / 2, body.belt
+    half, belt = body.width / 2, min(body.belt, _HIGHEST_LIGHT)
     bumper = _SILL + 0.32
     parts = [
         (_upright(-half + 0.05, half - 0.05, _SILL, _SILL + 0.1, -0.01), shaded(color, 0.4)),
@@ -123,6 +137,22 @@ def _rear(body: Body, color: Color) -> list[_Facet]:
     for left in (-half + 0.02, half - 0.36):
         box = (left, left + 0.34, belt - 0.24, belt - 0.06)
         parts.append((_upright(*box, -0.02), mixed(_LIGHT, shaded(color, 0.5), 0.2)))
+    return parts
+
+
+def _front(body: Body, color: Color) -> list[_Facet]:
+    """Paint bumper, grille, plate and lights onto the front, and a windscreen if it is tall."""
+    half, belt, z = body.width / 2, min(body.belt, _HIGHEST_LIGHT), body.length + 0.01
+    bumper = _SILL + 0.2
+    parts = [
+        (_upright(half - 0.05, -half + 0.05, _SILL, _SILL + 0.12, z), shaded(color, 0.4)),
+        (_upright(half - 0.5, -half + 0.5, bumper, belt - 0.12, z), shaded(_GLASS, 0.6)),
+        (_upright(0.26, -0.26, bumper, bumper + 0.12, z + 0.01), _PLATE),
+    ]
+    lights = (half - 0.04, -half + 0.44)
+    parts += [(_upright(x, x - 0.4, belt - 0.28, belt - 0.1, z), _HEADLIGHT) for x in lights]
+    if body.belt > _HIGHEST_LIGHT:
+        parts.append((_upright(half - 0.15, -half + 0.15, 1.5, 2.5, z), _GLASS))
     return parts
 
 
@@ -146,7 +176,10 @@ def _cabin(body: Body, color: Color) -> list[_Facet]:
         parts.append((side, shaded(color, 0.85)))
         parts.append((_inset(side, 0.08, 0.47), shaded(_GLASS, 0.8)))
         parts.append((_inset(side, 0.53, 0.92), shaded(_GLASS, 0.8)))
-    return [*parts, (rear, shaded(color, 0.95)), (_inset(rear, 0.1, 0.9), _GLASS)]
+    front = np.array([right[3], right[2], left[2], left[3]])
+    for end in (rear, front):
+        parts += [(end, shaded(color, 0.95)), (_inset(end, 0.1, 0.9), _GLASS)]
+    return parts
 
 
 def _quad(*corners: tuple[float, float, float]) -> Float64Array:
