@@ -32,7 +32,7 @@ _WHEEL = 0.31  # radius
 _HIGHEST_LIGHT = 1.15  # upper edge of the lights of a tall vehicle
 
 STANDS = _REAR_AXLE - _WHEEL
-"""Metres ahead of its rear at which a vehicle is drawn to stand on the road: its rear tyres."""
+"""Metres between its rear and the rear tyres, on which a vehicle is drawn to stand on the road."""
 
 
 _Facet = tuple[Float64Array, Color]
@@ -62,7 +62,8 @@ def draw_vehicle(image: Image, vehicle: SceneVehicle, scene: Scene, time: float)
     position = vehicle.position(time)
     if position is None:
         return
-    half, front, sun = vehicle.body.width / 2, vehicle.body.length, scene.light.sun
+    half, sun = vehicle.body.width / 2, scene.light.sun
+    front = vehicle.body.length - STANDS
     left, right = min(0.0, sun) - half, max(0.0, sun) + half
     shadow = _quad((left, 0, STANDS), (right, 0, STANDS), (right, 0, front), (left, 0, front))
     scene.camera.draw(image, _placed(shadow, position), _SHADOW)
