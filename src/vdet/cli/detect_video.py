@@ -104,12 +104,8 @@ _batch_options = options.bundle(
     ".json also all totals. With -d, give only the ending, as in .counts.csv. Can be repeated.",
 )
 @options.sink_option
-@option(
-    f"--start {options.TIME_FORM}",
-    "Begin at this time, as in 90, 1:30 or 0:01:30.5.",
-    options.parse_time,
-)
-@option(f"--end {options.TIME_FORM}", "Stop before this time.", options.parse_time)
+@options.start_option
+@options.end_option
 @option("--frames N", "Process at most N frames.", options.POSITIVE)
 @option(
     "--stride N",

@@ -20,6 +20,8 @@ from vdet.cli.evaluate import eval_group
 from vdet.cli.info import info
 from vdet.cli.messages import print_lines, set_up_logs
 from vdet.cli.mine import mine
+from vdet.cli.paths import paths
+from vdet.cli.suggest_lines import suggest_lines
 from vdet.cli.train import train
 from vdet.cli.train_net import train_net
 from vdet.errors import INTERRUPTED, ConfigError, VdetError, in_one_line
@@ -30,7 +32,7 @@ cli = Program(
     "vdet",
     [
         *(calibrate, config, count, demo, detect_image, detect_video, doctor, eval_group, info),
-        *(mine, train, train_net),
+        *(mine, paths, suggest_lines, train, train_net),
     ],
     help="Find and follow vehicles in road video on an ordinary CPU.",
     params=verbosity_options(),

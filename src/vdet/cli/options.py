@@ -134,6 +134,10 @@ truth_option = option(
     name="truths",
     multiple=True,
 )
+start_option = option(
+    f"--start {TIME_FORM}", "Begin at this time, as in 90, 1:30 or 0:01:30.5.", parse_time
+)
+end_option = option(f"--end {TIME_FORM}", "Stop before this time.", parse_time)
 model_option = option(
     "--model FILE",
     "Model file of the detector: .npz from vdet train, or .onnx, a network. It decides which "

@@ -1,0 +1,64 @@
+"""`vdet paths`: the picture in which lines are placed."""
+
+from pathlib import Path
+
+import click
+
+from vdet.cli import options
+from vdet.cli.command import command
+from vdet.cli.messages import counted, print_lines
+from vdet.cli.options import option
+from vdet.cli.watching import Watched, watch_options
+from vdet.errors import ConfigError
+from vdet.files import check_output
+
+
+@command(
+    "vdet paths in.mp4 -o paths.jpg",
+    "vdet paths in.mp4 --tracks-from tracks.jsonl --lines lines.yaml -o paths.jpg",
+    "vdet paths in.mp4 --no-paths --lines lines.yaml -o preview.jpg",
+)
+@click.argument("clip", type=options.PATH, metavar="CLIP")
+@options.output_file_option("Picture to write, .jpg or .png.")
+@option("--no-paths", "Search nothing: draw only the grid, and the lines and zones of --lines.")
+@watch_options
+@options.settings_options("detector.stride=2", options.lines_option, options.model_option)
+@options.overwrite_option
+def paths(
+    clip: Path,
+    output: Path,
+    no_paths: bool,
+    watched: Watched,
+    choice: options.SettingsChoice,
+    overwrite: bool,
+) -> None:
+    """Draw the paths of all vehicles on one frame, to place lines.
+
+    CLIP is a video or a picture. The paths are coloured by direction: they begin at a dot and end
+    at a tip. The grid has pixel coordinates as lines.yaml takes them. With --lines, the lines and
+    zones of a file are drawn too, with the sides of the lines. In a picture nothing is searched.
+    """
+    from vdet.media.images import PICTURE_SUFFIXES, is_picture_name, write_image
+    from vdet.traffic.borders import place
+    from vdet.traffic.paths import draw_grid, draw_paths, draw_places
+
+    settings = choice.read()
+    options.check_suffix(output, ".jpg", *sorted(PICTURE_SUFFIXES), what="pictures")
+    inputs = [clip, *choice.inputs(settings), *([watched.tracks] if watched.tracks else [])]
+    check_output(output, overwrite=overwrite, inputs=inputs)
+    image = watched.first_image(clip, settings).copy()
+    height, width = image.shape[:2]
+    try:
+        lines, zones = place(settings.counts, width, height)
+    except ConfigError as error:
+        raise ConfigError(f"{clip}: counts.{error}") from error
+    is_still = is_picture_name(clip) and "%" not in clip.name
+    draw_grid(image)
+    found = ""
+    if not no_paths and (watched.tracks or not is_still):
+        records = watched.records(clip, width, settings, choice)
+        draw_paths(image, records)
+        found = f", {counted(len(records), 'vehicle')}"
+    draw_places(image, lines, zones)
+    write_image(output, image, overwrite=overwrite)
+    print_lines(f"{output}: {width}×{height}{found}")

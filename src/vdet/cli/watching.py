@@ -1,0 +1,89 @@
+"""What commands need that look at a whole clip: one of its frames, and its vehicles."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vdet.cli import options
+from vdet.cli.messages import progress_steps
+from vdet.cli.options import option
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from vdet.config.schema import Settings
+    from vdet.media.images import Image
+    from vdet.traffic.records import VehicleRecord
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """The values of `watch_options`: a clip, and where the tracks of its vehicles are."""
+
+    tracks: Path | None
+    start: "Fraction | None"
+    end: "Fraction | None"
+
+    def first_image(self, clip: Path, settings: "Settings") -> "Image":
+        """Return the first frame, BGR uint8 `(H, W, 3)`; a picture itself.
+
+        Raises
+        ------
+        ImageError, VideoError
+            The clip cannot be read, or has no frame at `start`.
+        """
+        from vdet.errors import VideoError
+        from vdet.media import VideoReader
+        from vdet.media.images import is_picture_name, read_image
+
+        if is_picture_name(clip) and "%" not in clip.name:
+            return read_image(clip)
+        with VideoReader(clip, start=self.start, settings=settings.input) as reader:
+            for frame in reader:
+                return frame.image
+        raise VideoError(f"{clip}: has no frame at {float(self.start or 0):.2f} s; check --start")
+
+    def records(
+        self, clip: Path, width: int, settings: "Settings", choice: options.SettingsChoice
+    ) -> "tuple[VehicleRecord, ...]":
+        """Return the records of the vehicles: from the file of tracks, else the clip is searched.
+
+        `width` is that of the frames, pixels.
+
+        Raises
+        ------
+        VdetError
+            The tracks or the clip cannot be used.
+        """
+        from vdet.labels.reading import read_tracks
+        from vdet.run.video import VideoJob, open_video
+        from vdet.traffic.records import VehicleRecords
+
+        records = VehicleRecords(width)
+        if self.tracks is not None:
+            for frame in read_tracks(self.tracks, rate=1.0).frames:
+                records.add(frame)
+            return records.end()
+        job = VideoJob(clip, start=self.start, end=self.end)
+        model = choice.load_detector(settings.detector)
+        with progress_steps(" frames") as steps, open_video(job, model, settings) as video:
+            advance = partial(steps, "")(video.reader.expected)
+            for result in video.results:
+                records.add(result.frame_tracks)
+                advance(1)
+        return records.end()
+
+
+watch_options = options.bundle(
+    "watched",
+    Watched,
+    option(
+        "--tracks-from FILE",
+        "Take the vehicles from this file of tracks instead of searching.",
+        name="tracks",
+    ),
+    options.start_option,
+    options.end_option,
+)
+"""`--tracks-from FILE`, `--start` and `--end`."""

@@ -1,0 +1,63 @@
+"""The picture in which lines are placed."""
+
+import numpy as np
+import pytest
+
+from traffic.scenes import HEIGHT, LINE, WIDTH, ZONE, Path, frames, through
+from vdet.config.places import CountSettings
+from vdet.media.images import Image
+from vdet.polygons import Point
+from vdet.traffic.borders import place
+from vdet.traffic.paths import direction_color, draw_grid, draw_paths, draw_places
+from vdet.traffic.records import VehicleRecords
+
+GREY = 90
+
+
+@pytest.fixture
+def image() -> Image:
+    return np.full((HEIGHT, WIDTH, 3), GREY, np.uint8)
+
+
+def paths_drawn(image: Image, *paths: Path) -> None:
+    records = VehicleRecords(WIDTH)
+    for frame in frames(*paths):
+        records.add(frame)
+    draw_paths(image, records.end())
+
+
+def has_color(image: Image, point: Point, color: tuple[int, int, int]) -> bool:
+    x, y = map(round, point)
+    near = image[y - 3 : y + 4, x - 3 : x + 4].reshape(-1, 3).astype(int)
+    return bool((np.abs(near - color).max(axis=1) < 40).any())
+
+
+def test_a_path_has_the_colour_of_its_direction(image: Image) -> None:
+    paths_drawn(image, through((0, 200, 200), (5, 900, 200)), through((0, 900, 400), (5, 200, 400)))
+    for x in (300, 600, 800):
+        assert has_color(image, (x, 200), direction_color((0, 0), (1, 0)))
+        assert has_color(image, (x, 400), direction_color((1, 0), (0, 0)))
+    assert not has_color(image, (600, 400), direction_color((0, 0), (1, 0)))
+
+
+def test_vehicles_that_stand_have_no_path(image: Image) -> None:
+    empty = image.copy()
+    paths_drawn(empty)
+    paths_drawn(image, through((0, 600, 300), (5, 610, 300)))
+    assert (image == empty).all()
+
+
+def test_the_grid_has_lines_at_round_numbers_of_pixels(image: Image) -> None:
+    draw_grid(image)
+    assert (image[650, 100::100] != GREY).all()
+    assert (image[100:700:100, 650] != GREY).all()
+    assert (image[650, 550:598] == GREY).all()
+
+
+def test_lines_and_zones_are_drawn_where_they_lie(image: Image) -> None:
+    settings = CountSettings(size=(WIDTH, HEIGHT), lines=(LINE,), zones=(ZONE,))
+    draw_places(image, *place(settings, WIDTH, HEIGHT))
+    changed = (image != GREY).any(axis=2)
+    assert changed[400, 210:990].all()
+    assert changed[310:490, 410:790].all()
+    assert not changed[600:].any()
